@@ -1,0 +1,1 @@
+"""ringsim: how large deployable ring antennas open."""

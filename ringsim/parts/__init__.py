@@ -1,0 +1,1 @@
+"""What a scene is made of: frozen, validated records; numpy only, no engine."""

@@ -1,0 +1,1 @@
+"""Kinds of boom, one file each."""

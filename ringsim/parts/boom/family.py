@@ -1,0 +1,28 @@
+"""The family of booms."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from ringsim.parts.tube import Tube
+from ringsim.units import Density, Metre, Model
+
+
+class Boom(Model):
+    """The vertical tube at the first corner: fixed to the upper hinge assembly, while the
+    lower one slides along it.
+
+    Source: papers 000 and 002.  The length is inferred: the printed 0.2889 m is shorter than
+    the ring is high, so the lower hinge assembly would slide off.
+    """
+
+    base: Literal["free", "fixed"] = "free"
+    """free: the ring floats with its boom; fixed: the boom's upper end is clamped."""
+    length: Metre = 0.9
+    tube: Tube = Tube(outer_diameter=0.06, inner_diameter=0.058)
+    density: Density = 1800.0
+
+    @property
+    def mass(self) -> float:
+        """Mass in kg."""
+        return self.density * self.tube.area * self.length

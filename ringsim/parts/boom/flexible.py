@@ -1,0 +1,21 @@
+"""A flexible boom."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ringsim.parts.boom.family import Boom
+from ringsim.units import Pascal
+
+
+class FlexibleBoom(Boom):
+    """A chain of ANCF cable elements (axial and bending stiffness, no torsion).
+
+    Torsion is not needed: the sliding joint transmits no torque.
+    """
+
+    kind: Literal["flexible"] = "flexible"
+    elements: Annotated[int, Field(ge=1, le=64)] = 4
+    young_modulus: Pascal = 120e9

@@ -1,0 +1,35 @@
+"""Quantities that are one value for all sections, or a list with one value for each."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, TypeVar, Union
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Discriminator, Tag
+
+Array = NDArray[np.float64]
+_T = TypeVar("_T")
+
+ONE, EACH = "one value", "a value each"
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _one_or_each(value: Any) -> str:
+    return EACH if isinstance(value, (list, tuple)) else ONE
+
+
+PerSection = Annotated[
+    Union[Annotated[_T, Tag(ONE)], Annotated[tuple[_T, ...], Tag(EACH)]],  # noqa: UP007
+    Discriminator(_one_or_each),
+    BeforeValidator(_as_tuple),
+]
+"""One value for all sections, or a list (TOML array) with one value for each."""
+
+
+def spread(value: float | tuple[float, ...], sections: int) -> Array:
+    """One value per section, shape (sections,)."""
+    return np.broadcast_to(np.asarray(value, dtype=float), (sections,)).copy()

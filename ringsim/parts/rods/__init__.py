@@ -1,0 +1,1 @@
+"""Kinds of rods, one file each."""

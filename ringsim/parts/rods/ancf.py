@@ -1,0 +1,16 @@
+"""Absolute nodal coordinate beams, as in the papers."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from ringsim.parts.rods.family import Rods
+
+
+class AncfRods(Rods):
+    """Two-node beams with position and two slope vectors per node (18 coordinates).
+
+    Source: papers 000 and 002, eq. 1; exudyn ObjectANCFBeam.
+    """
+
+    kind: Literal["ancf"] = "ancf"

@@ -1,0 +1,31 @@
+"""The family of rod formulations, with what they have in common."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from ringsim.parts.persection import PerSection
+from ringsim.parts.tube import Tube
+from ringsim.units import Density, Model, Pascal, PoissonRatio, SecondOrZero
+
+
+class Rods(Model):
+    """Elastic rods: diagonals and halves of the folding bars."""
+
+    elements: Annotated[int, Field(ge=1, le=64)] = 1
+    """Elements per rod half."""
+    young_modulus: PerSection[Pascal] = 120e9
+    """One value, or one per section."""
+    density: Density = 1800.0
+    poisson_ratio: PoissonRatio = 0.3
+    damping: SecondOrZero = 0.0
+    """Stiffness-proportional (Kelvin-Voigt) damping: stress = E (strain + damping * rate)."""
+    diagonal: Tube = Tube(outer_diameter=0.010, inner_diameter=0.00915)
+    bar: Tube = Tube(outer_diameter=0.012, inner_diameter=0.01115)
+
+    @property
+    def shear_modulus_ratio(self) -> float:
+        """Shear over Young's modulus of an isotropic material."""
+        return 0.5 / (1.0 + self.poisson_ratio)

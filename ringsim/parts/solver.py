@@ -1,0 +1,53 @@
+"""Settings of the time integration."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from ringsim.units import Model, Ratio, Second, SecondOrZero
+
+
+class Solver(Model):
+    """Generalised-alpha with a step that follows the motion.
+
+    With ``step_control = "motion"`` the step keeps the local error of the mean opening angle,
+    expressed as a relative error in time, near ``tolerance``, between step / 200 and ``step``;
+    with "constant" every step is ``step``.
+    """
+
+    end_time: Second = 60.0
+    """The run ends here at the latest."""
+    settling_time: SecondOrZero = 0.2
+    """Time simulated after the last V-joint has locked."""
+    step: Second = 0.2
+    """Largest step, or the step if it is constant."""
+    step_control: Literal["motion", "constant"] = "motion"
+    tolerance: Annotated[float, Field(ge=1e-8, le=0.1)] = 1e-4
+    spectral_radius: Ratio = 0.5
+    """High-frequency amplification per step: 1 keeps every vibration, lower damps it."""
+    newton_tolerance: Annotated[float, Field(ge=1e-12, le=1e-2)] = 1e-6
+    """Residual at which Newton stops, relative to the driving forces of the scene."""
+
+    @model_validator(mode="after")
+    def _usable(self) -> Solver:
+        if self.step > self.end_time:
+            raise ValueError(
+                f"step = {self.step} s must not exceed end_time = {self.end_time} s"
+            )
+        if self.spectral_radius == 1.0:
+            raise ValueError(
+                "spectral_radius = 1.0 must be below 1: position constraints need some "
+                "numerical damping (0.9 is nearly undamped)"
+            )
+        return self
+
+
+class Record(Model):
+    """What a run writes down."""
+
+    interval: Second = 0.1
+    """Spacing of the output times."""
+    stress: bool = False
+    """Record axial + bending stress at the ends of every rod."""

@@ -1,0 +1,89 @@
+"""The pantograph ring: closed, or an open arc of the same polygon (two sections: the truss)."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from ringsim.geometry.ring import RingGeometry
+from ringsim.parts.structure.family import Structure
+from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Ratio
+
+
+class PantographRing(Structure):
+    """Sections of two crossing diagonals and two folding bars between hinge assemblies.
+
+    The plan view is a polygon with equal chords on an ellipse; the hinge assemblies fix its
+    angles.  Source: paper 002 (18-section antenna), table 1; paper 000 (two-section truss).
+    """
+
+    kind: Literal["pantograph-ring"] = "pantograph-ring"
+    sections: Annotated[int, Field(ge=1, le=360)] = 18
+    closed: bool = True
+    polygon_sections: Annotated[int, Field(ge=3, le=720)] = 18
+    """Sides of the full polygon that an open arc is cut from; a closed ring is its own."""
+    aspect_ratio: Ratio = 3.2856 / 3.5184
+    """Minor over major axis of the ellipse."""
+    half_bar: Metre = 0.2889
+    half_diagonal: Metre = 0.4275
+    hinge_offset: MetreOrZero = 0.006554
+    """Distance of the pins from the vertical line of their hinge assembly."""
+    corner_mass: KilogramOrZero = 0.0198
+    vjoint_mass: KilogramOrZero = 0.0198
+    hinge_size: Metre = 0.0112
+    """Edge of the cube whose inertia a hinge assembly has (its density is 13 975 kg/m^3)."""
+    opening_angle: Degree = 46.0
+    """Initial angle between the bar halves: near 0 stowed, 180 deployed."""
+
+    @model_validator(mode="after")
+    def _possible(self) -> PantographRing:
+        if self.half_bar >= self.half_diagonal:
+            raise ValueError(
+                f"half_bar = {self.half_bar} m must be below half_diagonal = "
+                f"{self.half_diagonal} m: the diagonals could not span the deployed section"
+            )
+        if self.closed and self.sections < 3:
+            raise ValueError(
+                f"sections = {self.sections} must be at least 3 for a closed ring "
+                "(or set closed = false)"
+            )
+        if not self.closed and self.sections >= self.polygon_sections:
+            raise ValueError(
+                f"sections = {self.sections} must be below polygon_sections = "
+                f"{self.polygon_sections} for an open arc (raise it, or set closed = true)"
+            )
+        if self.opening_angle > 179.9:
+            raise ValueError(
+                f"opening_angle = {self.opening_angle} deg must be at most 179.9: there is "
+                "nothing left to deploy"
+            )
+        if self.corner_mass == 0.0:
+            raise ValueError(
+                "corner_mass = 0.0 kg must be positive: a hinge assembly is a rigid body"
+            )
+        self.geometry()
+        return self
+
+    @property
+    def polygon(self) -> int:
+        """Sides of the full polygon."""
+        return self.sections if self.closed else self.polygon_sections
+
+    @property
+    def initial_phi(self) -> float:
+        """Initial angle of the bar halves from the horizontal, rad."""
+        return 0.5 * (math.pi - math.radians(self.opening_angle))
+
+    def geometry(self) -> RingGeometry:
+        """The ideal ring."""
+        return RingGeometry.of_polygon(
+            self.sections,
+            closed=self.closed,
+            polygon_sections=self.polygon,
+            aspect_ratio=self.aspect_ratio,
+            half_bar=self.half_bar,
+            half_diagonal=self.half_diagonal,
+            hinge_offset=self.hinge_offset,
+        )

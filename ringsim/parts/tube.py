@@ -1,0 +1,48 @@
+"""Tubular cross-sections and their elastic and inertial constants."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import model_validator
+
+from ringsim.units import Metre, MetreOrZero, Model
+
+
+class Tube(Model):
+    """A circular tube; inner_diameter = 0 is a solid rod."""
+
+    outer_diameter: Metre
+    inner_diameter: MetreOrZero
+
+    @model_validator(mode="after")
+    def _inside(self) -> Tube:
+        if self.inner_diameter >= self.outer_diameter:
+            raise ValueError(
+                f"inner_diameter = {self.inner_diameter} m must be below "
+                f"outer_diameter = {self.outer_diameter} m"
+            )
+        return self
+
+    @property
+    def area(self) -> float:
+        """Cross-section area in m^2."""
+        return 0.25 * math.pi * (self.outer_diameter**2 - self.inner_diameter**2)
+
+    @property
+    def second_moment(self) -> float:
+        """Second moment of area about a diameter in m^4."""
+        return math.pi / 64.0 * (self.outer_diameter**4 - self.inner_diameter**4)
+
+    def shear_factor(self, poisson_ratio: float) -> float:
+        """Timoshenko shear coefficient of a hollow circle.
+
+        Source: Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech. 33
+        (1966), with m = inner over outer diameter.
+        """
+        m2 = (self.inner_diameter / self.outer_diameter) ** 2
+        nu = poisson_ratio
+        return (
+            6.0 * (1.0 + nu) * (1.0 + m2) ** 2
+            / ((7.0 + 6.0 * nu) * (1.0 + m2) ** 2 + (20.0 + 12.0 * nu) * m2)
+        )

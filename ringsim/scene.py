@@ -1,0 +1,164 @@
+"""The scene: everything that one simulation needs, strict in and exact out."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tomli_w
+from pydantic import Field, ValidationError, model_validator
+
+from ringsim.choice import load_package, one_of
+from ringsim.parts.boom.family import Boom
+from ringsim.parts.joints import Joints, Stop
+from ringsim.parts.loads import Loads
+from ringsim.parts.net import Net
+from ringsim.parts.rods.family import Rods
+from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
+from ringsim.parts.solver import Record, Solver
+from ringsim.parts.structure.family import Structure
+from ringsim.parts.structure.pantograph_ring import PantographRing
+from ringsim.overrides import set_path
+from ringsim.refusal import InputError, explain
+from ringsim.units import Model
+
+for _package in ("structure", "rods", "boom"):
+    load_package(f"ringsim.parts.{_package}")
+
+if TYPE_CHECKING:
+    AnyStructure = PantographRing
+    AnyRods = Rods
+    AnyBoom = Boom
+else:
+    AnyStructure = one_of(Structure)
+    AnyRods = one_of(Rods)
+    AnyBoom = one_of(Boom)
+
+
+class Scene(Model):
+    """A structure with its loads and how to solve it.  Parts left out are not built."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
+    title: Annotated[str, Field(max_length=300)] = ""
+    structure: AnyStructure = PantographRing()
+    rods: AnyRods = GeometricallyExactRods()
+    joints: Joints = Joints()
+    stop: Stop | None = Stop()
+    boom: AnyBoom | None = None
+    net: Net | None = None
+    loads: Loads | None = None
+    solver: Solver = Solver()
+    record: Record = Record()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Scene:
+        sections = self.structure.sections
+        for path, value in _lists(self):
+            wanted = sections
+            if path == "net.stiffness":
+                wanted = sections if self.structure.closed else sections + 1
+            if len(value) != wanted:
+                raise ValueError(
+                    f"{path} has {len(value)} values, but the structure needs {wanted}: give "
+                    "one value for all, or a list of that length"
+                )
+        highest = 2.0 * self.structure.half_diagonal
+        if self.boom is not None and self.boom.length < highest:
+            raise ValueError(
+                f"boom.length = {self.boom.length} m must be at least {highest:.4g} m, the "
+                "height of the stowed ring: the sliding joint would leave the boom"
+            )
+        if self.stop is not None and self.stop.stowed_angle >= self.structure.opening_angle:
+            raise ValueError(
+                f"stop.stowed_angle = {self.stop.stowed_angle} deg must be below "
+                f"structure.opening_angle = {self.structure.opening_angle} deg"
+            )
+        return self
+
+    def with_values(self, values: dict[str, Any]) -> Scene:
+        """A copy with the fields at dotted paths replaced, validated again.
+
+        Raises
+        ------
+        InputError
+            If a path or a value is refused.
+        """
+        table = self.to_table()
+        for path, value in values.items():
+            set_path(table, path, value, self.structure.sections)
+        return scene_from_table(table, source=f"scene {self.name}")
+
+    def to_table(self) -> dict[str, Any]:
+        """The scene as nested plain tables, without the parts that it leaves out."""
+        return self.model_dump(mode="json", exclude_none=True)
+
+    def to_toml(self) -> str:
+        """The scene as TOML text; reading it back gives an equal scene."""
+        return tomli_w.dumps(self.to_table())
+
+
+def _lists(record: Model, prefix: str = "") -> list[tuple[str, tuple[float, ...]]]:
+    found: list[tuple[str, tuple[float, ...]]] = []
+    for name in type(record).model_fields:
+        value = getattr(record, name)
+        if isinstance(value, Model):
+            found += _lists(value, f"{prefix}{name}.")
+        elif isinstance(value, tuple):
+            found.append((f"{prefix}{name}", value))
+    return found
+
+
+def scene_from_table(table: dict[str, Any], *, source: str) -> Scene:
+    """Validate nested tables.
+
+    Raises
+    ------
+    InputError
+        One line per fault, each naming ``source``, field, value, bound and cure.
+    """
+    try:
+        return Scene.model_validate(table)
+    except ValidationError as error:
+        raise InputError(explain(error, Scene, source)) from None
+
+
+def scene_from_toml(text: str, *, source: str) -> Scene:
+    """Parse and validate TOML text; raises InputError."""
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source}: not valid TOML: {error}") from None
+    return scene_from_table(table, source=source)
+
+
+def builtin_scenes() -> dict[str, str]:
+    """TOML text of the built-in scenes by name."""
+    folder = resources.files("ringsim") / "scenes"
+    files = sorted((f for f in folder.iterdir() if f.name.endswith(".toml")), key=lambda f: f.name)
+    return {f.name.removesuffix(".toml"): f.read_text(encoding="utf-8") for f in files}
+
+
+def load_scene(name_or_path: str | Path) -> Scene:
+    """A built-in scene by name, or a scene file.
+
+    Raises
+    ------
+    InputError
+        If there is no such scene or file, or if its content is refused.
+    """
+    builtin = builtin_scenes()
+    if str(name_or_path) in builtin:
+        return scene_from_toml(builtin[str(name_or_path)], source=f"scene {name_or_path}")
+    path = Path(name_or_path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        names = ", ".join(builtin)
+        raise InputError(
+            f"{path}: no such file, and no built-in scene of that name (there are: {names})"
+        ) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
+    return scene_from_toml(text, source=path.name)

@@ -1,0 +1,45 @@
+"""Annotated field types: SI unit and bounds of every quantity that a scene may hold, in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The SI unit of a field, shown in error messages and documents."""
+
+    symbol: str
+
+
+class Model(BaseModel):
+    """A frozen record that refuses unknown keys, wrong types, NaN and infinity."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True
+    )
+
+
+Metre = Annotated[float, Field(gt=0.0, le=1e3), Unit("m")]
+MetreOrZero = Annotated[float, Field(ge=0.0, le=1e3), Unit("m")]
+Kilogram = Annotated[float, Field(gt=0.0, le=1e4), Unit("kg")]
+KilogramOrZero = Annotated[float, Field(ge=0.0, le=1e4), Unit("kg")]
+Newton = Annotated[float, Field(ge=-1e6, le=1e6), Unit("N")]
+Second = Annotated[float, Field(gt=0.0, le=1e6), Unit("s")]
+SecondOrZero = Annotated[float, Field(ge=0.0, le=1e6), Unit("s")]
+Pascal = Annotated[float, Field(ge=1e5, le=1e13), Unit("Pa")]
+Density = Annotated[float, Field(gt=0.0, le=3e4), Unit("kg/m^3")]
+PoissonRatio = Annotated[float, Field(ge=0.0, le=0.5), Unit("1")]
+Degree = Annotated[float, Field(gt=0.0, le=180.0), Unit("deg")]
+DegreeOrZero = Annotated[float, Field(ge=0.0, lt=180.0), Unit("deg")]
+Ratio = Annotated[float, Field(gt=0.0, le=1.0), Unit("1")]
+SpringRate = Annotated[float, Field(ge=0.0, le=1e9), Unit("N/m")]
+DampingRate = Annotated[float, Field(ge=0.0, le=1e6), Unit("N s/m")]
+TorsionRate = Annotated[float, Field(gt=0.0, le=1e7), Unit("N m/rad")]
+TorsionDamping = Annotated[float, Field(ge=0.0, le=1e5), Unit("N m s/rad")]
+Torque = Annotated[float, Field(ge=0.0, le=1e5), Unit("N m")]
+AngularRate = Annotated[float, Field(gt=0.0, le=1e3), Unit("rad/s")]
+Positive = Annotated[float, Field(gt=0.0, le=1e12), Unit("1")]

@@ -1,0 +1,115 @@
+"""The variables of a result: dimensions, units and meaning, in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+
+class Status(IntEnum):
+    """How a run ended; negative codes never occur, 0 is the only success."""
+
+    OK = 0
+    UNFINISHED = 1
+    SOLVER_FAILED = 2
+    DIVERGED = 3
+    ERROR = 4
+    CRASHED = 5
+    TIMEOUT = 6
+    MEMORY = 7
+
+    @property
+    def word(self) -> str:
+        """Lower-case name, as in the dataset's flag_meanings."""
+        return self.name.lower()
+
+    @property
+    def failed(self) -> bool:
+        """Whether the run gave no usable result."""
+        return self >= Status.SOLVER_FAILED
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Name, dimensions, SI unit (or degree where said) and meaning of one variable."""
+
+    name: str
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    dtype: str = "f8"
+
+
+PLANES = ("upper", "lower")
+RODS = (
+    "diagonal_rising_left", "diagonal_rising_right",
+    "diagonal_falling_left", "diagonal_falling_right",
+    "bar_upper_left", "bar_upper_right", "bar_lower_left", "bar_lower_right",
+)  # fmt: skip
+
+COORDINATES = (
+    Variable("plane", ("plane",), "1", "plane of the ring", "str"),
+    Variable("section", ("section",), "1", "section number, counted from the boom", "i4"),
+    Variable("time", ("time",), "s", "time since the start of the run"),
+    Variable("rod", ("rod",), "1", "rod half of a section", "str"),
+)
+
+_ALL = (
+    Variable("deployment_time", (), "s", "time at which the last V-joint reached 180 deg"),
+    Variable(
+        "opening_angle", ("plane", "section", "time"), "degree", "angle between the bar halves"
+    ),
+    Variable("lock_time", ("plane", "section"), "s", "time at which the V-joint reached 180 deg"),
+    Variable(
+        "asynchrony", ("time",), "degree", "largest difference of opening angles between V-joints"
+    ),
+    Variable("asynchrony_max", (), "degree", "largest asynchrony up to the deployment time"),
+    Variable("rod_stress", ("rod", "section", "time"), "Pa", "axial + bending stress of a rod"),
+    Variable("peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod"),
+    Variable("kinetic_energy", ("time",), "J", "kinetic energy"),
+    Variable("elastic_energy", ("time",), "J", "energy stored in rods, net and stops"),
+    Variable("work", ("time",), "J", "work done on the structure by forces and winches"),
+    Variable("dissipation", ("time",), "J", "energy lost in joints, dampers and stops"),
+    Variable(
+        "energy_error", (), "1", "largest energy imbalance over the largest energy exchanged"
+    ),
+    Variable("constraint_violation", ("time",), "m", "largest gap in any joint"),
+    Variable("constraint_error", (), "m", "largest gap in any joint at any step"),
+    Variable("steps", (), "1", "time steps", "i4"),
+    Variable("newton_iterations", (), "1", "Newton iterations", "i4"),
+    Variable("jacobians", (), "1", "Jacobian factorisations", "i4"),
+    Variable("final_time", (), "s", "time at which the run ended"),
+    Variable("status", (), "1", "how the run ended", "i1"),
+    Variable("wall_time", (), "s", "elapsed time of the run"),
+    Variable("cpu_time", (), "s", "processor time of the run"),
+)
+VARIABLES = {variable.name: variable for variable in _ALL}
+
+TIMINGS = ("wall_time", "cpu_time")
+"""The only variables that differ between repetitions of one run."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The result of one run, as plain arrays.
+
+    Attributes
+    ----------
+    status
+        How the run ended.
+    reason
+        One sentence: why it ended, and for a failure what to change.
+    coordinates
+        Values of the dimensions that occur in ``values``.
+    values
+        Arrays by variable name; shapes follow ``VARIABLES`` and ``coordinates``.  A failed run
+        has what was recorded until then, NaN elsewhere.
+    """
+
+    status: Status
+    reason: str
+    coordinates: dict[str, np.ndarray[Any, Any]] = field(default_factory=dict)
+    values: dict[str, np.ndarray[Any, Any]] = field(default_factory=dict)
