@@ -1,0 +1,64 @@
+"""The command line: verbs only, each in its own file and loaded only when it is called."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+import click
+
+from ringsim.refusal import InputError
+
+VERBS = {
+    "scenes": "List the built-in scenes.",
+    "check": "Check a scene file and say what it builds.",
+    "run": "Run one scene.",
+    "campaign": "Run a campaign, or finish an interrupted one.",
+}
+"""Verb and its line of help; the command ``VERB`` lives in ringsim.cli.VERB as ``command``."""
+
+EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED = 0, 2, 3, 130
+
+
+class _Verbs(click.Group):
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Verbs in the order of a user's work."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import the verb's file."""
+        if cmd_name not in VERBS:
+            return None
+        command: click.Command = importlib.import_module(f"ringsim.cli.{cmd_name}").command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the verbs without importing any of them."""
+        with formatter.section("Verbs"):
+            formatter.write_dl(list(VERBS.items()))
+
+
+@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="ringsim")
+def cli() -> None:
+    """How large deployable ring antennas open: simulations and campaigns.
+
+    Exit codes: 0 done, 2 bad input, 3 the simulation failed or too many samples did,
+    130 interrupted (run again to resume).
+    """
+
+
+def main() -> None:
+    """Entry point of the command ``ringsim``."""
+    try:
+        code = cli(standalone_mode=False)
+    except InputError as error:
+        click.echo(str(error), err=True)
+        code = EXIT_BAD_INPUT
+    except click.ClickException as error:
+        error.show()
+        code = EXIT_BAD_INPUT
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("interrupted", err=True)
+        code = EXIT_INTERRUPTED
+    sys.exit(code or EXIT_DONE)
