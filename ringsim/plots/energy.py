@@ -1,0 +1,72 @@
+"""Where the energy of a run comes from and goes to."""
+
+from __future__ import annotations
+
+import math
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ringsim.plots import style, wording
+
+_LOOKS = {
+    "work": (style.INK, "-"),
+    "kinetic_energy": (style.BLUE, "-"),
+    "elastic_energy": (style.ORANGE, (0, (5, 1.5))),
+    "dissipation": (style.VERMILLION, (0, (1.2, 1.2))),
+}
+
+
+@style.styled
+def energy(dataset: xr.Dataset) -> Figure:
+    """Energies over time, and what the balance lacks.
+
+    Parameters
+    ----------
+    dataset
+        A run with ``work``, ``kinetic_energy``, ``elastic_energy`` and ``dissipation`` (time);
+        ``energy_error`` is stated where it is known.
+
+    Returns
+    -------
+    Figure
+        Above the four energies, below their imbalance, each in a unit of its own size.
+    """
+    shown = [dataset[name] for name in _LOOKS]
+    lack = imbalance(dataset)
+    figure = style.new_figure(8.0, 5.8)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(5, 2))
+    factor, units = wording.readable_units(*shown)
+    for values in shown:
+        colour, dashes = _LOOKS[str(values.name)]
+        upper.plot(
+            values["time"], factor * values, color=colour, linestyle=dashes,
+            label=values.attrs["long_name"],
+        )  # fmt: skip
+    style.span_time(upper, dataset["work"])
+    upper.margins(y=0.08)
+    upper.set_ylabel(f"Energy ({units})")
+    upper.legend(loc="best")
+    factor, units = wording.readable_units(lack)
+    lower.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1.2)
+    lower.plot(lack["time"], factor * lack, color=style.PURPLE)
+    lower.set_ylabel(f"Imbalance ({units})")
+    lower.set_xlabel(wording.label(dataset["time"]))
+    error = float(dataset["energy_error"]) if "energy_error" in dataset else math.nan
+    if math.isfinite(error):
+        lower.set_title(f"{wording.label(dataset['energy_error'])}: {error:.1e}")
+    moment = wording.deployment_time(dataset)
+    if math.isfinite(moment):
+        style.mark_moment(upper, moment, f"all locked at {moment:.2f} s")
+        style.mark_moment(lower, moment)
+    wording.head(figure, upper, dataset, "Energy")
+    return figure
+
+
+def imbalance(dataset: xr.Dataset) -> xr.DataArray:
+    """Work - dissipation - kinetic - elastic energy since the start, (time,), J; ideally 0."""
+    stored = dataset["kinetic_energy"] + dataset["elastic_energy"]
+    lack = dataset["work"] - dataset["dissipation"] - stored
+    recorded = lack.dropna("time").values
+    first = float(recorded[0]) if recorded.size else math.nan
+    return (lack - first).assign_attrs(units=dataset["work"].attrs["units"])

@@ -1,0 +1,88 @@
+"""Words of the figures: labels, units and titles, all from the dataset's attributes."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+_PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
+_PREFIXED = ("J", "Pa", "N", "W")
+
+
+def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> str:
+    """Meaning and unit of a variable, as on an axis: "Time since the start of the run (s)".
+
+    ``units`` replaces the variable's own where its values were scaled; lines longer than
+    ``width`` characters are broken.
+    """
+    words = str(variable.attrs.get("long_name", variable.name))
+    units = str(variable.attrs.get("units", "1")) if units is None else units
+    words = words[:1].upper() + words[1:]
+    return textwrap.fill(words if units == "1" else f"{words} ({units})", width)
+
+
+def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
+    """A factor and a prefixed unit that bring the largest value between 0.5 and 500.
+
+    Parameters
+    ----------
+    *variables
+        Arrays that share one unit; only J, Pa, N and W get a prefix.
+
+    Returns
+    -------
+    tuple[float, str]
+        Multiply the values by the first; the second is their unit then.
+    """
+    units = str(variables[0].attrs.get("units", "1"))
+    largest = max((largest_magnitude(v) for v in variables), default=0.0)
+    if units not in _PREFIXED or largest == 0.0:
+        return 1.0, units
+    power = min(max(math.floor(math.log10(2.0 * largest) / 3.0), -4), 3)
+    return 1000.0**-power, _PREFIXES[power] + units
+
+
+def largest_magnitude(variable: xr.DataArray) -> float:
+    """Largest finite absolute value, 0 if there is none."""
+    values = np.abs(variable.values[np.isfinite(variable.values)])
+    return float(values.max()) if values.size else 0.0
+
+
+def status_word(dataset: xr.Dataset) -> str:
+    """The word of the run's status, from the flags of the variable ``status``."""
+    flags = np.atleast_1d(dataset["status"].attrs["flag_values"]).tolist()
+    words = str(dataset["status"].attrs["flag_meanings"]).split()
+    word: str = words[flags.index(int(dataset["status"]))]
+    return word.replace("_", " ")
+
+
+def deployment_time(dataset: xr.Dataset) -> float:
+    """Time at which the last V-joint locked (s), NaN if it did not."""
+    return float(dataset["deployment_time"]) if "deployment_time" in dataset else math.nan
+
+
+def ending(dataset: xr.Dataset) -> str:
+    """How the run ended, in one sentence."""
+    word = status_word(dataset)
+    deployed = deployment_time(dataset)
+    final = float(dataset["final_time"]) if "final_time" in dataset else math.nan
+    after = f" after {final:.4g} s" if math.isfinite(final) else ""
+    if word == "ok" and math.isfinite(deployed):
+        return f"Deployed after {deployed:.2f} s"
+    reason = str(dataset.attrs.get("reason", "")).strip()
+    start = f"Ended{after}" if word == "ok" else f"{word[:1].upper()}{word[1:]}{after}"
+    return f"{start}: {reason}" if reason else start
+
+
+def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: float = 8.0) -> None:
+    """Subject and scene above the figure, how the run ended above its first axes."""
+    inches = figure.get_size_inches()[0]
+    title = f"{subject}: {dataset.attrs.get('title', '')}".rstrip(": ")
+    figure.suptitle(textwrap.fill(title, int(9.5 * inches)), x=0.012, ha="left")
+    lines = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
+    axes.set_title("\n".join(lines), pad=pad)

@@ -1,0 +1,243 @@
+"""Figures show what the dataset holds, in its own units."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+
+from ringsim.dataset import to_dataset
+from ringsim.plots.asynchrony import asynchrony
+from ringsim.plots.diagonal_stress import default_sections, diagonal_stress
+from ringsim.plots.energy import energy, imbalance
+from ringsim.plots.opening_angles import opening_angles
+from ringsim.plots.ring import ring
+from ringsim.plots.run import PICTURES, draw_run
+from ringsim.refusal import InputError
+from ringsim.scene import scene_from_toml
+from ringsim.variables import VARIABLES, Outcome, Status
+
+DRAWINGS = [opening_angles, asynchrony, diagonal_stress, energy, ring]
+CHARTS = [opening_angles, asynchrony, diagonal_stress, energy]
+
+
+def words(figure) -> str:
+    """Everything written on a figure."""
+    return "\n".join(text.get_text() for text in figure.findobj(mpl.text.Text))
+
+
+def settings() -> dict:
+    """Matplotlib's, without the backend: reading that one chooses it."""
+    return {name: mpl.rcParams[name] for name in mpl.rcParams if name != "backend"}
+
+
+def dashed_lines(axes) -> list[float]:
+    """Times of the vertical lines."""
+    vertical = [
+        line for line in axes.lines if len(set(line.get_xdata())) == 1 < len(line.get_xdata())
+    ]
+    return [float(line.get_xdata()[0]) for line in vertical]
+
+
+@pytest.mark.parametrize("draw", CHARTS)
+def test_time_axis_is_named_by_the_dataset(draw, deployed):
+    run = deployed.copy()
+    run["time"] = run["time"].assign_attrs(long_name="moment", units="s")
+    assert any(axes.get_xlabel() == "Moment (s)" for axes in draw(run).axes)
+
+
+@pytest.mark.parametrize(
+    ("draw", "name", "label"),
+    [
+        (opening_angles, "opening_angle", "Some name (degree)"),
+        (asynchrony, "asynchrony", "Some name (degree)"),
+        (diagonal_stress, "rod_stress", "Some name (MPa)"),
+        (energy, "work", "some name"),
+    ],
+)
+def test_values_are_named_by_the_dataset(draw, name, label, deployed):
+    run = deployed.copy()
+    run[name] = run[name].assign_attrs(long_name="some name")
+    assert label in words(draw(run)).splitlines()
+
+
+@pytest.mark.parametrize("draw", DRAWINGS)
+def test_title_names_the_scene_and_how_the_run_ended(draw, deployed, failed):
+    assert deployed.attrs["title"] in words(draw(deployed))
+    assert "Deployed after 17.58 s" in words(draw(deployed))
+    text = " ".join(words(draw(failed)).split())
+    assert "Solver failed after 9.25 s: the step fell below its bound" in text
+
+
+@pytest.mark.parametrize("draw", CHARTS)
+def test_deployment_time_is_marked_only_if_there_is_one(draw, deployed, failed):
+    times = [time for axes in draw(deployed).axes for time in dashed_lines(axes)]
+    assert times
+    assert set(times) == {float(deployed.deployment_time)}
+    assert not [time for axes in draw(failed).axes for time in dashed_lines(axes)]
+
+
+@pytest.mark.parametrize("draw", DRAWINGS)
+def test_drawing_leaves_data_and_settings_as_they_were(draw, deployed):
+    data, before = deployed.copy(deep=True), settings()
+    draw(deployed)
+    assert deployed.identical(data)
+    assert settings() == before
+
+
+def test_every_section_of_both_planes_has_its_line(deployed):
+    figure = opening_angles(deployed)
+    upper, lower = figure.axes[0], figure.axes[1]
+    for axes, plane in ((upper, "upper"), (lower, "lower")):
+        (lines,) = [c for c in axes.collections if isinstance(c, LineCollection)]
+        segments = lines.get_segments()
+        assert lines.get_array().tolist() == list(range(1, 19))
+        for section, segment in enumerate(segments, start=1):
+            wanted = deployed.opening_angle.sel(plane=plane, section=section)
+            np.testing.assert_array_equal(segment[:, 0], deployed.time)
+            np.testing.assert_array_equal(segment[:, 1], wanted)
+
+
+def test_deviations_add_up_to_nothing(deployed):
+    figure = opening_angles(deployed)
+    shown = [c for axes in figure.axes[2:4] for c in axes.collections]
+    total = sum(segment[:, 1] for lines in shown for segment in lines.get_segments())
+    np.testing.assert_allclose(total, 0.0, atol=1e-11)  # 36 roundings of values up to 180
+
+
+def test_locks_are_marked_at_their_times(deployed):
+    for axes, plane in zip(opening_angles(deployed).axes, ("upper", "lower"), strict=False):
+        marks = np.asarray(axes.collections[-1].get_offsets())
+        np.testing.assert_array_equal(marks[:, 0], deployed.lock_time.sel(plane=plane))
+        assert set(marks[:, 1]) == {180.0}
+
+
+def test_largest_asynchrony_is_marked_where_it_is(deployed):
+    (axes,) = asynchrony(deployed).axes
+    (mark,) = [line for line in axes.lines if line.get_marker() == "o"]
+    at = int(deployed.asynchrony.values.argmax())
+    assert mark.get_xdata() == [deployed.time.values[at]]
+    assert mark.get_ydata() == [deployed.asynchrony.values[at]]
+    assert f"largest: {float(deployed.asynchrony_max):.3g} degree" in words(axes.figure)
+
+
+def test_asynchrony_after_the_deployment_does_not_count(deployed):
+    run = deployed.copy(deep=True)
+    run["asynchrony"].values[-1] = 99.0
+    (axes,) = asynchrony(run).axes
+    (mark,) = [line for line in axes.lines if line.get_marker() == "o"]
+    assert mark.get_ydata()[0] == deployed.asynchrony.max()
+
+
+@pytest.mark.parametrize(
+    ("sections", "chosen"), [(1, (1,)), (2, (1, 2)), (3, (1, 2)), (6, (1, 3)), (18, (1, 9))]
+)
+def test_stress_is_shown_at_the_boom_and_half_way_round(sections, chosen):
+    assert default_sections(sections) == chosen
+
+
+def test_stress_lines_are_the_halves_of_the_diagonals_in_black_and_red(deployed):
+    for axes, diagonal in zip(diagonal_stress(deployed).axes, ("rising", "falling"), strict=True):
+        lines = [line for line in axes.lines if len(line.get_xdata()) > 2]
+        wanted = [
+            deployed.rod_stress.sel(rod=f"diagonal_{diagonal}_{half}", section=section)
+            for section in (1, 9)
+            for half in ("left", "right")
+        ]
+        for line, values in zip(lines, wanted, strict=True):
+            np.testing.assert_array_equal(line.get_ydata(), 1e-6 * values)
+        red = [mpl.colors.to_rgb(line.get_color())[0] > 0.5 for line in lines]
+        assert red == [False, False, True, True]
+
+
+@pytest.mark.parametrize("sections", [[], [0], [1, 19], range(1, 8)])
+def test_sections_that_do_not_exist_are_refused(sections, deployed):
+    with pytest.raises(ValueError, match=r"sections = .* 1\.\.18"):
+        diagonal_stress(deployed, sections)
+
+
+def test_imbalance_is_what_the_energies_lack(deployed):
+    lack = imbalance(deployed).values
+    drift = 1e-6 * np.sin(deployed.time) * np.clip(deployed.time / 17.58, 0.0, 1.0)
+    np.testing.assert_allclose(lack, -drift, atol=1e-15)  # rounding of energies below 0.1 J
+
+
+def test_energies_are_drawn_in_the_unit_of_the_label(deployed):
+    upper, lower = energy(deployed).axes
+    assert upper.get_ylabel() == "Energy (mJ)"
+    np.testing.assert_array_equal(upper.lines[0].get_ydata(), 1e3 * deployed.work)
+    assert lower.get_ylabel() == "Imbalance (µJ)"
+    np.testing.assert_array_equal(lower.lines[1].get_ydata(), 1e6 * imbalance(deployed))
+    assert "2.3e-05" in lower.get_title(loc="left")
+
+
+@pytest.mark.parametrize(("sections", "closed"), [(1, False), (2, False), (6, True), (72, True)])
+def test_no_words_leave_the_sheet_or_meet(sections, closed, scene_of, made_run):
+    run = made_run(scene_of(sections, closed=closed))
+    for draw in DRAWINGS:
+        figure = draw(run)
+        figure.draw_without_rendering()
+        sheet = figure.bbox
+        loose = [t for a in figure.axes for t in (*a.texts, a.title, a._left_title)]
+        loose += [a.xaxis.label for a in figure.axes] + [a.yaxis.label for a in figure.axes]
+        loose += figure.texts
+        boxes = [t.get_window_extent() for t in loose if t.get_text() and t.get_visible()]
+        for number, box in enumerate(boxes):
+            assert box.x0 >= sheet.x0 - 1, draw.__name__
+            assert box.x1 <= sheet.x1 + 1, draw.__name__
+            assert box.y0 >= sheet.y0 - 1, draw.__name__
+            assert box.y1 <= sheet.y1 + 1, draw.__name__
+            assert not any(box.overlaps(other) for other in boxes[:number]), draw.__name__
+
+
+def test_only_figures_that_apply_are_written(tmp_path, deployed, scene_of, made_run):
+    names = {path.name for path in draw_run(deployed, tmp_path / "all")}
+    assert names == {f"{picture.name}.png" for picture in PICTURES}
+    plain = made_run(scene_of(6, parts=False), stress=False)
+    paths = draw_run(plain, tmp_path / "plain")
+    assert "diagonal_stress.png" not in {path.name for path in paths}
+    assert len(paths) == len(PICTURES) - 1
+    for path in paths:
+        assert path.read_bytes().startswith(b"\x89PNG")
+    assert sorted((tmp_path / "plain").iterdir()) == sorted(paths)
+
+
+def test_runs_that_ended_early_are_drawn_as_far_as_they_got(tmp_path, failed, unfinished):
+    assert len(draw_run(failed, tmp_path)) == len(PICTURES)
+    assert len(draw_run(unfinished, tmp_path)) == len(PICTURES)
+
+
+def test_a_single_record_can_be_drawn(tmp_path, scene_of, made_run):
+    run = made_run(scene_of(6), status=Status.DIVERGED, until=0.01)
+    assert len(draw_run(run, tmp_path)) == len(PICTURES)
+
+
+def test_a_run_without_records_has_no_figures(tmp_path, deployed):
+    scene = scene_from_toml(deployed.attrs["scene"], source="test")
+    crashed = to_dataset(Outcome(Status.CRASHED, "the solver process died"), scene)
+    assert draw_run(crashed, tmp_path) == []
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path, deployed):
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(InputError, match="taken"):
+        draw_run(deployed, tmp_path / "taken")
+
+
+def test_every_drawn_variable_is_defined():
+    assert {name for picture in PICTURES for name in picture.needs} <= set(VARIABLES)
+
+
+def test_importing_the_figures_changes_no_global_setting():
+    check = (
+        "import sys, matplotlib as mpl; "
+        "settings = lambda: {k: mpl.rcParams[k] for k in mpl.rcParams if k != 'backend'}; "
+        "before = settings(); import ringsim.plots.run; "
+        "assert settings() == before; assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    found = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True)
+    assert found.returncode == 0, found.stderr

@@ -1,0 +1,137 @@
+"""The drawn ring is the ideal ring, to scale."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+
+from ringsim.plots.camera import Camera
+from ringsim.plots.ring import instants, ring
+from ringsim.plots.ring_parts import facing_azimuth, ring_parts
+from ringsim.variables import Status
+
+
+def lengths(lines: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(lines[:, 1] - lines[:, 0], axis=-1)
+
+
+@pytest.mark.parametrize("angle", [1.0, 46.0, 110.0, 180.0])
+@pytest.mark.parametrize(("sections", "closed"), [(1, False), (2, False), (6, True), (18, True)])
+def test_rods_keep_their_lengths_while_the_ring_opens(sections, closed, angle, scene_of):
+    scene = scene_of(sections, closed=closed)
+    parts = {p.name: p.lines for p in ring_parts(scene, np.full((2, sections), angle))}
+    structure = scene.structure
+    assert parts["diagonals"].shape == (4 * sections, 2, 3)
+    assert parts["folding bars"].shape == (4 * sections, 2, 3)
+    np.testing.assert_allclose(lengths(parts["diagonals"]), structure.half_diagonal, rtol=1e-12)
+    np.testing.assert_allclose(lengths(parts["folding bars"]), structure.half_bar, rtol=1e-12)
+    np.testing.assert_allclose(
+        lengths(parts["hinge assemblies"]), structure.hinge_offset, rtol=1e-10
+    )
+    np.testing.assert_allclose(lengths(parts["boom"]), scene.boom.length, rtol=1e-12)
+
+
+def test_a_section_that_is_ahead_is_drawn_ahead(scene_of):
+    scene = scene_of(6)
+    opening = np.full((2, 6), 100.0)
+    bars = {p.name: p.lines for p in ring_parts(scene, opening)}["folding bars"]
+    opening[0, 2] = 130.0
+    opening[1, 4] = 70.0
+    shifted = {p.name: p.lines for p in ring_parts(scene, opening)}["folding bars"]
+    depth, moved = (np.abs(lines[:12, 0, 2] - lines[:12, 1, 2]) for lines in (bars, shifted))
+    half = scene.structure.half_bar
+    expected = half * np.sin(np.radians(90.0 - 0.5 * opening)).ravel()
+    np.testing.assert_allclose(depth, half * np.sin(np.radians(40.0)), rtol=1e-12)
+    np.testing.assert_allclose(moved, expected, rtol=1e-12)
+
+
+def test_parts_that_the_scene_leaves_out_are_not_drawn(scene_of):
+    parts = ring_parts(scene_of(6, parts=False), np.full((2, 6), 90.0))
+    assert {part.name for part in parts} == {"diagonals", "folding bars", "hinge assemblies"}
+
+
+def test_springs_are_taut_beyond_their_neutral_length(scene_of):
+    scene = scene_of(18)
+    stowed = {p.name: p.lines for p in ring_parts(scene, np.full((2, 18), 40.0))}
+    deployed = {p.name: p.lines for p in ring_parts(scene, np.full((2, 18), 180.0))}
+    assert (len(stowed["net, taut"]), len(stowed["net, slack"])) == (0, 18)
+    assert (len(deployed["net, taut"]), len(deployed["net, slack"])) == (18, 0)
+    assert lengths(deployed["net, taut"]).min() > scene.net.neutral_length
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 42.0, -130.0])
+def test_camera_keeps_all_distances(azimuth):
+    points = np.random.default_rng(3).normal(size=(20, 3))
+    paper, near = Camera(azimuth, 24.0).view(points)
+    turned = np.concatenate([paper, near[:, None]], axis=-1)
+    np.testing.assert_allclose(turned @ turned.T, points @ points.T, atol=1e-13)
+
+
+def test_camera_sees_up_as_up_and_near_as_near():
+    paper, near = Camera(0.0, 30.0).view(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1, 0]]))
+    assert paper[0, 1] > 0.0
+    assert paper[2, 0] == pytest.approx(1.0)
+    assert near[1] == pytest.approx(np.cos(np.radians(30.0)))
+
+
+def test_arcs_are_seen_from_outside(scene_of):
+    geometry = scene_of(5, closed=False).structure.geometry()
+    azimuth = np.radians(facing_azimuth(geometry))
+    view = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    assert (geometry.normals @ view > 0.0).all()
+
+
+def test_instants_are_first_middle_and_deployment(deployed):
+    (first, stowed), (second, half), (third, opened) = instants(deployed)
+    assert (first, second, third) == ("stowed", "half-way", "deployed")
+    assert float(stowed.time) == 0.0
+    spacing = float(np.diff(deployed.time).max())
+    assert abs(float(opened.time) - float(deployed.deployment_time)) <= 0.5 * spacing + 1e-12
+    middle = 0.5 * (float(stowed.mean()) + float(opened.mean()))
+    mean = deployed.opening_angle.mean(("plane", "section"))
+    assert abs(float(half.mean()) - middle) == float(np.abs(mean - middle).min())
+
+
+def test_instants_of_a_failed_run_end_at_its_last_record(failed):
+    name, last = instants(failed)[-1]
+    assert name == "end of the run"
+    assert float(last.time) == pytest.approx(9.2)
+    assert np.isfinite(last).all()
+
+
+def test_drawing_is_true_to_scale(deployed):
+    figure = ring(deployed)
+    (axes,) = figure.axes
+    figure.draw_without_rendering()
+    frame = axes.get_window_extent()
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    across, up = frame.width / (right - left), frame.height / (high - low)
+    assert across == pytest.approx(up, rel=1e-3)
+    (bar,) = axes.lines
+    metres = float(np.ptp(bar.get_xdata()))
+    (words,) = [text for text in axes.texts if text.get_text() == f"{metres:g} m"]
+    assert words.get_annotation_clip() is False  # it stands above the frame
+
+
+@pytest.mark.parametrize(("sections", "closed"), [(1, False), (2, False), (7, True), (72, True)])
+def test_views_stand_side_by_side_inside_the_sheet(sections, closed, scene_of, made_run):
+    (axes,) = ring(made_run(scene_of(sections, closed=closed))).axes
+    views = [
+        np.concatenate(c.get_segments()) for c in axes.collections if isinstance(c, LineCollection)
+    ]
+    edges = [(float(v[:, 0].min()), float(v[:, 0].max())) for v in views]
+    assert len(edges) == 3
+    assert edges[0][0] >= -1e-9
+    assert all(a[1] < b[0] for a, b in pairwise(edges))
+    assert edges[-1][1] <= axes.get_xlim()[1] + 1e-9
+    assert max(v[:, 1].max() for v in views) <= axes.get_ylim()[1] + 1e-9
+
+
+def test_a_ring_that_folds_is_not_called_stowed(scene_of, made_run):
+    run = made_run(scene_of(6), status=Status.UNFINISHED, until=12.0)
+    backwards = run.isel(time=slice(0, 100)).copy(deep=True)
+    backwards["opening_angle"].values[:] = backwards["opening_angle"].values[..., ::-1]
+    assert [name for name, _ in instants(backwards)] == ["start", "half-way", "end of the run"]

@@ -1,0 +1,64 @@
+"""What the figures say comes from the dataset alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from ringsim.plots import wording
+
+
+def quantity(values, units: str) -> xr.DataArray:
+    attributes = {"units": units, "long_name": "some quantity"}
+    return xr.DataArray(np.asarray(values, dtype=float), dims="time", attrs=attributes)
+
+
+@pytest.mark.parametrize(
+    ("largest", "units", "wanted"),
+    [
+        (0.06, "J", "mJ"),
+        (6e-7, "J", "µJ"),
+        (4e-7, "J", "nJ"),
+        (2.4e6, "Pa", "MPa"),
+        (700.0, "Pa", "kPa"),
+        (3.0, "J", "J"),
+        (1e-30, "J", "pJ"),
+        (1e30, "Pa", "GPa"),
+        (2.4e6, "degree", "degree"),
+        (0.0, "J", "J"),
+    ],
+)
+def test_prefix_follows_the_largest_value(largest, units, wanted):
+    factor, found = wording.readable_units(quantity([0.0, -largest, np.nan], units))
+    assert found == wanted
+    if units in ("J", "Pa") and 1e-12 < largest < 1e12:
+        assert 0.5 <= factor * largest < 500.0
+
+
+def test_prefixed_numbers_mean_the_same():
+    factor, units = wording.readable_units(quantity([0.06], "J"))
+    assert (factor * 0.06, units) == (pytest.approx(60.0, rel=1e-15), "mJ")
+
+
+def test_label_is_long_name_and_units():
+    assert wording.label(quantity([1.0], "N")) == "Some quantity (N)"
+    assert wording.label(quantity([1.0], "N"), "kN") == "Some quantity (kN)"
+    assert wording.label(quantity([1.0], "1")) == "Some quantity"
+
+
+def test_long_labels_are_broken_between_words():
+    assert wording.label(quantity([1.0], "N"), width=14) == "Some quantity\n(N)"
+
+
+def test_ending_tells_success_failure_and_the_lack_of_an_end(deployed, failed, unfinished):
+    assert wording.ending(deployed) == "Deployed after 17.58 s"
+    assert wording.ending(failed).startswith("Solver failed after 9.25 s: the step fell below")
+    assert wording.ending(unfinished).startswith("Unfinished after 12 s: ")
+
+
+def test_success_without_locking_gives_the_reason(unfinished):
+    run = unfinished.copy(deep=True)
+    run["status"] = run["status"].copy(data=np.int8(0))
+    run.attrs["reason"] = "the end time was reached"
+    assert wording.ending(run) == "Ended after 12 s: the end time was reached"

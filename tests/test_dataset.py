@@ -1,0 +1,207 @@
+"""A run survives the way into its file and back, whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from ringsim.dataset import save, to_dataset
+from ringsim.refusal import InputError
+from ringsim.scene import Scene, scene_from_table, scene_from_toml
+from ringsim.variables import COORDINATES, RODS, VARIABLES, Outcome, Status
+
+TIMES = np.array([0.0, 0.1, 0.25])
+
+
+def scene_of(sections: int = 4, *, stress: bool = False) -> Scene:
+    table = {
+        "name": "bench",
+        "title": 'quotes "and" umlauts ä, °',
+        "structure": {"kind": "pantograph-ring", "sections": sections},
+        "record": {"stress": stress},
+        "loads": {"force": 0.1 + 0.2},
+    }
+    return scene_from_table(table, source="test")
+
+
+def full_outcome(sections: int = 4) -> Outcome:
+    """Every variable, filled with random bits of full precision and some NaN."""
+    random = np.random.default_rng(7)
+    sizes = {"plane": 2, "section": sections, "time": len(TIMES), "rod": len(RODS)}
+    values = {}
+    for name, variable in VARIABLES.items():
+        shape = tuple(sizes[dim] for dim in variable.dims)
+        if np.dtype(variable.dtype).kind == "i":
+            values[name] = random.integers(0, 1000, shape)
+        else:
+            values[name] = random.normal(size=shape)
+            if variable.dims:
+                values[name][..., -1] = np.nan
+    del values["status"]
+    coordinates = {
+        "plane": np.array(["upper", "lower"]),
+        "section": np.arange(1, sections + 1),
+        "time": TIMES,
+        "rod": np.array(RODS),
+    }
+    return Outcome(Status.OK, "all V-joints have locked", coordinates, values)
+
+
+def failed_outcome() -> Outcome:
+    return Outcome(Status.CRASHED, "the solver process died: try a smaller step")
+
+
+def reopened(dataset: xr.Dataset, path) -> xr.Dataset:
+    save(dataset, path)
+    with xr.open_dataset(path, engine="netcdf4") as found:
+        return found.load()
+
+
+def test_file_gives_back_every_bit(tmp_path):
+    outcome = full_outcome()
+    written = to_dataset(outcome, scene_of(stress=True))
+    read = reopened(written, tmp_path / "run.nc")
+    xr.testing.assert_identical(read, written)
+    assert set(read.data_vars) == set(VARIABLES)
+    for name, values in outcome.values.items():
+        assert read[name].dtype == VARIABLES[name].dtype
+        np.testing.assert_array_equal(read[name].values, values)
+
+
+def test_every_variable_carries_dimensions_units_and_meaning():
+    dataset = to_dataset(full_outcome(), scene_of(stress=True))
+    for name, variable in VARIABLES.items():
+        assert dataset[name].dims == variable.dims
+        assert dataset[name].attrs["units"] == variable.units
+        assert dataset[name].attrs["long_name"] == variable.long_name
+    for coordinate in COORDINATES:
+        assert dataset[coordinate.name].attrs["long_name"] == coordinate.long_name
+    assert dataset.time.attrs["units"] == "s"
+    assert dataset.plane.values.tolist() == ["upper", "lower"]
+    assert dataset.section.values.tolist() == [1, 2, 3, 4]
+
+
+def test_time_stays_a_number_of_seconds(tmp_path):
+    read = reopened(to_dataset(full_outcome(), scene_of()), tmp_path / "run.nc")
+    assert read.time.dtype == "f8"
+    np.testing.assert_array_equal(read.time.values, TIMES)
+
+
+@pytest.mark.parametrize("status", list(Status))
+def test_status_is_a_flag_with_a_reason(status, tmp_path):
+    dataset = to_dataset(Outcome(status, "because"), scene_of())
+    read = reopened(dataset, tmp_path / "run.nc")
+    flags = read.status.attrs["flag_values"]
+    words = read.status.attrs["flag_meanings"].split()
+    assert read.status.dtype == np.int8
+    assert flags.dtype == np.int8
+    assert words[flags.tolist().index(int(read.status))] == status.word
+    assert read.attrs["reason"] == "because"
+
+
+def test_scene_comes_back_equal_from_the_file(tmp_path):
+    scene = scene_of(7)
+    read = reopened(to_dataset(full_outcome(7), scene), tmp_path / "run.nc")
+    assert scene_from_toml(read.attrs["scene"], source="file") == scene
+
+
+def test_origin_is_in_the_file():
+    attributes = to_dataset(full_outcome(), scene_of()).attrs
+    assert attributes["Conventions"].startswith("CF-1.11")
+    assert attributes["title"] == scene_of().title
+    assert attributes["numpy_version"] == np.__version__
+    assert attributes["python_version"] == sys.version.split()[0]
+    assert attributes["exudyn_version"].startswith("1.13")
+    assert attributes["ringsim_version"] in attributes["source"]
+    assert attributes["date_created"].endswith("Z")
+    assert attributes["date_created"] in attributes["history"]
+    assert "bench" in attributes["summary"]
+
+
+def test_crashed_run_has_the_same_scalars_all_missing(tmp_path):
+    read = reopened(to_dataset(failed_outcome(), scene_of()), tmp_path / "run.nc")
+    timeless = {n for n, v in VARIABLES.items() if "time" not in v.dims} - {"peak_rod_stress"}
+    assert set(read.data_vars) == timeless
+    assert read.lock_time.shape == (2, 4)
+    for name in timeless - {"status"}:
+        assert np.isnan(read[name]).all(), name
+    assert np.isnan(read.steps)
+
+
+def test_missing_counts_stay_whole_numbers_on_disk(tmp_path):
+    path = tmp_path / "run.nc"
+    save(to_dataset(failed_outcome(), scene_of()), path)
+    with xr.open_dataset(path, mask_and_scale=False) as raw:
+        assert raw.steps.dtype == np.int32
+        assert raw.steps.item() == raw.steps.attrs["_FillValue"] == -1
+
+
+def test_stress_is_only_promised_if_recorded():
+    assert "peak_rod_stress" not in to_dataset(failed_outcome(), scene_of())
+    assert "peak_rod_stress" in to_dataset(failed_outcome(), scene_of(stress=True))
+    assert "rod" not in to_dataset(failed_outcome(), scene_of(stress=True)).coords
+
+
+def test_numeric_arrays_are_compressed_and_no_dimension_is_unlimited(tmp_path):
+    save(to_dataset(full_outcome(), scene_of()), tmp_path / "run.nc")
+    with xr.open_dataset(tmp_path / "run.nc") as read:
+        for name in ("opening_angle", "lock_time", "asynchrony"):
+            assert read[name].encoding["zlib"]
+            assert read[name].encoding["shuffle"]
+            assert read[name].encoding["complevel"] == 4
+        assert not read.encoding["unlimited_dims"]
+
+
+def test_saving_again_forgets_the_encoding_of_an_older_file(tmp_path):
+    dataset = to_dataset(full_outcome(), scene_of())
+    dataset.asynchrony.encoding = {"dtype": "i2", "scale_factor": 0.1}
+    read = reopened(dataset, tmp_path / "run.nc")
+    np.testing.assert_array_equal(read.asynchrony.values, dataset.asynchrony.values)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"oppening_angle": np.zeros(3)}, "oppening_angle"),
+        ({"asynchrony": np.zeros((2, 3))}, "asynchrony"),
+        ({"asynchrony": np.zeros(5)}, "time"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused(values, message):
+    outcome = Outcome(Status.OK, "", {"time": TIMES}, values)
+    with pytest.raises(ValueError, match=message):
+        to_dataset(outcome, scene_of())
+
+
+def test_missing_folder_is_refused_with_its_name(tmp_path):
+    with pytest.raises(InputError, match=r"no folder .*absent"):
+        save(to_dataset(failed_outcome(), scene_of()), tmp_path / "absent" / "run.nc")
+
+
+def test_folder_instead_of_a_file_is_refused(tmp_path):
+    with pytest.raises(InputError, match="is a folder"):
+        save(to_dataset(failed_outcome(), scene_of()), tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("broken", ["write", "replace"])
+def test_interrupted_write_leaves_the_old_file_and_no_draft(broken, tmp_path, monkeypatch):
+    path = tmp_path / "run.nc"
+    old = to_dataset(full_outcome(), scene_of())
+    save(old, path)
+
+    def full_disk(*arguments, **keywords):
+        raise OSError(28, "No space left on device")
+
+    owner, name = (xr.Dataset, "to_netcdf") if broken == "write" else (os, "replace")
+    monkeypatch.setattr(owner, name, full_disk)
+    with pytest.raises(InputError, match=r"run\.nc: cannot be written: No space left"):
+        save(to_dataset(failed_outcome(), scene_of()), path)
+    monkeypatch.undo()
+    assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]
+    with xr.open_dataset(path) as read:
+        xr.testing.assert_identical(read.load(), old)
