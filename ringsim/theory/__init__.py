@@ -1,0 +1,1 @@
+"""Closed forms and quadratures: truths that need no multibody engine; numpy only."""

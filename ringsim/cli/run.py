@@ -1,0 +1,75 @@
+"""``ringsim run SCENE``."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import click
+
+from ringsim.overrides import parse_assignment
+from ringsim.refusal import InputError
+from ringsim.scene import load_scene
+
+EXIT_FAILED = 3
+
+
+@click.command("run")
+@click.argument("scene", metavar="SCENE")
+@click.option(
+    "--set", "settings", metavar="PATH=VALUE", multiple=True, help="Override a scene field."
+)
+@click.option(
+    "--out", metavar="FILE", type=click.Path(path_type=Path), help="netCDF file to write."
+)
+@click.option("--plot", is_flag=True, help="Draw figures beside the netCDF file.")
+def command(scene: str, settings: tuple[str, ...], out: Path | None, *, plot: bool) -> None:
+    """Run SCENE (a built-in name or a TOML file) and write SCENE.nc."""
+    chosen = load_scene(scene)
+    if settings:
+        chosen = chosen.with_values(dict(parse_assignment(text) for text in settings))
+    if plot:
+        chosen = chosen.with_values({"record.stress": True})
+    target = out if out is not None else Path(f"{chosen.name}.nc")
+
+    from ringsim.dataset import save, to_dataset
+    from ringsim.simulation import run
+    from ringsim.variables import Status
+
+    _require_folder(target)
+    outcome = run(chosen)
+    values = outcome.values
+    click.echo(f"{chosen.name}: {outcome.status.word}: {outcome.reason}")
+    rows = [
+        ("deployment time", "deployment_time", "s", "10.4f"),
+        ("largest asynchrony", "asynchrony_max", "deg", "10.4f"),
+        ("largest rod stress", "peak_rod_stress", "Pa", "10.3e"),
+        ("energy error", "energy_error", "", "10.1e"),
+        ("constraint error", "constraint_error", "m", "10.1e"),
+        ("steps", "steps", "", "10d"),
+        ("wall time", "wall_time", "s", "10.2f"),
+    ]
+    for label, name, unit, style in rows:
+        if name in values:
+            click.echo(f"  {label:20s}{format(values[name].item(), style)} {unit}".rstrip())
+    dataset = to_dataset(outcome, chosen)
+    save(dataset, target)
+    click.echo(f"wrote {target}")
+    if plot:
+        from ringsim.plots.run import draw_run
+
+        for picture in draw_run(dataset, target.parent):
+            click.echo(f"wrote {picture}")
+    if outcome.status >= Status.SOLVER_FAILED:
+        sys.exit(EXIT_FAILED)
+
+
+def _require_folder(target: Path) -> None:
+    """Refuse a target that cannot be written before time is spent on the run."""
+    if target.is_dir():
+        raise InputError(f"--out {target}: is a folder; name a file in it")
+    if not target.parent.is_dir():
+        raise InputError(f"--out {target}: there is no folder {target.parent}; create it first")
+    if not os.access(target.parent, os.W_OK):
+        raise InputError(f"--out {target}: the folder {target.parent} cannot be written")

@@ -1,0 +1,107 @@
+"""The boom at the first corner: rigid in the upper hinge assembly, or a chain of elements."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import exudyn.itemInterface as item
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.engine.pantograph_ring import RingModel
+from ringsim.parts.boom.flexible import FlexibleBoom
+from ringsim.parts.boom.rigid import RigidBoom
+
+Array = NDArray[np.float64]
+_ALL = [1, 1, 1, 1, 1, 1]
+_ACROSS = [1, 1, 0, 0, 0, 0]
+
+
+def add_boom(model: RingModel) -> None:
+    """Connect the boom, if any; the rigid one's inertia is already in the hinge assembly."""
+    boom = model.scene.boom
+    if boom is None:
+        return
+    if boom.base == "fixed":
+        top = model.fold.corners[0, 0]
+        model.assembly.generic_joint(
+            model.assembly.ground_marker(top),
+            model.assembly.body_marker(model.hinges[0][0][0], np.zeros(3)),
+            _ALL,
+        )
+    if isinstance(boom, RigidBoom):
+        model.assembly.generic_joint(
+            model.assembly.body_marker(model.hinges[0][0][0], np.zeros(3)),
+            model.assembly.body_marker(model.hinges[1][0][0], np.zeros(3)),
+            _ACROSS,
+        )
+    elif isinstance(boom, FlexibleBoom):
+        _add_flexible(model, boom)
+    else:
+        raise TypeError(f"no builder for a boom of kind {boom.kind}")
+
+
+def _add_flexible(model: RingModel, boom: FlexibleBoom) -> None:
+    assembly, system = model.assembly, model.assembly.system
+    top_body, top_node = model.hinges[0][0]
+    low_body, _ = model.hinges[1][0]
+    top, low = model.fold.corners[0, 0], model.fold.corners[1, 0]
+    start = assembly.starts[int(top_node)]
+    spin = 2.0 * start[4:7]
+    nodes = []
+    for drop in np.linspace(0.0, boom.length, boom.elements + 1):
+        arm = np.array([0.0, 0.0, -drop])
+        node = system.AddNode(
+            item.NodePointSlope1(
+                referenceCoordinates=[*(top + arm), 0.0, 0.0, -1.0],
+            )
+        )
+        assembly.starts[int(node)] = np.concatenate(
+            [start[:3] + np.cross(spin, arm), np.cross(spin, [0.0, 0.0, -1.0])]
+        )
+        nodes.append(node)
+    length = boom.length / boom.elements
+    cables = [
+        system.AddObject(
+            item.ObjectANCFCable(
+                nodeNumbers=nodes[k : k + 2],
+                length=length,
+                massPerLength=boom.density * boom.tube.area,
+                bendingStiffness=boom.young_modulus * boom.tube.second_moment,
+                axialStiffness=boom.young_modulus * boom.tube.area,
+            )
+        )
+        for k in range(boom.elements)
+    ]
+    assembly.bodies += cables
+    _clamp(model, top_body, nodes[0])
+    _slide(model, low_body, cables, length, float(top[2] - low[2]))
+
+
+def _clamp(model: RingModel, body: Any, node: Any) -> None:
+    """Hold position and direction of the boom's end on the upper hinge assembly."""
+    system = model.assembly.system
+    down = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    marker = model.assembly.body_marker(body, np.zeros(3), down)
+    end = system.AddMarker(item.MarkerNodeRigid(nodeNumber=node))
+    model.assembly.generic_joint(marker, end, [1, 1, 1, 0, 1, 1])
+
+
+def _slide(model: RingModel, body: Any, cables: list[Any], length: float, place: float) -> None:
+    """Let the lower hinge assembly slide along the chain of elements."""
+    system = model.assembly.system
+    markers = [system.AddMarker(item.MarkerBodyCable2DCoordinates(bodyNumber=c)) for c in cables]
+    element = min(int(place / length), len(cables) - 1)
+    data = system.AddNode(
+        item.NodeGenericData(initialCoordinates=[element, place], numberOfDataCoordinates=2)
+    )
+    system.AddObject(
+        item.ObjectJointSliding(
+            markerNumbers=[model.assembly.body_marker(body, np.zeros(3)), markers[element]],
+            slidingMarkerNumbers=markers,
+            slidingMarkerOffsets=[k * length for k in range(len(cables))],
+            nodeNumber=data,
+            constrainRotations=[0, 0, 0],
+            constrainTranslations=[1, 1, 1],
+        )
+    )

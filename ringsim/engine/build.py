@@ -1,0 +1,59 @@
+"""From a scene to a model that is ready to be integrated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.engine.boom import add_boom
+from ringsim.engine.joints import add_friction, add_stops
+from ringsim.engine.loads import add_loads
+from ringsim.engine.net import HubNet, add_net
+from ringsim.engine.pantograph_ring import RingModel, build_ring
+from ringsim.engine.rods import Formulation
+from ringsim.engine.rods_ancf import Ancf
+from ringsim.engine.rods_geometrically_exact import GeometricallyExact
+from ringsim.parts.rods.ancf import AncfRods
+from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
+from ringsim.scene import Scene
+
+Array = NDArray[np.float64]
+
+FORMULATIONS: dict[type, Formulation] = {
+    GeometricallyExactRods: GeometricallyExact(),
+    AncfRods: Ancf(),
+}
+
+
+@dataclass(frozen=True)
+class Built:
+    """A ring model with its optional parts.
+
+    Attributes
+    ----------
+    forces
+        Loads along z on the V-joints, shape (2, sections), N.
+    stops
+        Stop connectors, [plane][section]; empty without stops.
+
+    """
+
+    ring: RingModel
+    net: HubNet | None
+    forces: Array
+    stops: list[list[Any]]
+
+
+def build(scene: Scene) -> Built:
+    """Build every part that the scene names, and nothing else."""
+    ring = build_ring(scene, FORMULATIONS[type(scene.rods)])
+    add_boom(ring)
+    net = add_net(ring)
+    forces = add_loads(ring)
+    add_friction(ring)
+    stops = add_stops(ring)
+    ring.assembly.finish()
+    return Built(ring, net, forces, stops)

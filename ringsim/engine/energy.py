@@ -1,0 +1,115 @@
+"""The energy balance of a run: kinetic, elastic, work of the loads, power lost."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import exudyn as exu
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.engine.joints import friction_torque, stop_torque
+from ringsim.engine.net import HubNet, net_forces
+from ringsim.engine.pantograph_ring import RingModel
+from ringsim.engine.readings import JointGroup, State
+from ringsim.parts.joints import JointFriction
+
+Array = NDArray[np.float64]
+_KINETIC = exu.OutputVariableType.KineticEnergy
+_POTENTIAL = exu.OutputVariableType.PotentialEnergy
+
+
+class Energies(NamedTuple):
+    """Energies in J and the power lost in W at one instant."""
+
+    kinetic: float
+    elastic: float
+    work: float
+    loss: float
+
+
+class EnergyMeter:
+    """Measures the energies of a ring model.
+
+    Rods and bodies report theirs through exudyn; stops, net, loads and losses are evaluated
+    here.  Losses inside the rods (their own damping) are not measured.
+    """
+
+    def __init__(self, model: RingModel, net: HubNet | None, forces: Array) -> None:
+        self._model, self._net, self._forces = model, net, forces
+        assembly = model.assembly
+        self._output = assembly.system.GetObjectOutputBody
+        self._elements = [e for rods in model.rods.values() for rod in rods for e in rod.elements]
+        self._lifts = np.array(
+            [[assembly.coordinates_of(j.gap[0])[2] for j in plane] for plane in model.vjoints]
+        )
+        self._friction = self._friction_groups()
+        if net is not None:
+            self._corners = np.array(
+                [assembly.coordinates_of(node)[:3] for _, node in model.hinges[0]]
+            )
+            self._hub = assembly.coordinates_of(net.hub)[:3]
+
+    def read(self, state: State, angles: Array, rates: Array, latched: Array) -> Energies:
+        """Energies at the current state.
+
+        Parameters
+        ----------
+        angles, rates, latched
+            Opening angles, their rates and whether the latches hold, shape (2, sections).
+
+        """
+        kinetic = sum(self._output(body, _KINETIC) for body in self._model.assembly.bodies)
+        elastic = sum(self._output(element, _POTENTIAL) for element in self._elements)
+        lifted = (state.position - state.reference)[self._lifts]
+        loss = sum(
+            float(np.sum(friction_torque(law, group.sections, sections, rate) * rate))
+            for law, group, sections in self._friction
+            for rate in (group.rate(state),)
+        )
+        stored, lost = self._stops(angles, rates, latched)
+        net_stored, net_lost = self._net_energy(state)
+        return Energies(
+            float(kinetic),
+            float(elastic) + stored + net_stored,
+            float(np.sum(self._forces * lifted)),
+            loss + lost + net_lost,
+        )
+
+    def _friction_groups(self) -> list[tuple[JointFriction, JointGroup, int]]:
+        laws = self._model.scene.joints
+        found = []
+        for family, law in (("pivot", laws.pivot), ("hinge", laws.hinge), ("vjoint", laws.vjoint)):
+            if law is not None:
+                joints = [joint for joint in self._model.joints if joint.family == family]
+                group = JointGroup(self._model, joints)
+                found.append((law, group, self._model.geometry.sections))
+        return found
+
+    def _stops(self, angles: Array, rates: Array, latched: Array) -> tuple[float, float]:
+        stop = self._model.scene.stop
+        if stop is None:
+            return 0.0, 0.0
+        folded, turning = np.pi - angles, -rates
+        stowed = np.pi - np.radians(stop.stowed_angle)
+        ends = np.maximum(-folded, 0.0) + np.maximum(folded - stowed, 0.0)
+        depth = np.where(latched, folded, ends)
+        spring = stop_torque(stop, folded, np.zeros_like(turning), latched)
+        torque = stop_torque(stop, folded, turning, latched)
+        return (
+            0.5 * stop.stiffness * float(np.sum(depth**2)),
+            float(np.sum((torque - spring) * turning)),
+        )
+
+    def _net_energy(self, state: State) -> tuple[float, float]:
+        net = self._model.scene.net
+        if self._net is None or net is None:
+            return 0.0, 0.0
+        arms = state.position[self._corners] - state.position[self._hub]
+        moving = state.velocity[self._corners] - state.velocity[self._hub]
+        lengths = np.linalg.norm(arms, axis=1)
+        stretch, rate = lengths - net.neutral_length, np.sum(arms * moving, axis=1) / lengths
+        spring, damper = net_forces(
+            stretch, rate, self._net.stiffness, net.damping, two_sided=net.two_sided
+        )
+        return 0.5 * float(np.sum(spring * stretch)), float(np.sum(damper * rate))

@@ -1,0 +1,260 @@
+"""Integrating a built model: generalised-alpha with a step that follows the motion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.engine.build import Built
+from ringsim.engine.energy import Energies, EnergyMeter
+from ringsim.engine.joints import latch
+from ringsim.engine.predictor import Predictor
+from ringsim.engine.readings import JointGroup, Openings, State
+from ringsim.engine.stepping import StepControl
+from ringsim.engine.stress import StressMeter
+from ringsim.variables import Status
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class History:
+    """What was read at every accepted step; lists of equal length.
+
+    Attributes
+    ----------
+    angles, rates
+        Opening angles and rates, rad and rad/s, shape (2, sections) each.
+    gaps
+        Largest joint gap, m.
+    stresses
+        Shape (8, sections) each, Pa; empty unless recorded.
+
+    """
+
+    times: list[float] = field(default_factory=list)
+    angles: list[Array] = field(default_factory=list)
+    rates: list[Array] = field(default_factory=list)
+    energies: list[Energies] = field(default_factory=list)
+    gaps: list[float] = field(default_factory=list)
+    stresses: list[Array] = field(default_factory=list)
+    status: Status = Status.UNFINISHED
+    reason: str = ""
+    newton_iterations: int = 0
+    jacobians: int = 0
+    halvings: int = 0
+
+
+class Integration:
+    """One run of a built model."""
+
+    def __init__(self, built: Built) -> None:
+        ring, scene = built.ring, built.ring.scene
+        self._built, self._scene = built, scene
+        self._system = ring.assembly.system
+        self._solver = exu.MainSolverImplicitSecondOrder()
+        self._settings = _settings(built)
+        self._state = State(ring)
+        self._openings = Openings(ring)
+        self._energy = EnergyMeter(ring, built.net, built.forces)
+        self._stress = StressMeter(ring) if scene.record.stress else None
+        families = {joint.family for joint in ring.joints}
+        self._gaps = [
+            JointGroup(ring, [j for j in ring.joints if j.family == family])
+            for family in sorted(families)
+        ]
+        sections = ring.geometry.sections
+        self._latched = np.zeros((2, sections), dtype=bool)
+        self._locked = np.zeros((2, sections), dtype=bool)
+        self._settled_at = math.inf
+        self._steps = StepControl(
+            scene.solver,
+            _contact_step(built),
+            travel=math.pi - math.radians(scene.structure.opening_angle),
+        )
+        self._fresh = True
+        self.history = History()
+
+    def run(self) -> History:
+        """Integrate until all V-joints have locked and settled, or to the end time."""
+        history, solver, ring = self.history, self._solver, self._built.ring
+        solver.SetUserFunctionUpdateCurrentTime(self._system, self._update_time)
+        self._system.SetPostStepUserFunction(self._after_step)
+        self._system.SetPreNewtonResidualUserFunction(Predictor(ring.assembly, solver).apply)
+        self._read(0.0)
+        try:
+            if solver.InitializeSolver(self._system, self._settings):
+                solver.SolveSteps(self._system, self._settings)
+        except exu.ExudynError as error:
+            if history.status != Status.DIVERGED:
+                history.status = Status.SOLVER_FAILED
+                history.reason = self._explain(error)
+        history.newton_iterations = int(solver.it.newtonStepsCount)
+        history.jacobians = int(solver.it.newtonJacobiCount)
+        return history
+
+    def _update_time(self, solver: Any, system: Any, settings: Any) -> None:
+        """Set the step: the one chosen after the last step, or the reduced one of a retry."""
+        if self._fresh:
+            left = self._scene.solver.end_time - self.history.times[-1]
+            solver.it.currentStepSize = min(self._steps.step, left)
+            self._fresh = False
+        else:
+            self.history.halvings += 1
+            self._steps.step = solver.it.currentStepSize
+        solver.it.currentTime = solver.it.currentTime + solver.it.currentStepSize
+        system.systemData.SetTime(solver.it.currentTime, exu.ConfigurationType.Current)
+
+    def _after_step(self, system: Any, time: float) -> bool:
+        """Read the new state; False ends the run."""
+        if time <= self.history.times[-1]:
+            return True
+        self._fresh = True
+        if not self._read(time):
+            return False
+        angles, rates = self.history.angles[-1], self.history.rates[-1]
+        self._note_locks(angles, time)
+        if time >= self._settled_at or self._finished(time):
+            return False
+        self._steps.advance(
+            time,
+            float(np.mean(rates)),
+            to_stop=self._time_to_stop(angles, rates),
+            in_contact=bool(np.any(self._locked & (angles > math.pi - 0.1))),
+        )
+        return True
+
+    def _read(self, time: float) -> bool:
+        history, state = self.history, self._state
+        state.refresh()
+        if not state.finite():
+            history.status = Status.DIVERGED
+            history.reason = (
+                f"the state is not finite at {time:.6g} s: reduce solver.step or solver.tolerance"
+            )
+            return False
+        angles, rates = self._openings.read(state)
+        history.times.append(time)
+        history.angles.append(angles)
+        history.rates.append(rates)
+        history.energies.append(self._energy.read(state, angles, rates, self._latched))
+        history.gaps.append(max(float(group.gaps(state).max()) for group in self._gaps))
+        if self._stress is not None:
+            history.stresses.append(self._stress.read())
+        return True
+
+    def _note_locks(self, angles: Array, time: float) -> None:
+        stop, history = self._scene.stop, self.history
+        deployed = angles >= math.pi
+        fresh = deployed & ~self._locked
+        self._locked |= deployed
+        if stop is not None and stop.latch:
+            for plane, section in np.argwhere(fresh):
+                latch(self._built.ring, self._built.stops[plane][section])
+                self._latched[plane, section] = True
+        if math.isfinite(self._settled_at):
+            return
+        settling = self._scene.solver.settling_time if stop is not None else 0.0
+        stowed = 0.0 if stop is None else math.radians(stop.stowed_angle)
+        if self._locked.all():
+            history.status, history.reason = Status.OK, "all V-joints have reached 180 deg"
+            self._settled_at = time + settling
+        elif np.all(angles <= stowed):
+            history.status = Status.OK
+            history.reason = "all V-joints have reached the stowed stop"
+            self._settled_at = time + settling
+
+    def _finished(self, time: float) -> bool:
+        end = self._scene.solver.end_time
+        if time < end * (1.0 - 1e-12):
+            return False
+        if self.history.status == Status.UNFINISHED:
+            locked = int(self._locked.sum())
+            self.history.reason = (
+                f"solver.end_time = {end:g} s was reached with {locked} of "
+                f"{self._locked.size} V-joints locked"
+            )
+        return True
+
+    def _time_to_stop(self, angles: Array, rates: Array) -> float:
+        """Time until the first V-joint meets a stop at its present rate."""
+        stop = self._scene.stop
+        stowed = 0.0 if stop is None else math.radians(stop.stowed_angle)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            opening = np.where((rates > 0.0) & ~self._locked, (math.pi - angles) / rates, math.inf)
+            folding = np.where(
+                (rates < 0.0) & (angles > stowed), (stowed - angles) / rates, math.inf
+            )
+        return float(min(opening.min(), folding.min()))
+
+    def _explain(self, error: Exception) -> str:
+        time = self.history.times[-1]
+        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+        detail = next((line for line in lines if "step" in line.lower()), lines[0] if lines else "")
+        return (
+            f"the solver gave up at {time:.6g} s after {self.history.halvings} reductions of the "
+            f"step: reduce solver.step or solver.tolerance, or raise solver.newton_tolerance "
+            f"({detail[:200]})"
+        )
+
+
+def _contact_step(built: Built) -> float:
+    """Step that resolves a V-joint's bounce: a twentieth of its period on the stop's spring."""
+    scene = built.ring.scene
+    if scene.stop is None:
+        return scene.solver.step
+    rods, ring = scene.rods, scene.structure
+    half = rods.density * rods.bar.area * ring.half_bar**3 / 3.0
+    inertia = 2.0 * half + ring.vjoint_mass * ring.half_bar**2
+    return 2.0 * math.pi * math.sqrt(inertia / scene.stop.stiffness) / 20.0
+
+
+def _settings(built: Built) -> Any:
+    scene = built.ring.scene
+    settings = exu.SimulationSettings()
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = 2.0 * scene.solver.end_time
+    settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
+    time = settings.timeIntegration
+    time.verboseMode = 0
+    time.endTime = scene.solver.end_time
+    time.numberOfSteps = 1
+    time.adaptiveStep = True
+    time.adaptiveStepRecoverySteps = 10**6
+    time.minimumStepSize = 1e-9
+    time.generalizedAlpha.spectralRadius = scene.solver.spectral_radius
+    time.generalizedAlpha.computeInitialAccelerations = False
+    time.generalizedAlpha.resetAccelerations = False
+    time.newton.useModifiedNewton = True
+    time.newton.modifiedNewtonJacUpdatePerStep = True
+    time.newton.maxIterations = 25
+    time.newton.relativeTolerance = 1e-14
+    time.newton.absoluteTolerance = _residual_tolerance(built)
+    return settings
+
+
+def _residual_tolerance(built: Built) -> float:
+    """Residual norm in N at which Newton stops.
+
+    ``newton_tolerance`` times the driving forces, but above what round-off lets the residual
+    reach: the stiffest element's rate EA / L times coordinates of order 1 m, per coordinate.
+    """
+    scene = built.ring.scene
+    drive = float(np.linalg.norm(built.forces))
+    if scene.net is not None and built.net is not None:
+        drive += float(np.linalg.norm(built.net.stiffness)) * scene.net.neutral_length
+    stiffest = max(
+        np.max(scene.rods.young_modulus) * tube.area * scene.rods.elements / length
+        for tube, length in (
+            (scene.rods.diagonal, scene.structure.half_diagonal),
+            (scene.rods.bar, scene.structure.half_bar),
+        )
+    )
+    size = built.ring.assembly.system.systemData.ODE2Size()
+    round_off = 4.0 * np.finfo(float).eps * float(stiffest) * math.sqrt(size)
+    return max(scene.solver.newton_tolerance * drive, round_off)

@@ -1,0 +1,119 @@
+"""From the history of a run to its outcome on the scene's own time grid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
+from ringsim.engine.integrate import History
+from ringsim.scene import Scene
+from ringsim.variables import PLANES, RODS, Outcome
+
+Array = NDArray[np.float64]
+
+
+def output_times(scene: Scene) -> Array:
+    """The scene's output grid in s: multiples of ``record.interval`` up to the end time."""
+    count = math.floor(scene.solver.end_time / scene.record.interval * (1.0 + 1e-12))
+    return np.arange(count + 1) * scene.record.interval
+
+
+def lock_times(times: Array, angles: Array, rates: Array) -> Array:
+    """First time at which each V-joint reaches 180 deg, shape (2, sections), s; NaN if never.
+
+    The crossing is the root of the cubic that fits angles and rates at both ends of the step.
+
+    Parameters
+    ----------
+    times, angles, rates
+        Shapes (n,), (n, 2, sections) and the same; s, rad, rad/s.
+    """
+    found = np.full(angles.shape[1:], np.nan)
+    for place in np.ndindex(*found.shape):
+        past = angles[(slice(None), *place)] - math.pi
+        crossing = np.flatnonzero(past >= 0.0)
+        if len(crossing) == 0 or crossing[0] == 0:
+            continue
+        ends = slice(crossing[0] - 1, crossing[0] + 1)
+        cubic = CubicHermiteSpline(times[ends], past[ends], rates[(ends, *place)])
+        roots = cubic.roots(extrapolate=False)
+        inside = roots[(roots >= times[ends][0]) & (roots <= times[ends][1])]
+        found[place] = inside.min() if len(inside) else times[crossing[0]]
+    return found
+
+
+def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: float) -> Outcome:
+    """Put a run on the output grid; what lies after its end is NaN."""
+    sections = scene.structure.sections
+    grid = output_times(scene)
+    times = np.array(history.times)
+    angles, rates = np.array(history.angles), np.array(history.rates)
+    values: dict[str, Array] = {}
+
+    locks = lock_times(times, angles, rates)
+    deployed = float(locks.max()) if np.isfinite(locks).all() else math.nan
+    values["lock_time"] = locks
+    values["deployment_time"] = np.array(deployed)
+
+    opening = _on_grid(grid, times, angles, rates)
+    values["opening_angle"] = np.degrees(np.moveaxis(opening, 0, -1))
+    spread = np.degrees(np.ptp(angles.reshape(len(times), -1), axis=1))
+    flat = values["opening_angle"].reshape(-1, len(grid))
+    values["asynchrony"] = flat.max(axis=0) - flat.min(axis=0)
+    before = times <= deployed if math.isfinite(deployed) else np.ones(len(times), dtype=bool)
+    values["asynchrony_max"] = np.array(spread[before].max())
+
+    energies = np.array(history.energies)
+    lost = np.concatenate(
+        [[0.0], np.cumsum(0.5 * np.diff(times) * (energies[1:, 3] + energies[:-1, 3]))]
+    )
+    kinetic, elastic, work = energies[:, 0], energies[:, 1], energies[:, 2]
+    for name, series in (
+        ("kinetic_energy", kinetic),
+        ("elastic_energy", elastic),
+        ("work", work),
+        ("dissipation", lost),
+        ("constraint_violation", np.array(history.gaps)),
+    ):
+        values[name] = _on_grid(grid, times, series)
+    balance = kinetic - kinetic[0] + elastic - elastic[0] + lost - work
+    exchanged = max(np.abs(work).max(), np.ptp(kinetic), np.ptp(elastic), 1e-300)
+    values["energy_error"] = np.array(np.abs(balance).max() / exchanged)
+    values["constraint_error"] = np.array(max(history.gaps))
+    if history.stresses:
+        stresses = np.array(history.stresses)
+        values["rod_stress"] = np.moveaxis(_on_grid(grid, times, stresses), 0, -1)
+        values["peak_rod_stress"] = np.array(stresses.max())
+    counts = {
+        "steps": len(times) - 1,
+        "newton_iterations": history.newton_iterations,
+        "jacobians": history.jacobians,
+    }
+    values.update({name: np.array(count) for name, count in counts.items()})
+    values["final_time"] = np.array(times[-1])
+    values["wall_time"], values["cpu_time"] = np.array(wall_time), np.array(cpu_time)
+    coordinates = {
+        "plane": np.array(PLANES),
+        "section": np.arange(1, sections + 1),
+        "time": grid,
+    }
+    if "rod_stress" in values:
+        coordinates["rod"] = np.array(RODS)
+    return Outcome(history.status, history.reason, coordinates, values)
+
+
+def _on_grid(grid: Array, times: Array, series: Array, rates: Array | None = None) -> Array:
+    """Interpolate along the first axis: cubic Hermite with rates, else shape-preserving cubic."""
+    found = np.full((len(grid), *series.shape[1:]), np.nan)
+    inside = grid <= times[-1] * (1.0 + 1e-12)
+    where = np.minimum(grid[inside], times[-1])
+    if len(times) == 1:
+        found[inside] = series[0]
+    elif rates is not None:
+        found[inside] = CubicHermiteSpline(times, series, rates, axis=0)(where)
+    else:
+        found[inside] = PchipInterpolator(times, series, axis=0)(where)
+    return found

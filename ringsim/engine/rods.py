@@ -1,0 +1,119 @@
+"""Building rods: one function a formulation, found by the kind of the scene's rods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import exudyn as exu
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.engine.assembly import Assembly, Frame
+from ringsim.parts.rods.family import Rods
+from ringsim.parts.tube import Tube
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A chain of beam elements.
+
+    Attributes
+    ----------
+    nodes
+        From start to end; their frames have x along the rod and z along the section's normal.
+    elements
+        Objects, one fewer than nodes.
+    axes
+        Initial frame, columns in global coordinates, shape (3, 3).
+    tube
+        Cross-section.
+
+    """
+
+    nodes: list[Any]
+    elements: list[Any]
+    axes: Array
+    tube: Tube
+
+
+class NodeFrames(NamedTuple):
+    """Frames of n rod nodes: positions (n, 3), y and z axes (n, 3), rates about z (n,)."""
+
+    position: Array
+    y: Array
+    z: Array
+    spin: Array
+
+
+class Formulation(Protocol):
+    """What a rod formulation must offer."""
+
+    def add_node(self, assembly: Assembly, frame: Frame) -> Any:
+        """A node of this formulation."""
+
+    def add_element(self, assembly: Assembly, nodes: list[Any], length: float, section: Any) -> Any:
+        """An element between two nodes."""
+
+    def add_mass(self, assembly: Assembly, node: Any, mass: float) -> None:
+        """A point mass at a node."""
+
+    def read(self, coordinates: Array, rates: Array) -> NodeFrames:
+        """Frames of nodes from their total coordinates and rates, shape (n, coordinates)."""
+
+
+def beam_section(rods: Rods, tube: Tube, young_modulus: float) -> Any:
+    """Exudyn's section data: stiffness diag(EA, kGA, kGA, GJ, EI, EI) and inertia."""
+    area, second = tube.area, tube.second_moment
+    shear = young_modulus * rods.shear_modulus_ratio
+    factor = tube.shear_factor(rods.poisson_ratio)
+    stiffness = np.diag(
+        [
+            young_modulus * area,
+            factor * shear * area,
+            factor * shear * area,
+            shear * 2.0 * second,
+            young_modulus * second,
+            young_modulus * second,
+        ]
+    )
+    section = exu.BeamSection()
+    section.massPerLength = rods.density * area
+    section.inertia = rods.density * np.diag([2.0 * second, second, second])
+    section.stiffnessMatrix = stiffness
+    section.dampingMatrix = rods.damping * stiffness
+    return section
+
+
+def add_rod(
+    assembly: Assembly,
+    formulation: Formulation,
+    ends: tuple[Frame, Frame],
+    elements: int,
+    section: Any,
+    tube: Tube,
+) -> Rod:
+    """A straight rod between two frames that share their axes; motion is interpolated."""
+    first, last = ends
+    nodes = []
+    for share in np.linspace(0.0, 1.0, elements + 1):
+        nodes.append(
+            formulation.add_node(
+                assembly,
+                Frame(
+                    (1 - share) * first.position + share * last.position,
+                    first.axes,
+                    (1 - share) * first.acceleration + share * last.acceleration,
+                    first.turn,
+                ),
+            )
+        )
+    length = float(np.linalg.norm(last.position - first.position)) / elements
+    objects = [
+        formulation.add_element(assembly, nodes[k : k + 2], length, section)
+        for k in range(elements)
+    ]
+    assembly.bodies += objects
+    return Rod(nodes, objects, first.axes, tube)

@@ -1,0 +1,76 @@
+"""Choosing the next step from the motion so far."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from ringsim.parts.solver import Solver
+
+GROWTH = 1.5
+"""Largest ratio of two successive steps."""
+_LOCAL_ERROR = 0.1
+"""Local error constant C of the integrator, error = C h^3 d3(angle)/dt3."""
+_FINEST = 400.0
+"""The motion alone asks for no step below ``step`` over this."""
+_FIRST = 20.0
+"""The first step is ``step`` over this."""
+
+
+class StepControl:
+    """Steps that keep the relative error in time of the mean opening angle near a tolerance.
+
+    A local error C h^3 |a'''| in the angle a shifts the motion by C h^3 |a'''| / |a'| in time;
+    spread evenly over the run that gives h = sqrt(tolerance |a'| / (C |a'''|)).  The third
+    derivative comes from divided differences of the last three rates; a rate below ``travel``
+    over the end time counts as that much, or the tremor of a ring that hardly moves yet would
+    ask for tiny steps.  The ratio |a'''| / |a'| fades over its own time scale, so that a passage
+    of a''' through zero does not open the step.  Towards the end of the travel the step shrinks
+    so that the stop is met with a small one.
+    """
+
+    def __init__(self, solver: Solver, contact_step: float, travel: float) -> None:
+        self._solver = solver
+        self._contact = min(contact_step, solver.step)
+        self._least = solver.step / _FINEST
+        self._slow = travel / solver.end_time
+        self._bend = 0.0
+        self._past: deque[tuple[float, float]] = deque(maxlen=3)
+        self.step = solver.step if solver.step_control == "constant" else solver.step / _FIRST
+
+    def advance(self, time: float, rate: float, *, to_stop: float, in_contact: bool) -> float:
+        """The next step in s.
+
+        Parameters
+        ----------
+        time, rate
+            End of the step just taken and the mean opening rate there, s and rad/s.
+        to_stop
+            Estimated time until the next V-joint meets a stop, s; infinite if none will.
+        in_contact
+            Whether a V-joint is at its stop now.
+
+        """
+        self._past.append((time, rate))
+        if self._solver.step_control == "constant":
+            return self.step
+        wanted = max(self._from_motion(), self._least)
+        if in_contact:
+            wanted = min(wanted, self._contact)
+        elif math.isfinite(to_stop):
+            wanted = min(wanted, max(0.5 * to_stop, self._contact))
+        self.step = min(wanted, GROWTH * self.step, self._solver.step)
+        return self.step
+
+    def _from_motion(self) -> float:
+        if len(self._past) < 3:
+            return self.step
+        (t0, r0), (t1, r1), (t2, r2) = self._past
+        first, second = (r1 - r0) / (t1 - t0), (r2 - r1) / (t2 - t1)
+        third = abs(2.0 * (second - first) / (t2 - t0))
+        bend = third / max(abs(r2), self._slow)
+        fading = max(0.0, 1.0 - (t2 - t1) * math.sqrt(self._bend))
+        self._bend = max(bend, fading * self._bend)
+        if self._bend == 0.0:
+            return self._solver.step
+        return math.sqrt(self._solver.tolerance / _LOCAL_ERROR / self._bend)

@@ -1,0 +1,50 @@
+"""Axial + bending stress at the ends of the rods."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.engine.pantograph_ring import RingModel
+from ringsim.variables import RODS
+
+Array = NDArray[np.float64]
+_FORCE = exu.OutputVariableType.ForceLocal
+_TORQUE = exu.OutputVariableType.TorqueLocal
+
+
+class StressMeter:
+    """Stress |N| / A + |M| r / I of every rod half: the largest over both ends of its elements."""
+
+    def __init__(self, model: RingModel) -> None:
+        self._output = model.assembly.system.GetObjectOutputBody
+        self._places = [self._rows(model, name) for name in RODS]
+
+    def read(self) -> Array:
+        """Stresses at the current state, shape (8, sections), Pa."""
+        return np.array([[self._worst(*half) for half in row] for row in self._places])
+
+    def _rows(self, model: RingModel, name: str) -> list[Any]:
+        whole = name if name.startswith("bar") else name.rsplit("_", 1)[0]
+        rows = []
+        for rod in model.rods[whole]:
+            elements = rod.elements
+            if whole != name:
+                middle = len(elements) // 2
+                elements = elements[:middle] if name.endswith("left") else elements[middle:]
+            length = model.assembly.system.GetObjectParameter(elements[0], "length")
+            ends = [(elements[0], [-0.5 * length, 0.0, 0.0]), (elements[-1], [0.5 * length, 0, 0])]
+            rows.append((ends, rod.tube))
+        return rows
+
+    def _worst(self, ends: Any, tube: Any) -> float:
+        worst = 0.0
+        for element, place in ends:
+            force = self._output(element, _FORCE, place)
+            torque = self._output(element, _TORQUE, place)
+            bending = float(np.hypot(torque[1], torque[2])) * 0.5 * tube.outer_diameter
+            worst = max(worst, abs(force[0]) / tube.area + bending / tube.second_moment)
+        return worst
