@@ -1,0 +1,1 @@
+"""Kinds of cable faults, one file each."""

@@ -1,0 +1,38 @@
+"""The family of cable faults."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from ringsim.cable.ropes import Ropes
+from ringsim.cable.state import ChainState
+from ringsim.units import Model, SecondOrZero
+
+
+class CableFault(Model):
+    """Something that breaks at a given time and place."""
+
+    cable: Annotated[int, Field(ge=1)] = 1
+    """Which cable of the scene, counted from 1."""
+    time: SecondOrZero
+    """When it happens, in s of the simulation."""
+
+    def strike(self, ropes: Ropes, state: ChainState) -> Ropes:
+        """The ropes after the fault.
+
+        Parameters
+        ----------
+        ropes
+            The ropes before it.
+        state
+            The chain at that instant.
+
+        Raises
+        ------
+        ValueError
+            If the cable or the place on it does not exist.
+
+        """
+        raise NotImplementedError

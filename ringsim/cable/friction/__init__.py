@@ -1,0 +1,1 @@
+"""Kinds of friction between a rope and its pulleys, one file each."""

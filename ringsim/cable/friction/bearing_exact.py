@@ -1,0 +1,50 @@
+"""Friction in the pulley's bearing, without approximation."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from ringsim.cable.friction.bearing import BearingFriction
+from ringsim.cable.friction.family import Array, PulleyFriction
+from ringsim.parts.persection import PerSection
+from ringsim.units import MetreOrZero
+
+
+class ExactBearingFriction(PulleyFriction):
+    """The root below 1 of R (1 - eta) = f sqrt(1 + eta^2 + 2 eta cos a).
+
+    With k = f/R the balance squared is (1 - k^2)(1 + eta^2) = 2 (1 + k^2 cos a) eta.  Its two
+    roots are each other's inverse, one for each direction of the rope; the one below 1 is
+
+        eta = (q - k cos(a/2)) / (q + k cos(a/2)),   q = sqrt(1 - k^2 sin(a/2)^2),
+
+    because q^2 - k^2 cos(a/2)^2 = 1 - k^2 and (q + k cos(a/2))^2 = 1 + k^2 cos a
+    + 2 q k cos(a/2).  The closed form (kind "bearing") is the case q = 1; both agree for
+    a = 0 and a = pi.  Source of the balance: paper 000, eq. 18.
+    """
+
+    kind: Literal["bearing-exact"] = "bearing-exact"
+    coefficient: PerSection[MetreOrZero]
+    """f in metre: one value for all pulleys, or one for each in order from the winch."""
+
+    @property
+    def coefficients(self) -> Array:
+        """F in metre, shape () or (pulleys,)."""
+        return np.asarray(self.coefficient, dtype=float)
+
+    def refusal(self, radius: float) -> str | None:
+        """F must be below R, as for the closed form."""
+        return BearingFriction(coefficient=self.coefficient).refusal(radius)
+
+    def log_decay(self, angle: Array, radius: float) -> Array:
+        """ln(eta) = -2 artanh(k cos(a/2) / q)."""
+        ratio = self.coefficients / radius
+        root = np.sqrt(1.0 - (ratio * np.sin(0.5 * angle)) ** 2)
+        return np.asarray(-2.0 * np.arctanh(ratio * np.cos(0.5 * angle) / root))
+
+    def log_slope(self, angle: Array, radius: float) -> Array:
+        """The derivative k sin(a/2) / q."""
+        lateral = self.coefficients / radius * np.sin(0.5 * angle)
+        return np.asarray(lateral / np.sqrt(1.0 - lateral**2))

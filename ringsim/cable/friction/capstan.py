@@ -1,0 +1,37 @@
+"""A rope that slides on fixed sheaves."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from ringsim.cable.friction.family import Array, PulleyFriction
+from ringsim.parts.persection import PerSection
+from ringsim.units import FrictionCoefficient
+
+
+class CapstanFriction(PulleyFriction):
+    """eta = exp(-mu (pi - a)): dry friction along the wrap angle pi - a.
+
+    Source: Euler-Eytelwein.  The radius of the sheave plays no part.
+    """
+
+    kind: Literal["capstan"] = "capstan"
+    coefficient: PerSection[FrictionCoefficient]
+    """mu: one value for all sheaves, or one for each in order from the winch."""
+
+    @property
+    def coefficients(self) -> Array:
+        """mu, shape () or (pulleys,)."""
+        return np.asarray(self.coefficient, dtype=float)
+
+    def log_decay(self, angle: Array, radius: float) -> Array:
+        """ln(eta) = -mu (pi - a)."""
+        del radius
+        return np.asarray(-self.coefficients * (np.pi - angle))
+
+    def log_slope(self, angle: Array, radius: float) -> Array:
+        """The coefficient mu, whatever the angle."""
+        del radius
+        return np.broadcast_to(self.coefficients, angle.shape).astype(float)

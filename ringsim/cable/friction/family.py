@@ -1,0 +1,46 @@
+"""The family of friction laws: how much tension a rope loses on its way over a pulley."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.units import Model
+
+Array = NDArray[np.float64]
+
+
+class PulleyFriction(Model):
+    """Ratio eta of the tension behind a pulley to the tension before it, seen from the winch.
+
+    It holds while rope runs to the winch and depends on the angle a between the two pulls
+    alone: a = pi where the rope runs straight through, a = 0 where it turns back on itself.  A
+    kind defines ln(eta), at most 0, and its derivative; the logarithm keeps long products of
+    weak pulleys exact.
+    """
+
+    @property
+    def coefficients(self) -> Array:
+        """One coefficient for all pulleys (shape ()), or one for each (shape (pulleys,))."""
+        return np.zeros(())
+
+    def refusal(self, radius: float) -> str | None:
+        """Why the law has no solution on pulleys of this radius (m), or None if it has."""
+        del radius
+        return None
+
+    def log_decay(self, angle: Array, radius: float) -> Array:
+        """ln(eta) for the angles (rad, shape (pulleys,)) on pulleys of ``radius`` (m)."""
+        raise NotImplementedError
+
+    def log_slope(self, angle: Array, radius: float) -> Array:
+        """D ln(eta) / d angle, in 1/rad; same shapes."""
+        raise NotImplementedError
+
+    def decay(self, angle: Array, radius: float) -> Array:
+        """Tension ratio eta, in (0, 1]."""
+        return np.exp(self.log_decay(angle, radius))
+
+    def slope(self, angle: Array, radius: float) -> Array:
+        """D eta / d angle, in 1/rad."""
+        return self.decay(angle, radius) * self.log_slope(angle, radius)

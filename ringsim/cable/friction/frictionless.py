@@ -1,0 +1,25 @@
+"""Pulleys without friction."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from ringsim.cable.friction.family import Array, PulleyFriction
+
+
+class Frictionless(PulleyFriction):
+    """eta = 1: one tension in the whole rope, the driving-cable element of paper 001."""
+
+    kind: Literal["none"] = "none"
+
+    def log_decay(self, angle: Array, radius: float) -> Array:
+        """Zero for every pulley."""
+        del radius
+        return np.zeros_like(angle)
+
+    def log_slope(self, angle: Array, radius: float) -> Array:
+        """Zero for every pulley."""
+        del radius
+        return np.zeros_like(angle)

@@ -1,0 +1,145 @@
+"""What a scene says of a cable and its winches."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from ringsim.cable.faults.family import CableFault
+from ringsim.cable.friction.family import PulleyFriction
+from ringsim.cable.friction.frictionless import Frictionless
+from ringsim.cable.winding.family import (
+    FeedbackWinding,
+    PrescribedWinding,
+    WinchReading,
+    WinchState,
+    Winding,
+)
+from ringsim.choice import load_package, one_of
+from ringsim.units import (
+    AxialStiffness,
+    Metre,
+    MetreOrZero,
+    Model,
+    PositiveSpeed,
+    SecondOrZero,
+    SignedMetre,
+    Tension,
+)
+
+for _package in ("friction", "winding", "faults"):
+    load_package(f"ringsim.cable.{_package}")
+
+if TYPE_CHECKING:
+    AnyFriction = PulleyFriction
+    AnyWinding = Winding
+    AnyFault = CableFault
+else:
+    AnyFriction = one_of(PulleyFriction)
+    AnyWinding = one_of(Winding)
+    AnyFault = one_of(CableFault)
+
+
+class Winch(Model):
+    """A motor with a drum: a winding law between a start and a stop."""
+
+    winding: AnyWinding
+    start_time: SecondOrZero = 0.0
+    """The law's time begins here; the drum stands still before."""
+    stop_time: SecondOrZero | None = None
+    """The drum stands still from here on."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Winch:
+        if self.stop_time is not None and self.stop_time < self.start_time:
+            raise ValueError(
+                f"stop_time = {self.stop_time} s must not be before start_time = "
+                f"{self.start_time} s"
+            )
+        return self
+
+    @property
+    def feedback(self) -> bool:
+        """Whether ``advance`` needs readings."""
+        return self.winding.feedback
+
+    def turns(self, time: float) -> bool:
+        """Whether the motor is switched on at a time (s)."""
+        return self.start_time <= time and (self.stop_time is None or time < self.stop_time)
+
+    def at(self, time: float, state: WinchState) -> WinchState:
+        """Rope wound and its rate at a time within the present step.
+
+        A prescribed law answers exactly and ignores ``state``; one with feedback goes on from
+        ``state`` at the speed held.
+        """
+        if isinstance(self.winding, PrescribedWinding):
+            last = time if self.stop_time is None else min(time, self.stop_time)
+            clock = max(last - self.start_time, 0.0)
+            rate = self.winding.wound_rate(clock) if self.turns(time) else 0.0
+            return WinchState(time, self.winding.wound(clock), rate)
+        return state.at(time)
+
+    def advance(
+        self, time: float, duration: float, reading: WinchReading | None, state: WinchState
+    ) -> WinchState:
+        """The state to hold from ``time`` for a step of ``duration``; call once per step."""
+        if isinstance(self.winding, FeedbackWinding):
+            if not self.turns(time):
+                return WinchState(time, state.at(time).wound, 0.0)
+            if reading is None:
+                raise ValueError(f'winding.kind = "{self.winding}" needs a reading')
+            return self.winding.advance(time, duration, reading, state)
+        return self.at(time, state)
+
+
+class Cable(Model):
+    """A cable over the pulleys of one plane, with a winch at one end or both.
+
+    Its tension falls from the winch on; see ``ringsim.cable.chain`` for the equations.
+    """
+
+    plane: Literal["upper", "lower"] = "upper"
+    end: Literal["first", "last", "both"] = "first"
+    """Where the winch is: at section 1, at the last section, or one at either end."""
+    winch: Winch
+    far_winch: Winch | None = None
+    """With end = "both", the winch at the last section; left out, it is like the first."""
+    axial_stiffness: AxialStiffness = 1e5
+    """Young's modulus times cross-section (EA)."""
+    damping_time: SecondOrZero = 0.0
+    """Kelvin-Voigt time t_d: stress = E (strain + t_d * strain rate)."""
+    pulley_radius: Metre = 0.01
+    friction: AnyFriction = Frictionless()
+    slip_speed: PositiveSpeed = 2e-4
+    """Rope speed over a pulley at which 76 % of its friction acts (regularisation)."""
+    slack_width: Annotated[Tension, Field(ge=1e-6)] = 0.05
+    """Width of the passage from slack to taut; at the natural length 0.69 of it pulls."""
+    initial_slack: SignedMetre = 0.0
+    """Natural length minus path length at the start; negative: the cable is pre-stretched."""
+    block_offset: MetreOrZero = 0.105
+    """Distance of the V pulleys from the V-joint's axis, on the bisector and away from the bars.
+
+    Without it the V pulley would sit on the axis, its spans would keep their lengths and the
+    cable would do no work.  Source: h in paper 000, fig. 3; the value is inferred from its
+    deployment time.
+    """
+
+    @model_validator(mode="after")
+    def _usable(self) -> Cable:
+        reason = self.friction.refusal(self.pulley_radius)
+        if reason is not None:
+            raise ValueError(reason)
+        if self.far_winch is not None and self.end != "both":
+            raise ValueError(
+                f'far_winch needs end = "both", but end = "{self.end}" (leave one of them out)'
+            )
+        return self
+
+    @property
+    def winches(self) -> tuple[Winch, ...]:
+        """The winch at the path's beginning, and the one at its end if there is one."""
+        if self.end != "both":
+            return (self.winch,)
+        return (self.winch, self.far_winch or self.winch)

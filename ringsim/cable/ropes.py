@@ -1,0 +1,187 @@
+"""Which spans form one rope: a cable is one rope until a fault splits it.
+
+The points of all cables stand behind one another, each cable's in order from its winch.  A
+cable of p points has p - 1 spans and p - 2 pulleys (its inner points); a rope is a run of spans
+over which the cable slips.  Two ropes of a cable meet at a jammed pulley.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Ropes:
+    """The ropes of all cables.
+
+    Attributes
+    ----------
+    points_per_cable
+        Points of every cable, at least 2 each.
+    starts
+        First span of each rope, increasing, shape (ropes,).
+    content
+        Natural length of each rope in metre, with what its winches have wound since the start
+        (and without what they will still wind), shape (ropes,).
+    alive
+        Whether the rope can carry tension, shape (ropes,).
+
+    """
+
+    points_per_cable: tuple[int, ...]
+    starts: Indices
+    content: Array
+    alive: Flags
+
+    @classmethod
+    def whole(cls, points_per_cable: Sequence[int], content: Array) -> Ropes:
+        """One rope per cable; ``content`` is its natural length at the start, in metre."""
+        if min(points_per_cable) < 2:
+            raise ValueError("a cable needs at least two points")
+        spans = np.asarray(points_per_cable) - 1
+        starts = np.concatenate([[0], np.cumsum(spans)[:-1]]).astype(np.intp)
+        alive = np.ones(len(spans), dtype=bool)
+        return cls(tuple(points_per_cable), starts, np.asarray(content, dtype=float), alive)
+
+    @cached_property
+    def cable_starts(self) -> Indices:
+        """First span of each cable, with the number of all spans behind, shape (cables + 1,)."""
+        spans = np.asarray(self.points_per_cable) - 1
+        return np.concatenate([[0], np.cumsum(spans)]).astype(np.intp)
+
+    @cached_property
+    def spans(self) -> int:
+        """Number of spans of all cables."""
+        return int(self.cable_starts[-1])
+
+    @cached_property
+    def near(self) -> Indices:
+        """Point at each span's end nearer to the winch, shape (spans,)."""
+        cable = np.repeat(np.arange(len(self.points_per_cable)), np.diff(self.cable_starts))
+        return np.arange(self.spans) + cable
+
+    @cached_property
+    def far(self) -> Indices:
+        """Point at the other end, shape (spans,)."""
+        return self.near + 1
+
+    @cached_property
+    def ends(self) -> Indices:
+        """One more than the last span of each rope, shape (ropes,)."""
+        return np.append(self.starts[1:], self.spans)
+
+    @cached_property
+    def of_span(self) -> Indices:
+        """Rope of each span, shape (spans,)."""
+        return np.repeat(np.arange(len(self.starts)), self.ends - self.starts)
+
+    @cached_property
+    def behind(self) -> Indices:
+        """Span behind each pulley, seen from the winch, shape (pulleys,); before it: one less."""
+        return np.setdiff1d(np.arange(self.spans), self.cable_starts[:-1])
+
+    @cached_property
+    def of_pulley(self) -> Indices:
+        """Rope behind each pulley, shape (pulleys,)."""
+        return self.of_span[self.behind]
+
+    @cached_property
+    def slips(self) -> Array:
+        """1 where the rope slips over the pulley, 0 where it is jammed, shape (pulleys,)."""
+        return np.asarray(~np.isin(self.behind, self.starts), dtype=float)
+
+    @cached_property
+    def first(self) -> Indices:
+        """Rope at the winch of each cable, shape (cables,)."""
+        return self.of_span[self.cable_starts[:-1]]
+
+    @cached_property
+    def last(self) -> Indices:
+        """Rope at the far end of each cable, shape (cables,)."""
+        return self.of_span[self.cable_starts[1:] - 1]
+
+    @cached_property
+    def cable(self) -> Indices:
+        """Cable of each rope, shape (ropes,)."""
+        return np.searchsorted(self.cable_starts, self.starts, side="right") - 1
+
+    def per_rope(self, ends: Array) -> Array:
+        """Sum over a rope's ends of a quantity of the winches; (cables, 2) -> (ropes,)."""
+        total = np.zeros(len(self.starts))
+        total[self.first] += ends[:, 0]
+        total[self.last] += ends[:, 1]
+        return total
+
+    def pulleys(self, cable: int) -> slice:
+        """The pulleys of a cable, counted from 0."""
+        first = int(self.cable_starts[cable]) - cable
+        return slice(first, first + self.points_per_cable[cable] - 2)
+
+    def jam(self, cable: int, pulley: int, stored: Array, wound: Array) -> Ropes:
+        """The ropes after a pulley seizes the rope; cable and pulley count from 0.
+
+        Parameters
+        ----------
+        cable, pulley
+            Where; counted from the winch.
+        stored
+            Natural length in each span at that instant, in metre, shape (spans,).
+        wound
+            Rope wound at the two ends of each cable until then, in metre, shape (cables, 2).
+
+        Raises
+        ------
+        ValueError
+            If there is no such pulley.
+
+        """
+        self._check(cable, pulley, 2, "pulley")
+        start = int(self.cable_starts[cable]) + pulley + 1
+        if start in self.starts:
+            return self
+        k = int(self.of_span[start])
+        near = float(stored[self.starts[k] : start].sum())
+        far = float(stored[start : self.ends[k]].sum())
+        near += float(wound[cable, 0]) if self.first[cable] == k else 0.0
+        far += float(wound[cable, 1]) if self.last[cable] == k else 0.0
+        content = np.insert(self.content, k + 1, far)
+        content[k] = near
+        return replace(
+            self,
+            starts=np.insert(self.starts, k + 1, start),
+            content=content,
+            alive=np.insert(self.alive, k + 1, self.alive[k]),
+        )
+
+    def cut(self, cable: int, span: int) -> Ropes:
+        """The ropes after a span parts; both count from 0.
+
+        Raises
+        ------
+        ValueError
+            If there is no such span.
+
+        """
+        self._check(cable, span, 1, "span")
+        alive = self.alive.copy()
+        alive[self.of_span[self.cable_starts[cable] + span]] = False
+        return replace(self, alive=alive)
+
+    def _check(self, cable: int, place: int, fewer: int, what: str) -> None:
+        cables = len(self.points_per_cable)
+        if not 0 <= cable < cables:
+            raise ValueError(f"there is no cable {cable + 1} (there are 1 to {cables})")
+        count = self.points_per_cable[cable] - fewer
+        if not 0 <= place < count:
+            raise ValueError(
+                f"cable {cable + 1} has no {what} {place + 1} (there are 1 to {count})"
+            )

@@ -1,0 +1,208 @@
+"""The chain at one instant: tensions, forces, powers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.cable import slack
+from ringsim.cable.ropes import Ropes
+from ringsim.cable.winding.family import WinchReading
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RopeMaterial:
+    """Constants of the rope, one value per rope, shape (ropes,)."""
+
+    axial_stiffness: Array
+    damping_time: Array
+    slack_width: Array
+
+
+@dataclass(frozen=True)
+class ChainState:
+    """All spans, pulleys and ropes at one instant; see ``ringsim.cable.chain``.
+
+    Attributes
+    ----------
+    lengths, rates
+        Length of each span (m) and its rate (m/s), shape (spans,).
+    directions
+        Unit vectors away from the winch, shape (spans, 3).
+    angles
+        Angle between the two pulls on each pulley (rad), shape (pulleys,).
+    log_decays, log_slopes
+        Logarithm of the full decay at each pulley and its derivative, shape (pulleys,).
+    speeds
+        Rope over each pulley (m/s, towards the winch positive), shape (pulleys,).
+    exponents
+        Share and direction of the full decay, tanh(speed / slip speed), shape (pulleys,).
+    slip_speeds
+        Speed that regularises the exponents (m/s), shape (pulleys,).
+    shares
+        Tension of each span over its rope's mean tension, shape (spans,).
+    tensions
+        Shape (spans,), in N.
+    paths, path_rates
+        Path length of each rope (m) and its rate (m/s), shape (ropes,).
+    natural, wound_rates
+        Natural length of each rope (m) and what its winches take up (m/s), shape (ropes,).
+    forces
+        Elastic and viscous force of each rope before smoothing (N), shape (ropes,).
+    mean_tensions
+        Mean tension of each rope, weighted by length (N), shape (ropes,).
+    wound, wound_rate
+        Of the winches at both ends of each cable, m and m/s, shape (cables, 2).
+
+    """
+
+    ropes: Ropes
+    material: RopeMaterial
+    lengths: Array
+    rates: Array
+    directions: Array
+    angles: Array
+    log_decays: Array
+    log_slopes: Array
+    speeds: Array
+    exponents: Array
+    slip_speeds: Array
+    shares: Array
+    tensions: Array
+    paths: Array
+    path_rates: Array
+    natural: Array
+    wound_rates: Array
+    forces: Array
+    mean_tensions: Array
+    wound: Array
+    wound_rate: Array
+
+    @property
+    def strains(self) -> Array:
+        """Mean strain of each rope, (path - natural) / natural: paper 001's element."""
+        return self.paths / self.natural - 1.0
+
+    @property
+    def strain_rates(self) -> Array:
+        """Rate of the mean strain, in 1/s, shape (ropes,)."""
+        return (self.path_rates + self.paths / self.natural * self.wound_rates) / self.natural
+
+    @property
+    def is_slack(self) -> NDArray[np.bool_]:
+        """Whether a rope is longer than its path, or cut; shape (ropes,)."""
+        return np.asarray((self.paths < self.natural) | ~self.ropes.alive)
+
+    @property
+    def decays(self) -> Array:
+        """C of each span: its tension over the tension of its rope's first span."""
+        first = self.shares[self.ropes.starts][self.ropes.of_span]
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            return np.asarray(self.shares / first)
+
+    @property
+    def winch_tensions(self) -> Array:
+        """Tension at both ends of each cable, in N, shape (cables, 2)."""
+        edge = self.ropes.cable_starts
+        return np.stack([self.tensions[edge[:-1]], self.tensions[edge[1:] - 1]], axis=-1)
+
+    @property
+    def point_forces(self) -> Array:
+        """Force of the cable on each point of its path, in N, shape (points, 3).
+
+        F = T_behind u_behind - T_before u_before; on a pulley that is its reaction, at the
+        ends the pull on the winch and on the fixing.
+        """
+        pull = self.tensions[:, None] * self.directions
+        forces = np.zeros((self.ropes.spans + len(self.ropes.points_per_cable), 3))
+        forces[self.ropes.near] = pull
+        forces[self.ropes.far] -= pull
+        return forces
+
+    @property
+    def stored(self) -> Array:
+        """Natural length in each span, in metre: stretch goes with tension, slack evenly."""
+        rope = self.ropes.of_span
+        stretch = (self.paths - self.natural) / self.paths
+        taut, loose = np.maximum(stretch, 0.0), np.minimum(stretch, 0.0)
+        return np.asarray(self.lengths * (1.0 - taut[rope] * self.shares - loose[rope]))
+
+    @property
+    def friction_loss(self) -> Array:
+        """Power lost on each pulley, in W, never negative, shape (pulleys,).
+
+        (T_before - T_behind) * speed of the stretched rope, with
+        T_behind = T_before exp(exponent * log_decay).
+        """
+        before = self.tensions[self.ropes.behind - 1] * self.ropes.slips
+        lost = -np.expm1(self.exponents * self.log_decays)
+        stretched = 1.0 + self.strains[self.ropes.of_pulley]
+        return np.asarray(before * lost * self.speeds * stretched)
+
+    @property
+    def damping_loss(self) -> Array:
+        """Power lost inside each rope, in W, never negative, shape (ropes,)."""
+        elastic = self.material.axial_stiffness * self.strains
+        viscous = self.mean_tensions - self.ropes.alive * slack.tension(
+            elastic, self.material.slack_width
+        )
+        return np.asarray(viscous * self.strain_rates * self.natural)
+
+    @property
+    def energy_density(self) -> Array:
+        """Elastic energy of each rope per natural length, in J/m, shape (ropes,)."""
+        stiffness = self.material.axial_stiffness
+        elastic = slack.energy(stiffness * self.strains, self.material.slack_width)
+        return np.asarray(self.ropes.alive * elastic / stiffness)
+
+    @property
+    def elastic_energy(self) -> Array:
+        """Elastic energy of each rope, in J, shape (ropes,)."""
+        return self.energy_density * self.natural
+
+    @property
+    def drum_power(self) -> Array:
+        """Elastic energy that each rope carries onto its drums, in W, shape (ropes,)."""
+        return self.energy_density * self.wound_rates
+
+    @property
+    def winch_power(self) -> Array:
+        """Power that the winches at both ends of each cable put in, in W, shape (cables, 2)."""
+        strain = np.stack([self.strains[self.ropes.first], self.strains[self.ropes.last]], axis=-1)
+        return self.winch_tensions * (1.0 + strain) * self.wound_rate
+
+    def reading(self, cable: int, end: int = 0, path_slope: float = 0.0) -> WinchReading:
+        """What the winch at an end (0 first, 1 far) of a cable (from 0) knows of its rope."""
+        rope = int((self.ropes.last if end else self.ropes.first)[cable])
+        return WinchReading(
+            stretch=float(self.paths[rope] - self.natural[rope]),
+            natural_length=float(self.natural[rope]),
+            axial_stiffness=float(self.material.axial_stiffness[rope]),
+            damping_time=float(self.material.damping_time[rope]),
+            slack_width=float(self.material.slack_width[rope]),
+            tension_ratio=self._tension_ratio(rope, end, float(self.wound_rate[cable, end])),
+            path_rate=float(self.path_rates[rope]),
+            path_slope=path_slope,
+        )
+
+    def _tension_ratio(self, rope: int, end: int, present: float) -> Callable[[float], float]:
+        """End tension over mean tension, were that end's winch to turn at another speed."""
+        ropes = self.ropes
+        inner = (ropes.of_pulley == rope) & (ropes.slips > 0.0)
+        part = self.lengths[ropes.starts[rope] : ropes.ends[rope]] / self.paths[rope]
+        share = 1.0 - np.cumsum(part)[:-1] - float(end)
+        speeds, slip, decays = self.speeds[inner], self.slip_speeds[inner], self.log_decays[inner]
+        alive = float(ropes.alive[rope])
+
+        def ratio(speed: float) -> float:
+            exponents = np.tanh((speeds + (speed - present) * share) / slip)
+            logs = np.append(0.0, np.cumsum(exponents * decays))
+            weights = np.exp(logs - logs.max())
+            return float(alive * weights[-1 if end else 0] / (weights @ part))
+
+        return ratio

@@ -1,0 +1,1 @@
+"""Kinds of winding laws, one file each."""

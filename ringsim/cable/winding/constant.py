@@ -1,0 +1,24 @@
+"""Winding at constant speed."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from ringsim.cable.winding.family import PrescribedWinding
+from ringsim.units import Speed
+
+
+class ConstantWinding(PrescribedWinding):
+    """wound = speed * t; a negative speed pays rope out.  Source: paper 000, eq. 32."""
+
+    kind: Literal["constant"] = "constant"
+    speed: Speed
+
+    def wound(self, time: float) -> float:
+        """Rope taken up, in metre."""
+        return self.speed * time
+
+    def wound_rate(self, time: float) -> float:
+        """The speed, in m/s."""
+        del time
+        return self.speed

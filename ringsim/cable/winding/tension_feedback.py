@@ -1,0 +1,47 @@
+"""Winding that keeps the rope near a wanted tension, from measured bar angles."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from ringsim.cable.winding.family import FeedbackWinding, WinchReading
+from ringsim.units import AngularRate, ControlGain, PositiveSpeed, SpeedOrZero, Tension
+
+
+class TensionFeedbackWinding(FeedbackWinding):
+    """Wind as fast as the ideal geometry takes up rope, corrected by the tension's error.
+
+        speed = take-up + gain * (target - T),   cut to -max_payout .. max_speed
+
+    The measured angles give the path of the rope, hence its stretch and its tension, without
+    a force sensor.  The take-up is -dS/d(delta) * opening_rate: the speed that lets the
+    sections open at that rate, almost nothing at the stowed end where the path hardly depends
+    on the angle - a constant speed starts there with a jerk, throws the structure ahead and
+    lets the rope go slack.  Without an opening rate it is the measured -dS/dt: stretch then
+    answers to the correction alone, d(stretch)/dt = gain * (target - T), and T settles at the
+    target within a time of S / (EA * gain), whatever the structure does below max_speed.
+
+    Source: control on measured angles is what paper 000 proposes as further work; the law is
+    this project's.
+    """
+
+    kind: Literal["tension-feedback"] = "tension-feedback"
+    target: Tension
+    gain: ControlGain = 0.02
+    """Added speed per newton of missing tension."""
+    max_speed: PositiveSpeed
+    max_payout: SpeedOrZero = 0.0
+    opening_rate: AngularRate | None = None
+    """Wanted rate of the opening angle; left out, the winch follows the structure."""
+
+    def command(self, tension: float, reading: WinchReading) -> float:
+        """Speed wanted at a tension (N), in m/s."""
+        if self.opening_rate is None:
+            takeup = -reading.path_rate
+        else:
+            takeup = -reading.path_slope * self.opening_rate
+        return takeup + self.gain * (self.target - tension)
+
+    def limits(self) -> tuple[float, float]:
+        """From paying out to winding in."""
+        return -self.max_payout, self.max_speed

@@ -1,0 +1,83 @@
+"""Cables, paths and motions for the tests of this folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ringsim.cable.chain import Chain
+from ringsim.cable.friction.bearing import BearingFriction
+from ringsim.cable.friction.bearing_exact import ExactBearingFriction
+from ringsim.cable.friction.capstan import CapstanFriction
+from ringsim.cable.friction.frictionless import Frictionless
+from ringsim.cable.records import Cable, Winch
+from ringsim.cable.winding.constant import ConstantWinding
+
+RADIUS = 0.01
+LAWS = {
+    "none": Frictionless(),
+    "bearing": BearingFriction(coefficient=0.3 * RADIUS),
+    "bearing-exact": ExactBearingFriction(coefficient=0.3 * RADIUS),
+    "capstan": CapstanFriction(coefficient=0.2),
+}
+
+
+def cable(**fields):
+    defaults = {"winch": Winch(winding=ConstantWinding(speed=0.01)), "pulley_radius": RADIUS}
+    return Cable(**(defaults | fields))
+
+
+@dataclass
+class Case:
+    """A chain in motion; rope wound is counted from a rope as long as its path."""
+
+    chain: Chain
+    points: np.ndarray
+    velocities: np.ndarray
+    wound: np.ndarray
+    wound_rate: np.ndarray
+
+    def __post_init__(self):
+        self.ropes = self.chain.start(self.points)
+
+    def state(self, points=None, velocities=None, ropes=None, wound=None):
+        return self.chain.state(
+            self.ropes if ropes is None else ropes,
+            self.points if points is None else points,
+            self.velocities if velocities is None else velocities,
+            self.wound if wound is None else wound,
+            self.wound_rate,
+        )
+
+
+def random_case(seed, counts=(7, 4), speed=1.0, wound=0.0, winding=0.0, far_winding=0.0, **fields):
+    """Paths that wander in space; spans between 0.3 and 1 m, no two neighbours parallel."""
+    rng = np.random.default_rng(seed)
+    paths = []
+    for count in counts:
+        steps = rng.normal(size=(count - 1, 3))
+        steps *= rng.uniform(0.3, 1.0, size=(count - 1, 1)) / np.linalg.norm(steps, axis=1)[:, None]
+        paths.append(np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)]))
+    points = np.concatenate(paths)
+    cables = len(counts)
+    return Case(
+        Chain([cable(**fields) for _ in counts], counts),
+        points,
+        speed * rng.normal(size=points.shape),
+        np.tile([wound, 0.0], (cables, 1)),
+        np.tile([winding, far_winding], (cables, 1)),
+    )
+
+
+def still(points, wound, rate=(1.0, 0.0), **fields):
+    """One cable at rest, with its rope on the move."""
+    points = np.asarray(points, dtype=float)
+    chain = Chain([cable(**fields)], [len(points)])
+    return Case(
+        chain,
+        points,
+        np.zeros_like(points),
+        np.array([[wound, 0.0]]),
+        np.array([rate], dtype=float),
+    )

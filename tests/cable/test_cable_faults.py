@@ -1,0 +1,117 @@
+"""Jammed pulleys and cut cables: what stays, what goes, and what never jumps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from cable_cases import LAWS, random_case, still
+from ringsim.cable.faults.cut_cable import CutCable
+from ringsim.cable.faults.jammed_pulley import JammedPulley
+from ringsim.cable.records import AnyFault
+
+PATH = [[0, 0, 0], [1, 0, 0], [1.5, 0.6, 0], [2, 0, 0.4], [3, 0, 0], [3, 1, 0]]
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+@pytest.mark.parametrize("wound", [0.002, -0.01])
+def test_a_jam_changes_no_rope_and_no_tension(law, wound):
+    case = still(PATH, wound, friction=law, slip_speed=1e-3, slack_width=0.01, axial_stiffness=1e4)
+    before = case.state()
+    ropes = JammedPulley(pulley=2, time=1.0).strike(case.ropes, before)
+    after = case.state(ropes=ropes)
+    assert after.natural.sum() == pytest.approx(before.natural.sum(), rel=1e-15)
+    assert len(after.natural) == 2
+    # Tension per rope is continuous to first order of strain, 4e-4; within each of the ropes
+    # friction starts anew from the motion that is left, so compare the mean tensions.
+    mean = np.add.reduceat(before.tensions * before.lengths, ropes.starts) / after.paths
+    assert after.mean_tensions == pytest.approx(mean, rel=2e-3, abs=1e-12)
+
+
+def test_rope_no_longer_crosses_a_jammed_pulley():
+    case = still(PATH, 0.002, friction=LAWS["bearing"], axial_stiffness=1e4)
+    before = case.state()
+    ropes = JammedPulley(pulley=2, time=1.0).strike(case.ropes, before)
+    assert JammedPulley(pulley=2, time=2.0).strike(ropes, case.state(ropes=ropes)) is ropes
+    further = case.state(ropes=ropes, wound=case.wound + np.array([[0.01, 0.0]]))
+    now = case.state(ropes=ropes)
+    # All the rope wound comes from the winch's side.
+    assert further.natural[0] == pytest.approx(now.natural[0] - 0.01, rel=1e-14)
+    assert further.natural[1] == now.natural[1]
+    assert np.array_equal(further.tensions[2:], now.tensions[2:])
+    assert further.tensions[0] > now.tensions[0]
+    assert now.speeds[1] == 0.0
+    assert now.friction_loss[1] == 0.0
+    # The far rope has both ends fixed and rests.
+    assert now.speeds[2:] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_jams_between_two_winches_leave_each_its_own_rope():
+    case = still(PATH, 0.001, (0.1, 0.1), axial_stiffness=1e4)
+    case.wound = np.array([[0.001, 0.0005]])
+    ropes = case.ropes
+    for pulley in (3, 1):
+        ropes = JammedPulley(pulley=pulley, time=1.0).strike(ropes, case.state(ropes=ropes))
+    assert list(ropes.starts) == [0, 1, 3]
+    now, then = (case.state(ropes=ropes, wound=case.wound + w) for w in (0.0, [[0.01, 0.002]]))
+    assert now.natural - then.natural == pytest.approx([0.01, 0.0, 0.002], abs=1e-14)
+    assert list(now.wound_rates) == [0.1, 0.0, 0.1]
+
+
+def test_the_energy_identity_holds_for_split_ropes():
+    case = random_case(
+        9, wound=0.01, winding=0.2, far_winding=0.1, friction=LAWS["bearing"], damping_time=0.01
+    )
+    ropes = JammedPulley(cable=1, pulley=3, time=0.0).strike(case.ropes, case.state())
+    state = case.state(ropes=ropes)
+    stored = state.natural * state.mean_tensions * state.strain_rates
+    spent = np.sum(state.point_forces * case.velocities) + state.friction_loss.sum() + stored.sum()
+    assert state.winch_power.sum() == pytest.approx(spent, rel=1e-12)
+
+
+def test_a_cut_takes_the_tension_from_both_sides_up_to_the_next_jam():
+    case = random_case(7, counts=(7, 4), wound=0.01, winding=0.1, friction=LAWS["capstan"])
+    whole = CutCable(cable=1, span=4, time=1.0).strike(case.ropes, case.state())
+    state = case.state(ropes=whole)
+    assert np.all(state.tensions[:6] == 0.0)
+    assert np.all(state.point_forces[:7] == 0.0)
+    assert np.array_equal(state.tensions[6:], case.state().tensions[6:])
+    assert list(state.is_slack) == [True, False]
+    assert np.all(state.elastic_energy[:1] == 0.0)
+    jammed = JammedPulley(cable=1, pulley=3, time=0.5).strike(case.ropes, case.state())
+    after = CutCable(cable=1, span=5, time=1.0).strike(jammed, case.state(ropes=jammed))
+    state = case.state(ropes=after)
+    assert np.all(state.tensions[:3] > 0.0)
+    assert np.all(state.tensions[3:6] == 0.0)
+
+
+def test_a_jam_in_a_cut_cable_brings_no_tension_back():
+    case = random_case(7, wound=0.01)
+    ropes = CutCable(cable=2, span=1, time=0.0).strike(case.ropes, case.state())
+    ropes = JammedPulley(cable=2, pulley=1, time=1.0).strike(ropes, case.state(ropes=ropes))
+    assert np.all(case.state(ropes=ropes).tensions[6:] == 0.0)
+
+
+@pytest.mark.parametrize(
+    ("fault", "text"),
+    [
+        (JammedPulley(cable=3, pulley=1, time=0.0), r"there is no cable 3 \(there are 1 to 2\)"),
+        (
+            JammedPulley(cable=2, pulley=3, time=0.0),
+            r"cable 2 has no pulley 3 \(there are 1 to 2\)",
+        ),
+        (CutCable(cable=1, span=7, time=0.0), r"cable 1 has no span 7 \(there are 1 to 6\)"),
+    ],
+)
+def test_a_place_that_is_not_there_is_refused(fault, text):
+    case = random_case(1)
+    with pytest.raises(ValueError, match=text):
+        fault.strike(case.ropes, case.state())
+
+
+def test_faults_are_picked_by_kind():
+    read = TypeAdapter(AnyFault).validate_python
+    assert read({"kind": "cut-cable", "span": 2, "time": 3.0}) == CutCable(span=2, time=3.0)
+    with pytest.raises(ValidationError, match="jammed-pulley"):
+        read({"kind": "rusty-pulley", "pulley": 2, "time": 3.0})

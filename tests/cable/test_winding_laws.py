@@ -1,0 +1,187 @@
+"""Winding laws: what they promise of length, speed and tension."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from scipy.integrate import quad
+from scipy.interpolate import PchipInterpolator
+
+from cable_cases import LAWS, cable, still
+from ringsim.cable.records import Winch
+from ringsim.cable.winding.constant import ConstantWinding
+from ringsim.cable.winding.family import FeedbackWinding, WinchState, Winding
+from ringsim.cable.winding.ramp import RampWinding
+from ringsim.cable.winding.stall import StallWinding
+from ringsim.cable.winding.table import TableWinding
+from ringsim.cable.winding.tension_feedback import TensionFeedbackWinding
+from ringsim.choice import kinds_of
+
+TIMES = (0.0, 1.0, 1.5, 4.0, 5.0, 7.0)
+LENGTHS = (0.0, 0.1, 0.3, 0.35, 0.35, 0.2)
+LAWS_OF_TIME = {
+    "constant": ConstantWinding(speed=0.1),
+    "ramp": RampWinding(speed=-0.2, duration=2.0),
+    "ramp, cubic": RampWinding(speed=0.2, duration=2.0, shape="cubic"),
+    "table": TableWinding(times=TIMES, lengths=LENGTHS),
+}
+STALL = StallWinding(speed=0.1, max_tension=20.0)
+FEEDBACK = TensionFeedbackWinding(target=5.0, max_speed=0.3, max_payout=0.3)
+STIFFNESSES = [1e3, 1e5, 1e7]
+
+
+def test_the_laws_tested_here_are_all_laws_there_are():
+    tested = {law.kind for law in [*LAWS_OF_TIME.values(), STALL, FEEDBACK]}
+    assert tested == set(kinds_of(Winding))
+
+
+@pytest.mark.parametrize("law", LAWS_OF_TIME.values(), ids=LAWS_OF_TIME)
+def test_the_length_is_the_integral_of_the_speed(law):
+    assert law.wound(0.0) == 0.0
+    for end in (0.7, 1.3, 3.0, 6.5, 9.0):
+        breaks = [t for t in (*TIMES, 2.0) if t < end]
+        integral, _ = quad(law.wound_rate, 0.0, end, points=breaks, epsabs=1e-13)
+        assert law.wound(end) == pytest.approx(integral, abs=1e-12)
+
+
+@pytest.mark.parametrize(("shape", "order"), [("cubic", 2), ("quintic", 3)])
+def test_a_ramp_starts_as_smoothly_as_it_says(shape, order):
+    law = RampWinding(speed=0.2, duration=2.0, shape=shape)
+    early = [law.wound_rate(t) for t in (1e-3, 2e-3)]
+    assert np.log2(early[1] / early[0]) == pytest.approx(order, abs=2e-3)
+    late = [0.2 - law.wound_rate(2.0 - t) for t in (1e-3, 2e-3)]
+    # The difference to the full speed, 1e-7 to 1e-10 m/s, keeps six digits at least.
+    assert np.log2(late[1] / late[0]) == pytest.approx(order, abs=2e-3)
+    assert law.wound(2.0) == pytest.approx(0.2, rel=1e-15)
+
+
+def test_a_table_is_a_monotone_cubic():
+    law = TableWinding(times=TIMES, lengths=LENGTHS)
+    reference = PchipInterpolator(TIMES, LENGTHS)
+    inside = np.linspace(0.0, 7.0, 500)[:-1]
+    assert [law.wound(t) for t in inside] == pytest.approx(reference(inside), abs=1e-15)
+    assert [law.wound_rate(t) for t in inside] == pytest.approx(
+        reference.derivative()(inside), abs=1e-14
+    )
+    assert (law.wound(9.0), law.wound_rate(9.0)) == (0.2, 0.0)
+    straight = TableWinding(times=(0.0, 2.0), lengths=(0.0, 0.4))
+    assert (straight.wound(0.5), straight.wound_rate(0.5)) == pytest.approx((0.1, 0.2))
+
+
+@pytest.mark.parametrize(
+    ("table", "text"),
+    [
+        ({"times": (0.0, 1.0), "lengths": (0.0, 0.1, 0.2)}, "give one length for each time"),
+        ({"times": (0.0, 1.0, 1.0), "lengths": (0.0, 0.1, 0.2)}, "must be above the time before"),
+        ({"times": (0.0, 1.0), "lengths": (0.1, 0.2)}, "must start at 0"),
+        ({"times": (0.0,), "lengths": (0.0,)}, "at least 2 items"),
+    ],
+)
+def test_a_table_that_cannot_be_followed_is_refused(table, text):
+    with pytest.raises(ValidationError, match=text):
+        TableWinding(**table)
+
+
+def test_a_winch_keeps_its_hours():
+    winch = Winch(winding=ConstantWinding(speed=0.1), start_time=2.0, stop_time=5.0)
+    nothing = WinchState()
+    for time, wound, speed in [(1.0, 0.0, 0.0), (2.0, 0.0, 0.1), (4.0, 0.2, 0.1), (9.0, 0.3, 0.0)]:
+        now = winch.at(time, nothing)
+        assert (now.wound, now.speed) == pytest.approx((wound, speed))
+    with pytest.raises(ValidationError, match="must not be before start_time"):
+        Winch(winding=ConstantWinding(speed=0.1), start_time=2.0, stop_time=1.0)
+
+
+def test_far_winch_needs_two_ends():
+    winch = Winch(winding=ConstantWinding(speed=0.1), start_time=2.0)
+    with pytest.raises(ValidationError, match='far_winch needs end = "both"'):
+        cable(far_winch=winch)
+    assert cable(end="both", far_winch=winch).winches[1] == winch
+    assert cable(end="both").winches[1] == cable().winch
+    assert len(cable().winches) == 1
+
+
+def wind(law, stiffness, step, steps, path_speed=lambda time: 0.0):
+    """Wind a rope over two pulleys whose far end moves: tensions, speeds, last span's strain."""
+    winch = Winch(winding=law, start_time=0.0)
+    start = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 1, 0]], dtype=float)
+    case = still(
+        start, 0.0, axial_stiffness=stiffness, friction=LAWS["bearing"], initial_slack=0.005
+    )
+    state, tensions, speeds = WinchState(), [], []
+    for k in range(steps):
+        case.velocities[3, 0] = path_speed(k * step)
+        case.wound, case.wound_rate = np.array([[state.wound, 0.0]]), np.array([[state.speed, 0.0]])
+        now = case.state()
+        state = winch.advance(k * step, step, now.reading(0), state)
+        tensions.append(now.winch_tensions[0, 0])
+        speeds.append(state.speed)
+        case.points[3, 0] += step * path_speed(k * step)
+        state = winch.at((k + 1) * step, state)
+    return np.array(tensions), np.array(speeds), now.tensions[2] / stiffness
+
+
+@pytest.mark.parametrize("stiffness", STIFFNESSES)
+@pytest.mark.parametrize("step", [0.001, 0.04, 0.5])
+@pytest.mark.parametrize("backdrivable", [False, True])
+def test_a_stalling_winch_holds_its_maximum_tension_at_any_stiffness(stiffness, step, backdrivable):
+    law = StallWinding(speed=0.1, max_tension=20.0, backdrivable=backdrivable)
+    tensions, speeds, _ = wind(law, stiffness, step, 1000 if step < 0.01 else 60)
+    # The path is at rest, so the prediction is exact but for the rope speeds, which the chain
+    # sees at a step's end and the law at its beginning.
+    assert tensions.max() <= 20.0 * (1.0 + 1e-6)
+    assert tensions[-1] >= 19.0
+    assert speeds[-1] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("stiffness", STIFFNESSES)
+def test_a_backdrivable_winch_gives_rope_where_another_holds(stiffness):
+    pull = lambda time: 0.02 if time > 2.0 else 0.0  # noqa: E731
+    giving = StallWinding(speed=0.1, max_tension=20.0, backdrivable=True)
+    tensions, speeds, strain = wind(giving, stiffness, 0.04, 200, pull)
+    # It pays out at 0.02 m/s, a fifth of its speed: 20 N plus a fifth of the band of 5 %.
+    assert tensions[-1] == pytest.approx(20.0 * (1.0 + 0.2 * 0.05), rel=1e-3)
+    # The path grows in its last span, by rope that is stretched already.
+    assert speeds[-1] == pytest.approx(-0.02 / (1.0 + strain), rel=1e-3)
+    tensions, speeds, _ = wind(STALL, stiffness, 0.04, 200, pull)
+    assert tensions[-1] > 30.0
+    assert np.all(speeds >= 0.0)
+
+
+@pytest.mark.parametrize("stiffness", STIFFNESSES)
+def test_feedback_keeps_the_tension_while_the_structure_moves(stiffness):
+    moving = lambda time: -0.04 * (1.2 + np.sin(0.7 * time))  # noqa: E731
+    tensions, speeds, _ = wind(FEEDBACK, stiffness, 0.04, 250, moving)
+    # The rate known at a step's beginning is off by 0.04 * 0.7 * 0.04 = 1.1 mm/s at most, which
+    # the gain of 0.02 m/(N s) balances at an error of 0.06 N.
+    assert tensions[50:] == pytest.approx(5.0, abs=0.06)
+    assert speeds.max() <= 0.3
+    assert speeds.min() >= -0.3
+
+
+def test_feedback_with_an_opening_rate_starts_as_slowly_as_the_geometry():
+    law = TensionFeedbackWinding(target=5.0, max_speed=0.3, opening_rate=0.1)
+    reading = still([[0, 0, 0], [1, 0, 0]], 0.0).state().reading(0, path_slope=-0.2)
+    assert law.command(5.0, reading) == pytest.approx(0.02)
+    assert law.command(4.0, reading) == pytest.approx(0.04)
+
+
+@given(
+    stiffness=st.floats(1e3, 1e7),
+    duration=st.floats(1e-5, 1.0),
+    wound=st.floats(-0.01, 0.01),
+    law=st.sampled_from([STALL, FEEDBACK]),
+)
+def test_the_speed_chosen_answers_to_the_tension_it_causes(stiffness, duration, wound, law):
+    assert isinstance(law, FeedbackWinding)
+    reading = still([[0, 0, 0], [1, 0, 0]], wound, axial_stiffness=stiffness).state().reading(0)
+    speed = law.advance(0.0, duration, reading, WinchState()).speed
+    low, high = law.limits()
+    slack_tension = reading.tension_after(duration, speed - 1e-9)
+    taut_tension = reading.tension_after(duration, speed + 1e-9)
+    # Between the two neighbouring speeds the command crosses the diagonal.
+    assert min(max(law.command(slack_tension, reading), low), high) >= speed - 1e-9
+    assert min(max(law.command(taut_tension, reading), low), high) <= speed + 1e-9
