@@ -1,1 +1,34 @@
-"""ringsim: how large deployable ring antennas open."""
+"""ringsim: how large deployable ring antennas open.
+
+Public words: :class:`Scene`, :func:`load_scene` and :func:`simulate`.  Each is loaded when it is
+first used, so that importing ringsim costs nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene, load_scene
+    from ringsim.simulation import simulate
+
+__all__ = ["Scene", "load_scene", "simulate"]
+
+_HOMES = {
+    "Scene": "ringsim.scene",
+    "load_scene": "ringsim.scene",
+    "simulate": "ringsim.simulation",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public word on its first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    word = globals()[name] = getattr(importlib.import_module(_HOMES[name]), name)
+    return word
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -31,6 +31,11 @@ def kinds_of(family: type[Model]) -> dict[str, type[Model]]:
     return {str(leaf.model_fields["kind"].default): leaf for leaf in _leaves(family)}
 
 
+def kind_of(record: Model) -> str:
+    """The word that picks the kind of ``record`` in a scene."""
+    return str(type(record).model_fields["kind"].default)
+
+
 def _leaves(family: type[Model]) -> list[type[Model]]:
     below = family.__subclasses__()
     if not below:

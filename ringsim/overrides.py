@@ -7,8 +7,9 @@ import tomllib
 from typing import Any
 
 from ringsim.refusal import InputError
+from ringsim.units import LEFT_OUT
 
-_STEP = re.compile(r"^([A-Za-z_][A-Za-z0-9_]*)(?:\[(\d+)\])?$")
+_STEP = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[([0-9]{1,6})\])?")
 
 
 def parse_assignment(text: str) -> tuple[str, Any]:
@@ -17,23 +18,45 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     Raises
     ------
     InputError
-        If there is no ``=`` or no path.
+        If there is no ``=``, no path or no value.
     """
     path, equals, raw = text.partition("=")
     path, raw = path.strip(), raw.strip()
     if not equals or not path or not raw:
         raise InputError(f"--set {text}: must read PATH=VALUE, for example loads.force=0.02")
     try:
-        return path, tomllib.loads(f"value = {raw}")["value"]
-    except tomllib.TOMLDecodeError:
+        table = tomllib.loads(f"value = {raw}")
+    except (ValueError, RecursionError):
         return path, raw
+    return path, table["value"] if len(table) == 1 else raw
 
 
-def set_path(table: dict[str, Any], path: str, value: Any, sections: int) -> None:
+def section_of(path: str) -> tuple[str, int | None]:
+    """Split ``a.b[k]`` into ``a.b`` and k; without ``[k]`` the second is None."""
+    inner, dot, last = path.rpartition(".")
+    matched = _STEP.fullmatch(last)
+    if matched is None or matched[2] is None:
+        return path, None
+    return inner + dot + matched[1], int(matched[2])
+
+
+def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
     """Write ``value`` at ``path`` into nested tables, in place.
 
-    A step ``name[k]`` is the value of section k, counted from 1; a field that had one value for
-    all sections becomes a list of ``sections`` values first.  The value ``none`` removes a part.
+    A step through a part that is not there creates it.  A last step ``name[k]`` is the value of
+    section k, counted from 1; a field that had one value for all becomes a list first.  The
+    value "none" (or None) removes a part, and puts the default back in any other field.
+
+    Parameters
+    ----------
+    table
+        Nested tables of a scene.
+    path
+        Names joined by dots.
+    value
+        Any value that TOML can hold.
+    length
+        Number of values in a list at this path.
 
     Raises
     ------
@@ -42,29 +65,44 @@ def set_path(table: dict[str, Any], path: str, value: Any, sections: int) -> Non
     """
     *inner, last = path.split(".")
     for step in inner:
-        matched = _STEP.match(step)
-        if matched is None or matched[2] is not None:
+        if not _is_name(step):
             raise InputError(f"{path}: {step!r} is not the name of a table")
-        table = table.setdefault(step, {})
+        if table.get(step, LEFT_OUT) == LEFT_OUT:
+            table[step] = {}
+        table = table[step]
         if not isinstance(table, dict):
-            raise InputError(f"{path}: {step} is a value, not a table")
-    matched = _STEP.match(last)
-    if matched is None:
-        raise InputError(f"{path}: {last!r} is not a field name (or a name with [section])")
-    name, index = matched[1], matched[2]
-    if index is None:
-        if value == "none":
-            table.pop(name, None)
-        else:
-            table[name] = value
-        return
-    if not 1 <= int(index) <= sections:
-        raise InputError(f"{path}: there is no section {index} (there are 1 to {sections})")
+            raise InputError(f"{path}: {step} is a value, not a table: give it as {step}=VALUE")
+    name, section = section_of(last)
+    if not _is_name(name):
+        raise InputError(f"{path}: {last!r} is not a field name, or one with its section: name[1]")
+    if section is not None:
+        _set_section(table, name, section, value, length, path)
+    elif value is None or value == LEFT_OUT:
+        _remove(table, name)
+    else:
+        table[name] = value
+
+
+def _is_name(step: str) -> bool:
+    matched = _STEP.fullmatch(step)
+    return matched is not None and matched[2] is None
+
+
+def _remove(table: dict[str, Any], name: str) -> None:
+    if isinstance(table.get(name, {}), dict):
+        table[name] = LEFT_OUT
+    else:
+        del table[name]
+
+
+def _set_section(
+    table: dict[str, Any], name: str, section: int, value: Any, length: int, path: str
+) -> None:
     if name not in table:
-        raise InputError(f"{path}: {name} has no value to change for one section; set it first")
+        raise InputError(f"{path}: there is no {name} yet: give one value for all sections first")
     old = table[name]
-    values = list(old) if isinstance(old, list) else [old] * sections
-    if int(index) > len(values):
-        raise InputError(f"{path}: {name} has only {len(values)} values")
-    values[int(index) - 1] = value
+    values = list(old) if isinstance(old, (list, tuple)) else [old] * length
+    if not 1 <= section <= len(values):
+        raise InputError(f"{path}: there is no value {section}: choose one from 1 to {len(values)}")
+    values[section - 1] = value
     table[name] = values

@@ -11,6 +11,7 @@ import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
 from ringsim.choice import load_package, one_of
+from ringsim.overrides import section_of, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.joints import Joints, Stop
 from ringsim.parts.loads import Loads
@@ -20,8 +21,7 @@ from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.solver import Record, Solver
 from ringsim.parts.structure.family import Structure
 from ringsim.parts.structure.pantograph_ring import PantographRing
-from ringsim.overrides import set_path
-from ringsim.refusal import InputError, explain
+from ringsim.refusal import InputError, explain, known_or_nearest
 from ringsim.units import Model
 
 for _package in ("structure", "rods", "boom"):
@@ -35,6 +35,10 @@ else:
     AnyStructure = one_of(Structure)
     AnyRods = one_of(Rods)
     AnyBoom = one_of(Boom)
+
+
+MOST_RECORDS = 1_000_000
+"""Output times of one run, at most."""
 
 
 class Scene(Model):
@@ -54,15 +58,21 @@ class Scene(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        sections = self.structure.sections
         for path, value in _lists(self):
-            wanted = sections
-            if path == "net.stiffness":
-                wanted = sections if self.structure.closed else sections + 1
+            wanted = _length_of(path, self.structure.sections, closed=self.structure.closed)
             if len(value) != wanted:
                 raise ValueError(
                     f"{path} has {len(value)} values, but the structure needs {wanted}: give "
                     "one value for all, or a list of that length"
+                )
+        for rod, tube, longest in (
+            ("diagonal", self.rods.diagonal, self.structure.half_diagonal),
+            ("bar", self.rods.bar, self.structure.half_bar),
+        ):
+            if tube.outer_diameter >= longest:
+                raise ValueError(
+                    f"rods.{rod}.outer_diameter = {tube.outer_diameter} m must be below "
+                    f"structure.half_{rod} = {longest} m: a rod is longer than thick"
                 )
         highest = 2.0 * self.structure.half_diagonal
         if self.boom is not None and self.boom.length < highest:
@@ -75,10 +85,18 @@ class Scene(Model):
                 f"stop.stowed_angle = {self.stop.stowed_angle} deg must be below "
                 f"structure.opening_angle = {self.structure.opening_angle} deg"
             )
+        if self.record.interval * MOST_RECORDS < self.solver.end_time:
+            raise ValueError(
+                f"record.interval = {self.record.interval} s must be at least "
+                f"{self.solver.end_time / MOST_RECORDS:g} s, a {MOST_RECORDS}th of "
+                "solver.end_time: the result would not fit in memory"
+            )
         return self
 
     def with_values(self, values: dict[str, Any]) -> Scene:
-        """A copy with the fields at dotted paths replaced, validated again.
+        """A copy with the fields at dotted paths replaced in their order, validated again.
+
+        See :func:`ringsim.overrides.set_path` for ``name[k]`` and ``none``.
 
         Raises
         ------
@@ -87,16 +105,29 @@ class Scene(Model):
         """
         table = self.to_table()
         for path, value in values.items():
-            set_path(table, path, value, self.structure.sections)
+            set_path(table, path, value, _length_in(table, section_of(path)[0]))
         return scene_from_table(table, source=f"scene {self.name}")
 
     def to_table(self) -> dict[str, Any]:
         """The scene as nested plain tables, without the parts that it leaves out."""
-        return self.model_dump(mode="json", exclude_none=True)
+        return self.model_dump(mode="json")
 
     def to_toml(self) -> str:
         """The scene as TOML text; reading it back gives an equal scene."""
         return tomli_w.dumps(self.to_table())
+
+
+def _length_of(path: str, sections: int, *, closed: bool) -> int:
+    """Values in a list at ``path``: one per section, or one per corner."""
+    return sections + 1 if path == "net.stiffness" and not closed else sections
+
+
+def _length_in(table: dict[str, Any], path: str) -> int:
+    """The same for nested tables that may still be refused."""
+    structure = table.get("structure")
+    if not isinstance(structure, dict) or not isinstance(structure.get("sections"), int):
+        return 1
+    return _length_of(path, structure["sections"], closed=structure.get("closed") is not False)
 
 
 def _lists(record: Model, prefix: str = "") -> list[tuple[str, tuple[float, ...]]]:
@@ -116,7 +147,7 @@ def scene_from_table(table: dict[str, Any], *, source: str) -> Scene:
     Raises
     ------
     InputError
-        One line per fault, each naming ``source``, field, value, bound and cure.
+        One line naming ``source``, field, value, bound and cure.
     """
     try:
         return Scene.model_validate(table)
@@ -125,11 +156,21 @@ def scene_from_table(table: dict[str, Any], *, source: str) -> Scene:
 
 
 def scene_from_toml(text: str, *, source: str) -> Scene:
-    """Parse and validate TOML text; raises InputError."""
+    """Parse and validate TOML text.
+
+    Raises
+    ------
+    InputError
+        If the text is not TOML, or its content is refused.
+    """
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{source}: not valid TOML: {error}") from None
+        raise InputError(f"{source}: not valid TOML: {error}; correct that line") from None
+    except RecursionError:
+        raise InputError(f"{source}: not a scene: its lists or tables nest too deeply") from None
+    except ValueError as error:
+        raise InputError(f"{source}: a number cannot be read: {error}") from None
     return scene_from_table(table, source=source)
 
 
@@ -153,12 +194,22 @@ def load_scene(name_or_path: str | Path) -> Scene:
         return scene_from_toml(builtin[str(name_or_path)], source=f"scene {name_or_path}")
     path = Path(name_or_path)
     try:
-        text = path.read_text(encoding="utf-8")
+        content = path.read_bytes()
     except FileNotFoundError:
-        names = ", ".join(builtin)
+        hint = known_or_nearest(str(name_or_path), builtin)
         raise InputError(
-            f"{path}: no such file, and no built-in scene of that name (there are: {names})"
+            f"{path}: no such file, and no built-in scene of that name ({hint})"
         ) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: this is a folder: give the name of a scene file") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read: {reason}") from None
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path.name}: not a text file: byte {error.start + 1} is not UTF-8; "
+            "save it as UTF-8 text"
+        ) from None
     return scene_from_toml(text, source=path.name)

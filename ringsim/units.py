@@ -1,11 +1,23 @@
-"""Annotated field types: SI unit and bounds of every quantity that a scene may hold, in one place."""
+"""Annotated field types: SI unit and bounds of every quantity that a scene may hold."""
 
 from __future__ import annotations
 
+import types
+import typing
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+
+LEFT_OUT = "none"
+"""The word that leaves out a part which would be there by default: ``stop = "none"``."""
 
 
 @dataclass(frozen=True)
@@ -22,16 +34,51 @@ class Model(BaseModel):
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _leave_out(cls, table: Any) -> Any:
+        """Read the word "none" as nothing, where nothing is allowed."""
+        if not isinstance(table, dict):
+            return table
+        parts = cls.parts()
+        return {
+            key: None if isinstance(value, str) and value == LEFT_OUT and key in parts else value
+            for key, value in table.items()
+        }
 
-Metre = Annotated[float, Field(gt=0.0, le=1e3), Unit("m")]
+    @model_serializer(mode="wrap")
+    def _write_nothing(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Skip parts that are left out; say "none" where reading would put a default back."""
+        table: dict[str, Any] = write(self)
+        if "kind" in table:
+            table = {"kind": table.pop("kind"), **table}
+        for name in self.parts():
+            if table.get(name) is None:
+                table.pop(name, None)
+                if type(self).model_fields[name].default is not None:
+                    table[name] = LEFT_OUT
+        return table
+
+    @classmethod
+    def parts(cls) -> frozenset[str]:
+        """Names of the fields that may be left out."""
+        return frozenset(
+            name
+            for name, field in cls.model_fields.items()
+            if typing.get_origin(field.annotation) in (typing.Union, types.UnionType)
+            and type(None) in typing.get_args(field.annotation)
+        )
+
+
+Metre = Annotated[float, Field(ge=1e-6, le=1e3), Unit("m")]
 MetreOrZero = Annotated[float, Field(ge=0.0, le=1e3), Unit("m")]
-Kilogram = Annotated[float, Field(gt=0.0, le=1e4), Unit("kg")]
+Kilogram = Annotated[float, Field(ge=1e-9, le=1e4), Unit("kg")]
 KilogramOrZero = Annotated[float, Field(ge=0.0, le=1e4), Unit("kg")]
 Newton = Annotated[float, Field(ge=-1e6, le=1e6), Unit("N")]
-Second = Annotated[float, Field(gt=0.0, le=1e6), Unit("s")]
+Second = Annotated[float, Field(ge=1e-9, le=1e6), Unit("s")]
 SecondOrZero = Annotated[float, Field(ge=0.0, le=1e6), Unit("s")]
 Pascal = Annotated[float, Field(ge=1e5, le=1e13), Unit("Pa")]
-Density = Annotated[float, Field(gt=0.0, le=3e4), Unit("kg/m^3")]
+Density = Annotated[float, Field(ge=1e-3, le=3e4), Unit("kg/m^3")]
 PoissonRatio = Annotated[float, Field(ge=0.0, le=0.5), Unit("1")]
 Degree = Annotated[float, Field(gt=0.0, le=180.0), Unit("deg")]
 DegreeOrZero = Annotated[float, Field(ge=0.0, lt=180.0), Unit("deg")]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
+from typing import Any
 
 import click
 
@@ -32,6 +34,14 @@ class _Verbs(click.Group):
         command: click.Command = importlib.import_module(f"ringsim.cli.{cmd_name}").command
         return command
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Turn refused input into one line and its exit code."""
+        try:
+            return super().invoke(ctx)
+        except InputError as error:
+            click.echo(str(error), err=True)
+            ctx.exit(EXIT_BAD_INPUT)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the verbs without importing any of them."""
         with formatter.section("Verbs"):
@@ -52,13 +62,17 @@ def main() -> None:
     """Entry point of the command ``ringsim``."""
     try:
         code = cli(standalone_mode=False)
-    except InputError as error:
-        click.echo(str(error), err=True)
+    except click.exceptions.NoArgsIsHelpError as error:
+        error.show()
         code = EXIT_BAD_INPUT
     except click.ClickException as error:
-        error.show()
+        command = getattr(getattr(error, "ctx", None), "command_path", "ringsim")
+        click.echo(f"{command}: {error.format_message()} (see {command} --help)", err=True)
         code = EXIT_BAD_INPUT
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted", err=True)
         code = EXIT_INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = EXIT_DONE
     sys.exit(code or EXIT_DONE)

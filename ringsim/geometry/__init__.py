@@ -1,0 +1,1 @@
+"""Where everything is: polygons, fold states and mobility; numpy only."""

@@ -41,9 +41,7 @@ def corners(sides: int, aspect_ratio: float) -> Array:
     steps = 1 + int(np.ceil(8 * np.log(1.0 / aspect_ratio)))
     for ratio in aspect_ratio ** (np.arange(1, steps + 1) / steps):
         parameters, chord = _solve(parameters, float(ratio))
-    points = np.stack(
-        [np.cos(parameters), ratio * np.sin(parameters), np.zeros(sides)], axis=-1
-    )
+    points = np.stack([np.cos(parameters), ratio * np.sin(parameters), np.zeros(sides)], axis=-1)
     return points / chord
 
 

@@ -43,6 +43,8 @@ class Tube(Model):
         m2 = (self.inner_diameter / self.outer_diameter) ** 2
         nu = poisson_ratio
         return (
-            6.0 * (1.0 + nu) * (1.0 + m2) ** 2
+            6.0
+            * (1.0 + nu)
+            * (1.0 + m2) ** 2
             / ((7.0 + 6.0 * nu) * (1.0 + m2) ** 2 + (20.0 + 12.0 * nu) * m2)
         )

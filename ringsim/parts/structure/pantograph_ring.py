@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from ringsim.geometry.ring import RingGeometry
 from ringsim.parts.structure.family import Structure
-from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Ratio
+from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
 
 
 class PantographRing(Structure):
@@ -24,7 +24,7 @@ class PantographRing(Structure):
     closed: bool = True
     polygon_sections: Annotated[int, Field(ge=3, le=720)] = 18
     """Sides of the full polygon that an open arc is cut from; a closed ring is its own."""
-    aspect_ratio: Ratio = 3.2856 / 3.5184
+    aspect_ratio: Annotated[float, Field(ge=0.05, le=1.0), Unit("1")] = 3.2856 / 3.5184
     """Minor over major axis of the ellipse."""
     half_bar: Metre = 0.2889
     half_diagonal: Metre = 0.4275

@@ -1,0 +1,29 @@
+"""``ringsim scenes``: what is built in, and its text as a starting point."""
+
+from __future__ import annotations
+
+import click
+
+from ringsim.refusal import InputError, known_or_nearest
+from ringsim.scene import builtin_scenes, scene_from_toml
+
+
+@click.command("scenes", short_help="List the built-in scenes.")
+@click.argument("name", required=False)
+def command(name: str | None) -> None:
+    """List the built-in scenes, or print the TOML of one.
+
+    ``ringsim scenes ring18 > my.toml`` starts a scene of your own.
+    """
+    texts = builtin_scenes()
+    if name is not None:
+        if name not in texts:
+            raise InputError(f"{name}: no built-in scene ({known_or_nearest(name, texts)})")
+        click.echo(texts[name], nl=False)
+        return
+    scenes = [scene_from_toml(text, source=f"scene {key}") for key, text in texts.items()]
+    longest = max(len(scene.name) for scene in scenes)
+    for key, scene in zip(texts, scenes, strict=True):
+        sections = scene.structure.sections
+        count = f"{sections} section{'s' if sections > 1 else ''}"
+        click.echo(f"{key:<{longest}}  {count:>12}  {scene.title}")

@@ -1,0 +1,65 @@
+"""Importing ringsim costs nothing: heavy libraries are loaded by whoever needs them."""
+
+import subprocess
+import sys
+
+import pytest
+
+import ringsim
+
+HEAVY = ("exudyn", "mpi4py", "matplotlib", "xarray", "netCDF4", "scipy")
+
+
+def loaded_by(statements: str) -> set[str]:
+    """Heavy libraries among the modules of a fresh interpreter after ``statements``."""
+    report = f"{statements}\nimport sys\nprint(*[n for n in {HEAVY!r} if n in sys.modules])"
+    done = subprocess.run(
+        [sys.executable, "-c", report], capture_output=True, text=True, check=True
+    )
+    return set(done.stdout.splitlines()[-1].split())
+
+
+def calling(*arguments: str) -> str:
+    """Statements that call the command and go on after it has ended."""
+    return (
+        f"import sys\nsys.argv = {['ringsim', *arguments]!r}\nfrom ringsim.cli import main\n"
+        "try:\n    main()\nexcept SystemExit as done:\n    assert not done.code\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "statements",
+    [
+        "import ringsim",
+        "import ringsim.cli",
+        "from ringsim import Scene, load_scene\nload_scene('ring18')",
+        calling("--help"),
+        calling("--version"),
+        calling("scenes"),
+        calling("scenes", "ring18"),
+        calling("check", "ring18"),
+    ],
+)
+def test_nothing_heavy_is_loaded(statements: str) -> None:
+    assert loaded_by(statements) == set()
+
+
+def test_importing_ringsim_does_not_even_load_numpy_or_pydantic() -> None:
+    report = "import ringsim, sys\nprint('numpy' in sys.modules, 'pydantic' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", report], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["False", "False"]
+
+
+def test_public_words_are_listed_and_unknown_ones_refused() -> None:
+    assert set(ringsim.__all__) <= set(dir(ringsim))
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        _ = ringsim.simulat
+
+
+def test_public_words_are_the_things_themselves() -> None:
+    from ringsim.scene import Scene, load_scene
+
+    assert ringsim.Scene is Scene
+    assert ringsim.load_scene is load_scene

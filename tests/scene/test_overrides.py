@@ -1,0 +1,140 @@
+"""What ``--set PATH=VALUE`` means."""
+
+import pytest
+from click.testing import CliRunner
+
+from ringsim.cli import cli
+from ringsim.overrides import parse_assignment
+from ringsim.refusal import InputError
+from ringsim.scene import Scene, load_scene
+
+RING18 = load_scene("ring18")
+BARE = Scene(name="bare")
+
+
+def changed(scene: Scene, *assignments: str) -> Scene:
+    return scene.with_values(dict(parse_assignment(text) for text in assignments))
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("a=3", 3), ("a=3.0", 3.0), ("a=-1e-3", -1e-3), ("a = 0.5 ", 0.5), ("a=true", True),
+        ("a=[1.0, 2.0]", [1.0, 2.0]), ('a="word"', "word"), ("a='word'", "word"),
+        ("a=word", "word"),
+        ("a=geometrically-exact", "geometrically-exact"), ("a=none", "none"), ("a=x=y", "x=y"),
+        ("a={ kind = 'rigid' }", {"kind": "rigid"}), ("a=1 2", "1 2"), ("a=1\nb=2", "1\nb=2"),
+    ],
+)  # fmt: skip
+def test_value_is_toml_or_a_bare_word(text: str, value: object) -> None:
+    path, parsed = parse_assignment(text)
+    assert path == "a"
+    assert parsed == value
+    assert type(parsed) is type(value)
+
+
+def test_one_value_is_replaced_and_nothing_else() -> None:
+    scene = changed(RING18, "loads.force=0.02")
+    assert scene.loads is not None
+    assert scene.loads.force == 0.02
+    assert scene.with_values({"loads.force": 0.015}) == RING18
+
+
+def test_original_scene_stays_as_it_was() -> None:
+    before = RING18.to_toml()
+    changed(RING18, "loads.force=0.02", "boom=none", "rods.young_modulus[1]=1e11")
+    assert RING18.to_toml() == before
+
+
+@pytest.mark.parametrize("section", [1, 2, 18])
+def test_sections_are_counted_from_one(section: int) -> None:
+    scene = changed(RING18, f"rods.young_modulus[{section}]=1e11")
+    expected = [120e9] * 18
+    expected[section - 1] = 1e11
+    assert scene.rods.young_modulus == tuple(expected)
+
+
+def test_values_of_sections_add_up() -> None:
+    scene = changed(RING18, "loads.force=0.01", "loads.force[1]=0.02", "loads.force[3]=0.03")
+    assert scene.loads is not None
+    assert scene.loads.force == (0.02, 0.01, 0.03) + (0.01,) * 15
+
+
+def test_number_of_sections_set_before_counts() -> None:
+    scene = changed(RING18, "structure.sections=6", "loads.force[6]=0.02")
+    assert scene.loads is not None
+    assert scene.loads.force == (0.015,) * 5 + (0.02,)
+    with pytest.raises(InputError, match="from 1 to 6"):
+        changed(RING18, "structure.sections=6", "loads.force[7]=0.02")
+
+
+def test_net_of_an_open_arc_has_a_value_for_each_corner() -> None:
+    scene = changed(
+        RING18, "structure.closed=false", "structure.sections=2", "net.stiffness[3]=0.5"
+    )
+    assert scene.net is not None
+    assert scene.net.stiffness == (0.001, 0.001, 0.5)
+
+
+@pytest.mark.parametrize("part", ["boom", "net", "loads", "stop"])
+def test_none_removes_a_part(part: str) -> None:
+    assert getattr(changed(RING18, f"{part}=none"), part) is None
+    assert getattr(RING18.with_values({part: None}), part) is None
+
+
+def test_none_removes_a_part_that_is_not_there() -> None:
+    assert changed(BARE, "boom=none") == BARE
+
+
+def test_none_puts_the_default_of_a_plain_field_back() -> None:
+    assert changed(RING18, "rods.damping=none").rods.damping == BARE.rods.damping
+    assert RING18.rods.damping != BARE.rods.damping
+
+
+def test_removed_part_comes_back_with_a_field() -> None:
+    stop = changed(RING18, "stop=none", "stop.latch=true").stop
+    assert stop is not None
+    assert stop.latch
+
+
+def test_field_of_a_missing_part_creates_it() -> None:
+    scene = changed(BARE, "net.stiffness=0.5", "joints.hinge.viscous=0.1", "loads.force=1")
+    assert scene.net is not None
+    assert scene.joints.hinge is not None
+    assert scene.loads is not None
+    assert (scene.net.stiffness, scene.joints.hinge.viscous, scene.loads.force) == (0.5, 0.1, 1.0)
+
+
+def test_missing_part_with_kinds_needs_its_kind() -> None:
+    with pytest.raises(InputError, match=r"boom\.kind is missing"):
+        changed(BARE, "boom.length=1.0")
+    boom = changed(BARE, "boom.length=1.0", "boom.kind=rigid").boom
+    assert boom is not None
+    assert boom.length == 1.0
+
+
+def test_kind_changes_and_keeps_the_common_fields() -> None:
+    scene = changed(RING18, "rods.kind=ancf", "rods.elements=3")
+    assert scene.rods.kind == "ancf"
+    assert scene.rods.young_modulus == RING18.rods.young_modulus
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["structure.sections", "structure.closed", "structure.opening_angle", "loads.force",
+     "net.stiffness", "rods.kind", "rods.elements", "solver.step", "boom.base"],
+)  # fmt: skip
+def test_public_paths_exist(path: str) -> None:
+    value: object = RING18
+    for step in path.split("."):
+        value = getattr(value, step)
+    assert value is not None
+    assert RING18.with_values({path: value}) == RING18
+
+
+def test_command_line_applies_assignments_in_their_order() -> None:
+    result = CliRunner().invoke(
+        cli, ["check", "ring18", "--set", "structure.sections=6", "--set", "loads.force[6]=0.02"]
+    )
+    assert result.exit_code == 0, result.output
+    assert "6 sections" in result.stdout

@@ -1,0 +1,93 @@
+"""``ringsim scenes`` and ``ringsim check``."""
+
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from ringsim.cli import cli
+from ringsim.scene import builtin_scenes, load_scene
+
+
+def run(*arguments: str) -> str:
+    result = CliRunner().invoke(cli, list(arguments))
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    return result.stdout
+
+
+def line(summary: str, label: str) -> str:
+    (found,) = [text for text in summary.splitlines() if text.startswith(label)]
+    return found.removeprefix(label).strip()
+
+
+def test_scenes_lists_every_built_in_scene_with_its_title() -> None:
+    listed = run("scenes")
+    assert len(listed.splitlines()) == len(builtin_scenes())
+    for name in builtin_scenes():
+        scene = load_scene(name)
+        assert re.search(rf"^{name} +{scene.structure.sections} section", listed, re.MULTILINE)
+        assert scene.title in listed
+
+
+@pytest.mark.parametrize("name", builtin_scenes())
+def test_printed_scene_is_a_starting_point(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(run("scenes", name), encoding="utf-8")
+    assert load_scene(path) == load_scene(name)
+    assert run("check", str(path)) == run("check", name)
+
+
+def test_check_says_what_is_built() -> None:
+    summary = run("check", "ring18")
+    assert "closed ring, 18 sections" in line(summary, "structure")
+    assert "0.5909 m" in line(summary, "polygon")
+    assert "3.5184 m and 3.2856 m" in line(summary, "polygon")
+    assert line(summary, "deployed").endswith("x 0.630 m")
+    assert line(summary, "rods").startswith("108 geometrically-exact")
+    assert line(summary, "points") == "36 hinge assemblies, 36 V-joints, 18 pivots"
+    assert line(summary, "joints").startswith("198 revolutes")
+    assert line(summary, "mobility").startswith("1 internal degree of freedom")
+    assert line(summary, "left out") == "joint friction, stress output"
+
+
+def test_mass_is_the_sum_of_its_parts() -> None:
+    """Tubes by hand: 18 (4 x 0.4275 m and 4 x 0.2889 m) of 1800 kg/m^3; 72 points of 19.8 g."""
+    total, _, parts = line(run("check", "ring18"), "mass").partition(" kg: ")
+    by_name = {name: float(mass) for name, mass in re.findall(r"([\w-]+) ([\d.]+)", parts)}
+    quarter_pi = 0.785398
+    assert by_name["diagonals"] == pytest.approx(
+        1800 * 18 * 4 * 0.4275 * quarter_pi * (0.01**2 - 0.00915**2), rel=1e-3
+    )
+    assert by_name["bars"] == pytest.approx(
+        1800 * 18 * 4 * 0.2889 * quarter_pi * (0.012**2 - 0.01115**2), rel=1e-3
+    )
+    assert by_name["hinges"] + by_name["V-joints"] == pytest.approx(72 * 0.0198, rel=1e-3)
+    assert float(total) == pytest.approx(sum(by_name.values()), rel=1e-3)
+
+
+def test_check_of_an_open_arc_without_parts() -> None:
+    summary = run(
+        "check", "ring18", "--set", "structure.closed=false", "--set", "structure.sections=2",
+        "--set", "boom=none", "--set", "net=none", "--set", "loads=none", "--set", "stop=none",
+    )  # fmt: skip
+    assert "open arc of a 18-gon, 2 sections" in line(summary, "structure")
+    assert line(summary, "points") == "6 hinge assemblies, 4 V-joints, 2 pivots"
+    assert line(summary, "mobility").startswith("5 internal degrees of freedom")
+    for part in ("boom", "net", "loads", "stop"):
+        assert part in line(summary, "left out")
+
+
+@pytest.mark.parametrize("sections", [3, 5, 72, 73, 120])
+def test_check_of_any_number_of_sections(sections: int) -> None:
+    summary = run("check", "ring18", "--set", f"structure.sections={sections}")
+    assert f"{sections} sections" in line(summary, "structure")
+    axes = [float(axis) for axis in re.findall(r"([\d.]+) m", line(summary, "polygon"))][1:]
+    # Printed to 0.1 mm, and the smallest of these rings is 0.68 m wide.
+    assert axes[1] / axes[0] == pytest.approx(3.2856 / 3.5184, abs=1.5e-4)
+
+
+@pytest.mark.parametrize("verb", ["scenes", "check", "run", "campaign"])
+def test_help_lists_the_verb(verb: str) -> None:
+    assert verb in run("--help")
