@@ -58,9 +58,9 @@ def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) 
                 axes.plot(
                     values["time"], factor * values, color=colour, linestyle=dashes, linewidth=1.2
                 )
-        axes.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1.2)
         style.span_time(axes, stress)
         style.name_panel(axes, f"{diagonal} diagonal")
+    style.span_sizes(grid[0], factor * stress.values)
     _mark_deployment(dataset, grid)
     grid[-1].set_xlabel(wording.label(dataset["time"]))
     figure.supylabel(wording.label(stress, units), fontsize=10.5)

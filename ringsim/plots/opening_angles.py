@@ -50,7 +50,7 @@ def opening_angles(dataset: xr.Dataset) -> Figure:
         lower.set_xlabel(wording.label(dataset["time"]))
         style.span_time(upper, angle)
         _mark_deployment(dataset, upper, lower)
-    _limits(grid, angle, deviation)
+    _limits(grid, angle, deviation, wording.deployment_time(dataset))
     grid[0, 0].set_ylabel(wording.label(angle))
     units = angle.attrs.get("units", "")
     grid[1, 0].set_ylabel(f"Deviation from\nthe mean ({units})")
@@ -101,13 +101,15 @@ def _mark_deployment(dataset: xr.Dataset, upper: Axes, lower: Axes) -> None:
         style.mark_moment(lower, moment)
 
 
-def _limits(grid: np.ndarray, angle: xr.DataArray, deviation: xr.DataArray) -> None:
+def _limits(grid: np.ndarray, angle: xr.DataArray, deviation: xr.DataArray, moment: float) -> None:
+    """Room for all angles; for the deviations until all have locked (the rebound may leave)."""
     lowest = float(angle.min()) if angle.size else 0.0
     highest = float(angle.max()) if angle.size else 180.0
     for axes in grid[0]:
         axes.set_ylim(30.0 * math.floor(lowest / 30.0), max(188.0, highest + 4.0))
         axes.yaxis.set_major_locator(MultipleLocator(30.0))
-    span = max(1.08 * wording.largest_magnitude(deviation), _LEAST_SPAN)
+    moving = deviation.where(deviation["time"] <= moment) if math.isfinite(moment) else deviation
+    span = max(1.15 * wording.largest_magnitude(moving), _LEAST_SPAN)
     for axes in grid[1]:
         axes.set_ylim(-span, span)
 

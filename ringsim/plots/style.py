@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any, ParamSpec
 
 import matplotlib as mpl
+import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 INK, GREY, PALE = "#222222", "#6e6e6e", "#e4e4e4"
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
@@ -21,7 +23,12 @@ BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
 )  # fmt: skip
 """Colours that people with any kind of colour vision tell apart (Okabe and Ito 2008)."""
 
+PAPER: Any = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5}
+"""Ground of words that stand on a grid."""
+
 DPI = 150
+_FLAT = 0.05
+"""Typical over largest value below which a linear axis says little."""
 _SETTINGS: Any = {
     "axes.axisbelow": True,
     "axes.edgecolor": GREY,
@@ -33,7 +40,7 @@ _SETTINGS: Any = {
     "axes.titlelocation": "left",
     "axes.titlesize": 10,
     "axes.titlecolor": GREY,
-    "figure.titlesize": 12,
+    "figure.titlesize": 11,
     "figure.titleweight": "bold",
     "font.family": "DejaVu Sans",
     "font.size": 10,
@@ -88,11 +95,37 @@ def span_time(axes: Axes, values: xr.DataArray) -> None:
         axes.set_xlim(float(time[0]), float(time[-1]))
 
 
+def span_sizes(axes: Axes, sizes: np.ndarray) -> None:
+    """A value axis from zero; logarithmic where most of the run would be a flat line.
+
+    Locking gives peaks that are hundreds of times larger than all before, so a linear axis
+    would show nothing else.
+
+    Parameters
+    ----------
+    axes
+        Where the values were drawn.
+    sizes
+        What was drawn, any shape, not negative, NaN where nothing was recorded.
+    """
+    known = sizes[np.isfinite(sizes) & (sizes > 0.0)]
+    largest = float(known.max()) if known.size else 1.0
+    typical = float(np.median(known)) if known.size else 1.0
+    if typical > _FLAT * largest:
+        axes.set_ylim(0.0, 1.2 * largest)
+        return
+    lowest = max(float(np.quantile(known, 0.02)), 1e-5 * largest)
+    axes.set_yscale("log", nonpositive="clip")
+    axes.set_ylim(10.0 ** np.floor(np.log10(lowest)), 4.0 * largest)
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
 def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
     """A bold name in the upper left corner of the frame."""
     axes.text(
         0.02, height, text, transform=axes.transAxes, va="top", weight="bold", zorder=5,
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
+        bbox=PAPER,
     )  # fmt: skip
 
 

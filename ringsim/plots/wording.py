@@ -83,6 +83,13 @@ def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: flo
     """Subject and scene above the figure, how the run ended above its first axes."""
     inches = figure.get_size_inches()[0]
     title = f"{subject}: {dataset.attrs.get('title', '')}".rstrip(": ")
-    figure.suptitle(textwrap.fill(title, int(9.5 * inches)), x=0.012, ha="left")
+    figure.suptitle(_balanced(title, int(10.3 * inches)), x=0.012, ha="left")
     lines = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
     axes.set_title("\n".join(lines), pad=pad)
+
+
+def _balanced(text: str, width: int) -> str:
+    """Break a text into as few lines as fit, all about equally long."""
+    lines = len(textwrap.wrap(text, width))
+    fitting = (w for w in range(1, width + 1) if len(textwrap.wrap(text, w)) <= lines)
+    return textwrap.fill(text, next(fitting, width))

@@ -54,7 +54,7 @@ def _made_run(
     drift = 1e-6 * np.sin(time) * u
     stress_shape = (8, sections, len(time))
     phase = np.arange(8)[:, None, None] + 0.3 * number[None, :, None]
-    rods = 2.4e6 * u**2 * np.sin(4 * u + phase) + 2e5 * np.sin(9 * time + phase)
+    rods = np.abs(2.4e6 * u**2 * np.sin(4 * u + phase) + 2e5 * np.sin(9 * time + phase))
     values = {
         "opening_angle": angle,
         "asynchrony": np.ptp(angle, axis=(0, 1)),

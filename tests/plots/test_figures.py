@@ -133,6 +133,36 @@ def test_asynchrony_after_the_deployment_does_not_count(deployed):
     assert mark.get_ydata()[0] == deployed.asynchrony.max()
 
 
+def test_a_maximum_between_the_records_is_not_pinned_to_one(deployed):
+    run = deployed.copy(deep=True)
+    run["asynchrony_max"].values[...] = 2.5
+    (axes,) = asynchrony(run).axes
+    assert not [line for line in axes.lines if line.get_marker() == "o"]
+    assert [2.5, 2.5] in [list(line.get_ydata()) for line in axes.lines]
+    assert "largest: 2.5 degree, between two recorded times" in words(axes.figure)
+    assert axes.get_ylim()[1] > 2.5
+
+
+@pytest.mark.parametrize(("peak", "scale"), [(1.0, "linear"), (1000.0, "log")])
+def test_a_peak_at_the_lock_does_not_flatten_the_rest(peak, scale, deployed):
+    run = deployed.copy(deep=True)
+    run["asynchrony"].values[-1] *= peak
+    run["asynchrony"].values[-1] += peak
+    run["rod_stress"].values[..., -1] *= peak
+    for draw in (asynchrony, diagonal_stress):
+        for axes in draw(run).axes:
+            assert axes.get_yscale() == scale
+            shown = np.concatenate([line.get_ydata() for line in axes.lines[:1]])
+            assert np.nanmax(shown) < axes.get_ylim()[1]
+
+
+def test_the_rebound_does_not_set_the_scale_of_the_deviations(deployed):
+    run = deployed.copy(deep=True)
+    run["opening_angle"].values[0, 3, -1] = 90.0
+    limits = [[axes.get_ylim() for axes in opening_angles(r).axes[2:4]] for r in (deployed, run)]
+    assert limits[0] == limits[1]
+
+
 @pytest.mark.parametrize(
     ("sections", "chosen"), [(1, (1,)), (2, (1, 2)), (3, (1, 2)), (6, (1, 3)), (18, (1, 9))]
 )

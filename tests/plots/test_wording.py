@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from ringsim.plots import wording
+from ringsim.plots import style, wording
 
 
 def quantity(values, units: str) -> xr.DataArray:
@@ -55,6 +55,15 @@ def test_ending_tells_success_failure_and_the_lack_of_an_end(deployed, failed, u
     assert wording.ending(deployed) == "Deployed after 17.58 s"
     assert wording.ending(failed).startswith("Solver failed after 9.25 s: the step fell below")
     assert wording.ending(unfinished).startswith("Unfinished after 12 s: ")
+
+
+def test_a_long_title_is_broken_into_even_lines(deployed):
+    run = deployed.assign_attrs(title="word " * 30)
+    figure = style.new_figure(8.0, 3.0)
+    wording.head(figure, figure.subplots(), run, "Subject")
+    lines = figure.get_suptitle().splitlines()
+    assert len(lines) == 2
+    assert abs(len(lines[0]) - len(lines[1])) <= len("word ")
 
 
 def test_success_without_locking_gives_the_reason(unfinished):
