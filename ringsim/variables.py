@@ -73,9 +73,7 @@ _ALL = (
     Variable("elastic_energy", ("time",), "J", "energy stored in rods, net and stops"),
     Variable("work", ("time",), "J", "work done on the structure by forces and winches"),
     Variable("dissipation", ("time",), "J", "energy lost in joints, dampers and stops"),
-    Variable(
-        "energy_error", (), "1", "largest energy imbalance over the largest energy exchanged"
-    ),
+    Variable("energy_error", (), "1", "largest energy imbalance over the largest energy exchanged"),
     Variable("constraint_violation", ("time",), "m", "largest gap in any joint"),
     Variable("constraint_error", (), "m", "largest gap in any joint at any step"),
     Variable("steps", (), "1", "time steps", "i4"),

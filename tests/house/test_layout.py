@@ -1,0 +1,67 @@
+"""What must hold for the files as a whole."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from ringsim.cli import VERBS
+from ringsim.variables import VARIABLES
+
+ROOT = Path(__file__).parents[2]
+SOURCES = sorted((ROOT / "ringsim").rglob("*.py"))
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def readme_block(marker: str) -> str:
+    """The shell block that follows a marker comment."""
+    found = re.search(rf"<!-- {marker} -->\n```sh\n(.*?)```", README, re.DOTALL)
+    assert found is not None
+    return found[1]
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_file_is_longer_than_300_lines(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 300
+
+
+def test_every_folder_with_code_is_a_package() -> None:
+    """A folder without __init__.py would be missing from an installed copy."""
+    assert {path.parent for path in SOURCES} == {
+        path.parent for path in SOURCES if path.name == "__init__.py"
+    }
+
+
+def test_every_verb_has_its_file() -> None:
+    files = {path.stem for path in (ROOT / "ringsim" / "cli").glob("[a-z]*.py")}
+    assert set(VERBS) <= files
+
+
+def test_readme_names_every_verb() -> None:
+    for verb in VERBS:
+        assert f"`ringsim {verb}" in README
+
+
+def test_readme_names_every_variable() -> None:
+    results = README.partition("## Results")[2].partition("## ")[0]
+    assert set(re.findall(r"`([a-z_]+)`", results)) - {"ok", "reason"} == set(VARIABLES)
+
+
+def test_readme_blocks_are_one_line_each() -> None:
+    for marker in ("main", "tests"):
+        assert len(readme_block(marker).splitlines()) == 1
+
+
+def test_readme_installs_extras_that_exist() -> None:
+    extras = set(PROJECT["project"]["optional-dependencies"])
+    named = [set(text.split(",")) for text in re.findall(r"\.\[([a-z,]+)\]", README)]
+    assert len(named) == 2
+    for each in named:
+        assert each <= extras
+
+
+def test_ci_runs_the_test_block_of_the_readme() -> None:
+    assert "pytest" in readme_block("tests")
+    assert "<!-- tests -->" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
