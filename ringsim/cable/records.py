@@ -89,7 +89,7 @@ class Winch(Model):
             if not self.turns(time):
                 return WinchState(time, state.at(time).wound, 0.0)
             if reading is None:
-                raise ValueError(f'winding.kind = "{self.winding}" needs a reading')
+                raise ValueError(f"{type(self.winding).__name__} needs a reading of its rope")
             return self.winding.advance(time, duration, reading, state)
         return self.at(time, state)
 

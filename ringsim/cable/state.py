@@ -179,14 +179,15 @@ class ChainState:
     def reading(self, cable: int, end: int = 0, path_slope: float = 0.0) -> WinchReading:
         """What the winch at an end (0 first, 1 far) of a cable (from 0) knows of its rope."""
         rope = int((self.ropes.last if end else self.ropes.first)[cable])
+        present = float(self.wound_rate[cable, end])
         return WinchReading(
             stretch=float(self.paths[rope] - self.natural[rope]),
             natural_length=float(self.natural[rope]),
             axial_stiffness=float(self.material.axial_stiffness[rope]),
             damping_time=float(self.material.damping_time[rope]),
             slack_width=float(self.material.slack_width[rope]),
-            tension_ratio=self._tension_ratio(rope, end, float(self.wound_rate[cable, end])),
-            path_rate=float(self.path_rates[rope]),
+            tension_ratio=self._tension_ratio(rope, end, present),
+            path_rate=float(self.path_rates[rope] + self.wound_rates[rope]) - present,
             path_slope=path_slope,
         )
 

@@ -50,9 +50,10 @@ def test_rope_no_longer_crosses_a_jammed_pulley():
 def test_jams_between_two_winches_leave_each_its_own_rope():
     case = still(PATH, 0.001, (0.1, 0.1), axial_stiffness=1e4)
     case.wound = np.array([[0.001, 0.0005]])
-    ropes = case.ropes
+    ropes, whole = case.ropes, case.state().natural.sum()
     for pulley in (3, 1):
         ropes = JammedPulley(pulley=pulley, time=1.0).strike(ropes, case.state(ropes=ropes))
+        assert case.state(ropes=ropes).natural.sum() == pytest.approx(whole, rel=1e-15)
     assert list(ropes.starts) == [0, 1, 3]
     now, then = (case.state(ropes=ropes, wound=case.wound + w) for w in (0.0, [[0.01, 0.002]]))
     assert now.natural - then.natural == pytest.approx([0.01, 0.0, 0.002], abs=1e-14)

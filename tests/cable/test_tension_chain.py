@@ -194,8 +194,9 @@ def test_the_winch_pays_for_all_power(law, **motion):
         (energy(step) - energy(-step)) / (2 * step),
     ]
     # The energy's rate is a central difference: the elastic force changes by up to 1e-2 of the
-    # slack width within a step, which is 1e-4 / 6 of the rate; rounding is 1e-16 energy / step.
-    error = 2e-5 * np.abs(terms).max() + 1e-8 * (1.0 + state.elastic_energy.sum())
+    # slack width within a step, which is 1e-4 / 6 of the rate; lengths are rounded to 1e-15 m,
+    # that is 1e-8 m/s.
+    error = 2e-5 * np.abs(terms).max() + 1e-8 * (1.0 + state.tensions.sum())
     assert state.winch_power.sum() == pytest.approx(np.sum(terms), abs=error)
 
 

@@ -10,8 +10,8 @@ from pydantic import ValidationError
 from scipy.integrate import quad
 from scipy.interpolate import PchipInterpolator
 
-from cable_cases import LAWS, cable, still
-from ringsim.cable.records import Winch
+from cable_cases import LAWS, cable, random_case, still
+from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winding.constant import ConstantWinding
 from ringsim.cable.winding.family import FeedbackWinding, WinchState, Winding
 from ringsim.cable.winding.ramp import RampWinding
@@ -95,6 +95,36 @@ def test_a_winch_keeps_its_hours():
         Winch(winding=ConstantWinding(speed=0.1), start_time=2.0, stop_time=1.0)
 
 
+def test_a_winch_with_feedback_keeps_its_hours_too():
+    winch = Winch(winding=STALL, start_time=2.0, stop_time=5.0)
+    assert winch.feedback
+    reading = still([[0, 0, 0], [1, 0, 0]], 0.0, initial_slack=0.5).state().reading(0)
+    state = winch.advance(1.0, 1.0, reading, WinchState())
+    assert (state.wound, state.speed) == (0.0, 0.0)
+    state = winch.advance(2.0, 1.0, reading, state)
+    assert (state.time, state.wound, state.speed) == (2.0, 0.0, 0.1)
+    assert winch.at(2.5, state).wound == pytest.approx(0.05)
+    assert winch.advance(3.0, 1.0, reading, state).wound == pytest.approx(0.1)
+    state = winch.advance(5.0, 1.0, reading, state)
+    assert winch.at(9.0, state).wound == pytest.approx(0.3)
+    with pytest.raises(ValueError, match="StallWinding needs a reading"):
+        winch.advance(3.0, 1.0, None, state)
+
+
+def test_a_cable_reads_back_from_plain_tables():
+    table = {
+        "plane": "lower",
+        "end": "last",
+        "axial_stiffness": 20000,
+        "friction": {"kind": "capstan", "coefficient": [0.1, 0.2]},
+        "winch": {"winding": {"kind": "table", "times": [0, 1.0], "lengths": [0, 0.1]}},
+    }
+    read = Cable.model_validate(table)
+    assert list(read.friction.coefficients) == [0.1, 0.2]
+    assert read.winch.winding == TableWinding(times=(0.0, 1.0), lengths=(0.0, 0.1))
+    assert Cable.model_validate(read.model_dump(mode="json")) == read
+
+
 def test_far_winch_needs_two_ends():
     winch = Winch(winding=ConstantWinding(speed=0.1), start_time=2.0)
     with pytest.raises(ValidationError, match='far_winch needs end = "both"'):
@@ -167,6 +197,21 @@ def test_feedback_with_an_opening_rate_starts_as_slowly_as_the_geometry():
     reading = still([[0, 0, 0], [1, 0, 0]], 0.0).state().reading(0, path_slope=-0.2)
     assert law.command(5.0, reading) == pytest.approx(0.02)
     assert law.command(4.0, reading) == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize("end", [0, 1])
+@pytest.mark.parametrize("speed", [-0.2, 0.0, 1e-4, 0.3])
+def test_a_reading_foresees_the_tension_at_another_speed(end, speed):
+    case = random_case(
+        6, speed=0.1, wound=0.01, winding=0.1, far_winding=0.05, friction=LAWS["bearing"],
+        slip_speed=0.05, damping_time=0.01,
+    )  # fmt: skip
+    foreseen = case.state().reading(1, end).tension_after(0.0, speed)
+    case.wound_rate[1, end] = speed
+    state = case.state()
+    # The reading's strain rate leaves out terms of first order in strain, here 1e-2 of 1e-3.
+    assert state.strains[1] < 0.01
+    assert foreseen == pytest.approx(state.winch_tensions[1, end], rel=2e-3)
 
 
 @given(

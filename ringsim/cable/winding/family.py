@@ -41,7 +41,8 @@ class WinchReading:
         Tension at the winch over the mean tension of the rope as a function of the winch's
         speed (m/s), not falling; 1 without friction.
     path_rate
-        Rate of the path length, in m/s: negative while the structure takes up rope.
+        Rate of the path length and of another winch on the same rope, in m/s: negative while
+        the structure gives rope free.
     path_slope
         Derivative of the ideal path length after the opening angle at the measured angles, in
         m/rad.
