@@ -74,23 +74,34 @@ def _add_flexible(model: RingModel, boom: FlexibleBoom) -> None:
         for k in range(boom.elements)
     ]
     assembly.bodies += cables
-    _clamp(model, top_body, nodes[0])
+    _clamp(model, top_body, cables[0], 0.1 * length)
     _slide(model, low_body, cables, length, float(top[2] - low[2]))
 
 
-def _clamp(model: RingModel, body: Any, node: Any) -> None:
-    """Hold position and direction of the boom's end on the upper hinge assembly."""
+def _clamp(model: RingModel, body: Any, cable: Any, reach: float) -> None:
+    """Hold the boom's end on the upper hinge assembly at two points, ``reach`` apart.
+
+    The element's nodes have a slope but no orientation, so the direction is held by a second
+    spherical joint; the boom is inextensible between the two.
+    """
     system = model.assembly.system
-    down = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-    marker = model.assembly.body_marker(body, np.zeros(3), down)
-    end = system.AddMarker(item.MarkerNodeRigid(nodeNumber=node))
-    model.assembly.generic_joint(marker, end, [1, 1, 1, 0, 1, 1])
+    for drop in (0.0, reach):
+        system.AddObject(
+            item.ObjectJointSpherical(
+                markerNumbers=[
+                    model.assembly.body_marker(body, np.array([0.0, 0.0, -drop])),
+                    system.AddMarker(
+                        item.MarkerBodyPosition(bodyNumber=cable, localPosition=[drop, 0.0, 0.0])
+                    ),
+                ]
+            )
+        )
 
 
 def _slide(model: RingModel, body: Any, cables: list[Any], length: float, place: float) -> None:
     """Let the lower hinge assembly slide along the chain of elements."""
     system = model.assembly.system
-    markers = [system.AddMarker(item.MarkerBodyCable2DCoordinates(bodyNumber=c)) for c in cables]
+    markers = [system.AddMarker(item.MarkerBodyBeamShape(bodyNumber=c)) for c in cables]
     element = min(int(place / length), len(cables) - 1)
     data = system.AddNode(
         item.NodeGenericData(initialCoordinates=[element, place], numberOfDataCoordinates=2)

@@ -17,6 +17,8 @@ from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import JointGroup, Openings, State
 from ringsim.engine.stepping import StepControl
 from ringsim.engine.stress import StressMeter
+from ringsim.scene import Scene
+from ringsim.theory.ideal_ring import IdealRing
 from ringsim.variables import Status
 
 Array = NDArray[np.float64]
@@ -75,7 +77,7 @@ class Integration:
         self._steps = StepControl(
             scene.solver,
             _contact_step(built),
-            travel=math.pi - math.radians(scene.structure.opening_angle),
+            usual_rate=_usual_rate(scene),
         )
         self._fresh = True
         self.history = History()
@@ -201,6 +203,14 @@ class Integration:
             f"step: reduce solver.step or solver.tolerance, or raise solver.newton_tolerance "
             f"({detail[:200]})"
         )
+
+
+def _usual_rate(scene: Scene) -> float:
+    """Mean opening rate in rad/s if the initial acceleration of the ideal ring lasted."""
+    ring = scene.structure
+    travel = math.pi - math.radians(ring.opening_angle)
+    pull = 2.0 * abs(IdealRing.of(scene).acceleration_from_rest(ring.initial_phi))
+    return max(math.sqrt(0.5 * pull * travel), travel / scene.solver.end_time)
 
 
 def _contact_step(built: Built) -> float:

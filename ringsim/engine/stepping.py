@@ -22,18 +22,18 @@ class StepControl:
 
     A local error C h^3 |a'''| in the angle a shifts the motion by C h^3 |a'''| / |a'| in time;
     spread evenly over the run that gives h = sqrt(tolerance |a'| / (C |a'''|)).  The third
-    derivative comes from divided differences of the last three rates; a rate below ``travel``
-    over the end time counts as that much, or the tremor of a ring that hardly moves yet would
-    ask for tiny steps.  The ratio |a'''| / |a'| fades over its own time scale, so that a passage
+    derivative comes from divided differences of the last three rates; a rate below
+    ``usual_rate``, the mean rate to be expected of the run, counts as that much, or the tremor of
+    a ring that hardly moves yet would ask for tiny steps.  The ratio |a'''| / |a'| fades over its own time scale, so that a passage
     of a''' through zero does not open the step.  Towards the end of the travel the step shrinks
     so that the stop is met with a small one.
     """
 
-    def __init__(self, solver: Solver, contact_step: float, travel: float) -> None:
+    def __init__(self, solver: Solver, contact_step: float, usual_rate: float) -> None:
         self._solver = solver
         self._contact = min(contact_step, solver.step)
         self._least = solver.step / _FINEST
-        self._slow = travel / solver.end_time
+        self._usual = usual_rate
         self._bend = 0.0
         self._past: deque[tuple[float, float]] = deque(maxlen=3)
         self.step = solver.step if solver.step_control == "constant" else solver.step / _FIRST
@@ -56,7 +56,7 @@ class StepControl:
             return self.step
         wanted = max(self._from_motion(), self._least)
         if in_contact:
-            wanted = min(wanted, self._contact)
+            wanted = self._contact
         elif math.isfinite(to_stop):
             wanted = min(wanted, max(0.5 * to_stop, self._contact))
         self.step = min(wanted, GROWTH * self.step, self._solver.step)
@@ -68,7 +68,7 @@ class StepControl:
         (t0, r0), (t1, r1), (t2, r2) = self._past
         first, second = (r1 - r0) / (t1 - t0), (r2 - r1) / (t2 - t1)
         third = abs(2.0 * (second - first) / (t2 - t0))
-        bend = third / max(abs(r2), self._slow)
+        bend = third / max(abs(r2), self._usual)
         fading = max(0.0, 1.0 - (t2 - t1) * math.sqrt(self._bend))
         self._bend = max(bend, fading * self._bend)
         if self._bend == 0.0:

@@ -19,4 +19,4 @@ class Net(Model):
     damping: DampingRate = 0.0
     neutral_length: Metre = 0.7116
     two_sided: bool = False
-    hub_mass: Kilogram = 0.001
+    hub_mass: Kilogram = 1e-5

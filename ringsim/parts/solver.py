@@ -19,23 +19,21 @@ class Solver(Model):
 
     end_time: Second = 60.0
     """The run ends here at the latest."""
-    settling_time: SecondOrZero = 0.2
+    settling_time: SecondOrZero = 0.05
     """Time simulated after the last V-joint has locked."""
     step: Second = 0.2
     """Largest step, or the step if it is constant."""
     step_control: Literal["motion", "constant"] = "motion"
     tolerance: Annotated[float, Field(ge=1e-8, le=0.1)] = 1e-4
-    spectral_radius: Ratio = 0.5
+    spectral_radius: Ratio = 0.8
     """High-frequency amplification per step: 1 keeps every vibration, lower damps it."""
-    newton_tolerance: Annotated[float, Field(ge=1e-12, le=1e-2)] = 1e-6
+    newton_tolerance: Annotated[float, Field(ge=1e-12, le=1e-2)] = 1e-5
     """Residual at which Newton stops, relative to the driving forces of the scene."""
 
     @model_validator(mode="after")
     def _usable(self) -> Solver:
         if self.step > self.end_time:
-            raise ValueError(
-                f"step = {self.step} s must not exceed end_time = {self.end_time} s"
-            )
+            raise ValueError(f"step = {self.step} s must not exceed end_time = {self.end_time} s")
         if self.spectral_radius == 1.0:
             raise ValueError(
                 "spectral_radius = 1.0 must be below 1: position constraints need some "
