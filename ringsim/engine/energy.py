@@ -17,22 +17,26 @@ from ringsim.parts.joints import JointFriction
 Array = NDArray[np.float64]
 _KINETIC = exu.OutputVariableType.KineticEnergy
 _POTENTIAL = exu.OutputVariableType.PotentialEnergy
+_STRAIN = exu.OutputVariableType.StrainLocal
 
 
 class Energies(NamedTuple):
-    """Energies in J and the power lost in W at one instant."""
+    """Energies in J and the power lost in W at one instant; ``lost_in_rods`` is the energy in J
+    that the rods' own damping took since the reading before."""
 
     kinetic: float
     elastic: float
     work: float
     loss: float
+    lost_in_rods: float
 
 
 class EnergyMeter:
     """Measures the energies of a ring model.
 
     Rods and bodies report theirs through exudyn; stops, net, loads and losses are evaluated
-    here.  Losses inside the rods (their own damping) are not measured.
+    here.  The loss in the rods follows from the change of their strains between readings,
+    damping * L * (d eps)^T C (d eps) / dt, which is exact for strains that change evenly.
     """
 
     def __init__(self, model: RingModel, net: HubNet | None, forces: Array) -> None:
@@ -44,13 +48,24 @@ class EnergyMeter:
             [[assembly.coordinates_of(j.gap[0])[2] for j in plane] for plane in model.vjoints]
         )
         self._friction = self._friction_groups()
+        self._strains: tuple[float, Array] | None = None
+        self._rates = np.array(
+            [
+                rod.length * rod.stiffness
+                for rods in model.rods.values()
+                for rod in rods
+                for _ in rod.elements
+            ]
+        )
         if net is not None:
             self._corners = np.array(
                 [assembly.coordinates_of(node)[:3] for _, node in model.hinges[0]]
             )
             self._hub = assembly.coordinates_of(net.hub)[:3]
 
-    def read(self, state: State, angles: Array, rates: Array, latched: Array) -> Energies:
+    def read(
+        self, time: float, state: State, angles: Array, rates: Array, latched: Array
+    ) -> Energies:
         """Energies at the current state.
 
         Parameters
@@ -74,7 +89,20 @@ class EnergyMeter:
             float(elastic) + stored + net_stored,
             float(np.sum(self._forces * lifted)),
             loss + lost + net_lost,
+            self._lost_in_rods(time),
         )
+
+    def _lost_in_rods(self, time: float) -> float:
+        damping = self._model.scene.rods.damping
+        if damping == 0.0 or not self._model.formulation.has_strains:
+            return 0.0
+        centre = [0.0, 0.0, 0.0]
+        strains = np.array([self._output(e, _STRAIN, centre) for e in self._elements])
+        before, self._strains = self._strains, (time, strains)
+        if before is None or time <= before[0]:
+            return 0.0
+        change = strains - before[1]
+        return damping * float(np.sum(self._rates * change**2)) / (time - before[0])
 
     def _friction_groups(self) -> list[tuple[JointFriction, JointGroup, int]]:
         laws = self._model.scene.joints

@@ -144,7 +144,7 @@ class Integration:
         history.times.append(time)
         history.angles.append(angles)
         history.rates.append(rates)
-        history.energies.append(self._energy.read(state, angles, rates, self._latched))
+        history.energies.append(self._energy.read(time, state, angles, rates, self._latched))
         history.gaps.append(max(float(group.gaps(state).max()) for group in self._gaps))
         if self._stress is not None:
             history.stresses.append(self._stress.read())

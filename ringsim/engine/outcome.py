@@ -67,9 +67,8 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
     values["asynchrony_max"] = np.array(spread[before].max())
 
     energies = np.array(history.energies)
-    lost = np.concatenate(
-        [[0.0], np.cumsum(0.5 * np.diff(times) * (energies[1:, 3] + energies[:-1, 3]))]
-    )
+    between = 0.5 * np.diff(times) * (energies[1:, 3] + energies[:-1, 3]) + energies[1:, 4]
+    lost = np.concatenate([[0.0], np.cumsum(between)])
     kinetic, elastic, work = energies[:, 0], energies[:, 1], energies[:, 2]
     for name, series in (
         ("kinetic_energy", kinetic),

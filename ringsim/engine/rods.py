@@ -30,6 +30,10 @@ class Rod:
         Initial frame, columns in global coordinates, shape (3, 3).
     tube
         Cross-section.
+    stiffness
+        Diagonal of the sectional stiffness (EA, kGA, kGA, GJ, EI, EI), N and N m^2.
+    length
+        Length of one element, m.
 
     """
 
@@ -37,6 +41,8 @@ class Rod:
     elements: list[Any]
     axes: Array
     tube: Tube
+    stiffness: Array
+    length: float
 
 
 class NodeFrames(NamedTuple):
@@ -49,7 +55,12 @@ class NodeFrames(NamedTuple):
 
 
 class Formulation(Protocol):
-    """What a rod formulation must offer."""
+    """What a rod formulation must offer.
+
+    ``has_strains`` says whether exudyn reports strains, forces and moments of its elements.
+    """
+
+    has_strains: bool
 
     def add_node(self, assembly: Assembly, frame: Frame) -> Any:
         """A node of this formulation."""
@@ -116,4 +127,5 @@ def add_rod(
         for k in range(elements)
     ]
     assembly.bodies += objects
-    return Rod(nodes, objects, first.axes, tube)
+    stiffness = np.diag(np.array(section.stiffnessMatrix))
+    return Rod(nodes, objects, first.axes, tube, stiffness, length)

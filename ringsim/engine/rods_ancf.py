@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 class Ancf:
     """Formulation of ``AncfRods``: 9 coordinates a node, 18 an element."""
 
+    has_strains = False
+
     def add_node(self, assembly: Assembly, frame: Frame) -> Any:
         """A node with position and the slope vectors along y and z."""
         y, z = frame.axes[:, 1], frame.axes[:, 2]

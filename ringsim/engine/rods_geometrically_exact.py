@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 class GeometricallyExact:
     """Formulation of ``GeometricallyExactRods``."""
 
+    has_strains = True
+
     def add_node(self, assembly: Assembly, frame: Frame) -> Any:
         """A node with position and Euler parameters."""
         return assembly.add_rigid_node(frame)

@@ -31,7 +31,7 @@ class StepControl:
 
     def __init__(self, solver: Solver, contact_step: float, usual_rate: float) -> None:
         self._solver = solver
-        self._contact = min(contact_step, solver.step)
+        self._contact = min(contact_step * math.sqrt(solver.tolerance / 1e-4), solver.step)
         self._least = solver.step / _FINEST
         self._usual = usual_rate
         self._bend = 0.0
