@@ -55,7 +55,7 @@ def test_check_says_what_is_built() -> None:
 def test_mass_is_the_sum_of_its_parts() -> None:
     """Tubes by hand: 18 (4 x 0.4275 m and 4 x 0.2889 m) of 1800 kg/m^3; 72 points of 19.8 g."""
     total, _, parts = line(run("check", "ring18"), "mass").partition(" kg: ")
-    by_name = {name: float(mass) for name, mass in re.findall(r"([\w-]+) ([\d.]+)", parts)}
+    by_name = {name: float(mass) for name, mass in re.findall(r"([\w-]+) ([\d.e-]+)", parts)}
     quarter_pi = 0.785398
     assert by_name["diagonals"] == pytest.approx(
         1800 * 18 * 4 * 0.4275 * quarter_pi * (0.01**2 - 0.00915**2), rel=1e-3
