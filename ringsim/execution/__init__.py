@@ -1,0 +1,1 @@
+"""Who runs which sample, and how one run is kept apart from all others."""

@@ -1,0 +1,1 @@
+"""Which samples a campaign has: distributions of inputs and designs over them."""

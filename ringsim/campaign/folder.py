@@ -1,0 +1,177 @@
+"""A campaign's folder: its design, its identity, and whether it may be gone on with."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from ringsim.campaign.specification import Campaign
+from ringsim.execution.work import Retry
+from ringsim.refusal import InputError
+from ringsim.sampling.table import Table
+from ringsim.scene import Scene, scene_from_toml
+from ringsim.storage.design_file import NAME, read_design, write_design
+from ringsim.storage.files import unwritable
+from ringsim.storage.layout import Output
+from ringsim.storage.provenance import provenance
+from ringsim.storage.shards import ASIDE, FOLDER
+from ringsim.storage.store import JOURNALS, create_folders
+
+
+@dataclass(frozen=True)
+class Folder:
+    """A prepared campaign folder.
+
+    Attributes
+    ----------
+    path
+        Where it is.
+    identity
+        Digest of everything that decides about the results.
+    table
+        Inputs of all samples.
+    scene
+        Scene that they vary.
+    solver
+        ``module:function`` that runs one sample.
+    attributes
+        Global attributes of the design.
+    """
+
+    path: Path
+    identity: str
+    table: Table
+    scene: Scene
+    solver: str
+    attributes: dict[str, Any]
+
+    @property
+    def output(self) -> Output:
+        """How the merged file is stored."""
+        return Output.model_validate_json(self.attributes["output"])
+
+    @property
+    def retry(self) -> Retry:
+        """What is done about runs that the solver could not finish."""
+        return Retry.model_validate_json(self.attributes["retry"])
+
+
+def open_folder(path: Path) -> Folder:
+    """The campaign in a folder.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    table, attributes = read_design(path)
+    scene = scene_from_toml(attributes["scene"], source=f"{path / NAME}: scene")
+    return Folder(path, attributes["identity"], table, scene, attributes["solver"], attributes)
+
+
+def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> Folder:
+    """Create a campaign's folder, or check that it is this campaign's.
+
+    A design may have grown since: if its first samples are those of the folder, the new ones
+    are added.
+
+    Parameters
+    ----------
+    campaign
+        What is to be run.
+    path
+        The folder.
+    solver
+        ``module:function`` that runs one sample.
+
+    Raises
+    ------
+    InputError
+        If the folder belongs to another campaign, or cannot be written.
+    """
+    table = campaign.draw()
+    identity = _identity(campaign, table, solver)
+    if not (path / NAME).exists():
+        strangers = sorted(entry.name for entry in _entries(path) if not _ours(entry.name))
+        if strangers:
+            raise InputError(
+                f"{path}: this folder holds {strangers[0]} and no campaign: choose a new one with "
+                "--out"
+            )
+    else:
+        old = open_folder(path)
+        _refuse_another(campaign, old, identity, table, path)
+        if old.table.samples == table.samples and old.attributes["campaign"] == campaign.text:
+            return old
+    wanted = campaign.specification
+    attributes = provenance(name=wanted.name, title=wanted.title, action="designed") | {
+        "identity": identity,
+        "seed": wanted.seed,
+        "solver": solver,
+        "campaign": campaign.text,
+        "campaign_name": wanted.name,
+        "scene": campaign.scene.to_toml(),
+        "output": wanted.output.model_dump_json(),
+        "retry": wanted.retry.model_dump_json(),
+    }
+    try:
+        create_folders(path)
+        write_design(path, table, attributes)
+    except OSError as error:
+        raise unwritable(path / NAME, error) from error
+    return open_folder(path)
+
+
+def _entries(path: Path) -> list[Path]:
+    try:
+        return list(path.iterdir()) if path.exists() else []
+    except OSError as error:
+        raise InputError(f"{path}: this is no folder to write to: {error.strerror}") from None
+
+
+def _ours(name: str) -> bool:
+    return name in (FOLDER, JOURNALS, ASIDE) or name.startswith((".design", "lock", "progress"))
+
+
+def _identity(campaign: Campaign, table: Table, solver: str) -> str:
+    content = {
+        "scene": campaign.scene.to_toml(),
+        "inputs": [column.path for column in table.columns],
+        "seed": campaign.specification.seed,
+        "retry": campaign.specification.retry.model_dump(),
+        "solver": solver,
+        "version": version("ringsim"),
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
+
+
+def _refuse_another(
+    campaign: Campaign, old: Folder, identity: str, table: Table, path: Path
+) -> None:
+    cure = "choose another folder with --out, or delete this one"
+    if old.identity != identity:
+        differing = [
+            word
+            for word, mine in (
+                ("its scene", campaign.scene.to_toml() != old.attributes["scene"]),
+                ("its seed", campaign.specification.seed != int(old.attributes["seed"])),
+                ("its retry", campaign.specification.retry != old.retry),
+                ("the version of ringsim", old.attributes["ringsim_version"] != version("ringsim")),
+                (
+                    "its inputs",
+                    [c.path for c in table.columns] != [c.path for c in old.table.columns],
+                ),
+            )
+            if mine
+        ]
+        what = " and ".join(differing) or "its solver"
+        raise InputError(f"{path}: this folder holds another campaign ({what} differs): {cure}")
+    if not table.starts_with(old.table):
+        raise InputError(
+            f"{path}: this folder holds another campaign (its {old.table.samples} samples are not "
+            f"the first of the {table.samples} that {campaign.file.name} gives): {cure}"
+        )

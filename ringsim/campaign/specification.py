@@ -1,0 +1,142 @@
+"""The campaign file: which scene, which inputs, which design, which limits."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, ValidationError
+
+from ringsim.execution.work import Limits, Retry
+from ringsim.refusal import InputError, explain
+from ringsim.sampling.correlation import Correlation
+from ringsim.sampling.table import AnyDesign, AnyDistribution, Table, draw
+from ringsim.scene import Scene, builtin_scenes, load_scene
+from ringsim.storage.layout import Output
+from ringsim.units import Model
+
+SOLVER = "ringsim.simulation:run"
+"""What maps a scene to its outcome."""
+
+
+def _flat(inner: Callable[[Any], bool]) -> Callable[[Any], Any]:
+    """Join nested tables to dotted paths, down to tables that ``inner`` keeps."""
+
+    def flatten(table: Any, prefix: str = "") -> Any:
+        if not isinstance(table, dict):
+            return table
+        found: dict[str, Any] = {}
+        for name, value in table.items():
+            if isinstance(value, dict) and not inner(value):
+                found |= flatten(value, f"{prefix}{name}.")
+            else:
+                found[f"{prefix}{name}"] = value
+        return found
+
+    return flatten
+
+
+class Specification(Model):
+    """Content of a campaign file."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
+    title: Annotated[str, Field(max_length=300)] = ""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    scene: str
+    """Built-in scene, or scene file looked up beside the campaign file."""
+    set: Annotated[dict[str, Any], BeforeValidator(_flat(lambda table: False))] = Field(
+        default_factory=dict
+    )
+    """Values by scene path that all samples share."""
+    inputs: Annotated[
+        dict[str, AnyDistribution], BeforeValidator(_flat(lambda table: "kind" in table))
+    ] = Field(default_factory=dict)
+    """Distribution by scene path."""
+    correlations: list[Correlation] = Field(default_factory=list)
+    design: AnyDesign
+    limits: Limits = Limits()
+    retry: Retry = Retry()
+    max_failed: Annotated[int, Field(ge=0)] | None = None
+    """The campaign stops when more samples than this have failed."""
+    output: Output = Output()
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign file with the scene that it names.
+
+    Attributes
+    ----------
+    file
+        The campaign file.
+    text
+        Its text.
+    specification
+        Its content.
+    scene
+        The scene that its samples vary.
+    """
+
+    file: Path
+    text: str
+    specification: Specification
+    scene: Scene
+
+    def draw(self) -> Table:
+        """All inputs of all samples.
+
+        Raises
+        ------
+        InputError
+            If the scene refuses an input.
+        """
+        wanted = self.specification
+        try:
+            return draw(
+                self.scene,
+                wanted.inputs,
+                wanted.correlations,
+                wanted.design,
+                seed=wanted.seed,
+                folder=self.file.parent,
+            )
+        except InputError as error:
+            raise InputError(f"{self.file.name}: {error}") from None
+
+
+def load_campaign(path: Path) -> Campaign:
+    """Read a campaign file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or if its content or its scene is refused.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path.name}: not a text file: byte {error.start + 1} is not UTF-8; save it as UTF-8"
+        ) from None
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path.name}: not valid TOML: {error}; correct that line") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path.name}: not a campaign: {error}") from None
+    try:
+        specification = Specification.model_validate(table)
+    except ValidationError as error:
+        raise InputError(explain(error, Specification, path.name)) from None
+    name = specification.scene
+    base = load_scene(name if name in builtin_scenes() else path.parent / name)
+    try:
+        scene = base.with_values(specification.set)
+    except InputError as error:
+        raise InputError(f"{path.name}: set: {error}") from None
+    return Campaign(path, text, specification, scene)

@@ -1,0 +1,145 @@
+"""Watching a campaign: the progress bar, the progress file for others, the stop signals."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import platform
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from ringsim.storage.record import Result
+
+STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
+_PLAIN_SECONDS = 30.0
+_FILE_SECONDS = 1.0
+
+
+@dataclass
+class Stop:
+    """Whether the campaign is to stop, and why; falsy text means go on."""
+
+    reason: str = ""
+    signalled: bool = False
+
+    def asked(self) -> str:
+        """The reason to stop, or an empty string."""
+        return self.reason
+
+
+@contextlib.contextmanager
+def stopping_on_signals() -> Iterator[Stop]:
+    """Turn the first stop signal into a wish; a second one ends the process as usual."""
+    stop = Stop()
+
+    def note(number: int, _frame: Any) -> None:
+        stop.reason = f"stopped by {signal.Signals(number).name}"
+        stop.signalled = True
+        for each in STOPPERS:
+            signal.signal(each, before[each])
+
+    before = {each: signal.signal(each, note) for each in STOPPERS}
+    try:
+        yield stop
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
+
+
+@dataclass
+class Progress:
+    """Counts samples, and tells the terminal and the progress file.
+
+    Attributes
+    ----------
+    path
+        The progress file.
+    name
+        Of the campaign.
+    total, done, failed
+        Samples of this process's share: all, finished, failed among the finished.
+    workers
+        Samples that run at the same time.
+    """
+
+    path: Path
+    name: str
+    total: int
+    done: int
+    failed: int
+    workers: int
+    running: dict[int, float] = field(default_factory=dict)
+    _before: int = 0
+    _begin: float = field(default_factory=time.time)
+    _told: float = field(default_factory=time.monotonic)
+    _written: float = 0.0
+    _bar: Any = None
+
+    def __post_init__(self) -> None:
+        self._before = self.done
+        if sys.stderr.isatty():
+            self._bar = tqdm(
+                total=self.total, initial=self.done, desc=self.name, unit="sample", smoothing=0.1
+            )
+            self._bar.set_postfix(failed=self.failed)
+        else:
+            print(f"{self.name}: {self.done} of {self.total} samples done, {self.workers} workers",
+                  file=sys.stderr, flush=True)  # fmt: skip
+
+    def started(self, sample: int) -> None:
+        """Note that a sample runs."""
+        self.running[sample] = time.time()
+        self._save(state="running")
+
+    def finished(self, result: Result) -> None:
+        """Note that a sample has ended."""
+        self.running.pop(result.sample, None)
+        self.done += 1
+        self.failed += result.status.failed
+        if self._bar is not None:
+            self._bar.set_postfix(refresh=False, failed=self.failed)
+            self._bar.update()
+        elif time.monotonic() - self._told > _PLAIN_SECONDS:
+            self._told = time.monotonic()
+            print(f"{self.name}: {self.done} of {self.total} done, {self.failed} failed",
+                  file=sys.stderr, flush=True)  # fmt: skip
+        self._save(state="running")
+
+    def close(self, state: str) -> None:
+        """Say how it ended."""
+        if self._bar is not None:
+            self._bar.close()
+        self.running.clear()
+        self._written = 0.0
+        self._save(state=state)
+
+    def _save(self, state: str) -> None:
+        """Write the progress file, not more often than each second; never fail because of it."""
+        if time.monotonic() - self._written < _FILE_SECONDS:
+            return
+        self._written = time.monotonic()
+        content = {
+            "state": state,
+            "host": platform.node(),
+            "pid": os.getpid(),
+            "workers": self.workers,
+            "begin": self._begin,
+            "updated": time.time(),
+            "total": self.total,
+            "done": self.done,
+            "done_before": self._before,
+            "failed": self.failed,
+            "running": self.running,
+        }
+        draft = self.path.with_name(f"{self.path.name}.{os.getpid()}")
+        with contextlib.suppress(OSError):
+            draft.write_text(json.dumps(content), encoding="utf-8")
+            os.replace(draft, self.path)

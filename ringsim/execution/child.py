@@ -1,0 +1,71 @@
+"""The solver process: takes tasks from a pipe, one at a time, until its parent is gone."""
+
+from __future__ import annotations
+
+import ctypes
+import faulthandler
+import os
+import resource
+import signal
+import sys
+from multiprocessing.connection import Connection
+from typing import Any
+
+from ringsim.refusal import InputError
+
+_PR_SET_PDEATHSIG = 1
+_MOST_LOG_BYTES = 1 << 30
+
+
+def main() -> None:
+    """Serve the pipe whose file descriptor is the first argument."""
+    pipe = Connection(int(sys.argv[1]))
+    _die_with_parent(int(sys.argv[2]))
+    faulthandler.enable()
+    faulthandler.register(signal.SIGUSR2)
+    for ignored in (signal.SIGINT, signal.SIGUSR1):
+        signal.signal(ignored, signal.SIG_IGN)
+    try:
+        _serve(pipe, pipe.recv())
+    except (EOFError, ConnectionResetError, BrokenPipeError):
+        os._exit(0)
+
+
+def _serve(pipe: Connection, setup: dict[str, Any]) -> None:
+    from ringsim.execution.solve import fresh_scene, load_solver, solve
+
+    try:
+        solver, base = load_solver(setup["solver"]), fresh_scene(setup["scene"])
+    except InputError as error:
+        pipe.send(str(error))
+        return
+    _limit(resource.RLIMIT_DATA, int(setup["memory"]))
+    _limit(resource.RLIMIT_FSIZE, _MOST_LOG_BYTES)
+    _limit(resource.RLIMIT_CORE, 0)
+    pipe.send("")
+    while True:
+        task = pipe.recv()
+        os.ftruncate(1, 0)
+        signal.setitimer(signal.ITIMER_REAL, setup["backstop"])
+        result = solve(solver, base, task)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        pipe.send(result)
+
+
+def _limit(what: int, most: int) -> None:
+    hard = resource.getrlimit(what)[1]
+    if hard != resource.RLIM_INFINITY:
+        most = min(most, hard)
+    resource.setrlimit(what, (most, hard))
+
+
+def _die_with_parent(parent: int) -> None:
+    """Let the kernel end this process when its parent ends, however that happens."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

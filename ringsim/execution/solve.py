@@ -1,0 +1,123 @@
+"""One run, whatever happens in it: a result with a status, never an exception."""
+
+from __future__ import annotations
+
+import importlib
+import time
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ringsim.execution.work import Task
+from ringsim.refusal import InputError
+from ringsim.scene import Scene
+from ringsim.storage.record import Result, pack
+from ringsim.variables import VARIABLES, Outcome, Status
+
+Solver = Callable[[Scene], Outcome]
+LOG_CHARACTERS = 4000
+"""So much of what a failed run printed is kept."""
+
+_MAY_BE_MISSING = ("deployment_time",)
+
+
+def load_solver(name: str) -> Solver:
+    """The function ``module:function``.
+
+    Raises
+    ------
+    InputError
+        If there is no such function.
+    """
+    module, _, function = name.partition(":")
+    try:
+        solver: Solver = getattr(importlib.import_module(module), function)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"solver {name} cannot be loaded: {error}") from None
+    return solver
+
+
+def solve(solver: Solver, base: Scene, task: Task) -> Result:
+    """Run one sample.
+
+    Parameters
+    ----------
+    solver
+        Maps a scene to an outcome.
+    base
+        Scene that the sample varies.
+    task
+        Which sample.
+    """
+    step, begin = float("nan"), time.monotonic()
+    try:
+        scene = base.with_values(task.values)
+        if task.shrink != 1.0:
+            scene = scene.with_values({"solver.step": scene.solver.step * task.shrink})
+        step = scene.solver.step
+        outcome = solver(scene)
+        arrays, body = pack(outcome.coordinates | outcome.values)
+        status, reason, log = Status(outcome.status), str(outcome.reason), ""
+        fault = not_finite(outcome) if not status.failed else ""
+        if fault:
+            status, reason = Status.DIVERGED, fault
+    except MemoryError:
+        status, reason, log = Status.MEMORY, "the run needed more memory than allowed", _trace()
+        arrays, body = (), b""
+    except (Exception, SystemExit) as error:
+        status, log, arrays, body = Status.ERROR, _trace(), (), b""
+        reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return Result(
+        sample=task.sample,
+        status=status,
+        reason=" ".join(reason.split())[:1000],
+        log=log,
+        step=step,
+        seconds=time.monotonic() - begin,
+        finished=time.time(),
+        arrays=arrays,
+        body=body,
+    )
+
+
+def not_finite(outcome: Outcome) -> str:
+    """What is wrong with the numbers of a run that says it went well; empty if nothing is.
+
+    Missing values are right after the end of a run and for times that never came; before its
+    end, or infinite, they are not.
+    """
+    time_axis = outcome.coordinates.get("time")
+    end = outcome.values.get("final_time")
+    for name, values in outcome.values.items():
+        array = np.asarray(values)
+        if array.dtype.kind != "f" or name not in VARIABLES:
+            continue
+        if np.isinf(array).any():
+            return f"{name} is infinite: try a smaller solver.step"
+        dims = VARIABLES[name].dims
+        if "time" in dims and time_axis is not None and end is not None:
+            lasting = np.asarray(time_axis) <= float(end)
+            array = np.compress(lasting, array, axis=dims.index("time"))
+        elif dims or name in _MAY_BE_MISSING:
+            continue
+        if np.isnan(array).any():
+            return f"{name} is not a number: try a smaller solver.step"
+    return ""
+
+
+def _trace() -> str:
+    return traceback.format_exc()[-LOG_CHARACTERS:]
+
+
+def fresh_scene(table: dict[str, Any]) -> Scene:
+    """The scene of nested tables that have been checked before."""
+    return Scene.model_validate(table)
+
+
+def retold(reason: str, attempts: int, first: str) -> str:
+    """The reason of a run, with what became of the attempts before it."""
+    return (
+        f"{reason} (attempt {attempts}, with a smaller step; first: {first})" if first else reason
+    )

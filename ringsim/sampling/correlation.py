@@ -1,0 +1,88 @@
+"""Correlated inputs: a Gaussian copula over the axes of a design."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+from scipy.special import ndtr, ndtri
+
+from ringsim.refusal import InputError, known_or_nearest
+from ringsim.sampling.distributions.family import Array, inside
+from ringsim.units import Model
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+class Correlation(Model):
+    """Two inputs that depend on each other.
+
+    The coefficient is the linear correlation of the underlying standard normal variables
+    (Gaussian copula); between two normal inputs it is their own correlation.
+    """
+
+    between: Annotated[tuple[str, str], BeforeValidator(_as_tuple)]
+    coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]
+
+
+def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correlation]) -> Array:
+    """Make independent points of the unit cube depend on each other.
+
+    Parameters
+    ----------
+    points
+        Cumulative probabilities, shape (samples, axes).
+    paths
+        One path per axis; ``a.b`` in a correlation also means every ``a.b[k]``, section by
+        section.
+    correlations
+        The pairs.
+
+    Raises
+    ------
+    InputError
+        If a pair names what is not drawn, or if the pairs contradict each other.
+    """
+    matrix = np.eye(len(paths))
+    for pair in correlations:
+        for first, second in _columns(paths, pair):
+            matrix[first, second] = matrix[second, first] = pair.coefficient
+    moved = np.flatnonzero((matrix != np.eye(len(paths))).any(axis=1))
+    if moved.size == 0:
+        return points
+    try:
+        lower = np.linalg.cholesky(matrix[np.ix_(moved, moved)])
+    except np.linalg.LinAlgError:
+        raise InputError(
+            "correlations: the coefficients contradict each other (their matrix is not positive "
+            "definite): bring them nearer to 0"
+        ) from None
+    dependent = points.copy()
+    dependent[:, moved] = inside(ndtr(ndtri(points[:, moved]) @ lower.T))
+    return dependent
+
+
+def _columns(paths: Sequence[str], pair: Correlation) -> list[tuple[int, int]]:
+    first, second = (_of(paths, name) for name in pair.between)
+    if set(first) & set(second):
+        raise InputError(
+            f"correlations.between = {list(pair.between)} must name two different inputs"
+        )
+    if len(first) != len(second):
+        raise InputError(
+            f"correlations.between = {list(pair.between)}: one has {len(first)} values and the "
+            f"other {len(second)}: give both or neither each_section = true"
+        )
+    return list(zip(first, second, strict=True))
+
+
+def _of(paths: Sequence[str], name: str) -> list[int]:
+    found = [k for k, path in enumerate(paths) if path == name or path.startswith(f"{name}[")]
+    if not found:
+        hint = known_or_nearest(name, dict.fromkeys(path.split("[")[0] for path in paths))
+        raise InputError(f'correlations.between names "{name}", which is not an input ({hint})')
+    return found

@@ -1,0 +1,30 @@
+"""Latin hypercube samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from ringsim.sampling.designs.family import Axis, Design, Samples
+from ringsim.sampling.distributions.family import Array, inside
+
+
+class LatinHypercube(Design):
+    """Every input has exactly one sample in each of its n intervals of equal probability.
+
+    Source: McKay, Beckman and Conover, Technometrics 21 (1979).  Not extendable.
+    """
+
+    kind: Literal["latin-hypercube"] = "latin-hypercube"
+    samples: Samples
+
+    def points(self, axes: Sequence[Axis], seed: int) -> Array:
+        """Random places within randomly permuted intervals."""
+        from scipy.stats import qmc
+
+        if not axes:
+            return np.empty((self.samples, 0))
+        engine = qmc.LatinHypercube(d=len(axes), rng=np.random.default_rng(seed))
+        return inside(engine.random(self.samples))

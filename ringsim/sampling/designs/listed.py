@@ -1,0 +1,110 @@
+"""Samples listed in a file."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.refusal import InputError
+from ringsim.sampling.correlation import Correlation
+from ringsim.sampling.designs.family import Axis, Design
+
+
+class Listed(Design):
+    """One sample per row of a CSV file with scene paths in its header, or per netCDF sample.
+
+    In a netCDF file every variable over the dimension ``sample`` that has an attribute ``path``
+    is taken: the design or the result of another campaign can be listed as it is.
+    """
+
+    kind: Literal["list"] = "list"
+    file: str
+    """Looked up beside the campaign file."""
+
+    def table(
+        self,
+        axes: Sequence[Axis],
+        correlations: Sequence[Correlation],
+        *,
+        seed: int,
+        folder: Path,
+    ) -> dict[str, NDArray[Any]]:
+        """Values by path; see :meth:`Design.table`."""
+        if axes or correlations:
+            raise InputError(
+                "inputs: a listed design takes them from its file; leave out inputs and "
+                "correlations"
+            )
+        path = folder / self.file
+        if not path.is_file():
+            raise InputError(f"design.file = {self.file}: there is no file {path}")
+        columns = _from_netcdf(path) if path.suffix == ".nc" else _from_csv(path)
+        if not columns or not len(next(iter(columns.values()))):
+            raise InputError(f"design.file = {self.file}: no samples in it")
+        return columns
+
+
+def _from_csv(path: Path) -> dict[str, NDArray[Any]]:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"design.file = {path.name}: cannot be read: {error}") from None
+    rows = [row for row in csv.reader(text.splitlines()) if row]
+    if not rows:
+        return {}
+    header = [name.strip() for name in rows[0]]
+    for name in header:
+        if not name or header.count(name) > 1:
+            raise InputError(
+                f"design.file = {path.name}: column name {name!r} must be a scene path, once"
+            )
+    for number, row in enumerate(rows[1:], start=1):
+        if len(row) != len(header):
+            raise InputError(
+                f"design.file = {path.name}: row {number} has {len(row)} values and must have "
+                f"{len(header)}, one per column"
+            )
+    return {
+        name: _typed([row[column].strip() for row in rows[1:]])
+        for column, name in enumerate(header)
+    }
+
+
+def _typed(words: list[str]) -> NDArray[Any]:
+    """Whole numbers, numbers, true and false, or words: the narrowest that fits the column."""
+    if words and all(word in ("true", "false") for word in words):
+        return np.array([word == "true" for word in words])
+    for kind in (int, float):
+        try:
+            return np.array([kind(word) for word in words])
+        except (ValueError, OverflowError):
+            continue
+    return np.array(words)
+
+
+def _from_netcdf(path: Path) -> dict[str, NDArray[Any]]:
+    import netCDF4
+
+    columns: dict[str, NDArray[Any]] = {}
+    try:
+        with netCDF4.Dataset(path) as file:
+            file.set_auto_mask(False)
+            for variable in file.variables.values():
+                if variable.dimensions[:1] != ("sample",) or "path" not in variable.ncattrs():
+                    continue
+                values = np.asarray(variable[:])
+                if "dtype" in variable.ncattrs() and variable.dtype.kind == "i":
+                    values = values.astype(variable.getncattr("dtype"))
+                name = variable.getncattr("path")
+                if values.ndim == 1:
+                    columns[name] = values if values.dtype.kind != "O" else values.astype(str)
+                else:
+                    columns |= {f"{name}[{k + 1}]": values[:, k] for k in range(values.shape[1])}
+    except OSError as error:
+        raise InputError(f"design.file = {path.name}: cannot be read: {error}") from None
+    return columns

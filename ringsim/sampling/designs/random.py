@@ -1,0 +1,28 @@
+"""Independent random samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ringsim.sampling.designs.family import Axis, Design, Samples
+from ringsim.sampling.distributions.family import Array, inside
+
+
+class RandomDesign(Design):
+    """Plain Monte Carlo: sample i depends on the campaign's seed and on i alone."""
+
+    extendable: ClassVar[bool] = True
+
+    kind: Literal["random"] = "random"
+    samples: Samples
+
+    def points(self, axes: Sequence[Axis], seed: int) -> Array:
+        """One stream of random numbers per sample, in the order of the axes."""
+        points = np.empty((self.samples, len(axes)))
+        for sample in range(self.samples):
+            stream = np.random.SeedSequence(seed, spawn_key=(sample,))
+            points[sample] = np.random.default_rng(stream).random(len(axes))
+        return inside(points)

@@ -1,0 +1,41 @@
+"""Scrambled Sobol samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from ringsim.refusal import InputError
+from ringsim.sampling.designs.family import Axis, Design, Samples
+from ringsim.sampling.distributions.family import Array, inside
+
+
+class Sobol(Design):
+    """Low-discrepancy sequence with linear matrix scrambling and a digital shift.
+
+    Balanced at powers of two; fewer samples are the first ones of the next power of two.
+    Source: Joe and Kuo (2008) directions, Matousek (1998) scrambling, as in scipy.
+    """
+
+    extendable: ClassVar[bool] = True
+
+    kind: Literal["sobol"] = "sobol"
+    samples: Samples
+
+    def points(self, axes: Sequence[Axis], seed: int) -> Array:
+        """The first points of the sequence that belongs to the seed."""
+        from scipy.stats import qmc
+
+        if not axes:
+            return np.empty((self.samples, 0))
+        if len(axes) > qmc.Sobol.MAXDIM:
+            raise InputError(
+                f"design.kind = sobol has at most {qmc.Sobol.MAXDIM} inputs, not {len(axes)}: "
+                'use kind = "random"'
+            )
+        engine = qmc.Sobol(d=len(axes), scramble=True, rng=np.random.default_rng(seed), bits=30)
+        power = max(0, math.ceil(math.log2(self.samples)))
+        return inside(engine.random_base2(power)[: self.samples])

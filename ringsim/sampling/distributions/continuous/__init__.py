@@ -1,0 +1,1 @@
+"""Kinds of continuous distributions, one file each."""

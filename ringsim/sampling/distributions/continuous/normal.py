@@ -1,0 +1,28 @@
+"""Normal distribution."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy.special import ndtr, ndtri
+
+from ringsim.sampling.distributions.family import Array, Continuous
+
+
+class Normal(Continuous):
+    """Density exp(-(x - mean)^2 / (2 s^2)) / (s sqrt(2 pi)), s the standard deviation."""
+
+    kind: Literal["normal"] = "normal"
+    mean: float
+    standard_deviation: Annotated[float, Field(gt=0.0)]
+
+    def quantile(self, probability: Array) -> NDArray[Any]:
+        """Inverse of the cumulative distribution."""
+        values: Array = self.mean + self.standard_deviation * ndtri(probability)
+        return values
+
+    def probability(self, value: float) -> float:
+        """Cumulative distribution."""
+        return float(ndtr((value - self.mean) / self.standard_deviation))

@@ -1,0 +1,36 @@
+"""Uniform distribution."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import model_validator
+
+from ringsim.sampling.distributions.family import Array, Continuous
+
+
+class Uniform(Continuous):
+    """Constant density between low and high."""
+
+    bounded: ClassVar[bool] = True
+
+    kind: Literal["uniform"] = "uniform"
+    low: float
+    high: float
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Uniform:
+        if self.low >= self.high:
+            raise ValueError(f"low = {self.low} must be below high = {self.high}")
+        return self
+
+    def quantile(self, probability: Array) -> NDArray[Any]:
+        """Inverse of the cumulative distribution; its ends are low and high to the bit."""
+        values: Array = self.low * (1.0 - probability) + self.high * probability
+        return values
+
+    def probability(self, value: float) -> float:
+        """Cumulative distribution."""
+        return float(np.clip((value - self.low) / (self.high - self.low), 0.0, 1.0))

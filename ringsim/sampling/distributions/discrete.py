@@ -1,0 +1,63 @@
+"""A finite set of values."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, model_validator
+
+from ringsim.sampling.distributions.family import Array, Distribution
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+class Discrete(Distribution):
+    """Each of the values with its probability; all alike if none are given."""
+
+    kind: Literal["discrete"] = "discrete"
+    values: Annotated[
+        tuple[bool, ...] | tuple[int, ...] | tuple[float, ...] | tuple[str, ...],
+        BeforeValidator(_as_tuple),
+    ]
+    probabilities: Annotated[
+        tuple[Annotated[float, Field(gt=0.0)], ...] | None, BeforeValidator(_as_tuple)
+    ] = None
+
+    @model_validator(mode="after")
+    def _fitting(self) -> Discrete:
+        if not self.values:
+            raise ValueError("values must hold at least one value")
+        if len(set(self.values)) < len(self.values):
+            raise ValueError(f"values = {list(self.values)} must differ from each other")
+        if self.probabilities is not None:
+            if len(self.probabilities) != len(self.values):
+                raise ValueError(
+                    f"probabilities has {len(self.probabilities)} entries and must have "
+                    f"{len(self.values)}, one for each of the values"
+                )
+            if abs(sum(self.probabilities) - 1.0) > 1e-9:
+                raise ValueError(
+                    f"probabilities add up to {sum(self.probabilities):g} and must add up to 1"
+                )
+        return self
+
+    def _upper_ends(self) -> Array:
+        shares = self.probabilities or (1.0 / len(self.values),) * len(self.values)
+        upper: Array = np.cumsum(shares)
+        return upper
+
+    def quantile(self, probability: Array) -> NDArray[Any]:
+        """The value whose interval of cumulative probability holds the given one."""
+        chosen = np.searchsorted(self._upper_ends()[:-1], probability, side="right")
+        values: NDArray[Any] = np.array(self.values)[chosen]
+        return values
+
+    def levels(self, count: int) -> Array:
+        """One probability for each value, whatever ``count`` is: the middle of its interval."""
+        upper = self._upper_ends()
+        middle: Array = 0.5 * (upper + np.concatenate([[0.0], upper[:-1]]))
+        return middle

@@ -1,0 +1,45 @@
+"""The family of distributions: each one maps probabilities to values of an input."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.units import Model
+
+Array = NDArray[np.float64]
+
+
+class Distribution(Model):
+    """Distribution of one scene field, in the field's own unit."""
+
+    bounded: ClassVar[bool] = False
+    """Whether both ends are values that can occur."""
+
+    each_section: bool = False
+    """Draw one independent value for every section instead of one for all."""
+
+    def quantile(self, probability: Array) -> NDArray[Any]:
+        """Values at cumulative probabilities in the open interval (0, 1), same shape."""
+        raise NotImplementedError
+
+    def levels(self, count: int) -> Array:
+        """Probabilities of ``count`` grid points: from end to end, or centred if unbounded."""
+        if self.bounded and count > 1:
+            return np.linspace(0.0, 1.0, count)
+        return (np.arange(count) + 0.5) / count
+
+
+class Continuous(Distribution):
+    """A distribution over an interval of real numbers."""
+
+    def probability(self, value: float) -> float:
+        """Cumulative probability of ``value``."""
+        raise NotImplementedError
+
+
+def inside(probability: Array) -> Array:
+    """Probabilities moved off the ends 0 and 1, where quantiles may be infinite."""
+    return np.clip(probability, 2.0**-54, 1.0 - 2.0**-53)

@@ -1,0 +1,61 @@
+"""A continuous distribution cut off at one or both ends."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import model_validator
+
+from ringsim.choice import load_package, one_of
+from ringsim.sampling.distributions.family import Array, Continuous, Distribution
+
+load_package("ringsim.sampling.distributions.continuous")
+
+if TYPE_CHECKING:
+    AnyContinuous = Continuous
+else:
+    AnyContinuous = one_of(Continuous)
+
+LEAST_MASS = 1e-6
+"""Probability between the bounds, at least: less is a mistake in the bounds."""
+
+
+class Truncated(Distribution):
+    """The distribution ``of``, given that its value lies between ``low`` and ``high``."""
+
+    bounded: ClassVar[bool] = False
+
+    kind: Literal["truncated"] = "truncated"
+    of: AnyContinuous
+    low: float | None = None
+    high: float | None = None
+
+    @model_validator(mode="after")
+    def _some_mass(self) -> Truncated:
+        if self.low is None and self.high is None:
+            raise ValueError("truncated needs low, high or both; without them use the kind in of")
+        if self.of.each_section:
+            raise ValueError("of.each_section must be given beside kind, not inside of")
+        below, above = self._ends()
+        if above - below < LEAST_MASS:
+            raise ValueError(
+                f"low = {self.low}, high = {self.high} keep a probability of {above - below:.1e} "
+                f"only, must be at least {LEAST_MASS:g}: widen the bounds or move the mean"
+            )
+        return self
+
+    def _ends(self) -> tuple[float, float]:
+        below = 0.0 if self.low is None else self.of.probability(self.low)
+        above = 1.0 if self.high is None else self.of.probability(self.high)
+        return below, above
+
+    def quantile(self, probability: Array) -> NDArray[Any]:
+        """Inverse of the cumulative distribution, inside the bounds to the bit."""
+        below, above = self._ends()
+        values = self.of.quantile(below + (above - below) * probability)
+        low = -np.inf if self.low is None else self.low
+        high = np.inf if self.high is None else self.high
+        clipped: NDArray[Any] = np.clip(values, low, high)
+        return clipped

@@ -1,0 +1,78 @@
+"""Scene paths as inputs: their unit, and which of them a campaign may vary."""
+
+from __future__ import annotations
+
+import typing
+from typing import Any
+
+from pydantic import BaseModel
+
+from ringsim.overrides import section_of
+from ringsim.refusal import InputError
+from ringsim.scene import Scene
+from ringsim.units import Unit
+
+FIXED = ("name", "title", "structure.sections", "structure.closed", "solver.end_time", "record")
+"""Paths that give a result its shape or its name: all samples of a campaign share them."""
+
+
+def refuse_fixed(path: str) -> None:
+    """Refuse a path that would change the shape of a result.
+
+    Raises
+    ------
+    InputError
+        If all samples of a campaign must share this value.
+    """
+    for fixed in FIXED:
+        if path == fixed or path.startswith((f"{fixed}.", f"{fixed}[")):
+            raise InputError(
+                f"inputs: {path} must be the same for all samples, because it shapes the result: "
+                "give it under [set], and run a campaign for each value"
+            )
+
+
+def field_at(scene: Scene, path: str) -> Any:
+    """The value of a scene at a dotted path, one entry of a list at ``name[k]``."""
+    inner, section = section_of(path)
+    value: Any = scene
+    for step in inner.split("."):
+        value = getattr(value, step)
+    return value[section - 1] if section is not None and isinstance(value, tuple) else value
+
+
+def unit_at(scene: Scene, path: str) -> str:
+    """Symbol of the SI unit of the field at a path, "1" if it has none."""
+    *inner, last = section_of(path)[0].split(".")
+    owner: Any = scene
+    for step in inner:
+        owner = getattr(owner, step)
+    if not isinstance(owner, BaseModel) or last not in type(owner).model_fields:
+        return "1"
+    field = type(owner).model_fields[last]
+    found = _units(field.metadata) + _units(field.annotation)
+    return found[0] if found else "1"
+
+
+def each_of(scene: Scene, path: str, value: Any) -> int:
+    """How many values the list at a path has.
+
+    Raises
+    ------
+    InputError
+        If the field is one value for all sections.
+    """
+    if section_of(path)[1] is not None:
+        raise InputError(f"inputs: {path} is one section already: leave out each_section")
+    each = field_at(scene.with_values({path: value, f"{path}[1]": value}), path)
+    if not isinstance(each, tuple):
+        raise InputError(f"inputs: {path} is one value for all sections: leave out each_section")
+    return len(each)
+
+
+def _units(part: Any) -> list[str]:
+    if isinstance(part, Unit):
+        return [part.symbol]
+    inner = part if isinstance(part, (list, tuple)) else ()
+    inner = (*inner, *getattr(part, "__metadata__", ()), *typing.get_args(part))
+    return [symbol for each in inner for symbol in _units(each)]

@@ -1,0 +1,119 @@
+"""One sample's result as bytes: a small header and the raw arrays behind it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.variables import COORDINATES, VARIABLES, Status
+
+_DEFINED = {v.name: v for v in COORDINATES} | VARIABLES
+MISSING_COUNT = -1
+"""Stands for a missing whole number."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """How one sample ended, and what it gave.
+
+    Attributes
+    ----------
+    sample
+        Index of the sample.
+    status
+        How the run ended.
+    reason
+        One sentence: why it ended so.
+    log
+        The end of what a failed run printed.
+    attempts
+        Runs that were made; more than one if a failed run was repeated.
+    step
+        Largest time step of the run that counts, in s.
+    seconds
+        Elapsed time of all attempts.
+    finished
+        When it ended, as seconds since 1970.
+    arrays
+        Name, dtype and shape of each array in ``body``.
+    body
+        The arrays' bytes one behind the other.
+    """
+
+    sample: int
+    status: Status
+    reason: str
+    log: str = ""
+    attempts: int = 1
+    step: float = float("nan")
+    seconds: float = float("nan")
+    finished: float = 0.0
+    arrays: tuple[tuple[str, str, tuple[int, ...]], ...] = ()
+    body: bytes = field(default=b"", repr=False)
+
+    def unpack(self) -> dict[str, NDArray[Any]]:
+        """The arrays by name."""
+        found: dict[str, NDArray[Any]] = {}
+        start = 0
+        for name, dtype, shape in self.arrays:
+            kind = np.dtype(dtype)
+            count = int(np.prod(shape, dtype=np.int64))
+            found[name] = np.frombuffer(self.body, kind, count, start).reshape(shape)
+            start += count * kind.itemsize
+        return found
+
+    def header(self) -> bytes:
+        """Everything but the arrays' bytes."""
+        table = {name: getattr(self, name) for name in _FIELDS}
+        table["status"] = int(self.status)
+        return json.dumps(table, separators=(",", ":")).encode()
+
+
+_FIELDS = (
+    "sample", "status", "reason", "log", "attempts", "step", "seconds", "finished", "arrays",
+)  # fmt: skip
+
+
+def from_header(header: bytes, body: bytes) -> Result:
+    """The result whose :meth:`Result.header` is given."""
+    table = json.loads(header)
+    table["status"] = Status(table["status"])
+    table["arrays"] = tuple((name, dtype, tuple(shape)) for name, dtype, shape in table["arrays"])
+    return Result(**table, body=body)
+
+
+def pack(
+    arrays: Mapping[str, NDArray[Any]],
+) -> tuple[tuple[tuple[str, str, tuple[int, ...]], ...], bytes]:
+    """Bytes of a run's values and coordinates, cast to their defined types.
+
+    Raises
+    ------
+    ValueError
+        If a name has no definition, or an array has not the defined dimensions.
+    """
+    described: list[tuple[str, str, tuple[int, ...]]] = []
+    parts: list[bytes] = []
+    for name, values in arrays.items():
+        if name not in _DEFINED:
+            raise ValueError(f"there is no variable {name}")
+        wanted = _DEFINED[name]
+        array = np.asarray(values)
+        if array.ndim != len(wanted.dims):
+            raise ValueError(
+                f"{name} has shape {array.shape}, but its dimensions are {wanted.dims}"
+            )
+        if wanted.dtype == "str":
+            array = array.astype(str)
+        elif np.dtype(wanted.dtype).kind in "iu" and array.dtype.kind == "f":
+            array = np.where(np.isfinite(array), array, MISSING_COUNT).astype(wanted.dtype)
+        else:
+            array = array.astype(wanted.dtype)
+        described.append((name, array.dtype.str, array.shape))
+        parts.append(np.ascontiguousarray(array).tobytes())
+    return tuple(described), b"".join(parts)

@@ -1,0 +1,96 @@
+"""Stands in for the simulation: quick, exact, and able to fail in every way."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+
+import numpy as np
+
+from ringsim.scene import Scene
+from ringsim.variables import Outcome, Status
+
+
+def run(scene: Scene) -> Outcome:
+    """A deployment whose numbers depend on the inputs alone."""
+    force = scene.loads.force if scene.loads else 0.0
+    modulus = float(np.mean(scene.rods.young_modulus))
+    begin = time.perf_counter()
+    times = (
+        np.arange(int(scene.solver.end_time / scene.record.interval) + 1) * scene.record.interval
+    )
+    duration = 2.0 / np.sqrt(force) * (1.0 + 1e9 / modulus)
+    sections = scene.structure.sections
+    angle = np.where(times <= duration, 180.0 * (times / duration) ** 2, np.nan)
+    return Outcome(
+        Status.OK,
+        "all V-joints have reached 180 deg",
+        {
+            "plane": np.array(["upper", "lower"]),
+            "section": np.arange(1, sections + 1),
+            "time": times,
+        },
+        {
+            "deployment_time": np.array(duration),
+            "opening_angle": np.broadcast_to(angle, (2, sections, len(times))),
+            "asynchrony": np.where(times <= duration, 0.0, np.nan),
+            "lock_time": np.full((2, sections), duration),
+            "final_time": np.array(duration),
+            "steps": np.array(100),
+            "wall_time": np.array(time.perf_counter() - begin),
+        },
+    )
+
+
+def nothing(scene: Scene) -> Outcome:
+    """The least that a run can give."""
+    return Outcome(Status.OK, "nothing to do", {}, {"deployment_time": np.array(scene.loads.force)})
+
+
+def poisoned(scene: Scene) -> Outcome:
+    """Fails in the way that ``rods.poisson_ratio`` names, in percent."""
+    way = round(100 * scene.rods.poisson_ratio)
+    print(f"way {way}")
+    sys.stdout.flush()
+    match way:
+        case 1:
+            raise ZeroDivisionError("on purpose")
+        case 2:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        case 3:
+            os._exit(7)
+        case 4:
+            while True:
+                pass
+        case 5:
+            return run(scene) and _eat()
+        case 6:
+            outcome = run(scene)
+            outcome.values["asynchrony"][1] = np.nan
+            return outcome
+        case 7:
+            outcome = run(scene)
+            outcome.values["lock_time"] = np.array([[lambda: 0]], dtype=object)
+            return outcome
+        case 8:
+            sys.exit(5)
+        case 9:
+            return Outcome(Status.SOLVER_FAILED, "Newton does not converge: try a smaller step")
+        case 10:
+            if scene.solver.step > 0.1:
+                return Outcome(Status.SOLVER_FAILED, "Newton does not converge: try a smaller step")
+    return run(scene)
+
+
+def _eat() -> Outcome:
+    hoard = []
+    while True:
+        hoard.append(np.ones(1 << 22))
+
+
+def slow(scene: Scene) -> Outcome:
+    """Sleeps for as many seconds as ``rods.damping``."""
+    time.sleep(scene.rods.damping)
+    return run(scene)
