@@ -13,6 +13,8 @@ _LOCAL_ERROR = 0.1
 """Local error constant C of the integrator, error = C h^3 d3(angle)/dt3."""
 _FINEST = 400.0
 """The motion alone asks for no step below ``step`` over this."""
+_FILTERED = 1e-4
+"""Below this tolerance the readings that the step follows stay as far apart as at it."""
 _FIRST = 20.0
 """The first step is ``step`` over this."""
 
@@ -35,7 +37,8 @@ class StepControl:
         self._least = solver.step / _FINEST
         self._usual = usual_rate
         self._bend = 0.0
-        self._past: deque[tuple[float, float]] = deque(maxlen=3)
+        self._past: deque[tuple[float, float]] = deque()
+        self._stride = max(1.0, math.sqrt(_FILTERED / solver.tolerance))
         self.step = solver.step if solver.step_control == "constant" else solver.step / _FIRST
 
     def advance(self, time: float, rate: float, *, to_stop: float, in_contact: bool) -> float:
@@ -63,14 +66,27 @@ class StepControl:
         return self.step
 
     def _from_motion(self) -> float:
-        if len(self._past) < 3:
+        t2, r2 = self._past[-1]
+        apart = (self._stride - 0.5) * self.step
+        middle = self._before(t2 - apart)
+        if middle is None:
             return self.step
-        (t0, r0), (t1, r1), (t2, r2) = self._past
-        first, second = (r1 - r0) / (t1 - t0), (r2 - r1) / (t2 - t1)
-        third = abs(2.0 * (second - first) / (t2 - t0))
+        t1, r1 = middle
+        first = self._before(t1 - apart)
+        if first is None:
+            return self.step
+        t0, r0 = first
+        while self._past[0][0] < t0:
+            self._past.popleft()
+        early, late = (r1 - r0) / (t1 - t0), (r2 - r1) / (t2 - t1)
+        third = abs(2.0 * (late - early) / (t2 - t0))
         bend = third / max(abs(r2), self._usual)
         fading = max(0.0, 1.0 - (t2 - t1) * math.sqrt(self._bend))
         self._bend = max(bend, fading * self._bend)
         if self._bend == 0.0:
             return self._solver.step
         return math.sqrt(self._solver.tolerance / _LOCAL_ERROR / self._bend)
+
+    def _before(self, time: float) -> tuple[float, float] | None:
+        """The latest reading not after ``time``."""
+        return next((past for past in reversed(self._past) if past[0] <= time), None)
