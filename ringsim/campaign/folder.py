@@ -104,7 +104,7 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> Folder:
             )
     else:
         old = open_folder(path)
-        _refuse_another(campaign, old, identity, table, path)
+        refuse_another(campaign, old, table, solver)
         if old.table.samples == table.samples and old.attributes["campaign"] == campaign.text:
             return old
     wanted = campaign.specification
@@ -149,29 +149,29 @@ def _identity(campaign: Campaign, table: Table, solver: str) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 
-def _refuse_another(
-    campaign: Campaign, old: Folder, identity: str, table: Table, path: Path
-) -> None:
+def refuse_another(campaign: Campaign, old: Folder, table: Table, solver: str) -> None:
+    """Make sure that a folder holds this campaign, or fewer samples of it.
+
+    Raises
+    ------
+    InputError
+        If it holds another one; the text says what differs.
+    """
     cure = "choose another folder with --out, or delete this one"
-    if old.identity != identity:
-        differing = [
-            word
-            for word, mine in (
-                ("its scene", campaign.scene.to_toml() != old.attributes["scene"]),
-                ("its seed", campaign.specification.seed != int(old.attributes["seed"])),
-                ("its retry", campaign.specification.retry != old.retry),
-                ("the version of ringsim", old.attributes["ringsim_version"] != version("ringsim")),
-                (
-                    "its inputs",
-                    [c.path for c in table.columns] != [c.path for c in old.table.columns],
-                ),
-            )
-            if mine
-        ]
-        what = " and ".join(differing) or "its solver"
-        raise InputError(f"{path}: this folder holds another campaign ({what} differs): {cure}")
+    if old.identity != _identity(campaign, table, solver):
+        paths = [column.path for column in table.columns]
+        suspects = {
+            "its scene": campaign.scene.to_toml() != old.attributes["scene"],
+            "its seed": campaign.specification.seed != int(old.attributes["seed"]),
+            "its retry": campaign.specification.retry != old.retry,
+            "the version of ringsim": old.attributes["ringsim_version"] != version("ringsim"),
+            "its inputs": paths != [column.path for column in old.table.columns],
+            "its solver": solver != old.solver,
+        }
+        what = " and ".join(word for word, differs in suspects.items() if differs)
+        raise InputError(f"{old.path}: this folder holds another campaign ({what} differs): {cure}")
     if not table.starts_with(old.table):
         raise InputError(
-            f"{path}: this folder holds another campaign (its {old.table.samples} samples are not "
-            f"the first of the {table.samples} that {campaign.file.name} gives): {cure}"
+            f"{old.path}: this folder holds another campaign (its {old.table.samples} samples are "
+            f"not the first of the {table.samples} that {campaign.file.name} gives): {cure}"
         )

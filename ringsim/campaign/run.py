@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +16,7 @@ from ringsim.execution.cost import longest_first, relative_cost
 from ringsim.execution.launch import polite_barrier
 from ringsim.execution.work import Limits, Scheduler, Work
 from ringsim.refusal import InputError
-from ringsim.storage.files import locked, unwritable
+from ringsim.storage.files import reserved, unwritable
 from ringsim.storage.merge import NAME as MERGED
 from ringsim.storage.merge import merge_shards
 from ringsim.storage.provenance import provenance
@@ -26,7 +24,6 @@ from ringsim.storage.record import Result
 from ringsim.storage.store import Store, Survey, recover, survey
 
 DONE, TOO_MANY_FAILED, INTERRUPTED = 0, 3, 130
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -90,27 +87,6 @@ class Choices:
         return 0 if self.communicator is None else int(self.communicator.Get_rank())
 
 
-@contextlib.contextmanager
-def reserved(folder: Path, part: Part) -> Iterator[None]:
-    """Keep a second process from running the same samples.
-
-    Raises
-    ------
-    InputError
-        If one does so already.
-    """
-    with contextlib.ExitStack() as held:
-        got = held.enter_context(locked(folder / "lock", shared=not part.whole))
-        if got and not part.whole:
-            got = held.enter_context(locked(folder / f"lock-{part.writer}"))
-        if not got:
-            raise InputError(
-                f"{folder}: another process runs this campaign just now: wait for it, or stop it "
-                "(ringsim status tells which it is)"
-            )
-        yield
-
-
 def run_campaign(folder: Path, choices: Choices) -> int:
     """Run the missing samples of a prepared folder, on every rank that takes part.
 
@@ -129,7 +105,7 @@ def run_campaign(folder: Path, choices: Choices) -> int:
         fault = ""
         if choices.rank == 0:
             try:
-                held.enter_context(reserved(folder, choices.part))
+                held.enter_context(reserved(folder, choices.part.writer, alone=choices.part.whole))
                 prefix = "" if choices.part.whole else f"{choices.part.writer}-"
                 recover(folder, open_folder(folder).identity, prefix)
             except InputError as error:

@@ -16,6 +16,9 @@ VERBS = {
     "check": "Check a scene file and say what it builds.",
     "run": "Run one scene.",
     "campaign": "Run a campaign, or finish an interrupted one.",
+    "status": "Tell how far a campaign is.",
+    "merge": "Put the results of a campaign into one file.",
+    "replay": "Run one sample of a campaign again, in the foreground.",
 }
 """Verb and its line of help; the command ``VERB`` lives in ringsim.cli.VERB as ``command``."""
 

@@ -7,12 +7,14 @@ import fcntl
 import hashlib
 import os
 import secrets
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from ringsim.refusal import InputError
 
 DRAFT = ".draft"
+_LOCK_TRIES, _LOCK_PAUSE = 10, 0.1
 
 
 @contextlib.contextmanager
@@ -67,6 +69,47 @@ def locked(path: Path, *, shared: bool = False) -> Iterator[bool]:
         yield held
     finally:
         os.close(descriptor)
+
+
+@contextlib.contextmanager
+def reserved(folder: Path, writer: str, *, alone: bool) -> Iterator[None]:
+    """Keep a second process from running the same samples.
+
+    Parameters
+    ----------
+    folder
+        The campaign's folder.
+    writer
+        Name of the share of samples that is run.
+    alone
+        Whether no other share may run at the same time.
+
+    Raises
+    ------
+    InputError
+        If another process runs them already.
+    """
+    for _ in range(_LOCK_TRIES):
+        with contextlib.ExitStack() as held:
+            if held.enter_context(locked(folder / "lock", shared=not alone)) and (
+                held.enter_context(locked(folder / f"lock-{writer}"))
+            ):
+                yield
+                return
+        time.sleep(_LOCK_PAUSE)
+    raise InputError(
+        f"{folder}: another process runs this campaign just now: wait for it, or stop it (ringsim "
+        "status tells which it is)"
+    )
+
+
+def in_use(folder: Path, writer: str) -> bool:
+    """Whether a process runs a share of a campaign just now."""
+    path = folder / f"lock-{writer}"
+    if not path.exists():
+        return False
+    with locked(path, shared=True) as free:
+        return not free
 
 
 def unwritable(path: Path, error: BaseException) -> InputError:

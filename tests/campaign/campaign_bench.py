@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import xarray as xr
@@ -42,15 +42,41 @@ each_section = true
 """
 
 
+LISTED = """
+name = "listed"
+scene = "ring18"
+design = {{ kind = "list", file = "ways.csv" }}
+
+[set]
+name = "ring6"
+"structure.sections" = 6
+boom = "none"
+"solver.end_time" = 20.0
+{shared}
+
+{more}
+"""
+
+
 @dataclass
 class Bench:
     """A folder with a campaign file, and the command line to run it."""
 
     folder: Path
+    extra: dict[str, str] = field(default_factory=dict)
 
     def write(self, samples=20, *, shared="", inputs="", more="", name="small.toml"):
         path = self.folder / name
         path.write_text(CAMPAIGN.format(samples=samples, shared=shared, inputs=inputs, more=more))
+        return path
+
+    def write_listed(self, ways, *, more="", shared="", name="listed.toml"):
+        """A campaign whose samples fail in the given ways, see fake_solver.poisoned; 30 is none."""
+        rows = [f"{way / 100},{0.01 + 0.0005 * k}" for k, way in enumerate(ways)]
+        table = "\n".join(["rods.poisson_ratio,loads.force", *rows])
+        (self.folder / "ways.csv").write_text(table + "\n")
+        path = self.folder / name
+        path.write_text(LISTED.format(more=more, shared=shared))
         return path
 
     def command(self, *arguments, ranks=0, solver="fake_solver:run"):
@@ -61,7 +87,7 @@ class Bench:
         return [*front, *map(str, arguments), *end]
 
     def environment(self):
-        return os.environ | {"PYTHONPATH": str(HERE)}
+        return os.environ | {"PYTHONPATH": str(HERE)} | self.extra
 
     def start(self, *arguments, ranks=0, solver="fake_solver:run"):
         return subprocess.Popen(

@@ -78,6 +78,9 @@ def poisoned(scene: Scene) -> Outcome:
             sys.exit(5)
         case 9:
             return Outcome(Status.SOLVER_FAILED, "Newton does not converge: try a smaller step")
+        case 11:
+            if "CURED" not in os.environ:
+                raise ZeroDivisionError("not cured")
         case 10:
             if scene.solver.step > 0.1:
                 return Outcome(Status.SOLVER_FAILED, "Newton does not converge: try a smaller step")

@@ -1,0 +1,133 @@
+"""Whatever a run does, it costs that sample and no other."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from campaign_bench import comparable
+from ringsim.variables import Status
+
+POISON = {
+    3: (1, Status.ERROR, "ZeroDivisionError: on purpose"),
+    7: (2, Status.CRASHED, "SIGSEGV"),
+    8: (3, Status.CRASHED, "exit code 7"),
+    20: (4, Status.TIMEOUT, "limits.timeout = 2 s"),
+    21: (5, Status.MEMORY, "memory"),
+    30: (6, Status.DIVERGED, "asynchrony is not a number"),
+    31: (7, Status.ERROR, "lock_time|TypeError"),
+    44: (8, Status.ERROR, "SystemExit: 5"),
+    49: (9, Status.SOLVER_FAILED, "smaller step"),
+}
+SAMPLES = 50
+LIMITS = "[limits]\ntimeout = 2.0\nmemory = 6e8\n"
+
+
+def ways():
+    found = [30] * SAMPLES
+    for sample, (way, _, _) in POISON.items():
+        found[sample] = way
+    return found
+
+
+@pytest.fixture(scope="module")
+def healthy(tmp_path_factory):
+    from campaign_bench import Bench
+
+    bench = Bench(tmp_path_factory.mktemp("healthy"))
+    bench.run("campaign", bench.write_listed([30] * SAMPLES), "--workers", 2, "--out", "out")
+    return bench.result("out")
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_poisoned_samples_are_kept_with_their_reason(ranks, bench, healthy, request):
+    if ranks:
+        request.getfixturevalue("mpi")
+    workers = () if ranks else ("--workers", 2)
+    file = bench.write_listed(ways(), more=LIMITS)
+    bench.run(
+        "campaign", file, "--out", "out", *workers, solver="fake_solver:poisoned", ranks=ranks
+    )
+    result = bench.result("out")
+    for sample, (way, status, reason) in POISON.items():
+        assert result.status.values[sample] == status, (sample, result.reason.values[sample])
+        assert re.search(reason, str(result.reason.values[sample]))
+        assert f"way {way}" in str(result.log.values[sample])
+    good = [k for k in range(SAMPLES) if k not in POISON]
+    mine, theirs = comparable(result.isel(sample=good)), comparable(healthy.isel(sample=good))
+    xr.testing.assert_identical(
+        mine.drop_vars("rods_poisson_ratio"), theirs.drop_vars("rods_poisson_ratio")
+    )
+    assert np.isnan(result.deployment_time.values[[3, 7, 8, 20, 21]]).all()
+
+
+def test_log_of_a_crash_and_of_a_hang_says_where(bench):
+    file = bench.write_listed([2, 4, 30], more=LIMITS)
+    bench.run("campaign", file, "--workers", 1, "--out", "out", solver="fake_solver:poisoned")
+    logs = bench.result("out").log.values
+    assert "Segmentation fault" in logs[0]
+    for log in logs[:2]:
+        assert "fake_solver.py" in log
+        assert "in poisoned" in log
+    assert logs[2] == ""
+
+
+def test_smaller_step_is_tried_and_recorded(bench):
+    file = bench.write_listed([30, 10, 9], more="[retry]\ntimes = 2\nstep_factor = 0.5\n")
+    bench.run("campaign", file, "--workers", 2, "--out", "out", solver="fake_solver:poisoned")
+    result = bench.result("out")
+    assert result.attempts.values.tolist() == [1, 2, 3]
+    assert result.status.values.tolist() == [Status.OK, Status.OK, Status.SOLVER_FAILED]
+    np.testing.assert_allclose(result.solver_step.values, [0.2, 0.1, 0.05])
+    assert "attempt 2, with a smaller step; first: Newton does not converge" in str(
+        result.reason.values[1]
+    )
+    assert "identical" in bench.run("replay", "out", 1)
+
+
+def test_too_many_failures_stop_the_campaign(bench):
+    file = bench.write_listed([1] * 5 + [30] * 15, more="max_failed = 2")
+    text = file.read_text().replace("max_failed = 2", "")
+    file.write_text("max_failed = 2\n" + text)
+    printed = bench.run(
+        "campaign", file, "--workers", 1, "--out", "out", solver="fake_solver:poisoned", code=3
+    )
+    assert "3 samples failed, more than max_failed = 2; 17 samples are left" in printed
+    file.write_text(file.read_text().replace("max_failed = 2", "max_failed = 5"))
+    bench.run("campaign", file, "--workers", 1, "--out", "out", solver="fake_solver:poisoned")
+    assert (bench.result("out").status.values == Status.ERROR).sum() == 5
+
+
+def test_campaign_without_any_success_says_so_in_its_exit_code(bench):
+    file = bench.write_listed([1, 1])
+    bench.run("campaign", file, "--out", "out", solver="fake_solver:poisoned", code=3)
+
+
+def test_failed_samples_run_again_only_when_asked(bench):
+    file = bench.write_listed([1, 30, 11])
+    start = ("campaign", file, "--workers", 1, "--out", "out")
+    bench.run(*start, solver="fake_solver:poisoned")
+    bench.extra["CURED"] = "yes"
+    assert "3 of 3 samples done" in bench.run(*start, solver="fake_solver:poisoned")
+    assert bench.result("out").status.values.tolist() == [4, 0, 4]
+    printed = bench.run(*start, "--retry-failed", solver="fake_solver:poisoned")
+    assert "1 of 3 samples done" in printed
+    assert bench.result("out").status.values.tolist() == [4, 0, 0]
+
+
+def test_solver_that_cannot_be_loaded_is_refused(bench):
+    printed = bench.run(
+        "campaign", bench.write(samples=2), "--out", "out", solver="absent:run", code=2
+    )
+    assert printed.splitlines()[-1].startswith("solver absent:run cannot be loaded")
+
+
+def test_serial_run_gives_the_same_statuses_where_it_survives(bench):
+    file = bench.write_listed([30, 1, 6, 8, 9])
+    start = ("campaign", file, "--out", "out", "--workers", 0)
+    bench.run(*start, solver="fake_solver:poisoned")
+    expected = [Status.OK, Status.ERROR, Status.DIVERGED, Status.ERROR, Status.SOLVER_FAILED]
+    assert bench.result("out").status.values.tolist() == expected
