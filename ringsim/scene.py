@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
-from ringsim.choice import load_package, one_of
+from ringsim.cable.cables import Cables, pulleys_of
+from ringsim.cable.faults.family import CableFault
+from ringsim.choice import kind_of, load_package, one_of
 from ringsim.overrides import section_of, set_path
 from ringsim.parts.boom.family import Boom
+from ringsim.parts.faults.family import Fault
 from ringsim.parts.joints import Joints, Stop
 from ringsim.parts.loads import Loads
 from ringsim.parts.net import Net
+from ringsim.parts.persection import ListIn
 from ringsim.parts.rods.family import Rods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.solver import Record, Solver
@@ -24,17 +28,19 @@ from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.refusal import InputError, explain, known_or_nearest
 from ringsim.units import Model
 
-for _package in ("structure", "rods", "boom"):
+for _package in ("structure", "rods", "boom", "faults"):
     load_package(f"ringsim.parts.{_package}")
 
 if TYPE_CHECKING:
     AnyStructure = PantographRing
     AnyRods = Rods
     AnyBoom = Boom
+    AnyFault = Fault
 else:
     AnyStructure = one_of(Structure)
     AnyRods = one_of(Rods)
     AnyBoom = one_of(Boom)
+    AnyFault = one_of(Fault)
 
 
 MOST_RECORDS = 1_000_000
@@ -53,6 +59,8 @@ class Scene(Model):
     boom: AnyBoom | None = None
     net: Net | None = None
     loads: Loads | None = None
+    cables: Cables | None = None
+    faults: Annotated[tuple[AnyFault, ...], ListIn] = ()
     solver: Solver = Solver()
     record: Record = Record()
 
@@ -60,11 +68,17 @@ class Scene(Model):
     def _consistent(self) -> Scene:
         for path, value in _lists(self):
             wanted = _length_of(path, self.structure.sections, closed=self.structure.closed)
-            if len(value) != wanted:
+            if wanted is not None and len(value) != wanted:
                 raise ValueError(
                     f"{path} has {len(value)} values, but the structure needs {wanted}: give "
                     "one value for all, or a list of that length"
                 )
+        _check_faults(self)
+        if self.cables is not None and kind_of(self.rods) != "geometrically-exact":
+            raise ValueError(
+                f'cables need rods.kind = "geometrically-exact", not "{kind_of(self.rods)}": the '
+                "blocks of the V pulleys stand on nodes with an orientation"
+            )
         for rod, tube, longest in (
             ("diagonal", self.rods.diagonal, self.structure.half_diagonal),
             ("bar", self.rods.bar, self.structure.half_bar),
@@ -117,9 +131,34 @@ class Scene(Model):
         return tomli_w.dumps(self.to_table())
 
 
-def _length_of(path: str, sections: int, *, closed: bool) -> int:
-    """Values in a list at ``path``: one per section, or one per corner."""
-    return sections + 1 if path == "net.stiffness" and not closed else sections
+def _length_of(path: str, sections: int, *, closed: bool) -> int | None:
+    """Values in a list at ``path``: one per section, corner or pulley; None if any number."""
+    if path == "net.stiffness" and not closed:
+        return sections + 1
+    if path.startswith("cables."):
+        return pulleys_of(sections) if path.endswith(".coefficient") else None
+    return sections
+
+
+def _check_faults(scene: Scene) -> None:
+    """Every fault names a place that the scene has."""
+    cables = [] if scene.cables is None else scene.cables.present()
+    sections = scene.structure.sections
+    places = {"section": sections, "cable": len(cables), "pulley": pulleys_of(sections),
+              "span": pulleys_of(sections) + 1}  # fmt: skip
+    for number, fault in enumerate(scene.faults, 1):
+        for name, most in places.items():
+            given = getattr(fault, name, 1)
+            if isinstance(fault, CableFault) and not cables:
+                raise ValueError(
+                    f"faults[{number}] is a fault of a cable, but the scene has none: add "
+                    "[cables.upper], or leave the fault out"
+                )
+            if given > most:
+                raise ValueError(
+                    f"faults[{number}].{name} = {given} must be at most {most}: there is no such "
+                    f"{name}"
+                )
 
 
 def _length_in(table: dict[str, Any], path: str) -> int:
@@ -127,7 +166,8 @@ def _length_in(table: dict[str, Any], path: str) -> int:
     structure = table.get("structure")
     if not isinstance(structure, dict) or not isinstance(structure.get("sections"), int):
         return 1
-    return _length_of(path, structure["sections"], closed=structure.get("closed") is not False)
+    sections = structure["sections"]
+    return _length_of(path, sections, closed=structure.get("closed") is not False) or 1
 
 
 def _lists(record: Model, prefix: str = "") -> list[tuple[str, tuple[float, ...]]]:
@@ -136,7 +176,7 @@ def _lists(record: Model, prefix: str = "") -> list[tuple[str, tuple[float, ...]
         value = getattr(record, name)
         if isinstance(value, Model):
             found += _lists(value, f"{prefix}{name}.")
-        elif isinstance(value, tuple):
+        elif isinstance(value, tuple) and name != "faults":
             found.append((f"{prefix}{name}", value))
     return found
 

@@ -54,6 +54,7 @@ COORDINATES = (
     Variable("plane", ("plane",), "1", "plane of the ring", "str"),
     Variable("section", ("section",), "1", "section number, counted from the boom", "i4"),
     Variable("time", ("time",), "s", "time since the start of the run"),
+    Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
     Variable("rod", ("rod",), "1", "rod half of a section", "str"),
 )
 
@@ -69,6 +70,11 @@ _ALL = (
     Variable("asynchrony_max", (), "degree", "largest asynchrony up to the deployment time"),
     Variable("rod_stress", ("rod", "section", "time"), "Pa", "axial + bending stress of a rod"),
     Variable("peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod"),
+    Variable("cable_tension", ("plane", "span", "time"), "N", "tension of a cable's span"),
+    Variable("peak_tension", (), "N", "largest tension of any span of any cable"),
+    Variable("peak_tension_time", (), "s", "time of the largest tension"),
+    Variable("slack_duration", ("plane",), "s", "time for which the cable is slack at its winch"),
+    Variable("wound_length", ("plane", "time"), "m", "rope wound up by the cable's winches"),
     Variable("kinetic_energy", ("time",), "J", "kinetic energy"),
     Variable("elastic_energy", ("time",), "J", "energy stored in rods, net and stops"),
     Variable("work", ("time",), "J", "work done on the structure by forces and winches"),

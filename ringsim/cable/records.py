@@ -95,12 +95,11 @@ class Winch(Model):
 
 
 class Cable(Model):
-    """A cable over the pulleys of one plane, with a winch at one end or both.
+    """A cable over the pulleys of its plane, with a winch at one end or both.
 
     Its tension falls from the winch on; see ``ringsim.cable.chain`` for the equations.
     """
 
-    plane: Literal["upper", "lower"] = "upper"
     end: Literal["first", "last", "both"] = "first"
     """Where the winch is: at section 1, at the last section, or one at either end."""
     winch: Winch

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.engine.boom import add_boom
+from ringsim.engine.cables import CableDrive
+from ringsim.engine.faults import Faults
 from ringsim.engine.joints import add_friction, add_stops
 from ringsim.engine.loads import add_loads
 from ringsim.engine.net import HubNet, add_net
@@ -38,6 +40,10 @@ class Built:
         Loads along z on the V-joints, shape (2, sections), N.
     stops
         Stop connectors, [plane][section]; empty without stops.
+    cables
+        The driving cables, if the scene has any.
+    faults
+        What breaks during the run.
 
     """
 
@@ -45,6 +51,8 @@ class Built:
     net: HubNet | None
     forces: Array
     stops: list[list[Any]]
+    cables: CableDrive | None
+    faults: Faults
 
 
 def build(scene: Scene) -> Built:
@@ -55,5 +63,9 @@ def build(scene: Scene) -> Built:
     forces = add_loads(ring)
     add_friction(ring)
     stops = add_stops(ring)
+    cables = None if scene.cables is None else CableDrive(ring, scene.cables)
+    faults = Faults(ring, cables)
     ring.assembly.finish()
-    return Built(ring, net, forces, stops)
+    if cables is not None:
+        cables.locate()
+    return Built(ring, net, forces, stops, cables, faults)

@@ -8,6 +8,7 @@ import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.cable.state import ChainState
 from ringsim.engine.joints import friction_torque, stop_torque
 from ringsim.engine.net import HubNet, net_forces
 from ringsim.engine.pantograph_ring import RingModel
@@ -22,13 +23,15 @@ _STRAIN = exu.OutputVariableType.StrainLocal
 
 class Energies(NamedTuple):
     """Energies in J and the power lost in W at one instant; ``lost_in_rods`` is the energy in J
-    that the rods' own damping took since the reading before."""
+    that the rods' own damping took since the reading before, ``winch_power`` in W what the
+    winches put in less the strain energy that they wind up."""
 
     kinetic: float
     elastic: float
     work: float
     loss: float
     lost_in_rods: float
+    winch_power: float = 0.0
 
 
 class EnergyMeter:
@@ -64,7 +67,7 @@ class EnergyMeter:
             self._hub = assembly.coordinates_of(net.hub)[:3]
 
     def read(
-        self, time: float, state: State, angles: Array, rates: Array, latched: Array
+        self, time: float, state: State, angles: Array, rates: Array, latched: Array, chain: ChainState | None = None
     ) -> Energies:
         """Energies at the current state.
 
@@ -72,6 +75,8 @@ class EnergyMeter:
         ----------
         angles, rates, latched
             Opening angles, their rates and whether the latches hold, shape (2, sections).
+        chain
+            The cables, if there are any.
 
         """
         kinetic = sum(self._output(body, _KINETIC) for body in self._model.assembly.bodies)
@@ -84,12 +89,20 @@ class EnergyMeter:
         )
         stored, lost = self._stops(angles, rates, latched)
         net_stored, net_lost = self._net_energy(state)
+        loss += lost + net_lost
+        elastic += stored + net_stored
+        winch_power = 0.0
+        if chain is not None:
+            loss += float(chain.friction_loss.sum() + chain.damping_loss.sum())
+            elastic += float(chain.elastic_energy.sum())
+            winch_power = float(chain.winch_power.sum() - chain.drum_power.sum())
         return Energies(
             float(kinetic),
-            float(elastic) + stored + net_stored,
+            float(elastic),
             float(np.sum(self._forces * lifted)),
-            loss + lost + net_lost,
+            float(loss),
             self._lost_in_rods(time),
+            winch_power,
         )
 
     def _lost_in_rods(self, time: float) -> float:

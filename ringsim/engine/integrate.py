@@ -10,6 +10,8 @@ import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.cable.section_path import path_slope
+from ringsim.cable.state import ChainState
 from ringsim.engine.build import Built
 from ringsim.engine.energy import Energies, EnergyMeter
 from ringsim.engine.joints import latch
@@ -36,6 +38,9 @@ class History:
         Largest joint gap, m.
     stresses
         Shape (8, sections) each, Pa; empty unless recorded.
+    tensions, slack, wound
+        Tension of every span of all cables behind one another (N), whether each cable is
+        slack at its winch, and the rope that its winches have wound (m); empty without cables.
 
     """
 
@@ -45,6 +50,9 @@ class History:
     energies: list[Energies] = field(default_factory=list)
     gaps: list[float] = field(default_factory=list)
     stresses: list[Array] = field(default_factory=list)
+    tensions: list[Array] = field(default_factory=list)
+    slack: list[Array] = field(default_factory=list)
+    wound: list[Array] = field(default_factory=list)
     status: Status = Status.UNFINISHED
     reason: str = ""
     newton_iterations: int = 0
@@ -80,6 +88,7 @@ class Integration:
             usual_rate=_usual_rate(scene),
         )
         self._fresh = True
+        self._chain: ChainState | None = None
         self.history = History()
 
     def run(self) -> History:
@@ -100,12 +109,30 @@ class Integration:
         history.jacobians = int(solver.it.newtonJacobiCount)
         return history
 
+    def _path_slopes(self) -> Array:
+        """Derivative of each cable's ideal path length after the opening angle, m/rad."""
+        cables = self._scene.cables
+        if cables is None:
+            return np.zeros(0)
+        ring = self._scene.structure
+        angles = self.history.angles[-1]
+        return np.array(
+            [
+                float(np.sum(path_slope(ring.half_bar, cable.block_offset, angles[plane])))
+                for plane, cable in cables.present()
+            ]
+        )
+
     def _update_time(self, solver: Any, system: Any, settings: Any) -> None:
         """Set the step: the one chosen after the last step, or the reduced one of a retry."""
         if self._fresh:
-            left = self._scene.solver.end_time - self.history.times[-1]
-            solver.it.currentStepSize = min(self._steps.step, left)
+            now = self.history.times[-1]
+            left = min(self._scene.solver.end_time, self._built.faults.next_time) - now
+            step = min(self._steps.step, left)
+            solver.it.currentStepSize = step
             self._fresh = False
+            if self._built.cables is not None and self._chain is not None:
+                self._built.cables.advance(now, step, self._chain, self._path_slopes())
         else:
             self.history.halvings += 1
             self._steps.step = solver.it.currentStepSize
@@ -144,11 +171,29 @@ class Integration:
         history.times.append(time)
         history.angles.append(angles)
         history.rates.append(rates)
-        history.energies.append(self._energy.read(time, state, angles, rates, self._latched))
+        chain = self._read_cables(time)
+        reading = self._energy.read(time, state, angles, rates, self._latched, chain)
+        if self._built.faults.strike(time, angles, chain):
+            chain = self._read_cables(time)
+            after = self._energy.read(time, state, angles, rates, self._latched, chain)
+            released = reading.elastic - after.elastic
+            reading = after._replace(lost_in_rods=reading.lost_in_rods + released)
+        history.energies.append(reading)
+        if chain is not None:
+            history.tensions.append(chain.tensions)
+            history.slack.append(chain.is_slack[chain.ropes.first])
+            history.wound.append(chain.wound.sum(axis=1))
+            self._chain = chain
         history.gaps.append(max(float(group.gaps(state).max()) for group in self._gaps))
         if self._stress is not None:
             history.stresses.append(self._stress.read())
         return True
+
+    def _read_cables(self, time: float) -> ChainState | None:
+        cables = self._built.cables
+        if cables is None:
+            return None
+        return cables.current(self._state.position, self._state.velocity, time)
 
     def _note_locks(self, angles: Array, time: float) -> None:
         stop, history = self._scene.stop, self.history

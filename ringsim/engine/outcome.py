@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
+from ringsim.cable.cables import pulleys_of
 from ringsim.engine.integrate import History
 from ringsim.scene import Scene
 from ringsim.variables import PLANES, RODS, Outcome
@@ -69,7 +70,9 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
     energies = np.array(history.energies)
     between = 0.5 * np.diff(times) * (energies[1:, 3] + energies[:-1, 3]) + energies[1:, 4]
     lost = np.concatenate([[0.0], np.cumsum(between)])
-    kinetic, elastic, work = energies[:, 0], energies[:, 1], energies[:, 2]
+    driven = 0.5 * np.diff(times) * (energies[1:, 5] + energies[:-1, 5])
+    kinetic, elastic = energies[:, 0], energies[:, 1]
+    work = energies[:, 2] + np.concatenate([[0.0], np.cumsum(driven)])
     for name, series in (
         ("kinetic_energy", kinetic),
         ("elastic_energy", elastic),
@@ -86,6 +89,7 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
         stresses = np.array(history.stresses)
         values["rod_stress"] = np.moveaxis(_on_grid(grid, times, stresses), 0, -1)
         values["peak_rod_stress"] = np.array(stresses.max())
+    _add_cables(values, history, scene, grid)
     counts = {
         "steps": len(times) - 1,
         "newton_iterations": history.newton_iterations,
@@ -101,7 +105,33 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
     }
     if "rod_stress" in values:
         coordinates["rod"] = np.array(RODS)
+    if "cable_tension" in values:
+        coordinates["span"] = np.arange(1, values["cable_tension"].shape[1] + 1)
     return Outcome(history.status, history.reason, coordinates, values)
+
+
+def _add_cables(values: dict[str, Array], history: History, scene: Scene, grid: Array) -> None:
+    """Tensions by plane and span; a plane without a cable is NaN."""
+    if scene.cables is None or not history.tensions:
+        return
+    times = np.array(history.times)
+    tensions = np.array(history.tensions)
+    slack = np.array(history.slack)
+    spans = pulleys_of(scene.structure.sections) + 1
+    by_plane = np.full((2, spans, len(grid)), np.nan)
+    loose = np.full(2, np.nan)
+    wound = np.full((2, len(grid)), np.nan)
+    for number, (plane, _) in enumerate(scene.cables.present()):
+        own = tensions[:, number * spans : (number + 1) * spans]
+        by_plane[plane] = _on_grid(grid, times, own).T
+        ends = slack[:, number].astype(float)
+        loose[plane] = float(np.sum(0.5 * np.diff(times) * (ends[1:] + ends[:-1])))
+        wound[plane] = _on_grid(grid, times, np.array(history.wound)[:, number])
+    values["cable_tension"] = by_plane
+    values["slack_duration"] = loose
+    values["wound_length"] = wound
+    values["peak_tension"] = np.array(tensions.max())
+    values["peak_tension_time"] = np.array(times[np.argmax(tensions.max(axis=1))])
 
 
 def _on_grid(grid: Array, times: Array, series: Array, rates: Array | None = None) -> Array:

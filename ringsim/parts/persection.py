@@ -18,6 +18,10 @@ def _as_tuple(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
+ListIn = BeforeValidator(_as_tuple)
+"""TOML arrays arrive as lists; a frozen record keeps tuples."""
+
+
 def _one_or_each(value: Any) -> str:
     return EACH if isinstance(value, (list, tuple)) else ONE
 

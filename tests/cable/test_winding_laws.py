@@ -113,7 +113,6 @@ def test_a_winch_with_feedback_keeps_its_hours_too():
 
 def test_a_cable_reads_back_from_plain_tables():
     table = {
-        "plane": "lower",
         "end": "last",
         "axial_stiffness": 20000,
         "friction": {"kind": "capstan", "coefficient": [0.1, 0.2]},

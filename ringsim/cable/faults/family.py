@@ -8,16 +8,14 @@ from pydantic import Field
 
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.state import ChainState
-from ringsim.units import Model, SecondOrZero
+from ringsim.parts.faults.family import Fault
 
 
-class CableFault(Model):
+class CableFault(Fault):
     """Something that breaks at a given time and place."""
 
     cable: Annotated[int, Field(ge=1)] = 1
-    """Which cable of the scene, counted from 1."""
-    time: SecondOrZero
-    """When it happens, in s of the simulation."""
+    """Which cable of the scene, counted from 1: the upper one first."""
 
     def strike(self, ropes: Ropes, state: ChainState) -> Ropes:
         """The ropes after the fault.

@@ -1,0 +1,203 @@
+"""Where the cables run: points of their paths as functions of the nodes' coordinates.
+
+A hinge pulley is a point fixed on a hinge assembly.  A V pulley stands on a block without mass
+that a gear keeps on the bisector of the two bar halves: it is the point
+
+    p = r - sense h b,   b = (y_L + y_R + sense (x_R - x_L)) / |...|,
+
+r the V-joint, x and y the axes of the halves' frames, h the block's offset, sense +1 in the upper
+plane and -1 in the lower.  Half the turn of each half turns the block, so a force F on the pulley
+acts as F on the joint and as the moment arm x F shared evenly by the halves: the coupling is
+exact and resists nothing.  Source: paper 000, fig. 3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.cable.cables import Cables
+from ringsim.engine import quaternions
+from ringsim.engine.pantograph_ring import RingModel
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+WIDTH = 7
+"""Coordinates of a node: position and Euler parameters."""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """All points of all paths at one instant.
+
+    Attributes
+    ----------
+    points, velocities
+        Shape (points, 3), m and m/s.
+    arms
+        From the carrying node's position to the point, global, shape (points, 3).
+    gyrations
+        Matrices G of all nodes, angular velocity = G q_dot, shape (nodes, 3, 4).
+    """
+
+    points: Array
+    velocities: Array
+    arms: Array
+    gyrations: Array
+
+
+class CablePath:
+    """Points, velocities and generalised forces of the cables' paths.
+
+    Attributes
+    ----------
+    nodes
+        exudyn nodes whose coordinates the path depends on.
+    per_cable
+        Number of points of each cable.
+    leg_point, leg_node, leg_share
+        Every dependence of a point on a node: the point, the node's place in ``nodes``, and the
+        share of the node's turn that turns the point's arm.
+    """
+
+    def __init__(self, model: RingModel, cables: Cables) -> None:
+        self._register: dict[int, int] = {}
+        self.nodes: list[Any] = []
+        hinge: list[tuple[int, int, Array]] = []
+        block: list[tuple[int, int, int, float, float]] = []
+        self.per_cable: list[int] = []
+        count = 0
+        for plane, cable in cables.present():
+            path = _pulleys(model, plane, cables.winch_distance)
+            if cable.end == "last":
+                path = _from_last(model, plane, cables.winch_distance)
+            for stop in path:
+                if isinstance(stop[0], tuple):
+                    left, right = (self._number(node) for node in stop[0])
+                    sense = 1.0 if plane == 0 else -1.0
+                    block.append((count, left, right, sense, cable.block_offset))
+                else:
+                    hinge.append((count, self._number(stop[0]), stop[1]))
+                count += 1
+            self.per_cable.append(len(path))
+        self.count = count
+        self._hinge_point = np.array([h[0] for h in hinge])
+        self._hinge_node = np.array([h[1] for h in hinge])
+        self._hinge_arm = np.array([h[2] for h in hinge])
+        self._block_point = np.array([b[0] for b in block])
+        self._left = np.array([b[1] for b in block])
+        self._right = np.array([b[2] for b in block])
+        self._sense = np.array([b[3] for b in block])[:, None]
+        self._offset = np.array([b[4] for b in block])[:, None]
+        self.leg_point = np.concatenate([self._hinge_point, self._block_point, self._block_point])
+        self.leg_node = np.concatenate([self._hinge_node, self._left, self._right])
+        ones = np.ones(len(hinge))
+        halves = np.full(len(block), 0.5)
+        self.leg_share = np.concatenate([ones, halves, halves])
+        self.leg_carries = np.concatenate([ones, np.ones(len(block)), np.zeros(len(block))])
+
+    def place(self, coordinates: Array, rates: Array) -> Placed:
+        """Points and velocities from the nodes' coordinates and rates, shape (nodes, 7)."""
+        turns = coordinates[:, 3:]
+        axes = quaternions.axes_of(turns)
+        gyrations = gyration(turns)
+        spins = np.einsum("nij,nj->ni", gyrations, rates[:, 3:])
+        arms = np.empty((self.count, 3))
+        points, velocities = np.empty((self.count, 3)), np.empty((self.count, 3))
+        node = self._hinge_node
+        arms[self._hinge_point] = np.einsum("nij,nj->ni", axes[node], self._hinge_arm)
+        left, right = axes[self._left], axes[self._right]
+        bisector = left[:, :, 1] + right[:, :, 1] + self._sense * (right[:, :, 0] - left[:, :, 0])
+        bisector /= np.linalg.norm(bisector, axis=1)[:, None]
+        arms[self._block_point] = -self._sense * self._offset * bisector
+        carrier = np.empty(self.count, dtype=np.int64)
+        carrier[self._hinge_point], carrier[self._block_point] = node, self._left
+        turning = np.empty((self.count, 3))
+        turning[self._hinge_point] = spins[node]
+        turning[self._block_point] = 0.5 * (spins[self._left] + spins[self._right])
+        points[:] = coordinates[carrier, :3] + arms
+        velocities[:] = rates[carrier, :3] + np.cross(turning, arms)
+        return Placed(points, velocities, arms, gyrations)
+
+    def generalised(self, placed: Placed, forces: Array) -> Array:
+        """Generalised forces on the nodes' coordinates, shape (nodes, 7), of point forces."""
+        found = np.zeros((len(self.nodes), WIDTH))
+        pull = forces[self.leg_point]
+        moments = self.leg_share[:, None] * np.cross(placed.arms[self.leg_point], pull)
+        np.add.at(found[:, :3], self.leg_node, self.leg_carries[:, None] * pull)
+        turned = np.einsum("lij,li->lj", placed.gyrations[self.leg_node], moments)
+        np.add.at(found[:, 3:], self.leg_node, turned)
+        return found
+
+    def leg_maps(self, placed: Placed) -> Array:
+        """Derivative of each leg's point after its node's coordinates, shape (legs, 3, 7)."""
+        maps = np.zeros((len(self.leg_point), 3, WIDTH))
+        maps[:, range(3), range(3)] = self.leg_carries[:, None]
+        arms = self.leg_share[:, None] * placed.arms[self.leg_point]
+        maps[:, :, 3:] = -skew(arms) @ placed.gyrations[self.leg_node]
+        return maps
+
+    def turning_pairs(self) -> tuple[Indices, Indices]:
+        """Pairs of legs of the same point: how a moment on one node turns with another."""
+        first, second = [], []
+        for point in range(self.count):
+            own = np.flatnonzero(self.leg_point == point)
+            for a in own:
+                for b in own:
+                    first.append(a)
+                    second.append(b)
+        return np.array(first), np.array(second)
+
+    def _number(self, node: Any) -> int:
+        key = int(node)
+        if key not in self._register:
+            self._register[key] = len(self.nodes)
+            self.nodes.append(node)
+        return self._register[key]
+
+
+def gyration(turns: Array) -> Array:
+    """G = 2 [-v, w I + skew(v)] of quaternions (w, v): angular velocity = G q_dot."""
+    found = np.empty((len(turns), 3, 4))
+    found[:, :, 0] = -2.0 * turns[:, 1:]
+    found[:, :, 1:] = 2.0 * skew(turns[:, 1:])
+    found[:, range(3), range(1, 4)] += 2.0 * turns[:, :1]
+    return found
+
+
+def skew(vectors: Array) -> Array:
+    """Matrices of the cross product, shape (n, 3, 3)."""
+    found = np.zeros((len(vectors), 3, 3))
+    x, y, z = vectors.T
+    found[:, 0, 1], found[:, 0, 2], found[:, 1, 2] = -z, y, -x
+    found[:, 1, 0], found[:, 2, 0], found[:, 2, 1] = z, -y, x
+    return found
+
+
+def _pulleys(model: RingModel, plane: int, distance: float) -> list[Any]:
+    """Points from the winch at section 1: (hinge node, arm) or ((left, right), None)."""
+    fold = model.fold
+    inward = np.array([0.0, 0.0, -1.0 if plane == 0 else 1.0])
+    nodes = [node for _, node in model.hinges[plane]]
+    first = fold.left[plane, 0] - fold.corners[plane, 0]
+    path: list[Any] = [(nodes[0], first + distance * inward)]
+    for section in range(model.geometry.sections):
+        following = (section + 1) % len(nodes)
+        left = fold.left[plane, section] - fold.corners[plane, section]
+        right = fold.right[plane, section] - fold.corners[plane, following]
+        vjoint = model.vjoints[plane][section]
+        path.append((nodes[section], left))
+        path.append(((vjoint.gap[0], vjoint.gap[1]), None))
+        path.append((nodes[following], right))
+    return path
+
+
+def _from_last(model: RingModel, plane: int, distance: float) -> list[Any]:
+    """The same path with its winch at the last section."""
+    path = _pulleys(model, plane, distance)[1:][::-1]
+    node, arm = path[0]
+    inward = np.array([0.0, 0.0, -1.0 if plane == 0 else 1.0])
+    return [(node, arm + distance * inward), *path]

@@ -1,0 +1,71 @@
+"""Faults of a scene, struck at their times between two steps."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.cable.faults.family import CableFault
+from ringsim.cable.state import ChainState
+from ringsim.engine.cables import CableDrive
+from ringsim.engine.pantograph_ring import RingModel
+from ringsim.parts.faults.family import Fault
+from ringsim.parts.faults.stuck_vjoint import StuckVJoint
+
+Array = NDArray[np.float64]
+
+
+class Faults:
+    """The faults of a scene, in the order of their times.
+
+    A stuck V-joint is a torsion spring that lies inactive until its time comes.
+    """
+
+    def __init__(self, model: RingModel, drive: CableDrive | None) -> None:
+        self._model, self._drive = model, drive
+        self._waiting = sorted(model.scene.faults, key=lambda fault: fault.time)
+        self._springs: dict[int, Any] = {}
+        for fault in self._waiting:
+            if isinstance(fault, StuckVJoint):
+                joint = model.vjoints[("upper", "lower").index(fault.plane)][fault.section - 1]
+                self._springs[id(fault)] = model.assembly.torsion_spring(
+                    *joint.markers,
+                    stiffness=fault.stiffness,
+                    damping=fault.damping,
+                    activeConnector=False,
+                )
+
+    @property
+    def next_time(self) -> float:
+        """Time of the next fault, s; infinite if there is none left."""
+        return self._waiting[0].time if self._waiting else math.inf
+
+    def strike(self, time: float, angles: Array, state: ChainState | None) -> bool:
+        """Strike all faults that are due; returns whether there was one.
+
+        Parameters
+        ----------
+        angles
+            Opening angles, shape (2, sections), rad.
+        state
+            The cables now, if the scene has any.
+        """
+        due = [fault for fault in self._waiting if fault.time <= time + 1e-12]
+        for fault in due:
+            self._waiting.remove(fault)
+            self._strike(fault, angles, state)
+        return bool(due)
+
+    def _strike(self, fault: Fault, angles: Array, state: ChainState | None) -> None:
+        if isinstance(fault, StuckVJoint):
+            plane = ("upper", "lower").index(fault.plane)
+            sense = 1.0 if plane == 0 else -1.0
+            folded = math.pi - float(angles[plane, fault.section - 1])
+            spring, system = self._springs[id(fault)], self._model.assembly.system
+            system.SetObjectParameter(spring, "offset", sense * folded)
+            system.SetObjectParameter(spring, "activeConnector", True)
+        elif isinstance(fault, CableFault) and self._drive is not None and state is not None:
+            self._drive.ropes = fault.strike(self._drive.ropes, state)

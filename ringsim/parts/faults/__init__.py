@@ -1,0 +1,1 @@
+"""Faults of the structure, one file each."""

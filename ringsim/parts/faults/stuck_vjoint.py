@@ -1,0 +1,21 @@
+"""A V-joint that seizes."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ringsim.parts.faults.family import Fault
+from ringsim.units import TorsionDamping, TorsionRate
+
+
+class StuckVJoint(Fault):
+    """A stiff spring holds the joint at the angle that it has at that time."""
+
+    kind: Literal["stuck-vjoint"] = "stuck-vjoint"
+    plane: Literal["upper", "lower"] = "upper"
+    section: Annotated[int, Field(ge=1)]
+    """Counted from 1 at the boom."""
+    stiffness: TorsionRate = 1000.0
+    damping: TorsionDamping = 1.0
