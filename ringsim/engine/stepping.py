@@ -24,10 +24,11 @@ class StepControl:
 
     A local error C h^3 |a'''| in the angle a shifts the motion by C h^3 |a'''| / |a'| in time;
     spread evenly over the run that gives h = sqrt(tolerance |a'| / (C |a'''|)).  The third
-    derivative comes from divided differences of the last three rates; a rate below
-    ``usual_rate``, the mean rate to be expected of the run, counts as that much, or the tremor of
-    a ring that hardly moves yet would ask for tiny steps.  The ratio |a'''| / |a'| fades over its own time scale, so that a passage
-    of a''' through zero does not open the step.  Towards the end of the travel the step shrinks
+    derivative comes from divided differences of three rates, far enough apart not to see the rods
+    vibrate; a rate below ``usual_rate``, the mean rate to be expected of the run, counts as that
+    much, or the tremor of a ring that hardly moves yet would ask for tiny steps.  The ratio
+    |a'''| / |a'| fades over its own time scale, so that a passage of a''' through zero does
+    not open the step.  Towards the end of the travel the step shrinks
     so that the stop is met with a small one.
     """
 
