@@ -1,0 +1,94 @@
+"""Small rings and what the physics tests read from their runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from ringsim.engine.build import build
+from ringsim.engine.integrate import History, Integration
+from ringsim.engine.outcome import lock_times
+from ringsim.scene import Scene, load_scene
+from ringsim.theory.energy_quadrature import opening_time
+from ringsim.theory.ideal_ring import IdealRing
+
+Array = NDArray[np.float64]
+
+
+def ring(sections: int = 6, **values: Any) -> Scene:
+    """A ring of the paper's sections on a circle, with its boom, undamped, without a net.
+
+    Keywords name scene fields; two underscores stand for a dot.
+    """
+    plain = {
+        "structure.sections": sections,
+        "structure.aspect_ratio": 1.0,
+        "rods.damping": 0.0,
+        "net": "none",
+        "loads.force": 0.03,
+    }
+    chosen = {name.replace("__", "."): value for name, value in values.items()}
+    return load_scene("ring18").with_values(plain | chosen)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run at the engine's own steps."""
+
+    scene: Scene
+    history: History
+
+    @cached_property
+    def times(self) -> Array:
+        return np.array(self.history.times)
+
+    @cached_property
+    def angles(self) -> Array:
+        """Shape (steps + 1, 2, sections), rad."""
+        return np.array(self.history.angles)
+
+    @cached_property
+    def rates(self) -> Array:
+        return np.array(self.history.rates)
+
+    @cached_property
+    def locks(self) -> Array:
+        return lock_times(self.times, self.angles, self.rates)
+
+    @cached_property
+    def mean(self) -> CubicHermiteSpline:
+        """Mean opening angle over time, rad."""
+        return CubicHermiteSpline(
+            self.times, self.angles.mean(axis=(1, 2)), self.rates.mean(axis=(1, 2))
+        )
+
+    def reaches(self, angle: float) -> float:
+        """Time at which the mean opening angle first is ``angle`` (deg)."""
+        return float(self.mean.solve(math.radians(angle), extrapolate=False)[0])
+
+    def balance(self) -> Array:
+        """Energy that is missing from the balance at every step over the work so far, largest."""
+        energies = np.array(self.history.energies)
+        between = 0.5 * np.diff(self.times) * (energies[1:, 3] + energies[:-1, 3])
+        lost = np.concatenate([[0.0], np.cumsum(between + energies[1:, 4])])
+        missing = energies[:, 0] + energies[:, 1] - energies[0, 1] + lost - energies[:, 2]
+        return np.asarray(missing / np.abs(energies[:, 2]).max())
+
+    def before_contact(self) -> NDArray[np.bool_]:
+        return np.asarray(self.times < np.nanmin(self.locks))
+
+
+def run(scene: Scene) -> Run:
+    return Run(scene, Integration(build(scene)).run())
+
+
+def ideal_time(scene: Scene, angle: float = 180.0) -> float:
+    """Time in s at which the ideal ring reaches an opening angle (deg), by quadrature."""
+    end = 0.5 * (math.pi - math.radians(angle))
+    return opening_time(IdealRing.of(scene), scene.structure.initial_phi, end).time
