@@ -153,6 +153,17 @@ class ChainState:
         )
         return np.asarray(viscous * self.strain_rates * self.natural)
 
+    def viscous_slope(self, rope: int) -> float:
+        """Derivative of a rope's mean tension after the rate of its path, in N s/m."""
+        material = self.material
+        return float(
+            self.ropes.alive[rope]
+            * slack.slope(self.forces[rope], material.slack_width[rope])
+            * material.axial_stiffness[rope]
+            * material.damping_time[rope]
+            / self.natural[rope]
+        )
+
     @property
     def energy_density(self) -> Array:
         """Elastic energy of each rope per natural length, in J/m, shape (ropes,)."""

@@ -2,10 +2,12 @@
 
 One exudyn object spans all nodes that the paths depend on.  Its force is the chain's; its
 Jacobian is written with auxiliary unknowns that carry no mass and no force: for every span the
-change of its difference vector (three) and of its tension (one).  The dense coupling of a
-cable's spans (one mean tension, decays along the chain) then stands in a block of the size of
-the spans alone, and the large sparse matrix keeps its pattern; eliminating the unknowns gives
-exactly P^T (dF/dx) P with the material, decay and geometric parts of ringsim.cable.tangent.
+change of its difference vector (three) and of its tension (one), for every rope that of its mean
+tension.  The coupling of all spans of a rope through its mean tension is then a few sparse rows
+instead of a dense block over the whole ring; eliminating the unknowns gives P^T (dF/dx) P with
+the material, decay and geometric parts of ringsim.cable.tangent.  The decay part alone is dense
+(spans by spans).  Its entries are written only where they matter to Newton's convergence:
+those of friction that turns round within a step.  ``exact_tangent`` writes them all.
 """
 
 from __future__ import annotations
@@ -21,14 +23,16 @@ from ringsim.cable.cables import Cables
 from ringsim.cable.chain import Chain
 from ringsim.cable.records import Winch
 from ringsim.cable.state import ChainState
-from ringsim.cable.tangent import tangents
+from ringsim.cable.tangent import RopeTangent, tangents
 from ringsim.cable.winding.family import WinchState
-from ringsim.engine.cable_path import WIDTH, CablePath, Placed, skew
+from ringsim.engine.cable_path import WIDTH, CablePath, Placed, cross, gyration, skew
 from ringsim.engine.pantograph_ring import RingModel
 
 Array = NDArray[np.float64]
 _PER_SPAN = 4
 """Auxiliary unknowns of a span: three for its difference vector, one for its tension."""
+_NEGLIGIBLE = 0.02
+"""Decay entries are left out below this share of the largest geometric stiffness T / L."""
 
 
 class CableDrive:
@@ -58,7 +62,9 @@ class CableDrive:
         ]
         self._winch_states = [WinchState() for _ in self.winches]
         self._size = len(self.path.nodes) * WIDTH
-        self._aux = _PER_SPAN * self.ropes.spans
+        most_ropes = len(present) + len(model.scene.faults)
+        self.auxiliary = _PER_SPAN * self.ropes.spans + most_ropes
+        self.exact_tangent = False
         self._pattern = _Pattern(self)
         self._add_object()
 
@@ -113,17 +119,17 @@ class CableDrive:
 
     def _add_object(self) -> None:
         system = self._model.assembly.system
-        zeros = np.zeros(self._aux)
+        zeros = np.zeros(self.auxiliary)
         auxiliary = system.AddNode(
             item.NodeGenericODE2(
                 referenceCoordinates=zeros,
                 initialCoordinates=zeros,
                 initialCoordinates_t=zeros,
-                numberOfODE2Coordinates=self._aux,
+                numberOfODE2Coordinates=self.auxiliary,
             )
         )
         mass = exu.MatrixContainer()
-        size = self._size + self._aux
+        size = self._size + self.auxiliary
         mass.SetWithSparseMatrix(np.zeros((1, 3)), size, size)
         system.AddObject(
             item.ObjectGenericODE2(
@@ -141,7 +147,7 @@ class CableDrive:
 
     def _force(self, mbs: Any, t: float, number: int, q: Any, q_t: Any) -> Array:
         state, placed = self.evaluate(*self._split(q, q_t), t)
-        force = np.zeros(self._size + self._aux)
+        force = np.zeros(self._size + self.auxiliary)
         force[: self._size] = self.path.generalised(placed, state.point_forces).ravel()
         return force
 
@@ -150,8 +156,8 @@ class CableDrive:
     ) -> Any:
         state, placed = self.evaluate(*self._split(q, q_t), t)
         matrix = exu.MatrixContainer()
-        size = self._size + self._aux
-        triplets = self._pattern.triplets(state, placed, by_q, by_rate)
+        size = self._size + self.auxiliary
+        triplets = self._pattern.triplets(state, placed, by_q, by_rate, exact=self.exact_tangent)
         matrix.SetWithSparseMatrix(triplets, size, size)
         return matrix
 
@@ -183,7 +189,7 @@ class _Pattern:
         turn_rows = turn[self._first][:, None] + np.arange(4)
         turn_columns = turn[self._second][:, None] + np.arange(4)
         single = turn[:, None] + np.arange(4)
-        every = np.arange(self._size, self._size + _PER_SPAN * self._spans)
+        every = np.arange(self._size, self._size + drive.auxiliary)
         self._static = [
             _pairs(differences, own),
             _pairs(own, tension[:, None]),
@@ -192,6 +198,7 @@ class _Pattern:
             _pairs(single, single),
             (every, every),
         ]
+        self._ones = np.ones(len(every))
 
     def _difference(self, span: NDArray[np.int64]) -> NDArray[np.int64]:
         return np.asarray(self._size + 3 * span[:, None] + np.arange(3))
@@ -199,30 +206,63 @@ class _Pattern:
     def _tension(self, span: NDArray[np.int64]) -> NDArray[np.int64]:
         return np.asarray(self._size + 3 * self._spans + span)
 
-    def triplets(self, state: ChainState, placed: Placed, by_q: float, by_rate: float) -> Array:
+    def _mean(self, rope: int) -> NDArray[np.int64]:
+        return np.array([[self._size + _PER_SPAN * self._spans + rope]])
+
+    def triplets(
+        self, state: ChainState, placed: Placed, by_q: float, by_rate: float, *, exact: bool
+    ) -> Array:
         """All entries as (row, column, value), shape (entries, 3)."""
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
         units = state.directions[self._span]
-        values = [-maps, np.einsum("lij,li->lj", maps, units)[:, :, None]]
+        values = [-maps, np.einsum("lij,li->lj", maps, units)]
         directions = np.empty((self._spans, 3, 3))
-        blocks, places = [], []
-        for tangent in tangents(state, placed.velocities):
-            first = int(np.searchsorted(state.ropes.near, tangent.points.start))
-            count = len(tangent.directions)
-            directions[first : first + count] = tangent.by_direction
-            spans = np.arange(first, first + count)
-            coupling = tangent.by_mean + tangent.by_share
-            coupling = by_q * coupling + by_rate * tangent.by_velocity
-            blocks.append(-coupling.reshape(count, -1).ravel())
-            columns = self._difference(spans).ravel()
-            places.append(_pairs(self._tension(spans)[None], columns[None]))
+        places, blocks = list(self._static), []
+        for rope, tangent in enumerate(tangents(state, placed.velocities)):
+            spans = slice(state.ropes.starts[rope], state.ropes.ends[rope])
+            directions[spans] = tangent.by_direction
+            for place, block in self._rope(state, tangent, rope, by_q, by_rate, exact=exact):
+                places.append(place)
+                blocks.append(block)
         values.append(np.einsum("lij,lik->ljk", maps, directions[self._span]))
-        values += self._turning(state, placed)
-        flat = [by_q * np.asarray(v).ravel() for v in values]
-        flat.append(np.full(_PER_SPAN * self._spans, by_q))
-        rows = np.concatenate([r for r, _ in self._static] + [r for r, _ in places])
-        columns = np.concatenate([c for _, c in self._static] + [c for _, c in places])
-        return np.stack([rows, columns, np.concatenate(flat + blocks)], axis=1)
+        values += [*self._turning(state, placed), self._ones]
+        flat = [by_q * np.asarray(value).ravel() for value in values] + blocks
+        rows = np.concatenate([r for r, _ in places])
+        columns = np.concatenate([c for _, c in places])
+        return np.stack([rows, columns, np.concatenate(flat)], axis=1)
+
+    def _rope(
+        self,
+        state: ChainState,
+        tangent: RopeTangent,
+        rope: int,
+        by_q: float,
+        by_rate: float,
+        *,
+        exact: bool,
+    ) -> list[tuple[tuple[NDArray[np.int64], NDArray[np.int64]], Array]]:
+        """How a rope's span tensions follow its mean tension and the differences of its points."""
+        spans = np.arange(state.ropes.starts[rope], state.ropes.ends[rope])
+        tension, difference = self._tension(spans)[:, None], self._difference(spans).reshape(1, -1)
+        shares = state.shares[spans]
+        largest = int(np.argmax(shares))
+        by_mean = (tangent.by_mean[largest] / shares[largest]).ravel()
+        viscous = state.viscous_slope(rope) * tangent.directions.ravel()
+        decay = by_q * tangent.by_share + by_rate * (
+            tangent.by_velocity - shares[:, None, None] * viscous.reshape(-1, 3)
+        )
+        flat = decay.reshape(len(spans), -1)
+        kept = np.ones(flat.shape, dtype=bool)
+        if not exact:
+            stiffest = float(np.max(state.tensions[spans] / state.lengths[spans]))
+            kept = np.abs(flat) > by_q * _NEGLIGIBLE * max(stiffest, 1.0)
+        row, column = np.nonzero(kept)
+        mean = self._mean(rope)
+        return [
+            (_pairs(tension.T, mean), -by_q * shares),
+            (_pairs(mean, difference), -(by_q * by_mean + by_rate * viscous)),
+            ((tension[row, 0], difference[0, column]), -flat[row, column]),
+        ]
 
     def _turning(self, state: ChainState, placed: Placed) -> list[Array]:
         """Change of the moments arm x F at fixed F with the turns of the nodes."""
@@ -232,13 +272,13 @@ class _Pattern:
         along = np.einsum("li,li->l", arms, forces)
         kernel = arms[:, :, None] * forces[:, None, :] - along[:, None, None] * np.eye(3)
         shares = path.leg_share
-        gyrations = placed.gyrations[path.leg_node]
+        gyrations = gyration(placed.turns[path.leg_node])
         first, second = self._first, self._second
         weight = (shares[first] * shares[second])[:, None, None]
         pairs = np.einsum(
             "lia,lij,ljb->lab", gyrations[first], weight * kernel[first], gyrations[second]
         )
-        moments = shares[:, None] * np.cross(arms, forces)
+        moments = shares[:, None] * cross(arms, forces)
         own = np.zeros((len(moments), 4, 4))
         own[:, 0, 1:], own[:, 1:, 0] = -2.0 * moments, 2.0 * moments
         own[:, 1:, 1:] = 2.0 * skew(moments)
