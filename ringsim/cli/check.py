@@ -25,7 +25,11 @@ MOST_SECTIONS_FOR_MOBILITY = 72
     "--set", "assignments", multiple=True, metavar="PATH=VALUE",
     help="Replace a value, e.g. loads.force=0.02, rods.young_modulus[3]=1e11, net=none.",
 )  # fmt: skip
-def command(scene: str, assignments: tuple[str, ...]) -> None:
+@click.option(
+    "--deploys-in", "time", type=float, metavar="SECONDS",
+    help="Find the initial opening angle from which the ideal ring deploys in this time.",
+)  # fmt: skip
+def command(scene: str, assignments: tuple[str, ...], time: float | None) -> None:
     """Check FILE (a scene file, or the name of a built-in scene) without running it.
 
     Bad input ends with exit code 2 and one line that names the field, its value and the cure.
@@ -33,6 +37,14 @@ def command(scene: str, assignments: tuple[str, ...]) -> None:
     loaded = load_scene(scene)
     if assignments:
         loaded = loaded.with_values(dict(parse_assignment(text) for text in assignments))
+    if time is not None:
+        from ringsim.theory.calibration import opening_angle_for
+
+        angle = opening_angle_for(loaded, time)
+        click.echo(
+            f"structure.opening_angle = {angle:.6g} deg: the ideal ring deploys in {time:g} s"
+        )
+        return
     for label, text in summary(loaded):
         click.echo(f"{label:<12}{text}")
 

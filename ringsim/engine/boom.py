@@ -8,6 +8,7 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.choice import kind_of
 from ringsim.engine.pantograph_ring import RingModel
 from ringsim.parts.boom.flexible import FlexibleBoom
 from ringsim.parts.boom.rigid import RigidBoom
@@ -38,7 +39,7 @@ def add_boom(model: RingModel) -> None:
     elif isinstance(boom, FlexibleBoom):
         _add_flexible(model, boom)
     else:
-        raise TypeError(f"no builder for a boom of kind {boom.kind}")
+        raise TypeError(f"no builder for a boom of kind {kind_of(boom)}")
 
 
 def _add_flexible(model: RingModel, boom: FlexibleBoom) -> None:

@@ -24,7 +24,8 @@ _STRAIN = exu.OutputVariableType.StrainLocal
 class Energies(NamedTuple):
     """Energies in J and the power lost in W at one instant; ``lost_in_rods`` is the energy in J
     that the rods' own damping took since the reading before, ``winch_power`` in W what the
-    winches put in less the strain energy that they wind up."""
+    winches put in less the strain energy that they wind up.
+    """
 
     kinetic: float
     elastic: float
@@ -67,7 +68,13 @@ class EnergyMeter:
             self._hub = assembly.coordinates_of(net.hub)[:3]
 
     def read(
-        self, time: float, state: State, angles: Array, rates: Array, latched: Array, chain: ChainState | None = None
+        self,
+        time: float,
+        state: State,
+        angles: Array,
+        rates: Array,
+        latched: Array,
+        chain: ChainState | None = None,
     ) -> Energies:
         """Energies at the current state.
 
@@ -80,13 +87,12 @@ class EnergyMeter:
 
         """
         kinetic = sum(self._output(body, _KINETIC) for body in self._model.assembly.bodies)
-        elastic = sum(self._output(element, _POTENTIAL) for element in self._elements)
+        elastic = float(sum(self._output(element, _POTENTIAL) for element in self._elements))
         lifted = (state.position - state.reference)[self._lifts]
-        loss = sum(
-            float(np.sum(friction_torque(law, group.sections, sections, rate) * rate))
-            for law, group, sections in self._friction
-            for rate in (group.rate(state),)
-        )
+        loss = 0.0
+        for law, group, sections in self._friction:
+            rate = group.rate(state)
+            loss += float(np.sum(friction_torque(law, group.sections, sections, rate) * rate))
         stored, lost = self._stops(angles, rates, latched)
         net_stored, net_lost = self._net_energy(state)
         loss += lost + net_lost

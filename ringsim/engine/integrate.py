@@ -181,7 +181,7 @@ class Integration:
         history.energies.append(reading)
         if chain is not None:
             history.tensions.append(chain.tensions)
-            history.slack.append(chain.is_slack[chain.ropes.first])
+            history.slack.append(chain.is_slack[chain.ropes.first].astype(float))
             history.wound.append(chain.wound.sum(axis=1))
             self._chain = chain
         history.gaps.append(max(float(group.gaps(state).max()) for group in self._gaps))

@@ -46,7 +46,9 @@ def add_friction(model: RingModel) -> None:
             model.assembly.torsion_spring(*joint.markers, damping=viscous)
 
 
-def friction_torque(law: JointFriction, section: int, sections: int, rate: Array) -> Array:
+def friction_torque(
+    law: JointFriction, section: NDArray[np.int64], sections: int, rate: Array
+) -> Array:
     """The same law in numpy, for the energy balance; N m, against ``rate`` in rad/s."""
     viscous = spread(law.viscous, sections)[section]
     coulomb = spread(law.coulomb, sections)[section]

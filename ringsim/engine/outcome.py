@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 def output_times(scene: Scene) -> Array:
     """The scene's output grid in s: multiples of ``record.interval`` up to the end time."""
     count = math.floor(scene.solver.end_time / scene.record.interval * (1.0 + 1e-12))
-    return np.arange(count + 1) * scene.record.interval
+    return np.asarray(np.arange(count + 1) * scene.record.interval, dtype=float)
 
 
 def lock_times(times: Array, angles: Array, rates: Array) -> Array:
@@ -124,7 +124,7 @@ def _add_cables(values: dict[str, Array], history: History, scene: Scene, grid: 
     for number, (plane, _) in enumerate(scene.cables.present()):
         own = tensions[:, number * spans : (number + 1) * spans]
         by_plane[plane] = _on_grid(grid, times, own).T
-        ends = slack[:, number].astype(float)
+        ends = slack[:, number]
         loose[plane] = float(np.sum(0.5 * np.diff(times) * (ends[1:] + ends[:-1])))
         wound[plane] = _on_grid(grid, times, np.array(history.wound)[:, number])
     values["cable_tension"] = by_plane

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ringsim.engine.assembly import Assembly, Frame
 from ringsim.engine.rods import Formulation, Rod, add_rod, beam_section
 from ringsim.geometry.ring import Fold, RingGeometry
+from ringsim.parts.boom.rigid import RigidBoom
 from ringsim.parts.persection import spread
 from ringsim.scene import Scene
 from ringsim.theory.ideal_ring import IdealRing
@@ -100,7 +101,7 @@ def _add_hinges(model: RingModel, release: _Release) -> None:
             rate = release.rate.corners[plane, corner]
             node = model.assembly.add_rigid_node(release.frame(place, rate, np.eye(3)))
             mass, inertia, centre = ring.corner_mass, own, None
-            if plane == 0 and corner == 0 and boom is not None and boom.kind == "rigid":
+            if plane == 0 and corner == 0 and isinstance(boom, RigidBoom):
                 across = (
                     0.125 * boom.mass * (boom.tube.outer_diameter**2 + boom.tube.inner_diameter**2)
                 )

@@ -39,7 +39,7 @@ class Ancf:
                 nodeNumbers=nodes,
                 length=length,
                 sectionData=section,
-            )  # fmt: skip
+            )
         )
 
     def add_mass(self, assembly: Assembly, node: Any, mass: float) -> None:

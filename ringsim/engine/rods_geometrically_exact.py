@@ -31,7 +31,7 @@ class GeometricallyExact:
                 nodeNumbers=nodes,
                 length=length,
                 sectionData=section,
-            )  # fmt: skip
+            )
         )
 
     def add_mass(self, assembly: Assembly, node: Any, mass: float) -> None:

@@ -76,7 +76,8 @@ def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
     """Name and opening angles (plane, section) of the three recorded instants to draw.
 
     The first time, the time at which the mean opening angle is nearest to the middle between
-    the ends, and the time nearest to the deployment, or the last one if it was not reached.
+    the ends, and the deployment, at which every V-joint stands at 180 deg by definition, or the
+    last recorded time if it was not reached.
     """
     angle = dataset["opening_angle"].dropna("time", how="any")
     mean = angle.mean(("plane", "section")).values
@@ -86,7 +87,11 @@ def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
     middle = int(np.abs(mean[: last + 1] - 0.5 * (mean[0] + mean[last])).argmin())
     opens = mean[last] >= mean[0]
     names = ("stowed" if opens else "start", "half-way", "deployed" if done else "end of the run")
-    return [(n, angle.isel(time=i)) for n, i in zip(names, (0, middle, last), strict=True)]
+    moments = [(n, angle.isel(time=i)) for n, i in zip(names, (0, middle, last), strict=True)]
+    if done:
+        locked = xr.full_like(moments[2][1], 180.0).assign_coords(time=deployed)
+        moments[2] = (names[2], locked)
+    return moments
 
 
 def _compose(
