@@ -118,7 +118,8 @@ def run_campaign(folder: Path, choices: Choices) -> int:
 
 
 def _run_prepared(campaign: Folder, choices: Choices) -> int:
-    store = Store(campaign.path, campaign.identity, f"{choices.part.writer}-rank{choices.rank}")
+    writer = f"{choices.part.writer}-rank{choices.rank}"
+    store = Store(campaign.path, campaign.identity, writer, campaign.output.shard_samples)
     before = _survey(campaign, choices)
     with stopping_on_signals() as stop:
         progress = _progress(campaign, choices, before) if before is not None else None

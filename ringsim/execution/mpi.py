@@ -84,11 +84,14 @@ class Mpi:
                     gone |= {rank} if kind == "gone" else set()
                     fault = fault or (text if kind == "gone" else "")
                     reason = reason or text
-            result = slot.poll() if slot.busy else None
-            if result is not None:
-                moved = True
-                work.keep(result)
-                work.finished(replace(result, arrays=(), body=b""))
+            try:
+                result = slot.poll() if slot.busy else None
+                if result is not None:
+                    moved = True
+                    work.keep(result)
+                    work.finished(replace(result, arrays=(), body=b""))
+            except InputError as error:
+                fault = str(error)
             delay = _SHORTEST if moved else min(1.5 * delay, _LONGEST)
             if not moved:
                 _rest(slot, delay)

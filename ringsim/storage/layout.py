@@ -37,14 +37,16 @@ Digits = Annotated[int, Field(ge=1, le=15)]
 
 
 class Output(Model):
-    """How the merged file stores its variables."""
+    """How files store the results."""
 
     compression: Annotated[int, Field(ge=0, le=9)] = 4
     """Level of zlib; 0 stores plain numbers."""
     significant_digits: dict[str, Digits] = Field(default_factory=dict)
     """Decimal digits that are kept, by variable; the rest is rounded away before compression."""
     leave_out: list[str] = Field(default_factory=list)
-    """Output variables that are not stored."""
+    """Output variables that the merged file does not hold."""
+    shard_samples: Annotated[int, Field(ge=1, le=100_000)] = 256
+    """Samples in a shard, at most."""
 
 
 def add_dimension(file: Any, name: str, size: int) -> None:

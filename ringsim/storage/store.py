@@ -16,7 +16,6 @@ from ringsim.storage.shards import FOLDER, Shard, read_shards, write_shard
 from ringsim.variables import Status
 
 JOURNALS = "journals"
-SHARD_SAMPLES = 256
 SHARD_BYTES = 16 << 20
 
 
@@ -31,9 +30,12 @@ class Store:
         Identity of the campaign.
     writer
         Name of this process among those that write to the folder.
+    shard_samples
+        Samples in a shard, at most; large results make shards with fewer.
     """
 
-    def __init__(self, folder: Path, campaign: str, writer: str) -> None:
+    def __init__(self, folder: Path, campaign: str, writer: str, shard_samples: int) -> None:
+        self._shard_samples = shard_samples
         self._folder, self._campaign = folder, campaign
         self._path = folder / JOURNALS / f"{writer}.journal"
         self._journal: Journal | None = None
@@ -50,7 +52,7 @@ class Store:
             if self._journal is None:
                 self._journal = Journal(self._path)
             self._journal.append(result)
-            if self._journal.samples >= SHARD_SAMPLES or self._journal.size >= SHARD_BYTES:
+            if self._journal.samples >= self._shard_samples or self._journal.size >= SHARD_BYTES:
                 self._seal()
         except OSError as error:
             raise unwritable(self._path, error) from error

@@ -64,6 +64,7 @@ class Bench:
 
     folder: Path
     extra: dict[str, str] = field(default_factory=dict)
+    processes: list[subprocess.Popen] = field(default_factory=list)
 
     def write(self, samples=20, *, shared="", inputs="", more="", name="small.toml"):
         path = self.folder / name
@@ -90,11 +91,20 @@ class Bench:
         return os.environ | {"PYTHONPATH": str(HERE)} | self.extra
 
     def start(self, *arguments, ranks=0, solver="fake_solver:run"):
-        return subprocess.Popen(
+        process = subprocess.Popen(
             self.command(*arguments, ranks=ranks, solver=solver),
             cwd=self.folder, env=self.environment(), text=True,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
         )  # fmt: skip
+        self.processes.append(process)
+        return process
+
+    def close(self):
+        """End what is still running."""
+        for process in self.processes:
+            if process.poll() is None:
+                process.kill()
+                process.communicate()
 
     def run(self, *arguments, ranks=0, solver="fake_solver:run", code=0, timeout=120):
         done = subprocess.run(

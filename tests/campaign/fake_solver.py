@@ -93,6 +93,23 @@ def _eat() -> Outcome:
         hoard.append(np.ones(1 << 22))
 
 
+def traced(scene: Scene) -> Outcome:
+    """Takes ten milliseconds and adds a byte to a file when it has ended."""
+    time.sleep(0.01)
+    outcome = run(scene)
+    with open(os.environ["TRACE"], "ab", buffering=0) as trace:
+        trace.write(b".")
+    return outcome
+
+
+def spy(scene: Scene) -> Outcome:
+    """Tells what should not be in the solver's process."""
+    heavy = sorted({"mpi4py", "xarray", "matplotlib", "netCDF4"} & set(sys.modules))
+    inherited = [name for name in os.environ if name.startswith(("PMI", "OMPI", "HYDRA", "PMIX"))]
+    threads = [] if os.environ["OMP_NUM_THREADS"] == "1" else ["many threads"]
+    return Outcome(Status.OK, ", ".join(heavy + inherited + threads) or "clean", {}, {})
+
+
 def slow(scene: Scene) -> Outcome:
     """Sleeps for as many seconds as ``rods.damping``."""
     time.sleep(scene.rods.damping)

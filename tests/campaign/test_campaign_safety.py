@@ -1,0 +1,240 @@
+"""Broken files are found, full disks and stop signals survived, wrong folders refused."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from campaign_bench import Bench, comparable, opened
+
+SHARDS = "[output]\nshard_samples = 8\n"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A finished campaign with several shards; copy it before use."""
+    bench = Bench(tmp_path_factory.mktemp("whole"))
+    bench.run("campaign", bench.write(more=SHARDS), "--workers", 1, "--out", "out")
+    return bench
+
+
+@pytest.fixture
+def copied(whole, tmp_path):
+    shutil.copytree(whole.folder, tmp_path, dirs_exist_ok=True)
+    return Bench(tmp_path)
+
+
+def first_shard(bench):
+    return sorted((bench.folder / "out" / "shards").iterdir())[0]
+
+
+def flip_a_bit(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 4
+    path.write_bytes(content)
+
+
+def truncate(path):
+    os.truncate(path, path.stat().st_size - 7)
+
+
+def empty(path):
+    os.truncate(path, 0)
+
+
+@pytest.mark.parametrize("damage", [flip_a_bit, truncate, empty])
+def test_broken_shard_is_set_aside_and_its_samples_run_again(damage, copied):
+    shard = first_shard(copied)
+    damage(shard)
+    status = copied.run("status", "out")
+    assert "12 of 20 samples done" in status
+    assert shard.name in status
+    printed = copied.run("campaign", "small.toml", "--workers", 2, "--out", "out")
+    assert f"{shard.name}: its checksum is wrong; set aside" in printed
+    assert (copied.folder / "out" / "set-aside" / shard.name).exists()
+    before = xr.open_dataset(copied.folder / "out" / "campaign.nc")
+    with before:
+        assert (before.status == 0).all()
+
+
+def test_shard_set_aside_changes_no_value(copied, whole):
+    flip_a_bit(first_shard(copied))
+    copied.run("campaign", "small.toml", "--workers", 2, "--out", "out")
+    xr.testing.assert_identical(comparable(copied.result("out")), comparable(whole.result("out")))
+
+
+def test_merge_of_an_unfinished_campaign_has_gaps(copied):
+    first_shard(copied).unlink()
+    assert "8 not run" in copied.run("merge", "out")
+    result = copied.result("out")
+    meanings = dict(
+        zip(
+            result.status.attrs["flag_values"].tolist(),
+            result.status.attrs["flag_meanings"].split(),
+            strict=True,
+        )
+    )
+    words = [meanings[code] for code in result.status.values.tolist()]
+    assert sorted(set(words)) == ["not_run", "ok"]
+    gaps = np.array(words) == "not_run"
+    assert gaps.sum() == 8
+    np.testing.assert_array_equal(np.isnan(result.deployment_time.values), gaps)
+    assert np.isfinite(result.loads_force.values).all()
+
+
+def test_merging_twice_gives_the_same_values(copied):
+    before = comparable(copied.result("out"))
+    copied.run("merge", "out")
+    copied.run("merge", "out")
+    xr.testing.assert_identical(comparable(copied.result("out")), before)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("seed = 7", "seed = 8", "its seed"),
+        ('"solver.end_time" = 20.0', '"solver.end_time" = 21.0', "its scene"),
+        ('"net.stiffness" =', '"net.damping" =', "its inputs"),
+        ("high = 0.05", "high = 0.06", "20 samples are not the first"),
+        ("samples = 20", "samples = 10", "20 samples are not the first of the 10"),
+    ],
+)
+def test_folder_of_another_campaign_is_refused(old, new, named, copied):
+    file = copied.folder / "small.toml"
+    file.write_text(file.read_text().replace(old, new))
+    printed = copied.run("campaign", file, "--out", "out", code=2)
+    assert "this folder holds another campaign" in printed
+    assert named in printed
+    assert "--out" in printed
+
+
+def test_folder_with_other_files_is_refused(bench):
+    (bench.folder / "out").mkdir()
+    (bench.folder / "out" / "thesis.tex").touch()
+    printed = bench.run("campaign", bench.write(), "--out", "out", code=2)
+    assert "thesis.tex and no campaign" in printed
+
+
+def test_file_where_the_folder_should_be_is_refused(bench):
+    (bench.folder / "out").touch()
+    printed = bench.run("campaign", bench.write(), "--out", "out", code=2)
+    assert len(printed.splitlines()) == 1
+
+
+def wait_until_some_are_done(bench, process, samples=1):
+    end = time.monotonic() + 30
+    while time.monotonic() < end:
+        if (bench.folder / "out" / "design.nc").exists():
+            first = bench.run("status", "out").splitlines()[0]
+            if int(first.split(": ")[1].split()[0]) >= samples:
+                return
+        assert process.poll() is None, process.communicate()[0]
+        time.sleep(0.1)
+    raise AssertionError("the campaign does not begin")
+
+
+SLEEPY = {"shared": '"rods.damping" = 0.05', "more": SHARDS}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+def test_stop_signal_ends_the_campaign_and_it_goes_on_later(number, bench):
+    start = ("campaign", bench.write(60, **SLEEPY), "--workers", 2, "--out", "out")
+    process = bench.start(*start, solver="fake_solver:slow")
+    wait_until_some_are_done(bench, process)
+    process.send_signal(number)
+    printed, _ = process.communicate(timeout=10)
+    assert process.returncode == 130, printed
+    assert f"stopped by {number.name}" in printed
+    assert "the same command goes on" in printed
+    assert not (bench.folder / "out" / "campaign.nc").exists()
+    bench.run(*start, solver="fake_solver:slow")
+    assert (bench.result("out").status == 0).all()
+
+
+def test_stop_signal_reaches_all_ranks(bench, mpi):
+    start = ("campaign", bench.write(60, **SLEEPY), "--out", "out")
+    process = bench.start(*start, ranks=2, solver="fake_solver:slow")
+    wait_until_some_are_done(bench, process)
+    process.send_signal(signal.SIGUSR1)
+    printed, _ = process.communicate(timeout=20)
+    assert process.returncode == 130, printed
+    assert printed.count("the same command goes on") == 1
+    bench.run(*start, ranks=2, solver="fake_solver:slow")
+    assert (bench.result("out").status == 0).all()
+
+
+def test_running_campaign_tells_its_status_and_keeps_others_out(bench):
+    start = ("campaign", bench.write(600, **SLEEPY), "--workers", 2, "--out", "out")
+    process = bench.start(*start, solver="fake_solver:slow")
+    wait_until_some_are_done(bench, process, 4)
+    told = bench.run("status", "out")
+    assert "running, 2 workers" in told
+    assert "time left" in told
+    printed = bench.run(*start, solver="fake_solver:slow", code=2)
+    assert "another process runs this campaign" in printed
+    assert "not run" in bench.run("merge", "out")
+    process.kill()
+    process.communicate()
+    assert "killed, 2 workers" in bench.run("status", "out")
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of its own with little room."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(disk)]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("a small tmpfs cannot be mounted here: needs the right to mount")
+    yield disk
+    subprocess.run(["umount", "-l", str(disk)], check=True)
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_full_disk_stops_the_campaign_and_loses_no_finished_sample(
+    ranks, small_disk, bench, request
+):
+    if ranks:
+        request.getfixturevalue("mpi")
+    workers = () if ranks else ("--workers", 2)
+    file = bench.write(60, more=SHARDS, shared='"record.interval" = 0.01')
+    start = ("campaign", file, "--out", small_disk / "out", *workers)
+    printed = bench.run(*start, ranks=ranks, code=2)
+    line = next(line for line in printed.splitlines() if "cannot be written" in line)
+    assert "No space left on device" in line or "HDF error" in line
+    assert "make room" in line
+    subprocess.run(["mount", "-o", "remount,size=200m", str(small_disk)], check=True)
+    told = bench.run("status", small_disk / "out")
+    done = int(told.splitlines()[0].split(": ")[1].split()[0])
+    assert 0 < done < 60
+    printed = bench.run(*start, ranks=ranks)
+    assert f"{done} of 60 samples done" in printed
+    bench.run("campaign", file, "--out", "elsewhere", "--workers", 2)
+    mine, other = opened(small_disk / "out" / "campaign.nc"), bench.result("elsewhere")
+    xr.testing.assert_identical(comparable(mine), comparable(other))
+
+
+def test_launcher_of_another_mpi_is_refused(bench):
+    bench.extra["OMPI_COMM_WORLD_SIZE"] = "4"
+    printed = bench.run("campaign", bench.write(), "--out", "out", code=2)
+    assert "4 " in printed
+    assert "mpiexec" in printed or "cannot be loaded" in printed
+
+
+def test_workers_under_mpi_are_refused(bench, mpi):
+    printed = bench.run("campaign", bench.write(), "--workers", 2, "--out", "out", ranks=2, code=2)
+    assert printed.count("leave out --workers") == 1
+
+
+def test_solver_process_knows_neither_mpi_nor_xarray_nor_matplotlib(bench, mpi):
+    for ranks in (0, 2):
+        out = f"out{ranks}"
+        bench.run("campaign", bench.write(2), "--out", out, ranks=ranks, solver="fake_solver:spy")
+        assert set(bench.result(out).reason.values) == {"clean"}
