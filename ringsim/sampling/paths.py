@@ -64,7 +64,11 @@ def each_of(scene: Scene, path: str, value: Any) -> int:
     """
     if section_of(path)[1] is not None:
         raise InputError(f"inputs: {path} is one section already: leave out each_section")
-    each = field_at(scene.with_values({path: value, f"{path}[1]": value}), path)
+    scene.with_values({path: value})
+    try:
+        each = field_at(scene.with_values({path: value, f"{path}[1]": value}), path)
+    except InputError:
+        each = None
     if not isinstance(each, tuple):
         raise InputError(f"inputs: {path} is one value for all sections: leave out each_section")
     return len(each)

@@ -1,0 +1,254 @@
+"""Every design places its samples as it promises, and the same ones each time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+
+from ringsim.choice import kinds_of
+from ringsim.refusal import InputError
+from ringsim.sampling.correlation import Correlation
+from ringsim.sampling.designs.family import Design
+from ringsim.sampling.table import AnyDesign, AnyDistribution, draw, first_samples
+from ringsim.scene import load_scene
+
+DESIGN = TypeAdapter(AnyDesign)
+INPUTS = TypeAdapter(dict[str, AnyDistribution])
+
+THREE = {
+    "rods.young_modulus": {"kind": "normal", "mean": 120e9, "standard_deviation": 5e9},
+    "net.stiffness": {"kind": "lognormal", "mean": 1e-3, "standard_deviation": 2e-4},
+    "loads.force": {"kind": "uniform", "low": 0.01, "high": 0.02},
+}
+PROBABILISTIC = ["random", "latin-hypercube", "sobol"]
+
+
+@pytest.fixture(scope="module")
+def base():
+    return load_scene("ring18").with_values({"structure.sections": 6, "boom": "none"})
+
+
+def drawn(base, design, inputs=THREE, *, seed=5, folder=Path(), correlations=()):
+    return draw(
+        base,
+        INPUTS.validate_python(inputs),
+        correlations,
+        DESIGN.validate_python(design),
+        seed=seed,
+        folder=folder,
+    )
+
+
+def values(table, path):
+    return next(column.values for column in table.columns if column.path == path)
+
+
+def test_every_kind_is_tested():
+    assert set(kinds_of(Design)) == {*PROBABILISTIC, "grid", "list"}
+
+
+@pytest.mark.parametrize("kind", PROBABILISTIC)
+def test_same_seed_gives_the_same_samples_and_another_seed_others(kind, base):
+    design = {"kind": kind, "samples": 16}
+    once, again = drawn(base, design), drawn(base, design)
+    other = drawn(base, design, seed=6)
+    assert once.starts_with(again)
+    assert again.starts_with(once)
+    assert not np.intersect1d(values(once, "loads.force"), values(other, "loads.force")).size
+
+
+@pytest.mark.parametrize("kind", PROBABILISTIC)
+def test_extendable_designs_keep_their_first_samples(kind, base):
+    small = drawn(base, {"kind": kind, "samples": 100})
+    large = drawn(base, {"kind": kind, "samples": 200})
+    assert large.starts_with(small) == kinds_of(Design)[kind].extendable
+    assert np.array_equal(large.seeds[:100], small.seeds)
+
+
+def test_a_sample_depends_on_seed_and_index_alone(base):
+    table = drawn(base, {"kind": "random", "samples": 10})
+    alone = np.random.default_rng(np.random.SeedSequence(5, spawn_key=(7,))).random(3)
+    assert values(table, "loads.force")[7] == pytest.approx(0.01 + 0.01 * alone[2], rel=1e-12)
+
+
+def test_latin_hypercube_has_one_sample_in_every_interval(base):
+    force = values(drawn(base, {"kind": "latin-hypercube", "samples": 40}), "loads.force")
+    intervals = np.floor((force - 0.01) / 0.01 * 40).astype(int)
+    assert sorted(intervals.tolist()) == list(range(40))
+
+
+def test_sobol_points_are_balanced_at_powers_of_two(base):
+    force = values(drawn(base, {"kind": "sobol", "samples": 64}), "loads.force")
+    intervals = np.floor((force - 0.01) / 0.01 * 64).astype(int)
+    assert sorted(intervals.tolist()) == list(range(64))
+
+
+def test_grid_crosses_all_levels(base):
+    inputs = THREE | {"rods.elements": {"kind": "discrete", "values": [1, 2, 4]}}
+    table = drawn(base, {"kind": "grid", "levels": {"loads.force": 5, "net.stiffness": 2}}, inputs)
+    assert table.samples == 3 * 2 * 5 * 3
+    combinations = {tuple(c.values[k].item() for c in table.columns) for k in range(table.samples)}
+    assert len(combinations) == table.samples
+    np.testing.assert_allclose(np.unique(values(table, "loads.force")), np.linspace(0.01, 0.02, 5))
+    assert values(table, "rods.elements")[:4].tolist() == [1, 2, 4, 1]
+
+
+def test_csv_list_is_taken_as_it_is(base, tmp_path):
+    (tmp_path / "cases.csv").write_text(
+        "loads.force, rods.young_modulus[3], rods.elements, rods.kind\n"
+        "0.01, 1.1e11, 1, ancf\n0.02, 1.3e11, 2, geometrically-exact\n"
+    )
+    table = drawn(base, {"kind": "list", "file": "cases.csv"}, {}, folder=tmp_path)
+    assert table.values_of(0) == {
+        "loads.force": 0.01,
+        "rods.young_modulus[3]": 1.1e11,
+        "rods.elements": 1,
+        "rods.kind": "ancf",
+    }
+    scene = base.with_values(table.values_of(1))
+    assert scene.rods.young_modulus == (120e9, 120e9, 1.3e11, 120e9, 120e9, 120e9)
+
+
+def test_design_file_of_a_campaign_can_be_listed(base, tmp_path):
+    from ringsim.storage.design_file import write_design
+
+    inputs = THREE | {
+        "rods.young_modulus": THREE["rods.young_modulus"] | {"each_section": True},
+        "rods.kind": {"kind": "discrete", "values": ["ancf", "geometrically-exact"]},
+        "net.two_sided": {"kind": "discrete", "values": [True, False]},
+    }
+    table = drawn(base, {"kind": "random", "samples": 8}, inputs)
+    write_design(tmp_path, table, {})
+    again = drawn(base, {"kind": "list", "file": "design.nc"}, {}, folder=tmp_path)
+    for sample in range(8):
+        mine = base.with_values(table.values_of(sample))
+        assert base.with_values(again.values_of(sample)) == mine
+
+
+def test_each_section_gets_a_value_of_its_own(base):
+    inputs = {"rods.young_modulus": THREE["rods.young_modulus"] | {"each_section": True}}
+    table = drawn(base, {"kind": "random", "samples": 4}, inputs)
+    (column,) = table.columns
+    assert column.values.shape == (4, 6)
+    assert column.dim == "section"
+    assert len(np.unique(column.values)) == 24
+    scene = base.with_values(table.values_of(2))
+    assert scene.rods.young_modulus == tuple(column.values[2])
+
+
+def test_columns_know_their_unit_and_a_plain_name(base):
+    table = drawn(
+        base,
+        {"kind": "random", "samples": 2},
+        {"rods.young_modulus[2]": THREE["rods.young_modulus"], **THREE},
+    )
+    found = {column.path: (column.name, column.units) for column in table.columns}
+    assert found["rods.young_modulus[2]"] == ("rods_young_modulus_2", "Pa")
+    assert found["net.stiffness"] == ("net_stiffness", "N/m")
+
+
+@pytest.mark.parametrize("kind", PROBABILISTIC)
+def test_correlated_inputs_have_the_correlation_that_was_asked_for(kind, base):
+    inputs = THREE | {
+        "rods.density": {"kind": "normal", "mean": 1800.0, "standard_deviation": 50.0}
+    }
+    pair = Correlation(between=("rods.young_modulus", "rods.density"), coefficient=0.8)
+    plain = drawn(base, {"kind": kind, "samples": 2000}, inputs)
+    table = drawn(base, {"kind": kind, "samples": 2000}, inputs, correlations=[pair])
+    found = np.corrcoef(values(table, "rods.young_modulus"), values(table, "rods.density"))[0, 1]
+    # Standard error of a correlation of 0.8 from 2000 samples: (1 - 0.64) / sqrt(2000) = 0.008.
+    assert found == pytest.approx(0.8, abs=0.03)
+    assert values(table, "rods.density").std() == pytest.approx(50.0, rel=0.06)
+    assert np.array_equal(values(table, "loads.force"), values(plain, "loads.force"))
+
+
+def test_correlation_of_values_for_each_section_goes_section_by_section(base):
+    each = {"each_section": True, "kind": "normal"}
+    inputs = {
+        "rods.young_modulus": each | {"mean": 120e9, "standard_deviation": 5e9},
+        "loads.force": each | {"mean": 0.02, "standard_deviation": 0.001},
+    }
+    pair = Correlation(between=("rods.young_modulus", "loads.force"), coefficient=-0.9)
+    table = drawn(base, {"kind": "random", "samples": 2000}, inputs, correlations=[pair])
+    modulus, force = (column.values for column in table.columns)
+    matrix = np.corrcoef(modulus.T, force.T)[:6, 6:]
+    np.testing.assert_allclose(matrix, -0.9 * np.eye(6), atol=0.1)
+
+
+def test_first_samples_cut_a_table(base):
+    table = drawn(base, {"kind": "random", "samples": 20})
+    assert table.starts_with(first_samples(table, 5))
+    assert first_samples(table, 5).samples == 5
+
+
+@pytest.mark.parametrize(
+    ("inputs", "words"),
+    [
+        ({"rods.yung_modulus": THREE["rods.young_modulus"]}, "young_modulus"),
+        ({"structure.sections": {"kind": "discrete", "values": [6, 8]}}, "same for all samples"),
+        ({"record.interval": {"kind": "uniform", "low": 0.1, "high": 0.2}}, "same for all samples"),
+        ({"loads.force": {"kind": "discrete", "values": ["much", "more"]}}, "loads.force"),
+        ({"rods.density": THREE["loads.force"] | {"low": -1.0, "high": 1.0}}, "rods.density"),
+        (
+            {"rods.density": {"kind": "uniform", "low": 1e3, "high": 2e3, "each_section": True}},
+            "each_section",
+        ),
+        (
+            {"rods.diagonal.outer_diameter": {"kind": "uniform", "low": 0.009, "high": 0.02}},
+            "truncate",
+        ),
+    ],
+)
+def test_inputs_that_the_scene_refuses_are_refused_before_anything_runs(inputs, words, base):
+    with pytest.raises(InputError, match=words):
+        drawn(base, {"kind": "random", "samples": 30}, inputs)
+
+
+@pytest.mark.parametrize(
+    ("pairs", "words"),
+    [
+        ([("rods.young_modulus", "rods.young_modulus", 0.5)], "two different"),
+        ([("rods.young_modulus", "rods.densty", 0.5)], "not an input"),
+        (
+            [
+                ("rods.young_modulus", "net.stiffness", 0.9),
+                ("net.stiffness", "loads.force", 0.9),
+                ("rods.young_modulus", "loads.force", -0.9),
+            ],
+            "contradict",
+        ),
+    ],
+)
+def test_senseless_correlations_are_refused(pairs, words, base):
+    correlations = [Correlation(between=(a, b), coefficient=c) for a, b, c in pairs]
+    with pytest.raises(InputError, match=words):
+        drawn(base, {"kind": "random", "samples": 4}, correlations=correlations)
+
+
+def test_grid_refuses_correlations_and_unknown_levels(base):
+    pair = Correlation(between=("loads.force", "net.stiffness"), coefficient=0.5)
+    with pytest.raises(InputError, match="another design"):
+        drawn(base, {"kind": "grid"}, correlations=[pair])
+    with pytest.raises(InputError, match=r"did you mean loads\.force"):
+        drawn(base, {"kind": "grid", "levels": {"loads.forc": 3}})
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (None, "there is no file"),
+        ("", "no samples"),
+        ("loads.force\n", "no samples"),
+        ("loads.force,net.stiffness\n0.1\n", "row 1 has 1 values"),
+        ("loads.force,loads.force\n0.1,0.2\n", "once"),
+        ("loads.forse\n0.1\n", "force"),
+    ],
+)
+def test_unusable_lists_are_refused(text, words, base, tmp_path):
+    if text is not None:
+        (tmp_path / "cases.csv").write_text(text)
+    with pytest.raises(InputError, match=words):
+        drawn(base, {"kind": "list", "file": "cases.csv"}, {}, folder=tmp_path)
