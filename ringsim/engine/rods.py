@@ -108,19 +108,16 @@ def add_rod(
 ) -> Rod:
     """A straight rod between two frames that share their axes; motion is interpolated."""
     first, last = ends
-    nodes = []
-    for share in np.linspace(0.0, 1.0, elements + 1):
-        nodes.append(
-            formulation.add_node(
-                assembly,
-                Frame(
-                    (1 - share) * first.position + share * last.position,
-                    first.axes,
-                    (1 - share) * first.acceleration + share * last.acceleration,
-                    first.turn,
-                ),
-            )
+    frames = [
+        Frame(
+            (1 - share) * first.position + share * last.position,
+            first.axes,
+            (1 - share) * first.acceleration + share * last.acceleration,
+            first.turn,
         )
+        for share in np.linspace(0.0, 1.0, elements + 1)
+    ]
+    nodes = [formulation.add_node(assembly, frame) for frame in frames]
     length = float(np.linalg.norm(last.position - first.position)) / elements
     objects = [
         formulation.add_element(assembly, nodes[k : k + 2], length, section)
