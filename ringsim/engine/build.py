@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.engine.boom import add_boom
+from ringsim.engine.cable_path import ring_path
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.faults import Faults
 from ringsim.engine.joints import add_friction, add_stops
@@ -63,7 +64,9 @@ def build(scene: Scene) -> Built:
     forces = add_loads(ring)
     add_friction(ring)
     stops = add_stops(ring)
-    cables = None if scene.cables is None else CableDrive(ring, scene.cables)
+    cables = None
+    if scene.cables is not None:
+        cables = CableDrive(ring, scene.cables, ring_path(ring, scene.cables))
     faults = Faults(ring, cables)
     ring.assembly.finish()
     if cables is not None:

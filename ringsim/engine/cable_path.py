@@ -13,15 +13,18 @@ exact and resists nothing.  Source: paper 000, fig. 3.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ringsim.cable.cables import Cables
+from ringsim.engine.assembly import Assembly
 from ringsim.engine.pantograph_ring import RingModel
+from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -49,6 +52,39 @@ class Placed:
     turns: Array
 
 
+class Carrier(Protocol):
+    """What carries cables: the model of any structure."""
+
+    @property
+    def scene(self) -> Scene:
+        """What the model was built from."""
+
+    @property
+    def assembly(self) -> Assembly:
+        """The system under construction."""
+
+
+@dataclass(frozen=True)
+class FixedStop:
+    """A point of a path that is fixed on a node's body, ``arm`` (m) from the node."""
+
+    node: Any
+    arm: Array
+
+
+@dataclass(frozen=True)
+class BlockStop:
+    """A V pulley on its block between the nodes of two bar halves."""
+
+    left: Any
+    right: Any
+    sense: float
+    offset: float
+
+
+Stop = FixedStop | BlockStop
+
+
 class CablePath:
     """Points, velocities and generalised forces of the cables' paths.
 
@@ -63,35 +99,28 @@ class CablePath:
         share of the node's turn that turns the point's arm.
     """
 
-    def __init__(self, model: RingModel, cables: Cables) -> None:
+    def __init__(self, paths: Sequence[Sequence[Stop]]) -> None:
         self._register: dict[int, int] = {}
         self.nodes: list[Any] = []
         hinge: list[tuple[int, int, Array]] = []
         block: list[tuple[int, int, int, float, float]] = []
-        self.per_cable: list[int] = []
-        count = 0
-        for plane, cable in cables.present():
-            path = _pulleys(model, plane, cables.winch_distance)
-            if cable.end == "last":
-                path = _from_last(model, plane, cables.winch_distance)
-            for stop in path:
-                if isinstance(stop[0], tuple):
-                    left, right = (self._number(node) for node in stop[0])
-                    sense = 1.0 if plane == 0 else -1.0
-                    block.append((count, left, right, sense, cable.block_offset))
-                else:
-                    hinge.append((count, self._number(stop[0]), stop[1]))
-                count += 1
-            self.per_cable.append(len(path))
+        self.per_cable = [len(path) for path in paths]
+        for count, stop in enumerate(stop for path in paths for stop in path):
+            if isinstance(stop, BlockStop):
+                left, right = self._number(stop.left), self._number(stop.right)
+                block.append((count, left, right, stop.sense, stop.offset))
+            else:
+                hinge.append((count, self._number(stop.node), stop.arm))
+        count = sum(self.per_cable)
         self.count = count
-        self._hinge_point = np.array([h[0] for h in hinge])
-        self._hinge_node = np.array([h[1] for h in hinge])
+        self._hinge_point = np.array([h[0] for h in hinge], dtype=np.int64)
+        self._hinge_node = np.array([h[1] for h in hinge], dtype=np.int64)
         self._hinge_arm = np.array([h[2] for h in hinge])
-        self._block_point = np.array([b[0] for b in block])
-        self._left = np.array([b[1] for b in block])
-        self._right = np.array([b[2] for b in block])
-        self._sense = np.array([b[3] for b in block])[:, None]
-        self._offset = np.array([b[4] for b in block])[:, None]
+        self._block_point = np.array([b[0] for b in block], dtype=np.int64)
+        self._left = np.array([b[1] for b in block], dtype=np.int64)
+        self._right = np.array([b[2] for b in block], dtype=np.int64)
+        self._sense = np.array([b[3] for b in block], dtype=float)[:, None]
+        self._offset = np.array([b[4] for b in block], dtype=float)[:, None]
         self.leg_point = np.concatenate([self._hinge_point, self._block_point, self._block_point])
         self.leg_node = np.concatenate([self._hinge_node, self._left, self._right])
         ones = np.ones(len(hinge))
@@ -215,27 +244,38 @@ def skew(vectors: Array) -> Array:
     return found
 
 
-def _pulleys(model: RingModel, plane: int, distance: float) -> list[Any]:
-    """Points from the winch at section 1: (hinge node, arm) or ((left, right), None)."""
+def ring_path(model: RingModel, cables: Cables) -> CablePath:
+    """The paths of a ring's cables, each from its first winch."""
+    paths = []
+    for plane, cable in cables.present():
+        way = _from_last if cable.end == "last" else _pulleys
+        paths.append(way(model, plane, cables.winch_distance, cable.block_offset))
+    return CablePath(paths)
+
+
+def _pulleys(model: RingModel, plane: int, distance: float, offset: float) -> list[Stop]:
+    """Points from the winch at section 1."""
     fold = model.fold
-    inward = np.array([0.0, 0.0, -1.0 if plane == 0 else 1.0])
+    sense = 1.0 if plane == 0 else -1.0
+    inward = np.array([0.0, 0.0, -sense])
     nodes = [node for _, node in model.hinges[plane]]
     first = fold.left[plane, 0] - fold.corners[plane, 0]
-    path: list[Any] = [(nodes[0], first + distance * inward)]
+    path: list[Stop] = [FixedStop(nodes[0], first + distance * inward)]
     for section in range(model.geometry.sections):
         following = (section + 1) % len(nodes)
         left = fold.left[plane, section] - fold.corners[plane, section]
         right = fold.right[plane, section] - fold.corners[plane, following]
         vjoint = model.vjoints[plane][section]
-        path.append((nodes[section], left))
-        path.append(((vjoint.gap[0], vjoint.gap[1]), None))
-        path.append((nodes[following], right))
+        path.append(FixedStop(nodes[section], left))
+        path.append(BlockStop(vjoint.gap[0], vjoint.gap[1], sense, offset))
+        path.append(FixedStop(nodes[following], right))
     return path
 
 
-def _from_last(model: RingModel, plane: int, distance: float) -> list[Any]:
+def _from_last(model: RingModel, plane: int, distance: float, offset: float) -> list[Stop]:
     """The same path with its winch at the last section."""
-    path = _pulleys(model, plane, distance)[1:][::-1]
-    node, arm = path[0]
+    path = _pulleys(model, plane, distance, offset)[1:][::-1]
+    last = path[0]
+    assert isinstance(last, FixedStop)
     inward = np.array([0.0, 0.0, -1.0 if plane == 0 else 1.0])
-    return [(node, arm + distance * inward), *path]
+    return [FixedStop(last.node, last.arm + distance * inward), *path]

@@ -25,8 +25,7 @@ from ringsim.cable.records import Winch
 from ringsim.cable.state import ChainState
 from ringsim.cable.tangent import RopeTangent, tangents
 from ringsim.cable.winding.family import WinchState
-from ringsim.engine.cable_path import WIDTH, CablePath, Placed, cross, gyration, skew
-from ringsim.engine.pantograph_ring import RingModel
+from ringsim.engine.cable_path import WIDTH, CablePath, Carrier, Placed, cross, gyration, skew
 
 Array = NDArray[np.float64]
 _PER_SPAN = 4
@@ -46,10 +45,10 @@ class CableDrive:
         Plane of each cable.
     """
 
-    def __init__(self, model: RingModel, cables: Cables) -> None:
+    def __init__(self, model: Carrier, cables: Cables, path: CablePath) -> None:
         present = cables.present()
         self.planes = [plane for plane, _ in present]
-        self.path = CablePath(model, cables)
+        self.path = path
         self.chain = Chain([cable for _, cable in present], self.path.per_cable)
         self._model = model
         self._reference = self._gather_reference()
