@@ -17,6 +17,7 @@ from ringsim.engine.energy import Energies, EnergyMeter
 from ringsim.engine.joints import latch
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import JointGroup, Openings, State
+from ringsim.engine.settings import solver_settings
 from ringsim.engine.stepping import StepControl
 from ringsim.engine.stress import StressMeter
 from ringsim.scene import Scene
@@ -68,7 +69,7 @@ class Integration:
         self._built, self._scene = built, scene
         self._system = ring.assembly.system
         self._solver = exu.MainSolverImplicitSecondOrder()
-        self._settings = _settings(built)
+        self._settings = solver_settings(scene, _residual_tolerance(built))
         self._state = State(ring)
         self._openings = Openings(ring)
         self._energy = EnergyMeter(ring, built.net, built.forces)
@@ -267,30 +268,6 @@ def _contact_step(built: Built) -> float:
     half = rods.density * rods.bar.area * ring.half_bar**3 / 3.0
     inertia = 2.0 * half + ring.vjoint_mass * ring.half_bar**2
     return 2.0 * math.pi * math.sqrt(inertia / scene.stop.stiffness) / 20.0
-
-
-def _settings(built: Built) -> Any:
-    scene = built.ring.scene
-    settings = exu.SimulationSettings()
-    settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = 2.0 * scene.solver.end_time
-    settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
-    time = settings.timeIntegration
-    time.verboseMode = 0
-    time.endTime = scene.solver.end_time
-    time.numberOfSteps = 1
-    time.adaptiveStep = True
-    time.adaptiveStepRecoverySteps = 10**6
-    time.minimumStepSize = 1e-9
-    time.generalizedAlpha.spectralRadius = scene.solver.spectral_radius
-    time.generalizedAlpha.computeInitialAccelerations = False
-    time.generalizedAlpha.resetAccelerations = False
-    time.newton.useModifiedNewton = True
-    time.newton.modifiedNewtonJacUpdatePerStep = True
-    time.newton.maxIterations = 25
-    time.newton.relativeTolerance = 1e-14
-    time.newton.absoluteTolerance = _residual_tolerance(built)
-    return settings
 
 
 def _residual_tolerance(built: Built) -> float:
