@@ -19,7 +19,6 @@ from ringsim.scene import Scene
 from ringsim.variables import COORDINATES, PLANES, RODS, VARIABLES, Outcome, Status, Variable
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
-_ONLY_IF_STRESS = ("peak_rod_stress",)
 _MISSING_COUNT = -1
 
 
@@ -59,7 +58,7 @@ def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
             arrays[name] = _status(outcome.status)
         elif name in outcome.values:
             arrays[name] = _array(variable, outcome.values[name])
-        elif "time" not in variable.dims and (scene.record.stress or name not in _ONLY_IF_STRESS):
+        elif "time" not in variable.dims and _wanted(variable, scene):
             shape = tuple(len(axes[dim]) for dim in variable.dims)
             arrays[name] = _array(variable, np.full(shape, np.nan))
     used = {dim for array in arrays.values() for dim in array.dims}
@@ -108,6 +107,12 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
     finally:
         with contextlib.suppress(OSError):
             draft.unlink(missing_ok=True)
+
+
+def _wanted(variable: Variable, scene: Scene) -> bool:
+    """Whether a scene asks for what a variable says."""
+    holds = {"": True, "stress": scene.record.stress, "cables": scene.cables is not None}
+    return holds.get(variable.needs, False)
 
 
 def _axes(outcome: Outcome, scene: Scene) -> dict[str, np.ndarray[Any, Any]]:

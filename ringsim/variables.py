@@ -41,6 +41,8 @@ class Variable:
     units: str
     long_name: str
     dtype: str = "f8"
+    needs: str = ""
+    """What a scene must hold for it: "stress" output, "cables", or nothing."""
 
 
 PLANES = ("upper", "lower")
@@ -69,11 +71,19 @@ _ALL = (
     ),
     Variable("asynchrony_max", (), "degree", "largest asynchrony up to the deployment time"),
     Variable("rod_stress", ("rod", "section", "time"), "Pa", "axial + bending stress of a rod"),
-    Variable("peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod"),
+    Variable(
+        "peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod", needs="stress"
+    ),
     Variable("cable_tension", ("plane", "span", "time"), "N", "tension of a cable's span"),
-    Variable("peak_tension", (), "N", "largest tension of any span of any cable"),
-    Variable("peak_tension_time", (), "s", "time of the largest tension"),
-    Variable("slack_duration", ("plane",), "s", "time for which the cable is slack at its winch"),
+    Variable("peak_tension", (), "N", "largest tension of any span of any cable", needs="cables"),
+    Variable("peak_tension_time", (), "s", "time of the largest tension", needs="cables"),
+    Variable(
+        "slack_duration",
+        ("plane",),
+        "s",
+        "time for which the cable is slack at its winch",
+        needs="cables",
+    ),
     Variable("wound_length", ("plane", "time"), "m", "rope wound up by the cable's winches"),
     Variable("kinetic_energy", ("time",), "J", "kinetic energy"),
     Variable("elastic_energy", ("time",), "J", "energy stored in rods, net and stops"),

@@ -89,7 +89,8 @@ def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
     names = ("stowed" if opens else "start", "half-way", "deployed" if done else "end of the run")
     moments = [(n, angle.isel(time=i)) for n, i in zip(names, (0, middle, last), strict=True)]
     if done:
-        locked = xr.full_like(moments[2][1], 180.0).assign_coords(time=deployed)
+        locked = xr.full_like(moments[2][1], 180.0)
+        locked["time"] = locked["time"].copy(data=deployed)
         moments[2] = (names[2], locked)
     return moments
 

@@ -66,7 +66,7 @@ def merge_shards(
     for name in [*output.significant_digits, *output.leave_out]:
         if name not in VARIABLES:
             raise InputError(f"output: {name} is not an output variable")
-    scalars = {n for n, v in VARIABLES.items() if not v.dims and n != "peak_rod_stress"}
+    scalars = {n for n, v in VARIABLES.items() if not v.dims and not v.needs}
     wanted = {
         name: variable
         for name, variable in VARIABLES.items()
