@@ -1,0 +1,108 @@
+"""Both batch scripts on a real Slurm, interrupted and requeued, give the file of a local run."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+import slurm_cluster
+from campaign_bench import HERE, Bench, comparable
+
+SCRIPTS = Path(__file__).parents[2] / "slurm"
+SAMPLES = 60
+SLEEPY = {"shared": '"rods.damping" = 0.1', "more": "[output]\nshard_samples = 8\n"}
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    reason = slurm_cluster.missing()
+    if reason:
+        pytest.skip(f"no Slurm here: {reason}")
+    # Not below pytest's own folder: the path of a socket must be short and open to all.
+    folder = Path("/tmp") / f"ringsim-slurm-{os.getpid()}"
+    folder.mkdir()
+    found, fault = slurm_cluster.start(folder)
+    try:
+        if fault:
+            pytest.skip(f"no Slurm here: {fault}")
+        yield found
+    finally:
+        slurm_cluster.stop(found)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture(scope="module")
+def local(tmp_path_factory):
+    bench = Bench(tmp_path_factory.mktemp("local"))
+    bench.run(
+        "campaign", bench.write(SAMPLES, **SLEEPY), "--workers", 4, "--out", "out",
+        solver="fake_solver:slow",
+    )  # fmt: skip
+    return bench.result("out")
+
+
+def submit(cluster, bench, script, *options):
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    file = str(bench.write(SAMPLES, **SLEEPY))
+    answer = cluster.ask(
+        "sbatch", "--parsable", *options, str(SCRIPTS / script), file,
+        "--out", "out", "--solver", "fake_solver:slow",
+        cwd=bench.folder, extra={"PYTHONPATH": str(HERE), "PATH": path},
+    )  # fmt: skip
+    assert answer.isdigit(), answer
+    return answer
+
+
+def done(bench):
+    if not (bench.folder / "out" / "design.nc").exists():
+        return 0
+    return int(bench.run("status", "out").splitlines()[0].split(": ")[1].split()[0])
+
+
+def wait_for(condition, what, seconds=90):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if condition():
+            return
+        time.sleep(0.3)
+    raise AssertionError(f"waited for {what} in vain")
+
+
+def printed(bench):
+    return "\n".join(path.read_text() for path in bench.folder.glob("ringsim-*.out"))
+
+
+def finish(cluster, bench, job):
+    wait_for(
+        lambda: set(cluster.states(job)) == {"COMPLETED"} or "FAILED" in cluster.states(job),
+        "the job to end",
+    )
+    assert set(cluster.states(job)) == {"COMPLETED"}, printed(bench)
+
+
+def test_mpi_job_is_warned_leaves_is_requeued_and_completes(cluster, bench, local, mpi):
+    job = submit(cluster, bench, "mpi.sbatch")
+    wait_for(lambda: done(bench) >= 4, "the first samples")
+    cluster.ask("scancel", "--signal=USR1", "--batch", job)
+    wait_for(lambda: "stopped by SIGUSR1" in printed(bench), "the job to stop")
+    kept = done(bench)
+    assert 4 <= kept < SAMPLES
+    finish(cluster, bench, job)
+    assert f"{kept} of {SAMPLES} samples done, 2 workers" in printed(bench)
+    xr.testing.assert_identical(comparable(bench.result("out")), comparable(local))
+    assert "MPI, 2 ranks" in bench.result("out").attrs["execution"]
+
+
+def test_array_tasks_are_warned_leave_are_requeued_and_merge(cluster, bench, local):
+    job = submit(cluster, bench, "array.sbatch", "--array=1-3")
+    wait_for(lambda: done(bench) >= 4, "the first samples")
+    cluster.ask("scancel", "--signal=USR1", "--batch", f"{job}_2")
+    wait_for(lambda: "stopped by SIGUSR1" in printed(bench), "a task to stop")
+    finish(cluster, bench, job)
+    xr.testing.assert_identical(comparable(bench.result("out")), comparable(local))
