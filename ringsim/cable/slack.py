@@ -7,7 +7,8 @@ With width b (N) the elastic force y (N, negative when the rope is longer than i
     energy    integral of q dy from -inf = b^2 (-Li2(-exp(y / b))).
 
 Above y = 10 b the tension exceeds y by less than 5e-5 b, below y = -10 b it is less than that.
-No exponential can overflow.
+No exponential can overflow, and below y = -200 b the tension stays at 1e-87 b: numbers near
+the smallest double would overflow when somebody divides by them.
 """
 
 from __future__ import annotations
@@ -21,9 +22,12 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
 
+_SLACKEST = -200.0
+
+
 def tension(force: Array, width: Array) -> Array:
     """q(y) in N."""
-    return np.asarray(width * np.logaddexp(0.0, force / width))
+    return np.asarray(width * np.logaddexp(0.0, np.maximum(force / width, _SLACKEST)))
 
 
 def slope(force: Array, width: Array) -> Array:

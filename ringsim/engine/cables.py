@@ -1,13 +1,7 @@
 """Cables in the multibody model: their forces inside every Newton iteration.
 
-One exudyn object spans all nodes that the paths depend on.  Its force is the chain's; its
-Jacobian is written with auxiliary unknowns that carry no mass and no force: for every span the
-change of its difference vector (three) and of its tension (one), for every rope that of its mean
-tension.  The coupling of all spans of a rope through its mean tension is then a few sparse rows
-instead of a dense block over the whole ring; eliminating the unknowns gives P^T (dF/dx) P with
-the material, decay and geometric parts of ringsim.cable.tangent.  The decay part alone is dense
-(spans by spans).  Its entries are written only where they matter to Newton's convergence:
-those of friction that turns round within a step.  ``exact_tangent`` writes them all.
+One exudyn object spans all nodes that the paths depend on.  Its force is the chain's, its
+Jacobian that of ringsim.engine.cable_jacobian.
 """
 
 from __future__ import annotations
@@ -23,15 +17,11 @@ from ringsim.cable.cables import Cables
 from ringsim.cable.chain import Chain
 from ringsim.cable.records import Winch
 from ringsim.cable.state import ChainState
-from ringsim.cable.tangent import RopeTangent, tangents
 from ringsim.cable.winding.family import WinchState
-from ringsim.engine.cable_path import WIDTH, CablePath, Carrier, Placed, cross, gyration, skew
+from ringsim.engine.cable_jacobian import JacobianPattern, auxiliary_unknowns
+from ringsim.engine.cable_path import WIDTH, CablePath, Carrier, Placed
 
 Array = NDArray[np.float64]
-_PER_SPAN = 4
-"""Auxiliary unknowns of a span: three for its difference vector, one for its tension."""
-_NEGLIGIBLE = 0.02
-"""Decay entries are left out below this share of the largest geometric stiffness T / L."""
 
 
 class CableDrive:
@@ -43,6 +33,8 @@ class CableDrive:
         See ringsim.cable.
     planes
         Plane of each cable.
+    refusal
+        Why the chain last had no answer to a state that Newton tried; empty if it always had.
     """
 
     def __init__(self, model: Carrier, cables: Cables, path: CablePath) -> None:
@@ -62,9 +54,10 @@ class CableDrive:
         self._winch_states = [WinchState() for _ in self.winches]
         self._size = len(self.path.nodes) * WIDTH
         most_ropes = len(present) + len(model.scene.faults)
-        self.auxiliary = _PER_SPAN * self.ropes.spans + most_ropes
+        self.auxiliary = auxiliary_unknowns(self.ropes.spans, most_ropes)
         self.exact_tangent = False
-        self._pattern = _Pattern(self)
+        self.refusal = ""
+        self.pattern = JacobianPattern(self.path, self.ropes, self.auxiliary)
         self._add_object()
 
     def evaluate(self, coordinates: Array, rates: Array, time: float) -> tuple[ChainState, Placed]:
@@ -145,151 +138,29 @@ class CableDrive:
         return place, np.asarray(q_t[: self._size]).reshape(shape)
 
     def _force(self, mbs: Any, t: float, number: int, q: Any, q_t: Any) -> Array:
-        state, placed = self.evaluate(*self._split(q, q_t), t)
         force = np.zeros(self._size + self.auxiliary)
-        force[: self._size] = self.path.generalised(placed, state.point_forces).ravel()
+        try:
+            with np.errstate(all="ignore"):
+                state, placed = self.evaluate(*self._split(q, q_t), t)
+                force[: self._size] = self.path.generalised(placed, state.point_forces).ravel()
+        except ValueError as error:
+            # A stray Newton iterate, or no rope left: no number makes Newton take a smaller step.
+            self.refusal = str(error)
+            force[: self._size] = np.nan
         return force
 
     def _jacobian(
         self, mbs: Any, t: float, number: int, q: Any, q_t: Any, by_q: float, by_rate: float
     ) -> Any:
-        state, placed = self.evaluate(*self._split(q, q_t), t)
         matrix = exu.MatrixContainer()
         size = self._size + self.auxiliary
-        triplets = self._pattern.triplets(state, placed, by_q, by_rate, exact=self.exact_tangent)
+        try:
+            with np.errstate(all="ignore"):
+                state, placed = self.evaluate(*self._split(q, q_t), t)
+                exact = self.exact_tangent
+                triplets = self.pattern.triplets(state, placed, by_q, by_rate, exact=exact)
+        except ValueError as error:
+            self.refusal = str(error)
+            triplets = self.pattern.empty()
         matrix.SetWithSparseMatrix(triplets, size, size)
         return matrix
-
-
-class _Pattern:
-    """Rows and columns of the Jacobian, found once, and its values.
-
-    The object's equation is mass * acceleration - force = 0; what follows is its left-hand side.
-    """
-
-    def __init__(self, drive: CableDrive) -> None:
-        self._path, ropes = drive.path, drive.ropes
-        self._size = len(drive.path.nodes) * WIDTH
-        self._spans = ropes.spans
-        legs: list[tuple[int, int, float]] = []
-        for span in range(ropes.spans):
-            for point, sign in ((ropes.near[span], -1.0), (ropes.far[span], 1.0)):
-                for leg in np.flatnonzero(drive.path.leg_point == point):
-                    legs.append((span, int(leg), sign))
-        self._span = np.array([leg[0] for leg in legs])
-        self._leg = np.array([leg[1] for leg in legs])
-        self._sign = np.array([leg[2] for leg in legs])
-        nodes = drive.path.leg_node[self._leg]
-        own = nodes[:, None] * WIDTH + np.arange(WIDTH)
-        differences = self._difference(self._span)
-        tension = self._tension(self._span)
-        self._first, self._second = drive.path.turning_pairs()
-        turn = drive.path.leg_node * WIDTH + 3
-        turn_rows = turn[self._first][:, None] + np.arange(4)
-        turn_columns = turn[self._second][:, None] + np.arange(4)
-        single = turn[:, None] + np.arange(4)
-        every = np.arange(self._size, self._size + drive.auxiliary)
-        self._static = [
-            _pairs(differences, own),
-            _pairs(own, tension[:, None]),
-            _pairs(own, differences),
-            _pairs(turn_rows, turn_columns),
-            _pairs(single, single),
-            (every, every),
-        ]
-        self._ones = np.ones(len(every))
-
-    def _difference(self, span: NDArray[np.int64]) -> NDArray[np.int64]:
-        return np.asarray(self._size + 3 * span[:, None] + np.arange(3))
-
-    def _tension(self, span: NDArray[np.int64]) -> NDArray[np.int64]:
-        return np.asarray(self._size + 3 * self._spans + span)
-
-    def _mean(self, rope: int) -> NDArray[np.int64]:
-        return np.array([[self._size + _PER_SPAN * self._spans + rope]])
-
-    def triplets(
-        self, state: ChainState, placed: Placed, by_q: float, by_rate: float, *, exact: bool
-    ) -> Array:
-        """All entries as (row, column, value), shape (entries, 3)."""
-        maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
-        units = state.directions[self._span]
-        values = [-maps, np.einsum("lij,li->lj", maps, units)]
-        directions = np.empty((self._spans, 3, 3))
-        places, blocks = list(self._static), []
-        for rope, tangent in enumerate(tangents(state, placed.velocities)):
-            spans = slice(state.ropes.starts[rope], state.ropes.ends[rope])
-            directions[spans] = tangent.by_direction
-            for place, block in self._rope(state, tangent, rope, by_q, by_rate, exact=exact):
-                places.append(place)
-                blocks.append(block)
-        values.append(np.einsum("lij,lik->ljk", maps, directions[self._span]))
-        values += [*self._turning(state, placed), self._ones]
-        flat = [by_q * np.asarray(value).ravel() for value in values] + blocks
-        rows = np.concatenate([r for r, _ in places])
-        columns = np.concatenate([c for _, c in places])
-        return np.stack([rows, columns, np.concatenate(flat)], axis=1)
-
-    def _rope(
-        self,
-        state: ChainState,
-        tangent: RopeTangent,
-        rope: int,
-        by_q: float,
-        by_rate: float,
-        *,
-        exact: bool,
-    ) -> list[tuple[tuple[NDArray[np.int64], NDArray[np.int64]], Array]]:
-        """How a rope's span tensions follow its mean tension and the differences of its points."""
-        spans = np.arange(state.ropes.starts[rope], state.ropes.ends[rope])
-        tension, difference = self._tension(spans)[:, None], self._difference(spans).reshape(1, -1)
-        shares = state.shares[spans]
-        largest = int(np.argmax(shares))
-        by_mean = (tangent.by_mean[largest] / shares[largest]).ravel()
-        viscous = state.viscous_slope(rope) * tangent.directions.ravel()
-        decay = by_q * tangent.by_share + by_rate * (
-            tangent.by_velocity - shares[:, None, None] * viscous.reshape(-1, 3)
-        )
-        flat = decay.reshape(len(spans), -1)
-        kept = np.ones(flat.shape, dtype=bool)
-        if not exact:
-            stiffest = float(np.max(state.tensions[spans] / state.lengths[spans]))
-            kept = np.abs(flat) > by_q * _NEGLIGIBLE * max(stiffest, 1.0)
-        row, column = np.nonzero(kept)
-        mean = self._mean(rope)
-        return [
-            (_pairs(tension.T, mean), -by_q * shares),
-            (_pairs(mean, difference), -(by_q * by_mean + by_rate * viscous)),
-            ((tension[row, 0], difference[0, column]), -flat[row, column]),
-        ]
-
-    def _turning(self, state: ChainState, placed: Placed) -> list[Array]:
-        """Change of the moments arm x F at fixed F with the turns of the nodes."""
-        path = self._path
-        forces = state.point_forces[path.leg_point]
-        arms = placed.arms[path.leg_point]
-        along = np.einsum("li,li->l", arms, forces)
-        kernel = arms[:, :, None] * forces[:, None, :] - along[:, None, None] * np.eye(3)
-        shares = path.leg_share
-        gyrations = gyration(placed.turns[path.leg_node])
-        first, second = self._first, self._second
-        weight = (shares[first] * shares[second])[:, None, None]
-        pairs = np.einsum(
-            "lia,lij,ljb->lab", gyrations[first], weight * kernel[first], gyrations[second]
-        )
-        moments = shares[:, None] * cross(arms, forces)
-        own = np.zeros((len(moments), 4, 4))
-        own[:, 0, 1:], own[:, 1:, 0] = -2.0 * moments, 2.0 * moments
-        own[:, 1:, 1:] = 2.0 * skew(moments)
-        return [-pairs, -own]
-
-
-def _pairs(
-    rows: NDArray[np.int64], columns: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Row and column of every entry of blocks, (n, a) and (n, b) -> (n a b,) each."""
-    shape = (len(rows), rows.shape[1], columns.shape[1])
-    return (
-        np.broadcast_to(rows[:, :, None], shape).ravel(),
-        np.broadcast_to(columns[:, None, :], shape).ravel(),
-    )
