@@ -19,7 +19,8 @@ from ringsim.storage.record import Result
 
 _TO_WORKER, _TO_RANK_0 = 11, 12
 _SHORTEST, _LONGEST = 1e-4, 2e-3
-_LONGEST_OF_WORKER = 1e-2
+_LONGEST_OF_WORKER = 2e-2
+_AHEAD_SECONDS, _MOST_AHEAD = 0.02, 32
 
 
 class Mpi:
@@ -49,41 +50,39 @@ class Mpi:
             slot.close()
 
     def _schedule(self, queue: deque[int], slot: Slot, work: Work) -> str:
-        idle: list[int] = []
-        busy = 0
-        gone: set[int] = set()
-        reason = fault = ""
-        delay = _SHORTEST
+        held = dict.fromkeys(range(1, self.size), 0)
+        silent, mean, reason, fault, delay = set(held), 0.0, "", "", _SHORTEST
         while True:
             moved = False
             reason = reason or fault or work.stop()
-            if reason:
+            if reason or not (queue or slot.busy or any(held.values())):
                 break
-            while queue and idle:
-                sample = queue.popleft()
-                self.communicator.send(sample, dest=idle.pop(), tag=_TO_WORKER)
-                work.started(sample)
-                busy += 1
+            ahead = self._ahead(mean, len(queue))
+            for rank in held.keys() - silent if queue else ():
+                if held[rank] <= ahead // 2:
+                    batch = [queue.popleft() for _ in range(min(ahead - held[rank], len(queue)))]
+                    self.communicator.send(batch, dest=rank, tag=_TO_WORKER)
+                    held[rank] += len(batch)
+                    for sample in batch:
+                        work.started(sample)
             if queue and not slot.busy:
                 sample = queue.popleft()
                 slot.submit(work.task(sample))
                 work.started(sample)
-            if not queue and not busy and not slot.busy:
-                break
             while self.communicator.iprobe(tag=_TO_RANK_0):
                 moved = True
                 rank, message = self.communicator.recv(tag=_TO_RANK_0)
+                silent.discard(rank)
                 if isinstance(message, Result):
-                    busy -= 1
+                    held[rank] -= 1
+                    mean += 0.1 * (message.seconds - mean)
                     work.finished(message)
-                    idle.append(rank)
-                elif message is None:
-                    idle.append(rank)
-                else:
+                elif message is not None:
                     kind, text = message
-                    gone |= {rank} if kind == "gone" else set()
-                    fault = fault or (text if kind == "gone" else "")
                     reason = reason or text
+                    if kind == "gone":
+                        fault = fault or text
+                        del held[rank]
             try:
                 result = slot.poll() if slot.busy else None
                 if result is not None:
@@ -98,15 +97,19 @@ class Mpi:
         slot.close()
         for rank in range(1, self.size):
             self.communicator.send(None, dest=rank, tag=_TO_WORKER)
-        self._drain(work, gone)
+        self._drain(work, set(held))
         if fault:
             raise InputError(fault)
         return reason or work.stop()
 
-    def _drain(self, work: Work, gone: set[int]) -> None:
+    def _ahead(self, mean: float, left: int) -> int:
+        """Samples that a rank may hold: several if they are short, one towards the end."""
+        short = int(_AHEAD_SECONDS / max(mean, 1e-4))
+        return max(1, min(short, _MOST_AHEAD, left // (2 * self.size)))
+
+    def _drain(self, work: Work, there: set[int]) -> None:
         """Take what the others sent before they heard of the end."""
-        open_ranks = set(range(1, self.size)) - gone
-        while open_ranks:
+        while there:
             if not self.communicator.iprobe(tag=_TO_RANK_0):
                 time.sleep(_LONGEST)
                 continue
@@ -114,35 +117,35 @@ class Mpi:
             if isinstance(message, Result):
                 work.finished(message)
             elif isinstance(message, tuple) and message[0] in ("gone", "left"):
-                open_ranks.discard(rank)
+                there.discard(rank)
 
     def _serve(self, slot: Slot, work: Work) -> str:
         self._tell(None)
-        told, delay, reason = False, _SHORTEST, ""
+        told, delay, queue = False, _SHORTEST, deque[int]()
         while True:
             if self.communicator.iprobe(source=0, tag=_TO_WORKER):
-                sample = self.communicator.recv(source=0, tag=_TO_WORKER)
-                if sample is None:
-                    self._tell(("left", reason))
-                    return reason
-                slot.submit(work.task(sample))
-                delay = _SHORTEST
+                batch = self.communicator.recv(source=0, tag=_TO_WORKER)
+                if batch is None:
+                    self._tell(("left", ""))
+                    return ""
+                queue.extend(batch)
             try:
                 result = slot.poll() if slot.busy else None
                 if result is not None:
                     work.keep(result)
                     self._tell(replace(result, arrays=(), body=b""))
-                    delay = _SHORTEST
             except InputError as error:
                 slot.close()
                 self._tell(("gone", str(error)))
                 self._wait_for_the_end()
                 return str(error)
-            reason = work.stop()
-            if reason and not told:
-                self._tell(("stop", reason))
+            if queue and not slot.busy:
+                slot.submit(work.task(queue.popleft()))
+                delay = _SHORTEST
+            if work.stop() and not told:
+                self._tell(("stop", work.stop()))
                 told = True
-            delay = min(1.5 * delay, _LONGEST_OF_WORKER)
+            delay = min(1.5 * delay, _LONGEST_OF_WORKER if slot.busy else _LONGEST)
             _rest(slot, delay)
 
     def _tell(self, message: Any) -> None:

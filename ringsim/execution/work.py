@@ -21,7 +21,7 @@ class Limits(Model):
     """Elapsed time of one run."""
     memory: Bytes = 8e9
     """Memory of the solver process."""
-    recycle: Annotated[int, Field(ge=1)] = 1000
+    recycle: Annotated[int, Field(ge=1)] = 2000
     """Runs after which a solver process is replaced by a fresh one."""
 
 
