@@ -64,10 +64,22 @@ class Scene(Model):
     solver: Solver = Solver()
     record: Record = Record()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _ring_unless_said(cls, table: Any) -> Any:
+        """A structure that does not say its kind is a pantograph ring."""
+        structure = table.get("structure") if isinstance(table, dict) else None
+        if not isinstance(structure, dict) or "kind" in structure:
+            return table
+        return table | {"structure": {"kind": kind_of(PantographRing()), **structure}}
+
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
         for path, value in _lists(self):
-            wanted = _length_of(path, self.structure.sections, closed=self.structure.closed)
+            structure = self.structure
+            wanted = _length_of(
+                path, structure.sections, structure.pulleys, closed=structure.closed
+            )
             if wanted is not None and len(value) != wanted:
                 raise ValueError(
                     f"{path} has {len(value)} values, but the structure needs {wanted}: give "
@@ -79,26 +91,7 @@ class Scene(Model):
                 f'cables need rods.kind = "geometrically-exact", not "{kind_of(self.rods)}": the '
                 "blocks of the V pulleys stand on nodes with an orientation"
             )
-        for rod, tube, longest in (
-            ("diagonal", self.rods.diagonal, self.structure.half_diagonal),
-            ("bar", self.rods.bar, self.structure.half_bar),
-        ):
-            if tube.outer_diameter >= longest:
-                raise ValueError(
-                    f"rods.{rod}.outer_diameter = {tube.outer_diameter} m must be below "
-                    f"structure.half_{rod} = {longest} m: a rod is longer than thick"
-                )
-        highest = 2.0 * self.structure.half_diagonal
-        if self.boom is not None and self.boom.length < highest:
-            raise ValueError(
-                f"boom.length = {self.boom.length} m must be at least {highest:.4g} m, the "
-                "height of the stowed ring: the sliding joint would leave the boom"
-            )
-        if self.stop is not None and self.stop.stowed_angle >= self.structure.opening_angle:
-            raise ValueError(
-                f"stop.stowed_angle = {self.stop.stowed_angle} deg must be below "
-                f"structure.opening_angle = {self.structure.opening_angle} deg"
-            )
+        self.structure.check(self)
         if self.record.interval * MOST_RECORDS < self.solver.end_time:
             raise ValueError(
                 f"record.interval = {self.record.interval} s must be at least "
@@ -131,12 +124,12 @@ class Scene(Model):
         return tomli_w.dumps(self.to_table())
 
 
-def _length_of(path: str, sections: int, *, closed: bool) -> int | None:
+def _length_of(path: str, sections: int, pulleys: int, *, closed: bool) -> int | None:
     """Values in a list at ``path``: one per section, corner or pulley; None if any number."""
     if path == "net.stiffness" and not closed:
         return sections + 1
     if path.startswith("cables."):
-        return pulleys_of(sections) if path.endswith(".coefficient") else None
+        return pulleys if path.endswith(".coefficient") else None
     return sections
 
 
@@ -144,8 +137,8 @@ def _check_faults(scene: Scene) -> None:
     """Every fault names a place that the scene has."""
     cables = [] if scene.cables is None else scene.cables.present()
     sections = scene.structure.sections
-    places = {"section": sections, "cable": len(cables), "pulley": pulleys_of(sections),
-              "span": pulleys_of(sections) + 1}  # fmt: skip
+    pulleys = scene.structure.pulleys
+    places = {"section": sections, "cable": len(cables), "pulley": pulleys, "span": pulleys + 1}
     for number, fault in enumerate(scene.faults, 1):
         for name, most in places.items():
             given = getattr(fault, name, 1)
@@ -167,7 +160,8 @@ def _length_in(table: dict[str, Any], path: str) -> int:
     if not isinstance(structure, dict) or not isinstance(structure.get("sections"), int):
         return 1
     sections = structure["sections"]
-    return _length_of(path, sections, closed=structure.get("closed") is not False) or 1
+    closed = structure.get("closed") is not False
+    return _length_of(path, sections, pulleys_of(sections), closed=closed) or 1
 
 
 def _lists(record: Model, prefix: str = "") -> list[tuple[str, tuple[float, ...]]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -65,6 +65,34 @@ class PantographRing(Structure):
             )
         self.geometry()
         return self
+
+    def check(self, scene: Any) -> None:
+        """See ``Structure``: rods longer than thick, a boom to slide on, stops out of the way."""
+        for rod, tube, longest in (
+            ("diagonal", scene.rods.diagonal, self.half_diagonal),
+            ("bar", scene.rods.bar, self.half_bar),
+        ):
+            if tube.outer_diameter >= longest:
+                raise ValueError(
+                    f"rods.{rod}.outer_diameter = {tube.outer_diameter} m must be below "
+                    f"structure.half_{rod} = {longest} m: a rod is longer than thick"
+                )
+        highest = 2.0 * self.half_diagonal
+        if scene.boom is not None and scene.boom.length < highest:
+            raise ValueError(
+                f"boom.length = {scene.boom.length} m must be at least {highest:.4g} m, the "
+                "height of the stowed ring: the sliding joint would leave the boom"
+            )
+        if scene.stop is not None and scene.stop.stowed_angle >= self.opening_angle:
+            raise ValueError(
+                f"stop.stowed_angle = {scene.stop.stowed_angle} deg must be below "
+                f"structure.opening_angle = {self.opening_angle} deg"
+            )
+
+    @property
+    def pulleys(self) -> int:
+        """Pulleys of each cable: two hinges and a V-joint a section, less the cable's end."""
+        return 3 * self.sections - 1
 
     @property
     def polygon(self) -> int:

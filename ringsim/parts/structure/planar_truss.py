@@ -1,0 +1,178 @@
+"""The planar truss with a driving cable."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal
+
+from pydantic import model_validator
+
+from ringsim.geometry.planar_truss import TrussGeometry
+from ringsim.parts.structure.family import Structure
+from ringsim.parts.tube import Tube
+from ringsim.units import DampingRate, Metre, Model, SpringRate
+
+RING_PARTS = ("stop", "boom", "net", "loads")
+
+
+class DeployingSpring(Model):
+    """Compression spring inside the telescopic strut, with its damping."""
+
+    stiffness: SpringRate = 1200.0
+    free_length: Metre = 0.55
+    """Length of the strut at which the spring is without force."""
+    damping: DampingRate = 5.0
+
+
+class Rest(Model):
+    """One-sided contact that ends the contraction: buffers of the synchronising beam meet the
+    fixed axis and keep its upper joint at a distance.
+
+    Force stiffness * depth + damping * rate while positive.
+    """
+
+    buffer: Metre = 0.0118
+    """Between the fixed axis and the synchronising beam at the end of contraction."""
+    stiffness: SpringRate = 1e5
+    damping: DampingRate = 100.0
+
+
+class PlanarTruss(Structure):
+    """Fixed axis, two parallel beams, synchronising beam and sliding axis (telescopic strut).
+
+    The cable runs from a winch on the fixed axis over a pulley at the lower joint to the upper
+    outer joint.  ``rods`` gives the material and the tubes: ``rods.bar`` the upper and the lower
+    beam, ``rods.diagonal`` the outer tube of the strut, ``rods.elements`` half the elements of
+    the upper beam.
+
+    Paper 001 gives the parts and their sections (its fig. 4 and table 1), not where the strut
+    and the cable are attached, nor the spring.  They are chosen so that the ideal truss
+    (``ringsim.theory.planar_truss``) shows what its figs 8 and 9 show:
+
+    1. The cable has the published lengths.  If it ends at the outer joint of the upper beam,
+       0.9 m is reached at 90 deg or less from H = 0.646 m on, 0.1 m up to H = 0.727 m (then
+       folded flat).  H = 0.72 m puts 0.1 m at 3.1 deg and 0.9 m at 83.5 deg.  At 3.1 deg the
+       outer joint is 34 mm off the axis: half the axis' tube (15 mm), half the synchronising
+       beam (7.5 mm) and a buffer.  There the contraction ends on a rest, so winding further
+       only stretches the cable.
+    2. Tension T = F q p c / (b H s) for the spring's force F.  A two-tube strut at most doubles
+       its length; p = 0.12 m and q = 0.54 m need 0.42 .. 0.54 m.
+    3. The strut pushes the upper beam between its joint and the cable, so it bends most at the
+       head: M = T H sin(g) (b - q) / c.  It vanishes at either end of the beam; in time it is
+       small when folded (sin g) and when deployed (spring nearly relaxed) and largest in
+       between, at c = 0.47 m.  With T of 17 N there, b - q = 87 mm gives a strain of 4e-4.
+    4. 1200 N/m and 0.55 m give 17 N (1.73 kgf) at 0.49 m, 5.3 N at 0.1 m and 2.9 N at 0.9 m;
+       the rest of the published 2 kgf is the rise at the end of contraction.
+    """
+
+    planes: ClassVar[tuple[str, ...]] = ("upper",)
+    sections: ClassVar[int] = 1
+    closed: ClassVar[bool] = False
+    pulleys: ClassVar[int] = 1
+    long_names: ClassVar[dict[str, str]] = {
+        "opening_angle": "angle between the beams and the fixed axis",
+    }
+
+    kind: Literal["planar-truss"] = "planar-truss"
+    beam_length: Metre = 0.627
+    axis_length: Metre = 0.72
+    """Distance of the two joints on the fixed axis."""
+    strut_foot: Metre = 0.12
+    """Distance of the strut's joint on the fixed axis from the upper joint."""
+    strut_head: Metre = 0.54
+    """Distance of the strut's joint on the upper beam from the upper joint."""
+    strut_tube_length: Metre = 0.4
+    """Length of the strut's outer tube, and of its inner one."""
+    cable_length: Metre = 0.9
+    """Initial distance from the lower joint to the upper outer joint: 0.9 m deployed."""
+    axis: Tube = Tube(outer_diameter=0.030, inner_diameter=0.028)
+    strut_inner: Tube = Tube(outer_diameter=0.029, inner_diameter=0.027)
+    bar_width: Metre = 0.015
+    """Synchronising beam, in the plane of the truss."""
+    bar_depth: Metre = 0.008
+    """Synchronising beam, across the plane of the truss."""
+    spring: DeployingSpring = DeployingSpring()
+    rest: Rest = Rest()
+
+    @model_validator(mode="after")
+    def _possible(self) -> PlanarTruss:
+        for name, most, limit in (
+            ("strut_head", "beam_length", self.beam_length),
+            ("strut_foot", "axis_length", self.axis_length),
+        ):
+            if getattr(self, name) >= limit:
+                raise ValueError(
+                    f"{name} = {getattr(self, name)} m must be below {most} = {limit} m"
+                )
+        if self.rest_distance >= self.beam_length:
+            raise ValueError(
+                f"rest.buffer = {self.rest.buffer} m must leave the beams room to fold: the rest "
+                f"stands {self.rest_distance:.4g} m off the axis"
+            )
+        least, most_cable = self.stowed_cable_length, self.axis_length + self.beam_length
+        if not least < self.cable_length < most_cable:
+            raise ValueError(
+                f"cable_length = {self.cable_length} m must be above {least:.4g} m (at the rest) "
+                f"and below {most_cable:.4g} m (beams and axis in line)"
+            )
+        shortest, longest = self.geometry().strut(
+            [self.stowed_angle, max(self.initial_angle, self.stowed_angle)]
+        )
+        if not shortest >= self.strut_tube_length > 0.5 * longest:
+            raise ValueError(
+                f"strut_tube_length = {self.strut_tube_length} m must be above "
+                f"{0.5 * longest:.4g} m and at most {shortest:.4g} m: the tubes would part, or "
+                "meet each other's ends"
+            )
+        return self
+
+    def check(self, scene: Any) -> None:
+        """See ``Structure``: parts of rings are refused, the cable is needed."""
+        for name in RING_PARTS:
+            if getattr(scene, name) is not None:
+                raise ValueError(
+                    f'{name} is a part of rings: leave it out of a planar truss ({name} = "none")'
+                )
+        if scene.joints.model_dump():
+            raise ValueError("joints: a planar truss has no joint friction yet: leave it out")
+        if scene.faults:
+            raise ValueError("faults: a planar truss has no faults yet: leave them out")
+        if scene.cables is None or scene.cables.upper is None or scene.cables.lower is not None:
+            raise ValueError("cables must hold the one driving cable, as cables.upper")
+        if scene.cables.upper.end != "first":
+            raise ValueError(
+                f'cables.upper.end = "{scene.cables.upper.end}" must be "first": the winch '
+                "stands on the fixed axis"
+            )
+        if scene.solver.step_control != "constant":
+            raise ValueError('solver.step_control = "motion" must be "constant" for a planar truss')
+        outer, inner = scene.rods.diagonal, self.strut_inner
+        if inner.outer_diameter > outer.inner_diameter:
+            raise ValueError(
+                f"structure.strut_inner.outer_diameter = {inner.outer_diameter} m must be at "
+                f"most rods.diagonal.inner_diameter = {outer.inner_diameter} m: the tubes slide"
+            )
+
+    @property
+    def rest_distance(self) -> float:
+        """Distance of the upper outer joint from the axis at the end of contraction, m."""
+        return 0.5 * (self.axis.outer_diameter + self.bar_width) + self.rest.buffer
+
+    @property
+    def stowed_angle(self) -> float:
+        """Angle at the end of contraction, rad."""
+        return math.asin(self.rest_distance / self.beam_length)
+
+    @property
+    def stowed_cable_length(self) -> float:
+        """Cable length at the end of contraction, m."""
+        return float(self.geometry().cable(self.stowed_angle))
+
+    @property
+    def initial_angle(self) -> float:
+        """Angle at the start, rad."""
+        return float(self.geometry().angle(self.cable_length))
+
+    def geometry(self) -> TrussGeometry:
+        """The ideal truss."""
+        return TrussGeometry(self.beam_length, self.axis_length, self.strut_foot, self.strut_head)
