@@ -51,6 +51,8 @@ class Assembly:
         Objects with kinetic energy and, where elastic, potential energy.
     rigid_nodes
         Nodes with Euler parameters.
+    dampers
+        Dampers of the rods with their damping matrices, shape (6, 6).
 
     """
 
@@ -59,6 +61,7 @@ class Assembly:
     starts: dict[int, Array] = field(default_factory=dict)
     bodies: list[Any] = field(default_factory=list)
     rigid_nodes: list[Any] = field(default_factory=list)
+    dampers: list[tuple[Any, Array]] = field(default_factory=list)
     _laws: dict[Any, Any] = field(default_factory=dict)
     _ground: Any = None
 

@@ -135,10 +135,15 @@ def _add_cables(values: dict[str, Array], history: History, scene: Scene, grid: 
 
 
 def _on_grid(grid: Array, times: Array, series: Array, rates: Array | None = None) -> Array:
-    """Interpolate along the first axis: cubic Hermite with rates, else shape-preserving cubic."""
+    """Interpolate along the first axis: cubic Hermite with rates, else shape-preserving cubic.
+
+    NaN after the end of the run, and everywhere if the series is not known throughout.
+    """
     found = np.full((len(grid), *series.shape[1:]), np.nan)
     inside = grid <= times[-1] * (1.0 + 1e-12)
     where = np.minimum(grid[inside], times[-1])
+    if not np.isfinite(series).all():
+        return found
     if len(times) == 1:
         found[inside] = series[0]
     elif rates is not None:

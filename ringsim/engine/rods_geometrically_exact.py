@@ -25,7 +25,25 @@ class GeometricallyExact:
         return assembly.add_rigid_node(frame)
 
     def add_element(self, assembly: Assembly, nodes: list[Any], length: float, section: Any) -> Any:
-        """Exudyn's ObjectBeamGeometricallyExact."""
+        """Exudyn's ObjectBeamGeometricallyExact, and a damper if the section is damped.
+
+        exudyn's element takes no damping and says nothing of it.  Its strains are constant, so
+        damping C eps_dot is a damper C / L between its ends' frames moved to its middle, where
+        they coincide: a rigid motion of the element then costs nothing.
+        """
+        damping = np.array(section.dampingMatrix) / length
+        if damping.any():
+            middle = np.array([0.5 * length, 0.0, 0.0])
+            markers = [
+                assembly.body_marker(assembly.add_body(node, 0.0, np.zeros((3, 3))), arm)
+                for node, arm in zip(nodes, (middle, -middle), strict=True)
+            ]
+            damper = assembly.system.AddObject(
+                item.ObjectConnectorRigidBodySpringDamper(
+                    markerNumbers=markers, stiffness=np.zeros((6, 6)), damping=damping
+                )
+            )
+            assembly.dampers.append((damper, damping))
         return assembly.system.AddObject(
             item.ObjectBeamGeometricallyExact(
                 nodeNumbers=nodes,

@@ -1,6 +1,7 @@
 """The flexible ring against the energy quadrature, which knows no multibody code at all."""
 
 import pytest
+
 from ring_runs import Run, ideal_time, ring, run
 
 AGREEMENT = 2e-4

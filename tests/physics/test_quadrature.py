@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from ring_runs import ideal_time, ring
 from scipy.integrate import quad
 
+from ring_runs import ideal_time, ring
 from ringsim.scene import Scene, load_scene
 from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.ideal_ring import IdealRing

@@ -10,7 +10,8 @@ from ringsim.parts.rods.family import Rods
 class AncfRods(Rods):
     """Two-node beams with position and two slope vectors per node (18 coordinates).
 
-    Source: papers 000 and 002, eq. 1; exudyn ObjectANCFBeam.
+    Source: papers 000 and 002, eq. 1; exudyn ObjectANCFBeam, which tells neither stresses nor
+    what its damping takes: with damping the dissipation and the energy error are NaN.
     """
 
     kind: Literal["ancf"] = "ancf"

@@ -1,0 +1,76 @@
+"""Orders of convergence, and two rod formulations that have nothing in common but the physics."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ring_runs import ideal_time, ring, run
+
+
+def test_second_order_in_a_constant_step() -> None:
+    """Generalised-alpha is of second order in positions for index-3 constraints too.
+
+    170 deg lies before the first contact, so the motion is smooth up to there; the crossing is
+    interpolated by cubics, whose fourth order does not show.
+    """
+    times = [
+        run(
+            ring(3, solver__step=h, solver__step_control="constant", solver__end_time=2.48)
+        ).reaches(170.0)
+        for h in (0.02, 0.01, 0.005, 0.0025)
+    ]
+    changes = np.abs(np.diff(times))
+    orders = np.log2(changes[:-1] / changes[1:])
+    np.testing.assert_allclose(orders, 2.0, atol=0.1)
+
+
+@pytest.mark.parametrize("tolerance", [4e-4, 1e-4, 2.5e-5])
+def test_a_moving_step_keeps_its_tolerance(tolerance: float) -> None:
+    found = run(ring(3, solver__tolerance=tolerance, solver__end_time=2.48))
+    # 1.5e-5 stands for what no step can take away: elastic strains, which the reference (the
+    # limit of constant steps, 5.25e-5 later than the ideal ring) holds only at this modulus.
+    limit = ideal_time(found.scene, 170.0) * (1.0 + 5.25e-5)
+    assert found.reaches(170.0) == pytest.approx(limit, rel=tolerance + 1.5e-5)
+
+
+def test_a_tighter_tolerance_costs_steps_by_its_root() -> None:
+    """h ~ tolerance^(1/2) must hold also where the steps begin to see the rods vibrate."""
+    coarse, fine = (
+        len(run(ring(3, solver__tolerance=t, solver__end_time=2.48)).times) for t in (1e-4, 1e-5)
+    )
+    assert fine < 1.3 * math.sqrt(10.0) * coarse
+
+
+@pytest.mark.parametrize("kind", ["geometrically-exact", "ancf"])
+def test_refining_the_rods(kind: str) -> None:
+    """Elements are of second order or better; at the paper's stiffness one is enough.
+
+    Softer rods make the difference visible above round-off.  All runs share their steps, so
+    only space differs.
+    """
+    angles = []
+    for elements in (1, 2, 4):
+        found = run(
+            ring(
+                3,
+                rods__kind=kind,
+                rods__elements=elements,
+                rods__young_modulus=12e9,
+                solver__step=0.02,
+                solver__step_control="constant",
+                solver__end_time=2.44,
+            )
+        )
+        angles.append(float(found.mean(2.44)))
+    first, second = np.abs(np.diff(angles))
+    assert first < math.radians(0.05)
+    assert second < first / 2.0**1.8
+
+
+def test_formulations_agree() -> None:
+    """Shear-deformable beams with quaternions against slope vectors: same deployment time."""
+    exact, ancf = (run(ring(3, rods__kind=kind)) for kind in ("geometrically-exact", "ancf"))
+    assert ancf.reaches(175.0) == pytest.approx(exact.reaches(175.0), rel=1e-5)
+    assert ancf.locks.max() == pytest.approx(exact.locks.max(), rel=1e-4)
+    np.testing.assert_allclose(ancf.locks, exact.locks, rtol=1e-4)

@@ -1,0 +1,67 @@
+"""Energy, momentum and symmetry: what an undamped ring must keep."""
+
+import numpy as np
+import pytest
+
+from ring_runs import Run, ring, run
+
+
+@pytest.fixture(scope="module")
+def usual() -> Run:
+    return run(ring(3))
+
+
+@pytest.fixture(scope="module")
+def fine() -> Run:
+    return run(ring(3, solver__tolerance=8e-6))
+
+
+def test_energy_is_closed_before_the_first_contact(fine: Run) -> None:
+    """Velocities are of second order in the step, h^2 ~ tolerance; ten times the tolerance."""
+    assert np.abs(fine.balance()[fine.before_contact()]).max() < 1e-4
+
+
+def test_energy_error_falls_with_the_tolerance(usual: Run, fine: Run) -> None:
+    """Second order: 12.5 times the tolerance, 12.5 times the error (8.0e-4 and 7.9e-5)."""
+    errors = [np.abs(r.balance()[r.before_contact()]).max() for r in (usual, fine)]
+    assert 8.0 < errors[0] / errors[1] < 20.0
+
+
+def test_energy_converges_over_the_impact(fine: Run) -> None:
+    """Over the stop the steps are a twentieth of a bounce and shrink with the tolerance."""
+    finer = run(ring(3, solver__tolerance=2e-6))
+    errors = [np.abs(r.balance()).max() for r in (fine, finer)]
+    assert errors[1] < errors[0] / 2.0
+    assert errors[1] < 2e-3
+
+
+def test_stops_and_rods_take_energy_and_never_give_any(fine: Run) -> None:
+    energies = np.array(fine.history.energies)
+    assert (energies[:, 3] >= 0.0).all()
+    assert (energies[:, 4] >= 0.0).all()
+    assert (energies[fine.before_contact(), 3] == 0.0).all()
+
+
+def test_joints_stay_closed(fine: Run) -> None:
+    # Position constraints to Newton's last bit: coordinates of 1 m in doubles.
+    assert max(fine.history.gaps) < 1e-13
+
+
+def test_both_planes_move_alike(usual: Run) -> None:
+    """No gravity: with the boom left out of sight, above and below are mirror images."""
+    free = run(ring(3, boom="none"))
+    # Newton leaves 1e-5 of the driving forces.
+    np.testing.assert_allclose(free.angles[:, 0], free.angles[:, 1], atol=1e-6)
+    # And a circle of equal sections turns into itself.
+    np.testing.assert_allclose(np.ptp(free.angles, axis=(1, 2)), 0.0, atol=1e-6)
+
+
+def test_sections_on_both_sides_of_the_boom_mirror_each_other(usual: Run) -> None:
+    before = usual.angles[usual.before_contact()]
+    np.testing.assert_allclose(before, before[:, :, ::-1], atol=2e-6)
+
+
+def test_an_arc_is_its_own_mirror_image() -> None:
+    arc = run(ring(3, structure__closed=False, boom="none", solver__end_time=1.0))
+    assert np.ptp(arc.angles[-1]) > 1e-3
+    np.testing.assert_allclose(arc.angles, arc.angles[:, :, ::-1], atol=1e-6)
