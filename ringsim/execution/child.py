@@ -14,7 +14,7 @@ from typing import Any
 from ringsim.refusal import InputError
 
 _PR_SET_PDEATHSIG = 1
-_MOST_LOG_BYTES = 1 << 30
+_MOST_LOG_BYTES = 1 << 28
 
 
 def main() -> None:

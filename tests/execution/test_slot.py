@@ -1,0 +1,135 @@
+"""One supervised solver process: what it inherits, how it ends, that it is replaced."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+
+from ringsim.execution.slot import Slot
+from ringsim.execution.work import Limits, Retry, Task
+from ringsim.scene import load_scene
+from ringsim.variables import Status
+
+HERE = Path(__file__).parent
+BASE = load_scene("ring18").with_values({"structure.sections": 6, "boom": "none"})
+
+
+@pytest.fixture
+def slots(monkeypatch):
+    monkeypatch.syspath_prepend(str(HERE))
+    made = []
+
+    def make(solver="slot_solver:run", *, limits=None, retry=None):
+        made.append(Slot(solver, BASE.to_table(), limits or Limits(), retry or Retry()))
+        return made[-1]
+
+    yield make
+    for slot in made:
+        slot.close()
+
+
+def result_of(slot, sample=0, force=0.015):
+    slot.submit(Task(sample, {"loads.force": force}))
+    return awaited(slot)
+
+
+def awaited(slot, seconds=60.0):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        slot.pipe.poll(0.2)
+        result = slot.poll()
+        if result is not None:
+            return result
+    raise AssertionError("no result")
+
+
+def process_of(result):
+    return int(result.unpack()["steps"])
+
+
+def test_process_is_kept_for_the_next_sample(slots):
+    slot = slots()
+    first, second = result_of(slot, 3), result_of(slot, 4)
+    assert (first.sample, second.sample) == (3, 4)
+    assert process_of(first) == process_of(second) != os.getpid()
+
+
+def test_process_is_replaced_after_its_share_of_runs(slots):
+    slot = slots(limits=Limits(recycle=2))
+    processes = [process_of(result_of(slot)) for _ in range(5)]
+    assert processes[0] == processes[1] != processes[2] == processes[3] != processes[4]
+
+
+def test_process_killed_by_somebody_else_runs_its_sample_again(slots):
+    slot = slots("slot_solver:sleep")
+    first = process_of(result_of(slot))
+    slot.submit(Task(1, {}))
+    os.kill(first, signal.SIGKILL)
+    result = awaited(slot)
+    assert result.status is Status.OK
+    assert process_of(result) != first
+
+
+def test_process_that_is_killed_again_and_again_is_given_up(slots):
+    slot = slots("slot_solver:kill_itself")
+    result = result_of(slot)
+    assert result.status is Status.CRASHED
+    assert "SIGKILL" in result.reason
+    assert result_of(slots()).status is Status.OK
+
+
+def test_printing_without_end_does_not_fill_the_disk(slots):
+    result = result_of(slots("slot_solver:chatter"))
+    assert result.status is Status.ERROR
+    assert "File too large" in result.reason or "OSError" in result.reason
+
+
+def test_runs_have_a_folder_of_their_own(slots):
+    slot = slots("slot_solver:litter")
+    result = result_of(slot)
+    folder = Path(result.reason)
+    assert (folder / "litter").exists()
+    slot.close()
+    assert not folder.exists()
+
+
+def test_hang_that_holds_the_interpreter_is_ended(slots):
+    slot = slots("slot_solver:hold_the_lock", limits=Limits(timeout=1.0))
+    result = result_of(slot)
+    assert result.status is Status.TIMEOUT
+    assert "hold_the_lock" in result.log
+
+
+def test_solver_process_ends_with_its_parent():
+    script = textwrap.dedent(
+        """
+        import os, sys, time
+        from ringsim.execution.slot import Slot
+        from ringsim.execution.work import Limits, Retry, Task
+        from ringsim.scene import load_scene
+        slot = Slot("slot_solver:sleep", load_scene("ring18").to_table(), Limits(), Retry())
+        slot.submit(Task(0, {}))
+        while slot.poll() is None:
+            pass
+        slot.submit(Task(1, {"solver.end_time": 1000.0}))
+        print(slot._process.pid, flush=True)
+        os.kill(os.getpid(), 9)
+        """
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False,
+        env=os.environ | {"PYTHONPATH": str(HERE)},
+    )  # fmt: skip
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    orphan = Path(f"/proc/{int(done.stdout)}/stat")
+    end = time.monotonic() + 10.0
+    while orphan.exists() and orphan.read_text().rsplit(")", 1)[1].split()[0] != "Z":
+        assert time.monotonic() < end, "the solver process outlived its parent"
+        time.sleep(0.05)
