@@ -95,7 +95,10 @@ class JacobianPattern:
         for rope, tangent in enumerate(tangents(state, placed.velocities)):
             spans = slice(state.ropes.starts[rope], state.ropes.ends[rope])
             directions[spans] = tangent.by_direction
-            for place, block in self._rope(state, tangent, rope, by_q, by_rate, exact=exact):
+            entries = self._rope(state, tangent, rope, by_q, by_rate, exact=exact)
+            if exact:
+                entries += self._swinging(placed, tangent, spans, by_q)
+            for place, block in entries:
                 places.append(place)
                 blocks.append(block)
         values.append(np.einsum("lij,lik->ljk", maps, directions[self._span]))
@@ -137,6 +140,22 @@ class JacobianPattern:
             (_pairs(mean, difference), -(by_q * by_mean + by_rate * viscous)),
             ((tension[row, 0], difference[0, column]), -flat[row, column]),
         ]
+
+    def _swinging(
+        self, placed: Placed, tangent: RopeTangent, spans: slice, by_q: float
+    ) -> list[tuple[tuple[NDArray[np.int64], NDArray[np.int64]], Array]]:
+        """How a rope's span tensions follow velocities that turn with the nodes at fixed rates.
+
+        Against the rest it is of the order of a node's turn within one step.
+        """
+        own = np.flatnonzero((self._span >= spans.start) & (self._span < spans.stop))
+        swings = self._path.leg_swings(placed)[self._leg[own]] * self._sign[own, None, None]
+        by_velocity = tangent.by_velocity[:, self._span[own] - spans.start]
+        values = -by_q * np.einsum("slj,ljk->slk", by_velocity, swings)
+        tension = self._tension(np.arange(spans.start, spans.stop))
+        columns = self._path.leg_node[self._leg[own], None] * WIDTH + np.arange(WIDTH)
+        rows = np.broadcast_to(tension[:, None, None], values.shape).ravel()
+        return [((rows, np.broadcast_to(columns, values.shape).ravel()), values.ravel())]
 
     def _turning(self, state: ChainState, placed: Placed) -> list[Array]:
         """Change of the moments arm x F at fixed F with the turns of the nodes."""

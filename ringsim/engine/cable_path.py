@@ -42,14 +42,18 @@ class Placed:
         Shape (points, 3), m and m/s.
     arms
         From the carrying node's position to the point, global, shape (points, 3).
-    turns
-        Euler parameters of all nodes, shape (nodes, 4).
+    turns, turn_rates
+        Euler parameters of all nodes and their rates, shape (nodes, 4).
+    turning
+        Angular velocity of every arm, rad/s, shape (points, 3).
     """
 
     points: Array
     velocities: Array
     arms: Array
     turns: Array
+    turn_rates: Array
+    turning: Array
 
 
 class Carrier(Protocol):
@@ -152,7 +156,7 @@ class CablePath:
         turning[self._block_point] = 0.5 * (spins[self._left] + spins[self._right])
         points = coordinates[self._carrier, :3] + arms
         velocities = rates[self._carrier, :3] + cross(turning, arms)
-        return Placed(points, velocities, arms, turns)
+        return Placed(points, velocities, arms, turns, rates[:, 3:], turning)
 
     def generalised(self, placed: Placed, forces: Array) -> Array:
         """Generalised forces on the nodes' coordinates, shape (nodes, 7), of point forces."""
@@ -173,6 +177,19 @@ class CablePath:
         arms = self.leg_share[:, None] * placed.arms[self.leg_point]
         maps[:, :, 3:] = -skew(arms) @ gyration(placed.turns[self.leg_node])
         return maps
+
+    def leg_swings(self, placed: Placed) -> Array:
+        """Derivative of each leg's velocity after its node's coordinates at fixed rates.
+
+        With w = G(q) q_dot = -G(q_dot) q, w turns and carries the arm: dv = dw x arm + w x darm.
+        Shape (legs, 3, 7), 1/s.
+        """
+        swings = np.zeros((len(self.leg_point), 3, WIDTH))
+        arms = skew(self.leg_share[:, None] * placed.arms[self.leg_point])
+        turning = skew(placed.turning[self.leg_point])
+        carried = turning @ arms @ gyration(placed.turns[self.leg_node])
+        swings[:, :, 3:] = arms @ gyration(placed.turn_rates[self.leg_node]) - carried
+        return swings
 
     def turning_pairs(self) -> tuple[Indices, Indices]:
         """Pairs of legs of the same point: how a moment on one node turns with another."""

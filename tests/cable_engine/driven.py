@@ -1,0 +1,139 @@
+"""Trusses and rings with cables, and admissible motions of the nodes that carry the cables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.engine.build import Built, build
+from ringsim.engine.cables import CableDrive
+from ringsim.engine.quaternions import product
+from ringsim.scene import Scene, load_scene
+from ringsim.simulation import run
+from ringsim.variables import Outcome
+
+Array = NDArray[np.float64]
+
+
+def truss(sections: int = 2, **values: Any) -> Scene:
+    """The two-section truss, or a longer one.
+
+    Keywords name scene fields, two underscores stand for a dot, and ``both__`` for the same
+    field of either cable.
+    """
+    chosen = {"structure.sections": sections, "record.interval": 0.05}
+    for name, value in values.items():
+        path = name.replace("__", ".")
+        ends = ("cables.upper.", "cables.lower.") if path.startswith("both.") else ("",)
+        chosen |= {end + path.removeprefix("both."): value for end in ends}
+    return load_scene("truss2").with_values(chosen)
+
+
+def outcome(scene: Scene) -> Outcome:
+    """Run a scene; the checks that hold of every run are made here."""
+    found = run(scene)
+    assert found.values["constraint_error"] < 1e-9
+    return found
+
+
+def turned(turns: Array, rotations: Array) -> Array:
+    """Unit quaternions turned by global rotation vectors (rad), shape (n, 4) and (n, 3)."""
+    found = np.empty_like(turns)
+    for k, (q, r) in enumerate(zip(turns, rotations, strict=True)):
+        angle = float(np.linalg.norm(r))
+        half = np.array([np.cos(0.5 * angle), *(0.5 * np.sinc(0.5 * angle / np.pi) * r)])
+        found[k] = product(half, q)
+    return found
+
+
+def axis_of(turn: Array) -> Array:
+    """Third axis of the frame of a unit quaternion."""
+    w, x, y, z = turn
+    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+
+
+def rates_of(turns: Array, spins: Array) -> Array:
+    """Rates of unit quaternions at global angular velocities (rad/s)."""
+    return np.array(
+        [0.5 * product(np.array([0.0, *w]), q) for q, w in zip(turns, spins, strict=True)]
+    )
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Velocities (m/s) and spins (rad/s) of nodes, and what their V-joints turn; (n, 3) each."""
+
+    moves: Array
+    spins: Array
+    bends: Array
+
+
+@dataclass
+class Bench:
+    """The cables of a built scene, moved by hand."""
+
+    scene: Scene
+
+    def __post_init__(self) -> None:
+        self.built: Built = build(self.scene)
+        drive = self.built.cables
+        assert drive is not None
+        self.drive: CableDrive = drive
+        self.width = 7 * len(drive.path.nodes)
+        self.reference = np.array(
+            [
+                self.built.ring.assembly.system.GetNodeParameter(n, "referenceCoordinates")
+                for n in drive.path.nodes
+            ]
+        )
+        number = {int(node): k for k, node in enumerate(drive.path.nodes)}
+        self.pairs = [
+            (number[int(joint.gap[0])], number[int(joint.gap[1])])
+            for plane in self.built.ring.vjoints
+            for joint in plane
+        ]
+
+    def motion(self, rng: np.random.Generator, place: Array) -> Motion:
+        """A random motion that the V-joints allow, of the order of 1 m/s and 1 rad/s."""
+        moves, spins = rng.normal(size=(2, len(place), 3))
+        bends = np.zeros_like(spins)
+        for left, right in self.pairs:
+            moves[right], spins[right] = moves[left], spins[left]
+            bends[right] = rng.normal() * axis_of(place[left, 3:])
+        return Motion(0.3 * moves, spins, bends)
+
+    def moved(self, place: Array, motion: Motion, by: float) -> Array:
+        """The nodes' coordinates after a motion for a time ``by``; V-joints keep their axes."""
+        bent = turned(place[:, 3:], by * motion.bends)
+        return np.hstack([place[:, :3] + by * motion.moves, turned(bent, by * motion.spins)])
+
+    def rates(self, place: Array, motion: Motion) -> Array:
+        """Rates of the nodes' coordinates in a motion."""
+        return np.hstack([motion.moves, rates_of(place[:, 3:], motion.spins + motion.bends)])
+
+    def force(self, place: Array, rates: Array, time: float = 0.0) -> Array:
+        """Generalised forces that the solver sees, (nodes * 7,)."""
+        still = np.zeros(self.drive.auxiliary)
+        q = np.concatenate([(place - self.reference).ravel(), still])
+        q_t = np.concatenate([rates.ravel(), still])
+        return self.drive._force(None, time, 0, q, q_t)[: self.width]
+
+    def strike(self, place: Array, rates: Array, time: float) -> None:
+        """Let the scene's faults happen at a state."""
+        state, _ = self.drive.evaluate(place, rates, time)
+        angles = np.zeros((2, self.scene.structure.sections))
+        assert self.built.faults.strike(time, angles, state)
+
+    def jacobian(self, place: Array, rates: Array, by_rate: float, *, exact: bool = True) -> Array:
+        """d(-force)/dq + by_rate * d(-force)/dq_t, auxiliary unknowns eliminated."""
+        state, placed = self.drive.evaluate(place, rates, 0.0)
+        entries = self.drive.pattern.triplets(state, placed, 1.0, by_rate, exact=exact)
+        size = self.width + self.drive.auxiliary
+        whole = np.zeros((size, size))
+        np.add.at(whole, (entries[:, 0].astype(int), entries[:, 1].astype(int)), entries[:, 2])
+        own, rest = slice(None, self.width), slice(self.width, None)
+        eliminated = np.linalg.solve(whole[rest, rest], whole[rest, own])
+        return np.asarray(whole[own, own] - whole[own, rest] @ eliminated)
