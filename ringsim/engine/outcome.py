@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ringsim.cable.cables import pulleys_of
+from ringsim.engine.energy import Energies
 from ringsim.engine.integrate import History
 from ringsim.scene import Scene
 from ringsim.variables import PLANES, RODS, Outcome
@@ -59,7 +61,7 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
     values["lock_time"] = locks
     values["deployment_time"] = np.array(deployed)
 
-    opening = _on_grid(grid, times, angles, rates)
+    opening = on_grid(grid, times, angles, rates)
     values["opening_angle"] = np.degrees(np.moveaxis(opening, 0, -1))
     spread = np.degrees(np.ptp(angles.reshape(len(times), -1), axis=1))
     flat = values["opening_angle"].reshape(-1, len(grid))
@@ -67,27 +69,10 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
     before = times <= deployed if math.isfinite(deployed) else np.ones(len(times), dtype=bool)
     values["asynchrony_max"] = np.array(spread[before].max())
 
-    energies = np.array(history.energies)
-    between = 0.5 * np.diff(times) * (energies[1:, 3] + energies[:-1, 3]) + energies[1:, 4]
-    lost = np.concatenate([[0.0], np.cumsum(between)])
-    driven = 0.5 * np.diff(times) * (energies[1:, 5] + energies[:-1, 5])
-    kinetic, elastic = energies[:, 0], energies[:, 1]
-    work = energies[:, 2] + np.concatenate([[0.0], np.cumsum(driven)])
-    for name, series in (
-        ("kinetic_energy", kinetic),
-        ("elastic_energy", elastic),
-        ("work", work),
-        ("dissipation", lost),
-        ("constraint_violation", np.array(history.gaps)),
-    ):
-        values[name] = _on_grid(grid, times, series)
-    balance = kinetic - kinetic[0] + elastic - elastic[0] + lost - work
-    exchanged = max(np.abs(work).max(), np.ptp(kinetic), np.ptp(elastic), 1e-300)
-    values["energy_error"] = np.array(np.abs(balance).max() / exchanged)
-    values["constraint_error"] = np.array(max(history.gaps))
+    add_energies(values, grid, times, history.energies, history.gaps)
     if history.stresses:
         stresses = np.array(history.stresses)
-        values["rod_stress"] = np.moveaxis(_on_grid(grid, times, stresses), 0, -1)
+        values["rod_stress"] = np.moveaxis(on_grid(grid, times, stresses), 0, -1)
         values["peak_rod_stress"] = np.array(stresses.max())
     _add_cables(values, history, scene, grid)
     counts = {
@@ -110,6 +95,34 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
     return Outcome(history.status, history.reason, coordinates, values)
 
 
+def add_energies(
+    values: dict[str, Array],
+    grid: Array,
+    times: Array,
+    readings: Sequence[Energies],
+    gaps: Sequence[float],
+) -> None:
+    """Energies and joint gaps (m) over time, what the balance lacks, and the largest gap."""
+    energies = np.array(readings)
+    between = 0.5 * np.diff(times) * (energies[1:, 3] + energies[:-1, 3]) + energies[1:, 4]
+    lost = np.concatenate([[0.0], np.cumsum(between)])
+    driven = 0.5 * np.diff(times) * (energies[1:, 5] + energies[:-1, 5])
+    kinetic, elastic = energies[:, 0], energies[:, 1]
+    work = energies[:, 2] + np.concatenate([[0.0], np.cumsum(driven)])
+    for name, series in (
+        ("kinetic_energy", kinetic),
+        ("elastic_energy", elastic),
+        ("work", work),
+        ("dissipation", lost),
+        ("constraint_violation", np.array(gaps)),
+    ):
+        values[name] = on_grid(grid, times, series)
+    balance = kinetic - kinetic[0] + elastic - elastic[0] + lost - work
+    exchanged = max(np.abs(work).max(), np.ptp(kinetic), np.ptp(elastic), 1e-300)
+    values["energy_error"] = np.array(np.abs(balance).max() / exchanged)
+    values["constraint_error"] = np.array(max(gaps))
+
+
 def _add_cables(values: dict[str, Array], history: History, scene: Scene, grid: Array) -> None:
     """Tensions by plane and span; a plane without a cable is NaN."""
     if scene.cables is None or not history.tensions:
@@ -123,10 +136,10 @@ def _add_cables(values: dict[str, Array], history: History, scene: Scene, grid: 
     wound = np.full((2, len(grid)), np.nan)
     for number, (plane, _) in enumerate(scene.cables.present()):
         own = tensions[:, number * spans : (number + 1) * spans]
-        by_plane[plane] = _on_grid(grid, times, own).T
+        by_plane[plane] = on_grid(grid, times, own).T
         ends = slack[:, number]
         loose[plane] = float(np.sum(0.5 * np.diff(times) * (ends[1:] + ends[:-1])))
-        wound[plane] = _on_grid(grid, times, np.array(history.wound)[:, number])
+        wound[plane] = on_grid(grid, times, np.array(history.wound)[:, number])
     values["cable_tension"] = by_plane
     values["slack_duration"] = loose
     values["wound_length"] = wound
@@ -134,7 +147,7 @@ def _add_cables(values: dict[str, Array], history: History, scene: Scene, grid: 
     values["peak_tension_time"] = np.array(times[np.argmax(tensions.max(axis=1))])
 
 
-def _on_grid(grid: Array, times: Array, series: Array, rates: Array | None = None) -> Array:
+def on_grid(grid: Array, times: Array, series: Array, rates: Array | None = None) -> Array:
     """Interpolate along the first axis: cubic Hermite with rates, else shape-preserving cubic.
 
     NaN after the end of the run, and everywhere if the series is not known throughout.
