@@ -20,6 +20,7 @@ from ringsim.parts.joints import Joints, Stop
 from ringsim.parts.loads import Loads
 from ringsim.parts.net import Net
 from ringsim.parts.persection import ListIn
+from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.solver import Record, Solver
@@ -92,6 +93,11 @@ class Scene(Model):
                 "blocks of the V pulleys stand on nodes with an orientation"
             )
         self.structure.check(self)
+        if self.record.stress and isinstance(self.rods, AncfRods):
+            raise ValueError(
+                'record.stress = true is not possible with rods.kind = "ancf", whose elements '
+                'report no forces: choose "geometrically-exact", or leave record.stress out'
+            )
         if self.record.interval * MOST_RECORDS < self.solver.end_time:
             raise ValueError(
                 f"record.interval = {self.record.interval} s must be at least "
