@@ -20,7 +20,8 @@ Solver = Callable[[Scene], Outcome]
 LOG_CHARACTERS = 4000
 """So much of what a failed run printed is kept."""
 
-_MAY_BE_MISSING = ("deployment_time",)
+_ALWAYS_THERE = ("final_time", "energy_error", "constraint_error", "asynchrony_max")
+"""Numbers that every run has that went well."""
 
 
 def load_solver(name: str) -> Solver:
@@ -85,10 +86,11 @@ def solve(solver: Solver, base: Scene, task: Task) -> Result:
 def not_finite(outcome: Outcome) -> str:
     """What is wrong with the numbers of a run that says it went well; empty if nothing is.
 
-    Missing values are right after the end of a run and for times that never came; before its
-    end, or infinite, they are not.
+    Missing values are right after the end of a run, for times that never came and in rows of
+    things that are not there; a gap in a series before the end of the run is not right, nor is
+    anything infinite.
     """
-    time_axis = outcome.coordinates.get("time")
+    axis = outcome.coordinates.get("time")
     end = outcome.values.get("final_time")
     for name, values in outcome.values.items():
         array = np.asarray(values)
@@ -97,12 +99,14 @@ def not_finite(outcome: Outcome) -> str:
         if np.isinf(array).any():
             return f"{name} is infinite: try a smaller solver.step"
         dims = VARIABLES[name].dims
-        if "time" in dims and time_axis is not None and end is not None:
-            lasting = np.asarray(time_axis) <= float(end)
-            array = np.compress(lasting, array, axis=dims.index("time"))
-        elif dims or name in _MAY_BE_MISSING:
-            continue
-        if np.isnan(array).any():
+        if "time" in dims and axis is not None and end is not None:
+            lasting = np.asarray(axis) <= float(end)
+            gaps = np.isnan(np.compress(lasting, array, axis=dims.index("time")))
+            along = dims.index("time")
+            broken = bool((gaps.any(axis=along) & ~gaps.all(axis=along)).any())
+        else:
+            broken = name in _ALWAYS_THERE and bool(np.isnan(array).any())
+        if broken:
             return f"{name} is not a number: try a smaller solver.step"
     return ""
 

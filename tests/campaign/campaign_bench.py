@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -11,6 +12,10 @@ from pathlib import Path
 import xarray as xr
 
 HERE = Path(__file__).parent
+PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+"""Where programs of the virtual environment are found, also if it is not activated."""
+
+MPIEXEC = shutil.which("mpiexec", path=PATH)
 NOT_COMPARED = ("wall_time", "cpu_time", "log")
 """Timings, and the text that a dying process prints."""
 
@@ -83,7 +88,16 @@ class Bench:
     def command(self, *arguments, ranks=0, solver="fake_solver:run"):
         front = [sys.executable, "-m", "ringsim"]
         if ranks:
-            front = ["mpiexec", "-n", str(ranks), sys.executable, "-m", "mpi4py", "-m", "ringsim"]
+            front = [
+                MPIEXEC or "mpiexec",
+                "-n",
+                str(ranks),
+                sys.executable,
+                "-m",
+                "mpi4py",
+                "-m",
+                "ringsim",
+            ]
         end = ["--solver", solver] if solver and arguments[0] == "campaign" else []
         return [*front, *map(str, arguments), *end]
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import shutil
-
 import pytest
 
-from campaign_bench import Bench
+from campaign_bench import MPIEXEC, Bench
 
 
 @pytest.fixture
@@ -18,5 +16,5 @@ def bench(tmp_path):
 
 @pytest.fixture
 def mpi():
-    if shutil.which("mpiexec") is None:
+    if MPIEXEC is None:
         pytest.skip("there is no mpiexec: install ringsim[mpich]")

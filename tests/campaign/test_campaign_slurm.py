@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 import time
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 import xarray as xr
 
 import slurm_cluster
-from campaign_bench import HERE, Bench, comparable
+from campaign_bench import HERE, PATH, Bench, comparable
 
 SCRIPTS = Path(__file__).parents[2] / "slurm"
 SAMPLES = 60
@@ -48,12 +47,11 @@ def local(tmp_path_factory):
 
 
 def submit(cluster, bench, script, *options):
-    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
     file = str(bench.write(SAMPLES, **SLEEPY))
     answer = cluster.ask(
         "sbatch", "--parsable", *options, str(SCRIPTS / script), file,
         "--out", "out", "--solver", "fake_solver:slow",
-        cwd=bench.folder, extra={"PYTHONPATH": str(HERE), "PATH": path},
+        cwd=bench.folder, extra={"PYTHONPATH": str(HERE), "PATH": PATH},
     )  # fmt: skip
     assert answer.isdigit(), answer
     return answer

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
 import textwrap
+from pathlib import Path
 
 import pytest
 
 from ringsim.execution.launch import launched_size, mpi_world
 from ringsim.refusal import InputError
 
-needs_mpi = pytest.mark.skipif(shutil.which("mpiexec") is None, reason="there is no mpiexec")
+PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+MPIEXEC = shutil.which("mpiexec", path=PATH)
+needs_mpi = pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: ringsim[mpich]")
 
 
 def under_mpi(script, ranks=2):
     return subprocess.run(
-        ["mpiexec", "-n", str(ranks), sys.executable, "-c", textwrap.dedent(script)],
+        [MPIEXEC, "-n", str(ranks), sys.executable, "-c", textwrap.dedent(script)],
         capture_output=True, text=True, timeout=60, check=False,
     )  # fmt: skip
 
