@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.variables import COORDINATES, PLANES, RODS, VARIABLES, Outcome, Status, Variable
+from ringsim.variables import COORDINATES, RODS, VARIABLES, Fidelity, Outcome, Status, Variable
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
 _MISSING_COUNT = -1
@@ -58,6 +59,7 @@ def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
             arrays[name] = _status(outcome.status)
         elif name in outcome.values:
             arrays[name] = _array(variable, outcome.values[name])
+            arrays[name].attrs.update(_meaning(name, scene))
         elif "time" not in variable.dims and _wanted(variable, scene):
             shape = tuple(len(axes[dim]) for dim in variable.dims)
             arrays[name] = _array(variable, np.full(shape, np.nan))
@@ -112,13 +114,20 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
 def _wanted(variable: Variable, scene: Scene) -> bool:
     """Whether a scene asks for what a variable says."""
     holds = {"": True, "stress": scene.record.stress, "cables": scene.cables is not None}
+    holds[kind_of(scene.structure)] = True
     return holds.get(variable.needs, False)
+
+
+def _meaning(name: str, scene: Scene) -> dict[str, str]:
+    """Attributes by which a variable of this structure differs from the ring's."""
+    words = scene.structure.long_names.get(name)
+    return {} if words is None else {"long_name": words}
 
 
 def _axes(outcome: Outcome, scene: Scene) -> dict[str, np.ndarray[Any, Any]]:
     """Values of every dimension; the outcome's own where it has them."""
     known: dict[str, np.ndarray[Any, Any]] = {
-        "plane": np.array(PLANES),
+        "plane": np.array(scene.structure.planes),
         "section": np.arange(1, scene.structure.sections + 1),
         "rod": np.array(RODS),
         "time": np.empty(0),
@@ -152,6 +161,9 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
     now = datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
     software = f"ringsim {version('ringsim')}"
     title = scene.title or scene.name
+    ideal = int(outcome.values.get("fidelity", Fidelity.FULL)) == Fidelity.IDEAL
+    model = "ideal ring of rigid rods" if ideal else "multibody simulation with exudyn"
+    engine = "" if ideal else f" {version('exudyn')}"
     return {
         "Conventions": CONVENTIONS,
         "title": title,
@@ -160,7 +172,8 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
         "reason": outcome.reason,
         "history": f"{now} simulated by {software}",
         "date_created": now,
-        "source": f"{software}: multibody simulation with exudyn {version('exudyn')}",
+        "source": f"{software}: {model}{engine}",
+        "fidelity": "ideal" if ideal else "full",
         "creator_name": "ringsim",
         "ringsim_version": version("ringsim"),
         "exudyn_version": version("exudyn"),

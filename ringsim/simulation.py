@@ -5,9 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from ringsim.engine.build import build
-from ringsim.engine.integrate import Integration
-from ringsim.engine.outcome import to_outcome
+from ringsim.engine.solve import SOLVERS
 from ringsim.scene import Scene
 from ringsim.variables import Outcome
 
@@ -30,13 +28,8 @@ def run(scene: Scene) -> Outcome:
         status other than OK and the reason; it never raises.
     """
     wall, cpu = time.perf_counter(), time.process_time()
-    history = Integration(build(scene)).run()
-    return to_outcome(
-        history,
-        scene,
-        wall_time=time.perf_counter() - wall,
-        cpu_time=time.process_time() - cpu,
-    )
+    finish = SOLVERS[type(scene.structure)](scene)
+    return finish(wall_time=time.perf_counter() - wall, cpu_time=time.process_time() - cpu)
 
 
 def simulate(scene: Scene) -> xr.Dataset:

@@ -42,7 +42,7 @@ class Variable:
     long_name: str
     dtype: str = "f8"
     needs: str = ""
-    """What a scene must hold for it: "stress" output, "cables", or nothing."""
+    """What a scene must hold for it: "stress" output, "cables", a kind of structure, or nothing."""
 
 
 PLANES = ("upper", "lower")
@@ -58,6 +58,7 @@ COORDINATES = (
     Variable("time", ("time",), "s", "time since the start of the run"),
     Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
     Variable("rod", ("rod",), "1", "rod half of a section", "str"),
+    Variable("station", ("station",), "m", "distance along the upper beam from the fixed axis"),
 )
 
 _ALL = (
@@ -85,6 +86,17 @@ _ALL = (
         needs="cables",
     ),
     Variable("wound_length", ("plane", "time"), "m", "rope wound up by the cable's winches"),
+    Variable("cable_length", ("plane", "time"), "m", "driving cable from the lower joint on"),
+    Variable(
+        "bending_strain", ("station", "time"), "1", "bending strain of the upper beam's fibre"
+    ),
+    Variable(
+        "peak_bending_strain",
+        (),
+        "1",
+        "largest bending strain of the upper beam at any step",
+        needs="planar-truss",
+    ),
     Variable("kinetic_energy", ("time",), "J", "kinetic energy"),
     Variable("elastic_energy", ("time",), "J", "energy stored in rods, net and stops"),
     Variable("work", ("time",), "J", "work done on the structure by forces and winches"),

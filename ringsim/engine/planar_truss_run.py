@@ -1,0 +1,240 @@
+"""Integrating a planar truss, and what is read at every step.
+
+It is no ring: there are no V-joints to wait for, so a run lasts as long as its winding is
+watched (``solver.end_time``), in constant steps that exudyn halves only where Newton fails.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.cable.state import ChainState
+from ringsim.engine import quaternions
+from ringsim.engine.energy import Energies
+from ringsim.engine.planar_truss import TrussModel, rest_force
+from ringsim.engine.predictor import Predictor
+from ringsim.engine.settings import solver_settings
+from ringsim.variables import Status
+
+Array = NDArray[np.float64]
+_KINETIC = exu.OutputVariableType.KineticEnergy
+_POTENTIAL = exu.OutputVariableType.PotentialEnergy
+_TORQUE = exu.OutputVariableType.TorqueLocal
+_VELOCITY = exu.OutputVariableType.VelocityLocal
+_ANGULAR_VELOCITY = exu.OutputVariableType.AngularVelocityLocal
+_RECOVERY = 10
+"""Steps after which a halved step may grow again."""
+
+
+@dataclass
+class TrussHistory:
+    """What was read at every step; lists of equal length.
+
+    Attributes
+    ----------
+    angles, rates
+        Angle of the upper beam's chord from the axis and its rate, rad and rad/s.
+    cable_lengths
+        From the lower joint to the upper outer joint, m.
+    strains
+        Bending strain in the middle of each element of the upper beam.
+    tensions, slack, wound
+        Of each span (N), whether the cable is slack, and the rope wound (m).
+    """
+
+    times: list[float] = field(default_factory=list)
+    angles: list[float] = field(default_factory=list)
+    rates: list[float] = field(default_factory=list)
+    cable_lengths: list[float] = field(default_factory=list)
+    strains: list[Array] = field(default_factory=list)
+    energies: list[Energies] = field(default_factory=list)
+    gaps: list[float] = field(default_factory=list)
+    tensions: list[Array] = field(default_factory=list)
+    slack: list[bool] = field(default_factory=list)
+    wound: list[float] = field(default_factory=list)
+    status: Status = Status.UNFINISHED
+    reason: str = ""
+    newton_iterations: int = 0
+    jacobians: int = 0
+
+
+class TrussIntegration:
+    """One run of a built planar truss."""
+
+    def __init__(self, model: TrussModel) -> None:
+        self._model, self._system = model, model.assembly.system
+        self._solver = exu.MainSolverImplicitSecondOrder()
+        self._settings = solver_settings(model.scene, self._residual_tolerance())
+        solver = model.scene.solver
+        time = self._settings.timeIntegration
+        time.numberOfSteps = math.ceil(solver.end_time / solver.step * (1.0 - 1e-12))
+        time.adaptiveStepRecoverySteps = _RECOVERY
+        self._reader = TrussReader(model)
+        self.history = TrussHistory()
+
+    def run(self) -> TrussHistory:
+        """Integrate to the end time."""
+        history, solver = self.history, self._solver
+        self._system.SetPostStepUserFunction(self._after_step)
+        self._system.SetPreNewtonResidualUserFunction(Predictor(self._model.assembly, solver).apply)
+        self._read(0.0)
+        try:
+            if solver.InitializeSolver(self._system, self._settings):
+                solver.SolveSteps(self._system, self._settings)
+        except exu.ExudynError as error:
+            if history.status != Status.DIVERGED:
+                history.status = Status.SOLVER_FAILED
+                history.reason = (
+                    f"the solver gave up at {history.times[-1]:.6g} s: reduce solver.step, or "
+                    f"raise solver.newton_tolerance ({str(error).strip().splitlines()[0][:200]})"
+                )
+        end = self._model.scene.solver.end_time
+        if history.status == Status.UNFINISHED and history.times[-1] >= end * (1.0 - 1e-9):
+            history.status = Status.OK
+            history.reason = f"the cable was wound until solver.end_time = {end:g} s"
+        history.newton_iterations = int(solver.it.newtonStepsCount)
+        history.jacobians = int(solver.it.newtonJacobiCount)
+        return history
+
+    def _after_step(self, system: Any, time: float) -> bool:
+        """Read the new state; False ends the run."""
+        del system
+        return time <= self.history.times[-1] or self._read(time)
+
+    def _read(self, time: float) -> bool:
+        if self._reader.read(time, self.history):
+            step = self._model.scene.solver.step
+            chain, slope = self._reader.chain, self._reader.path_slope
+            self._model.cable.advance(time, step, chain, np.array([slope]))
+            return True
+        self.history.status = Status.DIVERGED
+        self.history.reason = f"the state is not finite at {time:.6g} s: reduce solver.step"
+        return False
+
+    def _residual_tolerance(self) -> float:
+        """Residual norm in N at which Newton stops, above what round-off lets it reach.
+
+        ``newton_tolerance`` times the spring's largest force, or the stiffest element's rate
+        times coordinates of order 1 m, per coordinate.
+        """
+        model, rods = self._model, self._model.scene.rods
+        truss = model.truss
+        shortest = float(truss.geometry().strut(truss.stowed_angle))
+        push = truss.spring.stiffness * abs(truss.spring.free_length - shortest)
+        element = float(np.diff(model.upper.places).min())
+        stiffest = float(np.max(rods.young_modulus)) * rods.bar.area / element
+        size = self._system.systemData.ODE2Size()
+        round_off = 4.0 * float(np.finfo(float).eps) * stiffest * math.sqrt(size)
+        return max(model.scene.solver.newton_tolerance * push, round_off)
+
+
+class TrussReader:
+    """Reads a truss model's state.
+
+    Attributes
+    ----------
+    chain
+        The cable at the last reading.
+    path_slope
+        Derivative of the cable's length after the opening angle there, m/rad.
+    """
+
+    chain: ChainState
+    path_slope: float
+
+    def __init__(self, model: TrussModel) -> None:
+        self._model = model
+        self._data = model.assembly.system.systemData
+        self._reference = np.array(self._data.GetODE2Coordinates(exu.ConfigurationType.Reference))
+        place = model.assembly.coordinates_of
+        self._upper = place(model.upper.nodes[0])[:3]
+        self._bar, self._tubes = place(model.bar), [place(node) for node in model.tubes]
+        self._pins = np.array(
+            [
+                [place(model.upper.nodes[-1])[:3], self._bar[:3]],
+                [place(model.upper.nodes[model.head])[:3], self._tubes[1][:3]],
+            ]
+        )
+        self._fixed = np.array([self._upper, place(model.lower.nodes[0])[:3], self._tubes[0][:3]])
+        self._fixed_at = np.array([model.points.upper, model.points.lower, model.points.foot])
+        self._lower_end = place(model.lower.nodes[-1])[:3]
+        rods = model.scene.rods
+        second = rods.bar.second_moment
+        self._per_moment = 0.5 * rods.bar.outer_diameter / (np.max(rods.young_modulus) * second)
+        self._damped: tuple[float, float] | None = None
+
+    def read(self, time: float, history: TrussHistory) -> bool:
+        """Append the current state to a history; False if it is not finite."""
+        position = np.asarray(self._data.GetODE2Coordinates()) + self._reference
+        velocity = np.asarray(self._data.GetODE2Coordinates_t())
+        if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
+            return False
+        arm = position[self._bar[:3]] - self._model.points.upper
+        moving = velocity[self._bar[:3]]
+        angle = math.atan2(arm[0], -arm[1])
+        rate = float(arm[0] * moving[1] - arm[1] * moving[0]) / float(arm[:2] @ arm[:2])
+        self.chain = self._model.cable.current(position, velocity, time)
+        self.path_slope = float(self._model.truss.geometry().cable_rate(angle))
+        history.times.append(time)
+        history.angles.append(angle)
+        history.rates.append(rate)
+        history.cable_lengths.append(float(self.chain.lengths[1]))
+        history.strains.append(self._strains())
+        history.energies.append(self._energies(time, position, velocity))
+        history.gaps.append(self._gap(position))
+        history.tensions.append(self.chain.tensions)
+        history.slack.append(bool(self.chain.is_slack[0]))
+        history.wound.append(float(self.chain.wound.sum()))
+        return True
+
+    def _strains(self) -> Array:
+        """Strain of the fibre on the side away from the strut, in the middle of each element."""
+        output, centre = self._model.assembly.system.GetObjectOutputBody, [0.0, 0.0, 0.0]
+        moments = [output(e, _TORQUE, centre)[2] for e in self._model.upper.elements]
+        return np.asarray(-self._per_moment * np.array(moments))
+
+    def _energies(self, time: float, position: Array, velocity: Array) -> Energies:
+        model, chain = self._model, self.chain
+        output = model.assembly.system.GetObjectOutputBody
+        kinetic = float(sum(output(body, _KINETIC) for body in model.assembly.bodies))
+        beams = (*model.upper.elements, *model.lower.elements)
+        elastic = float(sum(output(element, _POTENTIAL) for element in beams))
+        foot, head = (position[tube[:3]] for tube in self._tubes)
+        first, second = (velocity[tube[:3]] for tube in self._tubes)
+        strut = float(np.linalg.norm(head - foot))
+        closing = float((second - first) @ (head - foot)) / strut
+        spring, rest = model.truss.spring, model.truss.rest
+        distance, rate = float(position[self._bar[0]]), float(velocity[self._bar[0]])
+        room = model.truss.rest_distance
+        push, held = rest_force(rest, distance, rate, room)
+        elastic += 0.5 * spring.stiffness * (strut - spring.free_length) ** 2
+        elastic += 0.5 * rest.stiffness * max(room - distance, 0.0) ** 2
+        elastic += float(chain.elastic_energy.sum())
+        loss = spring.damping * closing**2 + (held - push) * rate
+        loss += float(chain.friction_loss.sum() + chain.damping_loss.sum())
+        winch = float(chain.winch_power.sum() - chain.drum_power.sum())
+        return Energies(kinetic, elastic, 0.0, loss, self._lost_in_beams(time), winch)
+
+    def _lost_in_beams(self, time: float) -> float:
+        """Trapezoid of the dampers' power since the reading before, J."""
+        read, power = self._model.assembly.system.GetObjectOutput, 0.0
+        for damper, matrix in self._model.assembly.dampers:
+            rate = np.concatenate([read(damper, _VELOCITY), read(damper, _ANGULAR_VELOCITY)])
+            power += float(rate @ matrix @ rate)
+        before, self._damped = self._damped, (time, power)
+        return 0.0 if before is None else 0.5 * (power + before[1]) * (time - before[0])
+
+    def _gap(self, position: Array) -> float:
+        """Largest distance of points that a joint holds together, m."""
+        pins = position[self._pins[:, 0]] - position[self._pins[:, 1]]
+        turn = quaternions.axes_of(position[self._bar[3:]][None])[0]
+        hanging = position[self._bar[:3]] - self._model.truss.axis_length * turn[:, 1]
+        ends = (position[self._lower_end] - hanging)[None]
+        fixed = position[self._fixed] - self._fixed_at
+        return float(np.linalg.norm(np.concatenate([pins, ends, fixed]), axis=1).max())
