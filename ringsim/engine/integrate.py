@@ -18,13 +18,15 @@ from ringsim.engine.joints import latch
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import JointGroup, Openings, State
 from ringsim.engine.settings import solver_settings
-from ringsim.engine.stepping import StepControl
+from ringsim.engine.stepping import StepControl, StopContact
 from ringsim.engine.stress import StressMeter
 from ringsim.scene import Scene
 from ringsim.theory.ideal_ring import IdealRing
 from ringsim.variables import Status
 
 Array = NDArray[np.float64]
+_NEAR = 0.1
+"""A locked V-joint counts as resting on its stop within this angle of it, rad."""
 
 
 @dataclass
@@ -151,12 +153,7 @@ class Integration:
         self._note_locks(angles, time)
         if time >= self._settled_at or self._finished(time):
             return False
-        self._steps.advance(
-            time,
-            float(np.mean(rates)),
-            to_stop=self._time_to_stop(angles, rates),
-            in_contact=bool(np.any(self._locked & (angles > math.pi - 0.1))),
-        )
+        self._steps.advance(time, float(np.mean(rates)), self._stop_contact(angles, rates))
         return True
 
     def _read(self, time: float) -> bool:
@@ -229,8 +226,8 @@ class Integration:
             )
         return True
 
-    def _time_to_stop(self, angles: Array, rates: Array) -> float:
-        """Time until the first V-joint meets a stop at its present rate."""
+    def _stop_contact(self, angles: Array, rates: Array) -> StopContact:
+        """V-joints that are about to meet a stop, and those that rest on one."""
         stop = self._scene.stop
         stowed = 0.0 if stop is None else math.radians(stop.stowed_angle)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -238,7 +235,14 @@ class Integration:
             folding = np.where(
                 (rates < 0.0) & (angles > stowed), (stowed - angles) / rates, math.inf
             )
-        return float(min(opening.min(), folding.min()))
+        waiting = np.minimum(opening, folding)
+        first = np.unravel_index(int(np.argmin(waiting)), waiting.shape)
+        resting = self._locked & (angles > math.pi - _NEAR)
+        return StopContact(
+            time_to_next=float(waiting[first]),
+            rate_of_next=float(abs(rates[first])),
+            resting_rate=float(np.max(np.abs(rates), where=resting, initial=0.0)),
+        )
 
     def _explain(self, error: Exception) -> str:
         time = self.history.times[-1]

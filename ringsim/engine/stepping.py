@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from typing import NamedTuple
 
 from ringsim.parts.solver import Solver
 
@@ -15,8 +16,27 @@ _FINEST = 400.0
 """The motion alone asks for no step below ``step`` over this."""
 _FILTERED = 1e-4
 """Below this tolerance the readings that the step follows stay as far apart as at it."""
+_DEPTH = math.radians(0.05)
+"""Angle by which a V-joint may pass its stop within one step, at the tolerance 1e-4."""
 _FIRST = 20.0
 """The first step is ``step`` over this."""
+
+
+class StopContact(NamedTuple):
+    """V-joints at their stops: what is coming and what is there.
+
+    Attributes
+    ----------
+    time_to_next, rate_of_next
+        Time until the first free V-joint meets a stop at its present rate, and that rate; s
+        (infinite if none will) and rad/s.
+    resting_rate
+        Largest rate of a V-joint that has locked and is near its stop, rad/s; 0 if none is.
+    """
+
+    time_to_next: float
+    rate_of_next: float
+    resting_rate: float
 
 
 class StepControl:
@@ -28,8 +48,8 @@ class StepControl:
     vibrate; a rate below ``usual_rate``, the mean rate to be expected of the run, counts as that
     much, or the tremor of a ring that hardly moves yet would ask for tiny steps.  The ratio
     |a'''| / |a'| fades over its own time scale, so that a passage of a''' through zero does
-    not open the step.  Towards the end of the travel the step shrinks
-    so that the stop is met with a small one.
+    not open the step.  Towards the end of the travel the step shrinks so that a V-joint meets its
+    stop with a small one, the smaller the faster it comes, and so it stays until it rests.
     """
 
     def __init__(self, solver: Solver, contact_step: float, usual_rate: float) -> None:
@@ -42,29 +62,32 @@ class StepControl:
         self._stride = max(1.0, math.sqrt(_FILTERED / solver.tolerance))
         self.step = solver.step if solver.step_control == "constant" else solver.step / _FIRST
 
-    def advance(self, time: float, rate: float, *, to_stop: float, in_contact: bool) -> float:
+    def advance(self, time: float, rate: float, stops: StopContact) -> float:
         """The next step in s.
 
         Parameters
         ----------
         time, rate
             End of the step just taken and the mean opening rate there, s and rad/s.
-        to_stop
-            Estimated time until the next V-joint meets a stop, s; infinite if none will.
-        in_contact
-            Whether a V-joint is at its stop now.
+        stops
+            Which V-joints are about to meet a stop or rest on one, and how fast they move.
 
         """
         self._past.append((time, rate))
         if self._solver.step_control == "constant":
             return self.step
         wanted = max(self._from_motion(), self._least)
-        if in_contact:
-            wanted = self._contact
-        elif math.isfinite(to_stop):
-            wanted = min(wanted, max(0.5 * to_stop, self._contact))
+        if stops.resting_rate > 0.0:
+            wanted = max(min(wanted, self._gentle(stops.resting_rate)), self._contact)
+        if math.isfinite(stops.time_to_next):
+            meeting = max(self._gentle(stops.rate_of_next), self._contact)
+            wanted = min(wanted, max(0.5 * stops.time_to_next, meeting))
         self.step = min(wanted, GROWTH * self.step, self._solver.step)
         return self.step
+
+    def _gentle(self, rate: float) -> float:
+        """Step in which a V-joint at this rate goes no deeper than allowed into its stop."""
+        return _DEPTH * math.sqrt(self._solver.tolerance / 1e-4) / rate
 
     def _from_motion(self) -> float:
         t2, r2 = self._past[-1]
