@@ -42,7 +42,8 @@ class Column:
     path
         Scene path that the values are written to.
     dim
-        Second dimension of ``values``, or empty.
+        Second dimension of ``values``, or empty: "section", or "place_k" for lists of another
+        length k.
     units
         SI unit of the field.
     origin
@@ -156,7 +157,8 @@ def _column(
     scene = base.with_values({path: first})
     dim = ""
     if values.ndim == 2:
-        dim = "section" if values.shape[1] == scene.structure.sections else "corner"
+        count = values.shape[1]
+        dim = "section" if count == scene.structure.sections else f"place_{count}"
     name = path.replace(".", "_").replace("[", "_").removesuffix("]")
     words = "listed in a file" if origin is None else origin.model_dump_json(exclude_none=True)
     found = field_at(scene, path)
