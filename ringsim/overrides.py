@@ -45,7 +45,8 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
 
     A step through a part that is not there creates it.  A last step ``name[k]`` is the value of
     section k, counted from 1; a field that had one value for all becomes a list first.  The
-    value "none" (or None) removes a part, and puts the default back in any other field.
+    value "none" (or None) removes a part, and puts the default back in any other field but
+    ``kind``, where "none" is a word like others.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
         raise InputError(f"{path}: {last!r} is not a field name, or one with its section: name[1]")
     if section is not None:
         _set_section(table, name, section, value, length, path)
-    elif value is None or value == LEFT_OUT:
+    elif value is None or (value == LEFT_OUT and name != "kind"):
         _remove(table, name)
     else:
         table[name] = value

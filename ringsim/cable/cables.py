@@ -27,6 +27,7 @@ class Cables(Model):
     winch_distance: Metre = 0.3
     """From the winch to the first pulley, along the boom (paper 000: the first span does not
     change its length)."""
+
     @model_validator(mode="after")
     def _any(self) -> Cables:
         if self.upper is None and self.lower is None:
