@@ -11,11 +11,13 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ringsim.parts.structure.pantograph_ring import PantographRing
+from ringsim.parts.structure.planar_truss import PlanarTruss
 from ringsim.plots import style
 from ringsim.plots.asynchrony import asynchrony
 from ringsim.plots.diagonal_stress import diagonal_stress
 from ringsim.plots.energy import energy
 from ringsim.plots.opening_angles import opening_angles
+from ringsim.plots.planar_truss import strain_over_length, tension_over_length
 from ringsim.plots.ring import ring
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
@@ -27,16 +29,24 @@ class _Picture:
     draw: Callable[[xr.Dataset], Figure]
     needs: tuple[str, ...]
     """Variables that must be recorded at one time at least."""
-    ring_only: bool = False
 
 
+_ENERGY = _Picture("energy", energy, ("work", "kinetic_energy", "elastic_energy", "dissipation"))
 PICTURES = (
     _Picture("opening_angles", opening_angles, ("opening_angle",)),
     _Picture("asynchrony", asynchrony, ("asynchrony",)),
     _Picture("diagonal_stress", diagonal_stress, ("rod_stress",)),
-    _Picture("ring", ring, ("opening_angle",), ring_only=True),
-    _Picture("energy", energy, ("work", "kinetic_energy", "elastic_energy", "dissipation")),
+    _Picture("ring", ring, ("opening_angle",)),
+    _ENERGY,
 )
+"""Of a ring."""
+TRUSS_PICTURES = (
+    _Picture("tension", tension_over_length, ("cable_tension", "cable_length")),
+    _Picture("bending_strain", strain_over_length, ("bending_strain", "cable_length")),
+    _ENERGY,
+)
+"""Of a planar truss."""
+_OF_KIND = {PantographRing: PICTURES, PlanarTruss: TRUSS_PICTURES}
 
 
 def draw_run(dataset: xr.Dataset, folder: str | Path) -> list[Path]:
@@ -63,21 +73,21 @@ def draw_run(dataset: xr.Dataset, folder: str | Path) -> list[Path]:
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for picture in PICTURES:
-            if _applies(picture, dataset):
-                path = folder / f"{picture.name}.png"
-                style.write(picture.draw(dataset), path)
-                written.append(path)
+        for picture in _pictures(dataset):
+            path = folder / f"{picture.name}.png"
+            style.write(picture.draw(dataset), path)
+            written.append(path)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from error
     return written
 
 
-def _applies(picture: _Picture, dataset: xr.Dataset) -> bool:
-    recorded = all(
-        name in dataset and bool(np.isfinite(dataset[name]).any()) for name in picture.needs
-    )
-    if not (recorded and picture.ring_only):
-        return recorded
+def _pictures(dataset: xr.Dataset) -> tuple[_Picture, ...]:
+    """The pictures of the run's kind of structure for which something was recorded."""
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
-    return isinstance(scene.structure, PantographRing)
+    pictures = _OF_KIND[type(scene.structure)]
+    return tuple(picture for picture in pictures if _recorded(picture, dataset))
+
+
+def _recorded(picture: _Picture, dataset: xr.Dataset) -> bool:
+    return all(name in dataset and bool(np.isfinite(dataset[name]).any()) for name in picture.needs)
