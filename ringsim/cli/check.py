@@ -11,6 +11,8 @@ from ringsim.choice import kind_of
 from ringsim.geometry.mobility import internal_mobility
 from ringsim.geometry.ring import RingGeometry
 from ringsim.overrides import parse_assignment
+from ringsim.parts.structure.pantograph_ring import PantographRing
+from ringsim.parts.structure.planar_truss import PlanarTruss
 from ringsim.refusal import show
 from ringsim.scene import Scene, load_scene
 from ringsim.units import Model
@@ -51,23 +53,8 @@ def command(scene: str, assignments: tuple[str, ...], time: float | None) -> Non
 
 def summary(scene: Scene) -> list[tuple[str, str]]:
     """What a scene builds, as pairs of a label and a text."""
-    structure, rods = scene.structure, scene.rods
-    geometry = structure.geometry()
-    sections, corners = geometry.sections, len(geometry.plan)
-    shape = "closed ring" if geometry.closed else f"open arc of a {structure.polygon}-gon"
-    masses = _masses(scene)
-    lines = [
-        ("scene", f"{scene.name}: {scene.title}" if scene.title else scene.name),
-        ("structure", f"{kind_of(structure)}, {shape}, {_count(sections, 'section')}"),
-        ("polygon", _polygon(geometry)),
-        ("deployed", _size(geometry, 0.0)),
-        ("initial", f"{_size(geometry, structure.initial_phi)} at {structure.opening_angle} deg"),
-        ("rods", f"{6 * sections} {kind_of(rods)} ({_count(rods.elements, 'element')} a rod half)"),
-        ("points", f"{2 * corners} hinge assemblies, {2 * sections} V-joints, {sections} pivots"),
-        ("joints", f"{11 * sections} revolutes"),
-        ("mobility", _mobility(geometry, structure.initial_phi)),
-        ("mass", f"{sum(masses.values()):.4g} kg: {_listed(masses)}"),
-    ]
+    lines = [("scene", f"{scene.name}: {scene.title}" if scene.title else scene.name)]
+    lines += _OF_KIND[type(scene.structure)](scene)
     for name in sorted(type(scene).parts()):
         part = getattr(scene, name)
         if part is not None:
@@ -78,6 +65,53 @@ def summary(scene: Scene) -> list[tuple[str, str]]:
     lines.append(("left out", ", ".join(_left_out(scene)) or "nothing"))
     lines.append(("solver", _fields(scene.solver)))
     return lines
+
+
+def _of_ring(scene: Scene) -> list[tuple[str, str]]:
+    structure, rods = scene.structure, scene.rods
+    geometry = structure.geometry()
+    sections, corners = geometry.sections, len(geometry.plan)
+    shape = "closed ring" if geometry.closed else f"open arc of a {structure.polygon}-gon"
+    masses = _masses(scene)
+    return [
+        ("structure", f"{kind_of(structure)}, {shape}, {_count(sections, 'section')}"),
+        ("polygon", _polygon(geometry)),
+        ("deployed", _size(geometry, 0.0)),
+        ("initial", f"{_size(geometry, structure.initial_phi)} at {structure.opening_angle} deg"),
+        ("rods", f"{6 * sections} {kind_of(rods)} ({_count(rods.elements, 'element')} a rod half)"),
+        ("points", f"{2 * corners} hinge assemblies, {2 * sections} V-joints, {sections} pivots"),
+        ("joints", f"{11 * sections} revolutes"),
+        ("mobility", _mobility(geometry, structure.initial_phi)),
+        ("mass", f"{sum(masses.values()):.4g} kg: {_listed(masses)}"),
+    ]
+
+
+def _of_planar_truss(scene: Scene) -> list[tuple[str, str]]:
+    truss, rods = scene.structure, scene.rods
+    assert isinstance(truss, PlanarTruss)
+    geometry = truss.geometry()
+    ends = [truss.initial_angle, truss.stowed_angle]
+    cable, strut = geometry.cable(ends), geometry.strut(ends)
+    angles = [math.degrees(angle) for angle in ends]
+    tubes = rods.diagonal.area + truss.strut_inner.area
+    masses = {
+        "axis": rods.density * truss.axis.area * truss.axis_length,
+        "beams": 2 * rods.density * rods.bar.area * truss.beam_length,
+        "synchronising beam": rods.density * truss.bar_width * truss.bar_depth * truss.axis_length,
+        "strut": rods.density * tubes * truss.strut_tube_length,
+    }
+    return [
+        ("structure", f"{kind_of(truss)}, two beams of {truss.beam_length} m"),
+        ("initial", f"{angles[0]:.4g} deg, {cable[0]:.4g} m of cable, strut {strut[0]:.4g} m"),
+        ("at its rest", f"{angles[1]:.4g} deg, {cable[1]:.4g} m of cable, strut {strut[1]:.4g} m"),
+        ("rods", f"2 {kind_of(rods)} ({2 * rods.elements} and 2 elements)"),
+        ("joints", "6 revolutes, 1 prismatic joint"),
+        ("mobility", "1 internal degree of freedom with rigid beams"),
+        ("mass", f"{sum(masses.values()):.4g} kg: {_listed(masses)}"),
+    ]
+
+
+_OF_KIND = {PantographRing: _of_ring, PlanarTruss: _of_planar_truss}
 
 
 def _count(number: int, noun: str) -> str:
