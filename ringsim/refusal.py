@@ -150,7 +150,7 @@ def _walk(
             continue
         else:
             owner = inside[0] if inside else None
-            field = None
+            field = field if field is not None and _is_table(field) else None
             path.append(str(step))
     return path, owner, field
 
@@ -160,15 +160,23 @@ def _kinds(field: FieldInfo | None) -> list[str]:
     return [str(_tag(model)) for model in models if _tag(model) is not None]
 
 
+def _is_table(field: FieldInfo) -> bool:
+    """Whether the field holds values by free names."""
+    return typing.get_origin(field.annotation) is dict
+
+
 def _tag(model: type[BaseModel]) -> Any:
     kind = model.model_fields.get("kind")
     return kind.default if kind is not None else None
 
 
+_NESTING = (typing.Union, types.UnionType, typing.Annotated, tuple, list, dict)
+
+
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    if typing.get_origin(annotation) in (typing.Union, types.UnionType, typing.Annotated, tuple):
+    if typing.get_origin(annotation) in _NESTING:
         return [m for part in typing.get_args(annotation) for m in _models_in(part)]
     return []
 

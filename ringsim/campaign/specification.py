@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationError
 
 from ringsim.execution.work import Limits, Retry
-from ringsim.refusal import InputError, explain
+from ringsim.refusal import InputError, explain, known_or_nearest
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.table import AnyDesign, AnyDistribution, Table, draw
 from ringsim.scene import Scene, builtin_scenes, load_scene
@@ -133,8 +133,14 @@ def load_campaign(path: Path) -> Campaign:
         specification = Specification.model_validate(table)
     except ValidationError as error:
         raise InputError(explain(error, Specification, path.name)) from None
-    name = specification.scene
-    base = load_scene(name if name in builtin_scenes() else path.parent / name)
+    name, builtin = specification.scene, builtin_scenes()
+    beside = path.parent / name
+    if name not in builtin and not beside.is_file():
+        raise InputError(
+            f"{path.name}: scene = {name!r}: there is no file {beside}, and no built-in scene of "
+            f"that name ({known_or_nearest(name, builtin)})"
+        )
+    base = load_scene(name if name in builtin else beside)
     try:
         scene = base.with_values(specification.set)
     except InputError as error:

@@ -1,0 +1,163 @@
+"""Campaign files: what is read from them, and one clear line for each mistake."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ringsim.campaign.specification import load_campaign
+from ringsim.execution.cost import longest_first, relative_cost
+from ringsim.refusal import InputError
+
+ROOT = Path(__file__).parents[2]
+GOOD = """
+name = "good"
+seed = 3
+scene = "ring18"
+design = { kind = "random", samples = 4 }
+[set]
+boom = "none"
+structure.sections = 6
+[inputs]
+rods.young_modulus = { kind = "normal", mean = 120e9, standard_deviation = 6e9 }
+"loads.force" = { kind = "uniform", low = 0.01, high = 0.02 }
+"""
+
+
+def loaded(folder, text=GOOD):
+    path = folder / "good.toml"
+    path.write_text(text)
+    return load_campaign(path)
+
+
+def test_paths_may_be_quoted_or_nested(tmp_path):
+    campaign = loaded(tmp_path)
+    assert campaign.scene.structure.sections == 6
+    assert campaign.scene.boom is None
+    assert list(campaign.specification.inputs) == ["rods.young_modulus", "loads.force"]
+
+
+def test_scene_file_is_looked_up_beside_the_campaign_file(tmp_path):
+    scene = loaded(tmp_path).scene
+    (tmp_path / "mine.toml").write_text(scene.to_toml())
+    again = loaded(tmp_path, GOOD.replace('"ring18"', '"mine.toml"'))
+    assert again.scene == scene
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "campaigns").glob("*.toml")), ids=lambda p: p.stem)
+def test_shipped_campaigns_can_be_drawn(file):
+    campaign = load_campaign(file)
+    assert campaign.draw().samples >= 1
+
+
+def test_example_in_the_readme_can_be_drawn(tmp_path):
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r'```toml\n(name = "study".*?)```', readme, re.DOTALL)
+    assert loaded(tmp_path, example).draw().samples == 256
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("seed = 3", "sead = 3", r"sead is not a known key \(did you mean seed\?\)"),
+        ("seed = 3", "seed = -3", "seed = -3 must be at least 0"),
+        ("seed = 3", "seed = 3.5", "whole number"),
+        ('name = "good"', 'name = "a/b"', "name"),
+        ('"ring18"', '"ring19"', "there is no file.*did you mean ring18"),
+        ('kind = "random"', 'kind = "randon"', "did you mean random"),
+        ("samples = 4", "samples = 0", r"design\.samples = 0 must be at least 1"),
+        ("samples = 4", "sample = 4", "sample"),
+        ('kind = "normal"', 'kind = "norm"', "did you mean normal"),
+        ("mean = 120e9, ", "", "mean is missing"),
+        ("structure.sections = 6", "structure.section = 6", "structure.section is not a known key"),
+        ('boom = "none"', "boom = 3", "boom"),
+        ("low = 0.01", "low = 0.03", "must be below high"),
+        ("[set]", "[set", "not valid TOML"),
+        ("[inputs]", "[limits]\ntimeout = 0\n[inputs]", r"limits\.timeout = 0 s must be at least"),
+        ("[inputs]", "[limits]\nmemory = 1\n[inputs]", r"limits\.memory"),
+        ("[inputs]", "[retry]\nstep_factor = 2\n[inputs]", "step_factor = 2"),
+        ("[inputs]", "[output]\ncompression = 10\n[inputs]", "compression = 10"),
+        ("seed = 3", "seed = 3\nmax_failed = -1", "max_failed = -1"),
+    ],
+)
+def test_mistakes_are_refused_in_one_line(old, new, words, tmp_path):
+    with pytest.raises(InputError, match=words) as refusal:
+        loaded(tmp_path, GOOD.replace(old, new)).draw()
+    assert "\n" not in str(refusal.value)
+    assert str(refusal.value).startswith("good.toml: ")
+
+
+@pytest.mark.parametrize("part", ["0/2", "3/2", "2", "a/b", "-1/2", "1/0"])
+def test_senseless_parts_are_refused(part, bench):
+    printed = bench.run("campaign", bench.write(2), "--part", part, code=2)
+    assert "must read i/n" in printed
+
+
+def test_unknown_output_variable_is_refused(bench):
+    file = bench.write(2, more='[output]\nleave_out = ["opening_angel"]')
+    printed = bench.run("campaign", file, "--workers", 0, "--out", "out", code=2)
+    assert "opening_angel is not an output variable" in printed
+
+
+def test_output_is_rounded_and_left_out_where_asked(bench):
+    more = '[output]\nleave_out = ["lock_time"]\nsignificant_digits = { opening_angle = 4 }\n'
+    exact, rough = bench.write(4), bench.write(4, more=more, name="rough.toml")
+    bench.run("campaign", exact, "--workers", 0, "--out", "exact")
+    bench.run("campaign", rough, "--workers", 0, "--out", "rough")
+    exact, rough = bench.result("exact"), bench.result("rough")
+    assert "lock_time" in exact
+    assert "lock_time" not in rough
+    np.testing.assert_allclose(rough.opening_angle, exact.opening_angle, rtol=5e-4)
+    assert not np.array_equal(rough.opening_angle, exact.opening_angle, equal_nan=True)
+    np.testing.assert_array_equal(rough.deployment_time, exact.deployment_time)
+    sizes = [(bench.folder / out / "campaign.nc").stat().st_size for out in ("rough", "exact")]
+    assert sizes[0] < sizes[1]
+
+
+def test_dry_run_tells_the_plan_and_keeps_nothing(bench):
+    printed = bench.run("campaign", bench.write(16), "--workers", 2, "--dry-run", "--out", "out")
+    assert "16 to run here" in printed
+    assert "from a trial run of sample" in printed
+    assert "rods.young_modulus" in printed
+    assert not (bench.folder / "out").exists()
+    bench.run("campaign", bench.write(16), "--workers", 2, "--out", "out")
+    printed = bench.run("campaign", bench.write(20), "--dry-run", "--out", "out")
+    assert "4 to run here" in printed
+    assert "from 16 samples that are done" in printed
+
+
+def test_replay_gives_the_stored_result_and_saves_it(bench):
+    bench.run("campaign", bench.write(4), "--workers", 2, "--out", "out")
+    printed = bench.run("replay", "out", 2, "--save", "two.nc")
+    assert "identical to the stored result" in printed
+    assert (bench.folder / "two.nc").exists()
+    assert "young_modulus" in bench.run("replay", "out", 2, "--scene")
+    assert "choose one from 0 to 3" in bench.run("replay", "out", 4, code=2)
+    assert "no campaign in this folder" in bench.run("replay", "absent", 0, code=2)
+
+
+def test_long_runs_come_first(tmp_path):
+    text = GOOD + 'rods.elements = { kind = "discrete", values = [1, 2, 4] }\n'
+    campaign = loaded(tmp_path, text.replace("samples = 4", "samples = 30"))
+    table = campaign.draw()
+    cost = relative_cost(table, campaign.scene)
+    elements = next(c.values for c in table.columns if c.path == "rods.elements")
+    order = longest_first(np.arange(30), cost)
+    assert sorted(order) == list(range(30))
+    assert elements[order[0]] == 4
+    assert elements[order[-1]] == 1
+    assert cost.mean() == pytest.approx(1.0)
+    assert longest_first(np.array([4, 2, 9]), np.ones(10)) == [4, 2, 9]
+
+
+@pytest.mark.skipif(shutil.which("ncdump") is None, reason="there is no ncdump")
+def test_file_opens_in_ncdump(bench):
+    bench.run("campaign", bench.write(2), "--workers", 0, "--out", "out")
+    path = bench.folder / "out" / "campaign.nc"
+    header = subprocess.run(["ncdump", "-h", path], capture_output=True, text=True, check=True)
+    assert 'sample:standard_name = "realization"' in header.stdout
