@@ -103,7 +103,8 @@ class Assembly:
                 centerOfMass=[0.0, 0.0, 0.0] if centre is None else list(centre),
             )
         )
-        self.bodies.append(body)
+        if mass > 0.0:
+            self.bodies.append(body)
         return body
 
     def body_marker(self, body: Any, place: Array, axes: Array | None = None) -> Any:

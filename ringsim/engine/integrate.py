@@ -108,6 +108,10 @@ class Integration:
             if history.status != Status.DIVERGED:
                 history.status = Status.SOLVER_FAILED
                 history.reason = self._explain(error)
+        if history.status == Status.UNFINISHED and not history.reason:
+            # exudyn may give up without raising anything.
+            history.status = Status.SOLVER_FAILED
+            history.reason = self._explain(RuntimeError("it stopped before the end"))
         history.newton_iterations = int(solver.it.newtonStepsCount)
         history.jacobians = int(solver.it.newtonJacobiCount)
         return history

@@ -92,6 +92,8 @@ def scene_tables(draw: st.DrawFn) -> dict[str, Any]:
         "loads": {"force": each(-1e3, 1e3)} if draw(st.booleans()) else None,
         "record": {"stress": draw(st.booleans()), "interval": draw(st.floats(0.01, 1.0))},
     }
+    if table["rods"]["kind"] == "ancf":
+        table["record"]["stress"] = False
     if table["net"] is not None:
         table["net"]["stiffness"] = each(0.0, 1e3, sections if closed else sections + 1)
     return without_none(table)
