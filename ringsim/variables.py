@@ -32,6 +32,13 @@ class Status(IntEnum):
         return self >= Status.SOLVER_FAILED
 
 
+class Fidelity(IntEnum):
+    """Which model answered: the full multibody model, or the ideal ring with rigid rods."""
+
+    FULL = 0
+    IDEAL = 1
+
+
 @dataclass(frozen=True)
 class Variable:
     """Name, dimensions, SI unit (or degree where said) and meaning of one variable."""
@@ -86,7 +93,7 @@ _ALL = (
         needs="cables",
     ),
     Variable("wound_length", ("plane", "time"), "m", "rope wound up by the cable's winches"),
-    Variable("cable_length", ("plane", "time"), "m", "driving cable from the lower joint on"),
+    Variable("cable_length", ("plane", "time"), "m", "length of the driving cable"),
     Variable(
         "bending_strain", ("station", "time"), "1", "bending strain of the upper beam's fibre"
     ),
@@ -108,6 +115,7 @@ _ALL = (
     Variable("newton_iterations", (), "1", "Newton iterations", "i4"),
     Variable("jacobians", (), "1", "Jacobian factorisations", "i4"),
     Variable("final_time", (), "s", "time at which the run ended"),
+    Variable("fidelity", (), "1", "model: 0 full multibody, 1 ideal ring of rigid rods", "i4"),
     Variable("status", (), "1", "how the run ended", "i1"),
     Variable("wall_time", (), "s", "elapsed time of the run"),
     Variable("cpu_time", (), "s", "processor time of the run"),
