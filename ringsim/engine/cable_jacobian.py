@@ -84,9 +84,19 @@ class JacobianPattern:
         return np.stack([every, every, self._ones], axis=1)
 
     def triplets(
-        self, state: ChainState, placed: Placed, by_q: float, by_rate: float, *, exact: bool
+        self,
+        state: ChainState,
+        placed: Placed,
+        by_q: float,
+        by_rate: float,
+        *,
+        exact: bool,
+        left: Array | None = None,
     ) -> Array:
-        """All entries as (row, column, value), shape (entries, 3)."""
+        """All entries as (row, column, value), shape (entries, 3).
+
+        ``left`` is the share of each rope's stiffness that its winches do not answer.
+        """
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
         units = state.directions[self._span]
         values = [-maps, np.einsum("lij,li->lj", maps, units)]
@@ -95,7 +105,8 @@ class JacobianPattern:
         for rope, tangent in enumerate(tangents(state, placed.velocities)):
             spans = slice(state.ropes.starts[rope], state.ropes.ends[rope])
             directions[spans] = tangent.by_direction
-            entries = self._rope(state, tangent, rope, by_q, by_rate, exact=exact)
+            share = 1.0 if left is None else float(left[rope])
+            entries = self._rope(state, tangent, rope, by_q, by_rate, exact=exact, left=share)
             if exact:
                 entries += self._swinging(placed, tangent, spans, by_q)
             for place, block in entries:
@@ -117,13 +128,14 @@ class JacobianPattern:
         by_rate: float,
         *,
         exact: bool,
+        left: float,
     ) -> list[tuple[tuple[NDArray[np.int64], NDArray[np.int64]], Array]]:
         """How a rope's span tensions follow its mean tension and the differences of its points."""
         spans = np.arange(state.ropes.starts[rope], state.ropes.ends[rope])
         tension, difference = self._tension(spans)[:, None], self._difference(spans).reshape(1, -1)
         shares = state.shares[spans]
         largest = int(np.argmax(shares))
-        by_mean = (tangent.by_mean[largest] / shares[largest]).ravel()
+        by_mean = left * (tangent.by_mean[largest] / shares[largest]).ravel()
         viscous = state.viscous_slope(rope) * tangent.directions.ravel()
         decay = by_q * tangent.by_share + by_rate * (
             tangent.by_velocity - shares[:, None, None] * viscous.reshape(-1, 3)

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from ringsim.cable.cables import Cables
 from ringsim.cable.chain import Chain
-from ringsim.cable.records import Winch
 from ringsim.cable.state import ChainState
-from ringsim.cable.winding.family import WinchState
 from ringsim.engine.cable_jacobian import JacobianPattern, auxiliary_unknowns
 from ringsim.engine.cable_path import WIDTH, CablePath, Carrier, Placed
+from ringsim.engine.winches import Winches
 
 Array = NDArray[np.float64]
 
@@ -31,6 +30,8 @@ class CableDrive:
     ----------
     chain, ropes
         See ringsim.cable.
+    winches
+        What winds them.
     planes
         Plane of each cable.
     refusal
@@ -46,12 +47,7 @@ class CableDrive:
         self._reference = self._gather_reference()
         start = self.path.place(self._reference, np.zeros_like(self._reference))
         self.ropes = self.chain.start(start.points)
-        self.winches: list[tuple[int, int, Winch]] = [
-            (number, end, winch)
-            for number, (_, cable) in enumerate(present)
-            for end, winch in enumerate(cable.winches)
-        ]
-        self._winch_states = [WinchState() for _ in self.winches]
+        self.winches = Winches(self.chain.cables)
         self._size = len(self.path.nodes) * WIDTH
         most_ropes = len(present) + len(model.scene.faults)
         self.auxiliary = auxiliary_unknowns(self.ropes.spans, most_ropes)
@@ -63,35 +59,37 @@ class CableDrive:
     def evaluate(self, coordinates: Array, rates: Array, time: float) -> tuple[ChainState, Placed]:
         """The chain from the nodes' total coordinates and rates, shape (nodes, 7)."""
         placed = self.path.place(coordinates, rates)
-        wound, wound_rate = self.wound(time)
+        wound, wound_rate = self.winches.at(time, self.ropes, *self._paths(placed))
         state = self.chain.state(self.ropes, placed.points, placed.velocities, wound, wound_rate)
         return state, placed
 
-    def wound(self, time: float) -> tuple[Array, Array]:
-        """Rope wound and its rate at both ends of each cable, shape (cables, 2)."""
-        wound, rate = np.zeros((len(self.planes), 2)), np.zeros((len(self.planes), 2))
-        for (number, end, winch), held in zip(self.winches, self._winch_states, strict=True):
-            state = winch.at(time, held)
-            wound[number, end], rate[number, end] = state.wound, state.speed
-        return wound, rate
+    def _paths(self, placed: Placed) -> tuple[Array | None, Array | None]:
+        """Path of each rope and its rate, m and m/s, if a winch asks for them."""
+        if not self.winches.answering:
+            return None, None
+        ropes = self.ropes
+        apart = placed.points[ropes.far] - placed.points[ropes.near]
+        moving = placed.velocities[ropes.far] - placed.velocities[ropes.near]
+        lengths = np.sqrt(np.einsum("ij,ij->i", apart, apart))
+        rates = np.einsum("ij,ij->i", apart, moving) / lengths
+        return np.add.reduceat(lengths, ropes.starts), np.add.reduceat(rates, ropes.starts)
 
     def advance(self, time: float, duration: float, state: ChainState, slopes: Array) -> None:
-        """Let the winches choose their speed for the next step.
+        """Let the winches begin the next step.
 
         Parameters
         ----------
         slopes
             Derivative of each cable's ideal path length after the opening angle, m/rad.
         """
-        self._winch_states = [
-            winch.advance(
-                time,
-                duration,
-                state.reading(number, end, float(slopes[number])) if winch.feedback else None,
-                held,
-            )
-            for (number, end, winch), held in zip(self.winches, self._winch_states, strict=True)
-        ]
+        del duration
+        self.winches.advance(time, state, slopes)
+
+    def _left(self, state: ChainState, time: float) -> Array | None:
+        """Share of the material stiffness that the winches leave to each rope; None for all."""
+        if not self.winches.answering:
+            return None
+        return self.winches.stiffness_left(time, self.ropes, state.paths, state.path_rates)
 
     def current(self, position: Array, velocity: Array, time: float) -> ChainState:
         """The chain at a state of the whole system (total coordinates)."""
@@ -157,8 +155,14 @@ class CableDrive:
         try:
             with np.errstate(all="ignore"):
                 state, placed = self.evaluate(*self._split(q, q_t), t)
-                exact = self.exact_tangent
-                triplets = self.pattern.triplets(state, placed, by_q, by_rate, exact=exact)
+                triplets = self.pattern.triplets(
+                    state,
+                    placed,
+                    by_q,
+                    by_rate,
+                    exact=self.exact_tangent,
+                    left=self._left(state, t),
+                )
         except ValueError as error:
             self.refusal = str(error)
             triplets = self.pattern.empty()

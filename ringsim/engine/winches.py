@@ -1,0 +1,189 @@
+"""The winches of all cables, turning within every Newton iteration.
+
+A prescribed law knows its rope at any time.  A law with feedback answers to the tension at the
+end of the step, which depends on the rope wound during the step and on where the structure gets
+to: with V the speed of all such winches of a rope, h the time into the step, S its path and M its
+natural length without V,
+
+    V = sum_i command_i(r_i q(y)),   y = EA (S / (M - V h) - 1 + t_d de/dt),
+
+r_i the ratio of the tension at a winch to the rope's mean tension, taken from the step before.
+Commands fall with the tension and y grows with V, so there is one solution for any EA and step.
+A law that follows the structure knows the path taken up so far in the step, S_0 - S, not the rate
+at its start: its tension then answers to its own correction alone, whatever the structure does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from ringsim.cable.records import Cable, Winch
+from ringsim.cable.ropes import Ropes
+from ringsim.cable.slack import tension
+from ringsim.cable.state import ChainState
+from ringsim.cable.winding.family import FeedbackWinding, WinchReading, WinchState
+
+Array = NDArray[np.float64]
+_NUDGE = 1e-8
+"""Change of path in m by which the answer of the winches to the structure is measured."""
+
+
+@dataclass(frozen=True)
+class _Member:
+    """A winch with feedback that runs in this step."""
+
+    number: int
+    law: FeedbackWinding
+    reading: WinchReading
+    ratio: float
+
+
+@dataclass(frozen=True)
+class _Rope:
+    """A rope that such winches wind in this step, as it was at the beginning."""
+
+    index: int
+    members: tuple[_Member, ...]
+    start: float
+    path: float
+
+    def speeds(self, time: float, path: float, rate: float, natural: float, rest: float) -> Array:
+        """Speed of every member, m/s.
+
+        Parameters
+        ----------
+        path, rate
+            Path of the rope and its rate, m and m/s.
+        natural
+            Natural length if the members had not wound since the start of the step, m.
+        rest
+            Speed of the other winches on the rope, m/s.
+        """
+        elapsed, count = time - self.start, len(self.members)
+        follow = (path - self.path) / elapsed if elapsed > 0.0 else rate
+        laws = [
+            (m.law, replace(m.reading, path_rate=(follow + rest) / count), m.ratio, m.law.limits())
+            for m in self.members
+        ]
+        material = self.members[0].reading
+        width = np.asarray(material.slack_width)
+
+        def commands(total: float) -> list[float]:
+            left = natural - total * elapsed
+            strain_rate = (rate + path / left * (total + rest)) / left
+            force = material.axial_stiffness * (
+                path / left - 1.0 + material.damping_time * strain_rate
+            )
+            mean = float(tension(np.asarray(force), width))
+            return [
+                min(max(law.command(ratio * mean, reading), limits[0]), limits[1])
+                for law, reading, ratio, limits in laws
+            ]
+
+        low = sum(limits[0] for *_, limits in laws)
+        high = sum(limits[1] for *_, limits in laws)
+        if sum(commands(high)) >= high:
+            total = high
+        elif sum(commands(low)) <= low:
+            total = low
+        else:
+            total = brentq(lambda v: v - sum(commands(v)), low, high, xtol=1e-16, rtol=1e-14)
+        found = np.array(commands(total))
+        # Steep commands amplify the last bits of the total: share these out.
+        return np.asarray(found + (total - found.sum()) / count)
+
+
+class Winches:
+    """Rope wound and speeds at both ends of each cable."""
+
+    def __init__(self, cables: Sequence[Cable]) -> None:
+        self._cables = len(cables)
+        self._winches: list[tuple[int, int, Winch]] = [
+            (number, end, winch)
+            for number, cable in enumerate(cables)
+            for end, winch in enumerate(cable.winches)
+        ]
+        self._held = [WinchState() for _ in self._winches]
+        self._ropes: list[_Rope] = []
+        self._speeds: dict[int, float] = {}
+
+    @property
+    def answering(self) -> bool:
+        """Whether any winch answers to its rope in this step."""
+        return bool(self._ropes)
+
+    def at(
+        self, time: float, ropes: Ropes, paths: Array | None, rates: Array | None
+    ) -> tuple[Array, Array]:
+        """Rope wound (m) and its rate (m/s) at both ends of each cable, shape (cables, 2) each.
+
+        Parameters
+        ----------
+        paths, rates
+            Path of each rope and its rate, m and m/s; not needed if no winch answers.
+        """
+        wound, speed = np.zeros((self._cables, 2)), np.zeros((self._cables, 2))
+        answering = {m.number for rope in self._ropes for m in rope.members}
+        for place, ((number, end, winch), held) in enumerate(
+            zip(self._winches, self._held, strict=True)
+        ):
+            state = WinchState(time, held.wound) if place in answering else winch.at(time, held)
+            wound[number, end], speed[number, end] = state.wound, state.speed
+        if not self._ropes or paths is None or rates is None:
+            return wound, speed
+        natural, rest = ropes.content - ropes.per_rope(wound), ropes.per_rope(speed)
+        for rope in self._ropes:
+            k = rope.index
+            found = rope.speeds(
+                time, float(paths[k]), float(rates[k]), float(natural[k]), float(rest[k])
+            )
+            for member, value in zip(rope.members, found, strict=True):
+                number, end, _ = self._winches[member.number]
+                speed[number, end] = self._speeds[member.number] = float(value)
+                wound[number, end] += float(value) * (time - rope.start)
+        return wound, speed
+
+    def stiffness_left(self, time: float, ropes: Ropes, paths: Array, rates: Array) -> Array:
+        """Share of a change of path that stretches the rope, not answered by its winches."""
+        left = np.ones(len(ropes.starts))
+        near = ropes.per_rope(self.at(time, ropes, paths, rates)[0])
+        for rope in self._ropes:
+            moved = paths.copy()
+            moved[rope.index] += _NUDGE
+            far = ropes.per_rope(self.at(time, ropes, moved, rates)[0])
+            left[rope.index] += (far - near)[rope.index] / _NUDGE
+        return np.clip(left, 0.0, 1.0)
+
+    def advance(self, time: float, state: ChainState, slopes: Array) -> None:
+        """Begin a step at ``time`` (s) in a state of the chain.
+
+        Parameters
+        ----------
+        slopes
+            Derivative of each cable's ideal path length after the opening angle, m/rad.
+        """
+        self._held = [
+            WinchState(time, float(state.wound[number, end]), self._speeds.get(place, 0.0))
+            for place, (number, end, _) in enumerate(self._winches)
+        ]
+        members: dict[int, list[_Member]] = {}
+        for place, (number, end, winch) in enumerate(self._winches):
+            law = winch.winding
+            if not isinstance(law, FeedbackWinding):
+                continue
+            if not winch.turns(time):
+                self._held[place] = WinchState(time, self._held[place].wound, 0.0)
+                continue
+            reading = state.reading(number, end, float(slopes[number]))
+            ratio = reading.tension_ratio(float(state.wound_rate[number, end]))
+            rope = int((state.ropes.last if end else state.ropes.first)[number])
+            members.setdefault(rope, []).append(_Member(place, law, reading, ratio))
+        self._ropes = [
+            _Rope(rope, tuple(found), time, float(state.paths[rope]))
+            for rope, found in members.items()
+        ]
