@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from ringsim.choice import kind_of
 from ringsim.overrides import parse_assignment
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
@@ -38,7 +39,10 @@ def command(
     chosen = load_scene(scene)
     if settings:
         chosen = chosen.with_values(dict(parse_assignment(text) for text in settings))
-    if plot and chosen.rods.kind != "ancf":
+    if fidelity == "ideal" and chosen.record.stress:
+        chosen = chosen.with_values({"record.stress": False})
+        click.echo("stress is left out: the rods of the ideal ring are rigid")
+    elif plot and fidelity == "full" and kind_of(chosen.rods) != "ancf":
         chosen = chosen.with_values({"record.stress": True})
     target = out if out is not None else Path(f"{chosen.name}.nc")
 
