@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import types
 import typing
 from dataclasses import dataclass
@@ -60,6 +61,7 @@ class Model(BaseModel):
         return table
 
     @classmethod
+    @functools.cache
     def parts(cls) -> frozenset[str]:
         """Names of the fields that may be left out."""
         return frozenset(

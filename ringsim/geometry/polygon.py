@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,13 +38,20 @@ def corners(sides: int, aspect_ratio: float) -> Array:
         raise ValueError(f"a closed polygon needs at least 3 sides, not {sides}")
     if not 0.0 < aspect_ratio <= 1.0:
         raise ValueError(f"aspect_ratio = {aspect_ratio} must be in (0, 1]")
+    return _found(sides, aspect_ratio).copy()
+
+
+@functools.lru_cache(maxsize=64)
+def _found(sides: int, aspect_ratio: float) -> Array:
+    """The corners; kept, because the scenes of a campaign ask for the same ones again and again."""
     ratio = 1.0
     parameters = 2.0 * np.pi * np.arange(sides) / sides
     steps = 1 + int(np.ceil(8 * np.log(1.0 / aspect_ratio)))
     for ratio in aspect_ratio ** (np.arange(1, steps + 1) / steps):
         parameters, chord = _solve(parameters, float(ratio))
     points = np.stack([np.cos(parameters), ratio * np.sin(parameters), np.zeros(sides)], axis=-1)
-    return points / chord
+    found: Array = points / chord
+    return found
 
 
 def _solve(parameters: Array, ratio: float) -> tuple[Array, float]:
