@@ -109,8 +109,7 @@ class Integration:
                 history.status = Status.SOLVER_FAILED
                 history.reason = self._explain(error)
         if history.status == Status.UNFINISHED and not history.reason:
-            # exudyn may give up without raising anything.
-            history.status = Status.SOLVER_FAILED
+            history.status = Status.SOLVER_FAILED  # exudyn may give up without raising
             history.reason = self._explain(RuntimeError("it stopped before the end"))
         history.newton_iterations = int(solver.it.newtonStepsCount)
         history.jacobians = int(solver.it.newtonJacobiCount)
