@@ -18,7 +18,7 @@ from ringsim.refusal import InputError
 from ringsim.storage.record import Result
 
 _TO_WORKER, _TO_RANK_0 = 11, 12
-_SHORTEST, _LONGEST = 1e-4, 2e-3
+_SHORTEST, _LONGEST = 1e-4, 5e-3
 _LONGEST_OF_WORKER = 2e-2
 _AHEAD_SECONDS, _MOST_AHEAD = 0.02, 32
 
@@ -50,7 +50,7 @@ class Mpi:
             slot.close()
 
     def _schedule(self, queue: deque[int], slot: Slot, work: Work) -> str:
-        held = dict.fromkeys(range(1, self.size), 0)
+        held: dict[int, deque[int]] = {rank: deque() for rank in range(1, self.size)}
         silent, mean, reason, fault, delay = set(held), 0.0, "", "", _SHORTEST
         while True:
             moved = False
@@ -59,12 +59,13 @@ class Mpi:
                 break
             ahead = self._ahead(mean, len(queue))
             for rank in held.keys() - silent if queue else ():
-                if held[rank] <= ahead // 2:
-                    batch = [queue.popleft() for _ in range(min(ahead - held[rank], len(queue)))]
+                mine = held[rank]
+                if queue and len(mine) <= ahead // 2:
+                    batch = [queue.popleft() for _ in range(min(ahead - len(mine), len(queue)))]
                     self.communicator.send(batch, dest=rank, tag=_TO_WORKER)
-                    held[rank] += len(batch)
-                    for sample in batch:
-                        work.started(sample)
+                    if not mine:
+                        work.started(batch[0])
+                    mine.extend(batch)
             if queue and not slot.busy:
                 sample = queue.popleft()
                 slot.submit(work.task(sample))
@@ -74,9 +75,11 @@ class Mpi:
                 rank, message = self.communicator.recv(tag=_TO_RANK_0)
                 silent.discard(rank)
                 if isinstance(message, Result):
-                    held[rank] -= 1
                     mean += 0.1 * (message.seconds - mean)
                     work.finished(message)
+                    held[rank].popleft()
+                    if held[rank]:
+                        work.started(held[rank][0])
                 elif message is not None:
                     kind, text = message
                     reason = reason or text
@@ -103,9 +106,9 @@ class Mpi:
         return reason or work.stop()
 
     def _ahead(self, mean: float, left: int) -> int:
-        """Samples that a rank may hold: several if they are short, one towards the end."""
-        short = int(_AHEAD_SECONDS / max(mean, 1e-4))
-        return max(1, min(short, _MOST_AHEAD, left // (2 * self.size)))
+        """Samples that a rank may hold: two, more if they are short, one towards the end."""
+        wanted = max(2, min(int(_AHEAD_SECONDS / max(mean, 1e-4)), _MOST_AHEAD))
+        return max(1, min(wanted, left // (2 * self.size)))
 
     def _drain(self, work: Work, there: set[int]) -> None:
         """Take what the others sent before they heard of the end."""
