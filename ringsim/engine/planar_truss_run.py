@@ -88,19 +88,27 @@ class TrussIntegration:
             if solver.InitializeSolver(self._system, self._settings):
                 solver.SolveSteps(self._system, self._settings)
         except exu.ExudynError as error:
-            if history.status != Status.DIVERGED:
-                history.status = Status.SOLVER_FAILED
-                history.reason = (
-                    f"the solver gave up at {history.times[-1]:.6g} s: reduce solver.step, or "
-                    f"raise solver.newton_tolerance ({str(error).strip().splitlines()[0][:200]})"
-                )
+            self._fail(str(error).strip().splitlines()[0][:200])
         end = self._model.scene.solver.end_time
-        if history.status == Status.UNFINISHED and history.times[-1] >= end * (1.0 - 1e-9):
-            history.status = Status.OK
-            history.reason = f"the cable was wound until solver.end_time = {end:g} s"
+        if history.status == Status.UNFINISHED:
+            if history.times[-1] < end * (1.0 - 1e-9):
+                self._fail("it stopped before the end time")
+            else:
+                history.status = Status.OK
+                history.reason = f"the cable was wound until solver.end_time = {end:g} s"
         history.newton_iterations = int(solver.it.newtonStepsCount)
         history.jacobians = int(solver.it.newtonJacobiCount)
         return history
+
+    def _fail(self, detail: str) -> None:
+        """Note why the solver gave up, unless the reader knows better."""
+        history = self.history
+        if history.status == Status.UNFINISHED:
+            history.status = Status.SOLVER_FAILED
+            history.reason = (
+                f"the solver gave up at {history.times[-1]:.6g} s: reduce solver.step, or raise "
+                f"solver.newton_tolerance ({self._model.cable.refusal or detail})"
+            )
 
     def _after_step(self, system: Any, time: float) -> bool:
         """Read the new state; False ends the run."""

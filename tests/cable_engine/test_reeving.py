@@ -147,9 +147,9 @@ def test_tension_of_a_swinging_rope(
     assert own.min() > 1.0
     assert np.ptp(own) > 2.0
     assert np.ptp(places, axis=0).max() > 0.1
-    # Newton stops at 1e-10 of the forces; a second of motion may multiply that a thousandfold.
-    np.testing.assert_allclose(own, other, rtol=1e-6)
-    np.testing.assert_allclose(places, others, rtol=0.0, atol=1e-7)
+    # Newton stops at 1e-10 N of residual; a second of smooth motion adds little to that.
+    np.testing.assert_allclose(own, other, rtol=1e-9)
+    np.testing.assert_allclose(places, others, rtol=0.0, atol=1e-10)
 
 
 def test_tension_at_given_states(driven: tuple[Array, Array, CableDrive]) -> None:

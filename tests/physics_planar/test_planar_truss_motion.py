@@ -152,3 +152,12 @@ def test_a_pulley_with_friction_costs_the_winch():
     decay = (1.0 - ratio) / (1.0 + ratio)
     np.testing.assert_allclose((diagonal / winch)[late], decay[late], rtol=1e-3)
     assert float(done.values["energy_error"]) < 1e-3
+
+
+def test_winding_up_the_whole_rope_fails_with_a_reason():
+    winding = {"kind": "constant", "speed": 20.0}
+    values = {"cables.upper.winch.winding": winding, "solver.end_time": 0.1}
+    done = run(load_scene("planar-truss").with_values(values))
+    assert done.status == Status.SOLVER_FAILED
+    assert "gave up at" in done.reason
+    assert float(done.values["final_time"]) < 0.1
