@@ -14,6 +14,7 @@ from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.parts.structure.planar_truss import PlanarTruss
 from ringsim.plots import style
 from ringsim.plots.asynchrony import asynchrony
+from ringsim.plots.cables import cables
 from ringsim.plots.diagonal_stress import diagonal_stress
 from ringsim.plots.energy import energy
 from ringsim.plots.opening_angles import opening_angles
@@ -37,6 +38,7 @@ PICTURES = (
     _Picture("asynchrony", asynchrony, ("asynchrony",)),
     _Picture("diagonal_stress", diagonal_stress, ("rod_stress",)),
     _Picture("ring", ring, ("opening_angle",)),
+    _Picture("cables", cables, ("cable_tension", "opening_angle")),
     _ENERGY,
 )
 """Of a ring."""

@@ -1,0 +1,173 @@
+"""What the cables do: the quantities that a study of one winch asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ringsim.cable.records import Cable
+from ringsim.cable.section_path import span_length
+from ringsim.parts.structure.pantograph_ring import PantographRing
+from ringsim.plots import style, wording
+from ringsim.scene import scene_from_toml
+
+Array = NDArray[np.float64]
+
+_PANELS = (
+    ("Length of a span (m)", "_lengths"),
+    ("Elongation of a span (mm)", "_elongations"),
+    ("Decay factor of a section", "_decays"),
+    ("Tension at section's start (N)", "_tensions"),
+    ("Force on hinge pulley (N)", "_hinge_forces"),
+    ("Force on V pulley (N)", "_block_forces"),
+)
+
+
+class SectionSeries:
+    """A cable's quantities by section over time, shape (section, time), from a recorded run.
+
+    Tensions are recorded; span lengths and angles are recomputed from the opening angles on the
+    ideal geometry of one section (see ``ringsim.cable.section_path``), where the spans on either
+    side of the V pulley are equally long.
+
+    Parameters
+    ----------
+    dataset
+        A run with ``cable_tension`` and ``opening_angle``.
+    plane
+        "upper" or "lower"; its cable must exist.
+    """
+
+    def __init__(self, dataset: xr.Dataset, plane: str) -> None:
+        scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
+        ring, cables = scene.structure, scene.cables
+        assert isinstance(ring, PantographRing)
+        assert cables is not None
+        cable = cables.upper if plane == "upper" else cables.lower
+        assert cable is not None
+        self.cable: Cable = cable
+        self.time = dataset["time"].values
+        order = slice(None, None, -1 if cable.end == "last" else 1)
+        self.opening = np.radians(
+            dataset["opening_angle"].sel(plane=plane).transpose("section", "time").values[order]
+        )
+        self.tension = dataset["cable_tension"].sel(plane=plane).transpose("span", "time").values
+        self._half, self._offset = ring.half_bar, cable.block_offset
+        self._fold = 0.5 * (np.pi - self.opening)
+
+    @property
+    def sections(self) -> int:
+        """Number of sections, in the order from the winch."""
+        return len(self.opening)
+
+    @property
+    def lengths(self) -> Array:
+        """Length of the span before the V pulley, m."""
+        return span_length(self._half, self._offset, self.opening)
+
+    @property
+    def entry(self) -> Array:
+        """Tension of the span between the section's first hinge pulley and its V pulley, N."""
+        return np.asarray(self.tension[1::3][: self.sections])
+
+    @property
+    def behind(self) -> Array:
+        """Tension of the span behind the V pulley, N."""
+        return np.asarray(self.tension[2::3][: self.sections])
+
+    @property
+    def arriving(self) -> Array:
+        """Tension of the span before the section's first hinge pulley, N."""
+        return np.asarray(self.tension[0::3][: self.sections])
+
+    @property
+    def elongations(self) -> Array:
+        """T L / EA of the span before the V pulley, m."""
+        return self.entry * self.lengths / self.cable.axial_stiffness
+
+    @property
+    def decays(self) -> Array:
+        """Tension behind a section over the tension before it; NaN while the rope is slack."""
+        after = np.concatenate([self.arriving[1:], self.behind[-1:]])
+        taut = self.arriving > self.cable.slack_width
+        return np.asarray(np.where(taut, after / np.where(taut, self.arriving, 1.0), np.nan))
+
+    @property
+    def hinge_forces(self) -> Array:
+        """Force on the first hinge pulley, N.
+
+        The rope comes up the boom at the first section, and from the section before, square to
+        the boom, at all others.
+        """
+        along = self.entry * self._half * np.cos(self._fold) / self.lengths
+        inward = self.entry * (self._half * np.sin(self._fold) + self._offset) / self.lengths
+        inward[0] += self.arriving[0]
+        along[1:] -= self.arriving[1:]
+        return np.asarray(np.hypot(along, inward))
+
+    @property
+    def block_forces(self) -> Array:
+        """Force on the V pulley along its bisector, N."""
+        drop = self._half * np.sin(self._fold) + self._offset
+        return np.asarray((self.entry + self.behind) * drop / self.lengths)
+
+
+_VALUES: dict[str, Callable[[SectionSeries], Array]] = {
+    "_lengths": lambda s: s.lengths,
+    "_elongations": lambda s: 1e3 * s.elongations,
+    "_decays": lambda s: s.decays,
+    "_tensions": lambda s: s.entry,
+    "_hinge_forces": lambda s: s.hinge_forces,
+    "_block_forces": lambda s: s.block_forces,
+}
+
+
+@style.styled
+def cables(dataset: xr.Dataset) -> Figure:
+    """Span lengths, elongations, decays, tensions and forces on the pulleys, section by section.
+
+    Parameters
+    ----------
+    dataset
+        A run of a ring or truss with cables.
+
+    Returns
+    -------
+    Figure
+        The upper cable, or the lower where there is no other; colour counts the sections from
+        the winch.
+    """
+    tension = dataset["cable_tension"]
+    plane = next(str(p) for p in dataset["plane"].values if np.isfinite(tension.sel(plane=p)).any())
+    series = SectionSeries(dataset, plane)
+    figure = style.new_figure(11.0, 8.4)
+    grid = figure.subplots(3, 2, sharex=True)
+    moment = wording.deployment_time(dataset)
+    for axes, (title, name) in zip(grid.ravel(), _PANELS, strict=True):
+        values = _VALUES[name](series)
+        _draw(axes, series, values)
+        axes.set_ylabel(title)
+        style.span_time(axes, dataset["opening_angle"])
+        if name not in ("_lengths", "_decays"):
+            style.span_sizes(axes, np.where(values > 1e-6, values, np.nan))
+        if np.isfinite(moment):
+            style.mark_moment(axes, moment)
+    for axes in grid[-1]:
+        axes.set_xlabel(wording.label(dataset["time"]))
+    if 1 < series.sections <= 6:
+        grid[0, 0].legend(loc="best")
+    wording.head(figure, grid[0, 0], dataset, f"{plane.capitalize()} cable")
+    return figure
+
+
+def _draw(axes: Axes, series: SectionSeries, values: Array) -> None:
+    colours = style.section_colours(series.sections)(np.arange(series.sections))
+    for section, row in enumerate(values):
+        axes.plot(
+            series.time, row, color=colours[section], linewidth=1.2, label=f"section {section + 1}"
+        )

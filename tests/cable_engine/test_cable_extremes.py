@@ -1,0 +1,104 @@
+"""Far ends of every range: a run ends with a status, and what is wrong with it shows."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from driven import outcome, truss
+from ringsim.variables import Outcome, Status
+
+TOLD = 0.1
+"""Energy error from which on a result counts as refused by its own balance."""
+
+
+def sound(found: Outcome) -> None:
+    """Finished, or ended for a reason that is told; the times of winding are met."""
+    assert found.reason
+    values = found.values
+    assert np.isfinite(values["energy_error"])
+    assert found.status in (Status.OK, Status.UNFINISHED)
+    assert values["energy_error"] < TOLD
+    if found.status == Status.OK:
+        assert np.isfinite(values["deployment_time"])
+
+
+def wound_in(speed: float, start: float, **values: Any) -> Outcome:
+    """A truss whose winch takes up the rope of a whole deployment at a speed (m/s)."""
+    length = 0.36
+    return outcome(
+        truss(
+            both__winch__winding__speed=speed,
+            structure__opening_angle=start,
+            solver__end_time=1.5 * length / speed,
+            record__interval=0.01 * length / speed,
+            **values,
+        )
+    )
+
+
+QUICK = [
+    {"both__axial_stiffness": 1e3},
+    {"both__axial_stiffness": 1e6},
+    {"both__friction__coefficient": 0.0},
+    {"both__friction__coefficient": 0.0095},
+    {"start": 2.0},
+    {"speed": 0.5},
+]
+
+
+@pytest.mark.parametrize("case", QUICK, ids=lambda case: "-".join(map(str, case.items())))
+def test_one_value_at_its_end(case: dict[str, Any]) -> None:
+    values = {"speed": 0.05, "start": 20.0} | case
+    found = wound_in(**values)
+    sound(found)
+    assert found.status == Status.OK
+    # The rope decides when the truss has opened: 0.341 m of it from 20 deg on.
+    if values["speed"] == 0.05:
+        assert found.values["deployment_time"] == pytest.approx(6.9, abs=0.15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stiffness", [1e3, 1e7])
+@pytest.mark.parametrize("friction", [0.0, 0.0095])
+@pytest.mark.parametrize(("speed", "start"), [*itertools.product([0.001, 0.5], [2.0, 60.0])])
+def test_corners_of_the_ranges(
+    stiffness: float, friction: float, speed: float, start: float
+) -> None:
+    sound(
+        wound_in(
+            speed,
+            start,
+            both__axial_stiffness=stiffness,
+            both__friction__coefficient=friction,
+        )
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("speed", [0.01, 0.5])
+@pytest.mark.parametrize(
+    "fault",
+    [{"kind": "jammed-pulley", "pulley": 2}, {"kind": "cut-cable", "span": 2}],
+    ids=["jam", "cut"],
+)
+def test_faults_in_the_middle_of_a_deployment(fault: dict[str, Any], speed: float) -> None:
+    sound(wound_in(speed, 20.0, faults=[fault | {"time": 0.15 / speed}]))
+
+
+@pytest.mark.slow
+def test_the_truss_of_the_paper_opens_in_its_time_with_slack_after_the_start() -> None:
+    found = outcome(truss())
+    assert found.status == Status.OK
+    assert 33.0 < found.values["deployment_time"] < 37.0
+    assert found.values["energy_error"] < 1e-3
+    assert (found.values["slack_duration"] > 0.3).all()
+    assert found.values["peak_tension_time"] < 0.2
+    tension = found.values["cable_tension"][:, 0]
+    times = found.coordinates["time"]
+    # The jerk of the stowed end throws the truss ahead of its rope; light tension after that.
+    assert tension[:, (times > 0.25) & (times < 0.5)].max() < 1e-3
+    assert 0.02 < np.median(tension[:, (times > 25.0) & (times < 33.0)]) < 0.1
