@@ -38,17 +38,18 @@ PICTURES = (
     _Picture("asynchrony", asynchrony, ("asynchrony",)),
     _Picture("diagonal_stress", diagonal_stress, ("rod_stress",)),
     _Picture("ring", ring, ("opening_angle",)),
-    _Picture("cables", cables, ("cable_tension", "opening_angle")),
     _ENERGY,
 )
 """Of a ring."""
+CABLE_PICTURES = (_Picture("cables", cables, ("cable_tension", "opening_angle")),)
+"""Of a ring with cables, besides."""
 TRUSS_PICTURES = (
     _Picture("tension", tension_over_length, ("cable_tension", "cable_length")),
     _Picture("bending_strain", strain_over_length, ("bending_strain", "cable_length")),
     _ENERGY,
 )
 """Of a planar truss."""
-_OF_KIND = {PantographRing: PICTURES, PlanarTruss: TRUSS_PICTURES}
+_OF_KIND = {PantographRing: PICTURES + CABLE_PICTURES, PlanarTruss: TRUSS_PICTURES}
 
 
 def draw_run(dataset: xr.Dataset, folder: str | Path) -> list[Path]:
