@@ -87,12 +87,13 @@ def test_the_equation_without_friction_is_the_quadrature() -> None:
 
 @pytest.mark.parametrize("name", LAWS)
 def test_friction_slows_the_ring_as_the_ideal_equation_says(name: str) -> None:
-    scene = ring(3, joints=LAWS[name])
+    # Ten times the paper's stiffness: slow rings dwell where elasticity tells (2.5e-4 else).
+    scene = ring(3, joints=LAWS[name], rods__young_modulus=120e10)
     found = run(scene)
     reached, expected = found.reaches(170.0), ideal_time_with_friction(scene, 170.0)
     slowed = expected / ideal_time(scene, 170.0) - 1.0
     assert slowed > 0.02
-    # 1e-4 of step control and the rods' own share: hundreds of times less than the slowing.
+    # 1e-4 of step control and what is left of the rods' share.
     assert reached == pytest.approx(expected, rel=2e-4)
     energies = np.array(found.history.energies)
     before = found.before_contact()
