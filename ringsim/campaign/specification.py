@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError
 
@@ -18,8 +18,8 @@ from ringsim.scene import Scene, builtin_scenes, load_scene
 from ringsim.storage.layout import Output
 from ringsim.units import Model
 
-SOLVER = "ringsim.simulation:run"
-"""What maps a scene to its outcome."""
+SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_ideal"}
+"""What maps a scene to its outcome, by fidelity."""
 
 
 def _flat(inner: Callable[[Any], bool]) -> Callable[[Any], Any]:
@@ -59,6 +59,8 @@ class Specification(Model):
     design: AnyDesign
     limits: Limits = Limits()
     retry: Retry = Retry()
+    fidelity: Literal["full", "ideal"] = "full"
+    """full: the flexible multibody model; ideal: rigid rods, one coordinate."""
     max_failed: Annotated[int, Field(ge=0)] | None = None
     """The campaign stops when more samples than this have failed."""
     output: Output = Output()

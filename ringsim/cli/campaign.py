@@ -12,7 +12,7 @@ import click
 from ringsim.campaign.folder import prepare_folder
 from ringsim.campaign.plan import plan
 from ringsim.campaign.run import Choices, Part, run_campaign
-from ringsim.campaign.specification import SOLVER, Campaign, load_campaign
+from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
 from ringsim.cli import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.execution.launch import aborting, describe, launched_size, mpi_world
 from ringsim.execution.local import Local
@@ -45,7 +45,7 @@ class Request:
 @click.option("--part", default="1/1", help="Run only the i-th of n shares of the samples: i/n.")
 @click.option("--retry-failed", is_flag=True, help="Run the failed samples again, too.")
 @click.option("--dry-run", is_flag=True, help="Show plan and predicted cost; keep nothing.")
-@click.option("--solver", default=SOLVER, hidden=True)
+@click.option("--solver", default="", hidden=True)
 def command(**options: Any) -> int:
     """Run the campaign of FILE; the same command again goes on with what is missing.
 
@@ -68,6 +68,10 @@ def _folder(campaign: Campaign, request: Request) -> Path:
     return request.out or Path("runs") / campaign.specification.name
 
 
+def _solver(campaign: Campaign, request: Request) -> str:
+    return request.solver or SOLVERS[campaign.specification.fidelity]
+
+
 def _part(text: str) -> Part:
     number, slash, count = text.partition("/")
     if not (slash and number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
@@ -82,7 +86,7 @@ def _show_plan(request: Request, size: int) -> int:
         _folder(campaign, request),
         workers=max(1, request.workers or size),
         part=_part(request.part),
-        solver=request.solver,
+        solver=_solver(campaign, request),
     ):
         click.echo(line)
     return EXIT_DONE
@@ -100,7 +104,7 @@ def _prepare(campaign: Campaign, request: Request, workers: int | None) -> tuple
         retry_failed=request.retry_failed,
         description=f"{count} local workers" if count else "in one process",
     )
-    prepare_folder(campaign, folder, solver=request.solver)
+    prepare_folder(campaign, folder, solver=_solver(campaign, request))
     return folder, choices
 
 

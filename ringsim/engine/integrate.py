@@ -177,7 +177,10 @@ class Integration:
         if self._built.faults.strike(time, angles, chain):
             chain = self._read_cables(time)
             after = self._energy.read(time, state, angles, rates, self._latched, chain)
-            released = reading.elastic - after.elastic
+            # Powers jump at a fault: half the step before it belongs to those from before.
+            power = (reading.loss - reading.winch_power) - (after.loss - after.winch_power)
+            before = 0.5 * (time - history.times[-2]) if len(history.times) > 1 else 0.0
+            released = reading.elastic - after.elastic + before * power
             reading = after._replace(lost_in_rods=reading.lost_in_rods + released)
         history.energies.append(reading)
         if chain is not None:
@@ -254,8 +257,13 @@ class Integration:
         return (
             f"the solver gave up at {time:.6g} s after {self.history.halvings} reductions of the "
             f"step: reduce solver.step or solver.tolerance, or raise solver.newton_tolerance "
-            f"({detail[:200]})"
+            f"({self._refusal() or detail[:200]})"
         )
+
+    def _refusal(self) -> str:
+        """What the cables could not answer, if that is why a step failed."""
+        cables = self._built.cables
+        return "" if cables is None else cables.refusal
 
 
 def _usual_rate(scene: Scene) -> float:
