@@ -124,10 +124,44 @@ def tangents(state: ChainState, velocities: Array) -> list[RopeTangent]:
         The velocities that it was evaluated with, in m/s, shape (points, 3).
 
     """
-    return [_tangent(state, velocities, k) for k in range(len(state.natural))]
+    return [rope_tangent(state, velocities, k) for k in range(len(state.natural))]
 
 
-def _tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent:
+def mean_tangent(state: ChainState, velocities: Array, rope: int) -> tuple[Array, Array]:
+    """What is left of a rope's tangent if the shares of its spans stay as they are.
+
+    Returns
+    -------
+    tuple
+        Derivatives of the rope's mean tension after the differences of its points, shape (n, 3),
+        N/m, and T_i (I - u_i u_i^T) / L_i of its spans, shape (n, 3, 3), N/m.
+
+    """
+    ropes = state.ropes
+    spans = slice(int(ropes.starts[rope]), int(ropes.ends[rope]))
+    first = int(ropes.near[spans.start])
+    unit, length = state.directions[spans], state.lengths[spans]
+    natural = float(state.natural[rope])
+    elastic, viscous = _mean_slopes(state, rope)
+    relative = np.diff(velocities[first : first + len(unit) + 1], axis=0)
+    swing = (relative - unit * state.rates[spans, None]) / length[:, None]
+    across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
+    stretched = elastic + viscous * float(state.wound_rates[rope]) / natural
+    scale = (state.tensions[spans] / length)[:, None, None]
+    return stretched * unit + viscous * swing, scale * across
+
+
+def _mean_slopes(state: ChainState, rope: int) -> tuple[float, float]:
+    """Derivatives of a rope's mean tension after its path (N/m) and its rate (N s/m)."""
+    stiffness = float(state.material.axial_stiffness[rope]) / float(state.natural[rope])
+    stiffness *= bool(state.ropes.alive[rope]) * float(
+        slack.slope(state.forces[rope], state.material.slack_width[rope])
+    )
+    return stiffness, stiffness * float(state.material.damping_time[rope])
+
+
+def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent:
+    """The tangent of one rope; see ``tangents``."""
     ropes = state.ropes
     spans = slice(int(ropes.starts[rope]), int(ropes.ends[rope]))
     first = int(ropes.near[spans.start])
@@ -141,11 +175,7 @@ def _tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent:
     swing = (relative - unit * state.rates[spans, None]) / length[:, None]
     projector = (np.eye(3) - unit[:, :, None] * unit[:, None, :]) / length[:, None, None]
 
-    stiffness = float(state.material.axial_stiffness[rope]) / natural
-    stiffness *= bool(ropes.alive[rope]) * float(
-        slack.slope(state.forces[rope], state.material.slack_width[rope])
-    )
-    viscous = stiffness * float(state.material.damping_time[rope])
+    stiffness, viscous = _mean_slopes(state, rope)
     elastic = stiffness + viscous * float(state.wound_rates[rope]) / natural
     material = share[:, None, None] * (elastic * unit + viscous * swing)
 

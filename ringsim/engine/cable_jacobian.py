@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.state import ChainState
-from ringsim.cable.tangent import RopeTangent, tangents
+from ringsim.cable.tangent import RopeTangent, mean_tangent, rope_tangent
 from ringsim.engine.cable_path import WIDTH, CablePath, Placed, cross, gyration, skew
 
 Array = NDArray[np.float64]
 _PER_SPAN = 4
 """Auxiliary unknowns of a span: three for its difference vector, one for its tension."""
+_STEADY = 0.9999
+"""Share of the full friction from which its changes with the rope's speed do not matter."""
 _NEGLIGIBLE = 0.02
 """Decay entries are left out below this share of the largest geometric stiffness T / L."""
 
@@ -102,13 +104,18 @@ class JacobianPattern:
         values = [-maps, np.einsum("lij,li->lj", maps, units)]
         directions = np.empty((self._spans, 3, 3))
         places, blocks = list(self._static), []
-        for rope, tangent in enumerate(tangents(state, placed.velocities)):
-            spans = slice(state.ropes.starts[rope], state.ropes.ends[rope])
-            directions[spans] = tangent.by_direction
+        for rope in range(len(state.natural)):
+            spans = slice(int(state.ropes.starts[rope]), int(state.ropes.ends[rope]))
             share = 1.0 if left is None else float(left[rope])
-            entries = self._rope(state, tangent, rope, by_q, by_rate, exact=exact, left=share)
-            if exact:
-                entries += self._swinging(placed, tangent, spans, by_q)
+            if not exact and self._steady(state, rope):
+                mean, directions[spans] = mean_tangent(state, placed.velocities, rope)
+                entries = self._steady_rope(state, rope, share * mean, by_q, by_rate)
+            else:
+                tangent = rope_tangent(state, placed.velocities, rope)
+                directions[spans] = tangent.by_direction
+                entries = self._rope(state, tangent, rope, by_q, by_rate, exact=exact, left=share)
+                if exact:
+                    entries += self._swinging(placed, tangent, spans, by_q)
             for place, block in entries:
                 places.append(place)
                 blocks.append(block)
@@ -118,6 +125,25 @@ class JacobianPattern:
         rows = np.concatenate([r for r, _ in places])
         columns = np.concatenate([c for _, c in places])
         return np.stack([rows, columns, np.concatenate(flat)], axis=1)
+
+    @staticmethod
+    def _steady(state: ChainState, rope: int) -> bool:
+        """Whether the rope runs over all its pulleys in one direction, well above their slip."""
+        own = (state.ropes.of_pulley == rope) & (state.ropes.slips > 0.0)
+        return bool(np.all(np.abs(state.exponents[own]) > _STEADY))
+
+    def _steady_rope(
+        self, state: ChainState, rope: int, mean_slope: Array, by_q: float, by_rate: float
+    ) -> list[tuple[tuple[NDArray[np.int64], NDArray[np.int64]], Array]]:
+        """The same with the shares of its spans held: the mean tension alone moves."""
+        spans = np.arange(state.ropes.starts[rope], state.ropes.ends[rope])
+        tension, difference = self._tension(spans)[None], self._difference(spans).reshape(1, -1)
+        viscous = state.viscous_slope(rope) * state.directions[spans]
+        mean = self._mean(rope)
+        return [
+            (_pairs(tension, mean), -by_q * state.shares[spans]),
+            (_pairs(mean, difference), -(by_q * mean_slope + by_rate * viscous).ravel()),
+        ]
 
     def _rope(
         self,
