@@ -17,11 +17,10 @@ from ringsim.engine.energy import Energies, EnergyMeter
 from ringsim.engine.joints import latch
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import JointGroup, Openings, State
+from ringsim.engine.scales import contact_step, residual_tolerance, usual_rate
 from ringsim.engine.settings import solver_settings
 from ringsim.engine.stepping import StepControl, StopContact
 from ringsim.engine.stress import StressMeter
-from ringsim.scene import Scene
-from ringsim.theory.ideal_ring import IdealRing
 from ringsim.variables import Status
 
 Array = NDArray[np.float64]
@@ -71,7 +70,7 @@ class Integration:
         self._built, self._scene = built, scene
         self._system = ring.assembly.system
         self._solver = exu.MainSolverImplicitSecondOrder()
-        self._settings = solver_settings(scene, _residual_tolerance(built))
+        self._settings = solver_settings(scene, residual_tolerance(built))
         self._state = State(ring)
         self._openings = Openings(ring)
         self._energy = EnergyMeter(ring, built.net, built.forces)
@@ -87,8 +86,8 @@ class Integration:
         self._settled_at = math.inf
         self._steps = StepControl(
             scene.solver,
-            _contact_step(built),
-            usual_rate=_usual_rate(scene),
+            contact_step(built),
+            usual_rate=usual_rate(scene),
         )
         self._fresh = True
         self._chain: ChainState | None = None
@@ -154,7 +153,7 @@ class Integration:
             return False
         angles, rates = self.history.angles[-1], self.history.rates[-1]
         self._note_locks(angles, time)
-        if time >= self._settled_at or self._finished(time):
+        if time >= self._settled_at or self._finished(time) or self._exhausted(time):
             return False
         self._steps.advance(time, float(np.mean(rates)), self._stop_contact(angles, rates))
         return True
@@ -232,6 +231,18 @@ class Integration:
             )
         return True
 
+    def _exhausted(self, time: float) -> bool:
+        """Give up a run whose steps have become too small to end."""
+        most = self._scene.solver.max_steps
+        if len(self.history.times) <= most:
+            return False
+        self.history.status = Status.SOLVER_FAILED
+        self.history.reason = (
+            f"solver.max_steps = {most} steps took the run to {time:.6g} s only, the last of "
+            f"{time - self.history.times[-2]:.1e} s: raise solver.tolerance or solver.max_steps"
+        )
+        return True
+
     def _stop_contact(self, angles: Array, rates: Array) -> StopContact:
         """V-joints that are about to meet a stop, and those that rest on one."""
         stop = self._scene.stop
@@ -264,44 +275,3 @@ class Integration:
         """What the cables could not answer, if that is why a step failed."""
         cables = self._built.cables
         return "" if cables is None else cables.refusal
-
-
-def _usual_rate(scene: Scene) -> float:
-    """Mean opening rate in rad/s if the initial acceleration of the ideal ring lasted."""
-    ring = scene.structure
-    travel = math.pi - math.radians(ring.opening_angle)
-    pull = 2.0 * abs(IdealRing.of(scene).acceleration_from_rest(ring.initial_phi))
-    return max(math.sqrt(0.5 * pull * travel), travel / scene.solver.end_time)
-
-
-def _contact_step(built: Built) -> float:
-    """Step that resolves a V-joint's bounce: a twentieth of its period on the stop's spring."""
-    scene = built.ring.scene
-    if scene.stop is None:
-        return scene.solver.step
-    rods, ring = scene.rods, scene.structure
-    half = rods.density * rods.bar.area * ring.half_bar**3 / 3.0
-    inertia = 2.0 * half + ring.vjoint_mass * ring.half_bar**2
-    return 2.0 * math.pi * math.sqrt(inertia / scene.stop.stiffness) / 20.0
-
-
-def _residual_tolerance(built: Built) -> float:
-    """Residual norm in N at which Newton stops.
-
-    ``newton_tolerance`` times the driving forces, but above what round-off lets the residual
-    reach: the stiffest element's rate EA / L times coordinates of order 1 m, per coordinate.
-    """
-    scene = built.ring.scene
-    drive = float(np.linalg.norm(built.forces))
-    if scene.net is not None and built.net is not None:
-        drive += float(np.linalg.norm(built.net.stiffness)) * scene.net.neutral_length
-    stiffest = max(
-        np.max(scene.rods.young_modulus) * tube.area * scene.rods.elements / length
-        for tube, length in (
-            (scene.rods.diagonal, scene.structure.half_diagonal),
-            (scene.rods.bar, scene.structure.half_bar),
-        )
-    )
-    size = built.ring.assembly.system.systemData.ODE2Size()
-    round_off = 4.0 * np.finfo(float).eps * float(stiffest) * math.sqrt(size)
-    return max(scene.solver.newton_tolerance * drive, round_off)

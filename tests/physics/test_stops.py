@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from ring_runs import ideal_time, ring, run
 from ringsim.engine.joints import stop_torque
 from ringsim.parts.joints import Stop
+from ringsim.simulation import run as outcome_of
 from ringsim.simulation import simulate
+from ringsim.variables import Status
 
 FOLDED = st.floats(-0.2, math.pi)
 RATE = st.floats(-50.0, 50.0)
@@ -114,3 +116,11 @@ def test_hard_cases_give_a_dataset(hardship: dict[str, float]) -> None:
     assert str(dataset.attrs["reason"])
     if int(dataset["status"]) >= 2:
         assert "solver." in str(dataset.attrs["reason"])
+
+
+def test_a_run_that_creeps_is_given_up_with_the_cure() -> None:
+    outcome = outcome_of(ring(3, solver__max_steps=20))
+    assert outcome.status is Status.SOLVER_FAILED
+    assert "solver.max_steps = 20" in outcome.reason
+    assert "raise solver.tolerance" in outcome.reason
+    assert int(outcome.values["steps"]) == 20

@@ -1,0 +1,52 @@
+"""Scales of a scene that the step control starts from."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ringsim.engine.build import Built
+from ringsim.scene import Scene
+from ringsim.theory.ideal_ring import IdealRing
+
+
+def usual_rate(scene: Scene) -> float:
+    """Mean opening rate in rad/s if the initial acceleration of the ideal ring lasted."""
+    ring = scene.structure
+    travel = math.pi - math.radians(ring.opening_angle)
+    pull = 2.0 * abs(IdealRing.of(scene).acceleration_from_rest(ring.initial_phi))
+    return max(math.sqrt(0.5 * pull * travel), travel / scene.solver.end_time)
+
+
+def contact_step(built: Built) -> float:
+    """Step that resolves a V-joint's bounce: a twentieth of its period on the stop's spring."""
+    scene = built.ring.scene
+    if scene.stop is None:
+        return scene.solver.step
+    rods, ring = scene.rods, scene.structure
+    half = rods.density * rods.bar.area * ring.half_bar**3 / 3.0
+    inertia = 2.0 * half + ring.vjoint_mass * ring.half_bar**2
+    return 2.0 * math.pi * math.sqrt(inertia / scene.stop.stiffness) / 20.0
+
+
+def residual_tolerance(built: Built) -> float:
+    """Residual norm in N at which Newton stops.
+
+    ``newton_tolerance`` times the driving forces, but above what round-off lets the residual
+    reach: the stiffest element's rate EA / L times coordinates of order 1 m, per coordinate.
+    """
+    scene = built.ring.scene
+    drive = float(np.linalg.norm(built.forces))
+    if scene.net is not None and built.net is not None:
+        drive += float(np.linalg.norm(built.net.stiffness)) * scene.net.neutral_length
+    stiffest = max(
+        np.max(scene.rods.young_modulus) * tube.area * scene.rods.elements / length
+        for tube, length in (
+            (scene.rods.diagonal, scene.structure.half_diagonal),
+            (scene.rods.bar, scene.structure.half_bar),
+        )
+    )
+    size = built.ring.assembly.system.systemData.ODE2Size()
+    round_off = 4.0 * np.finfo(float).eps * float(stiffest) * math.sqrt(size)
+    return max(scene.solver.newton_tolerance * drive, round_off)
