@@ -233,13 +233,13 @@ class Integration:
 
     def _exhausted(self, time: float) -> bool:
         """Give up a run whose steps have become too small to end."""
-        most = self._scene.solver.max_steps
+        most = self._scene.solver.step_limit
         if len(self.history.times) <= most:
             return False
         self.history.status = Status.SOLVER_FAILED
         self.history.reason = (
-            f"solver.max_steps = {most} steps took the run to {time:.6g} s only, the last of "
-            f"{time - self.history.times[-2]:.1e} s: raise solver.tolerance or solver.max_steps"
+            f"solver.step_limit = {most} steps took the run to {time:.6g} s only, the last of "
+            f"{time - self.history.times[-2]:.1e} s: raise solver.tolerance or solver.step_limit"
         )
         return True
 

@@ -30,7 +30,7 @@ class Solver(Model):
     newton_tolerance: Annotated[float, Field(ge=1e-12, le=1e-2)] = 1e-5
     """Residual at which Newton stops, relative to the driving forces of the scene."""
 
-    max_steps: Annotated[int, Field(ge=1, le=10_000_000)] = 20_000
+    step_limit: Annotated[int, Field(ge=1, le=10_000_000)] = 20_000
     """A run that has not ended after so many steps is given up."""
 
     @model_validator(mode="after")

@@ -119,8 +119,8 @@ def test_hard_cases_give_a_dataset(hardship: dict[str, float]) -> None:
 
 
 def test_a_run_that_creeps_is_given_up_with_the_cure() -> None:
-    outcome = outcome_of(ring(3, solver__max_steps=20))
+    outcome = outcome_of(ring(3, solver__step_limit=20))
     assert outcome.status is Status.SOLVER_FAILED
-    assert "solver.max_steps = 20" in outcome.reason
+    assert "solver.step_limit = 20" in outcome.reason
     assert "raise solver.tolerance" in outcome.reason
     assert int(outcome.values["steps"]) == 20
