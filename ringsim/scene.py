@@ -98,6 +98,11 @@ class Scene(Model):
                 'record.stress = true is not possible with rods.kind = "ancf", whose elements '
                 'report no forces: choose "geometrically-exact", or leave record.stress out'
             )
+        if self.record.interval > self.solver.end_time:
+            raise ValueError(
+                f"record.interval = {self.record.interval} s must not exceed solver.end_time = "
+                f"{self.solver.end_time} s: nothing but the start would be recorded"
+            )
         if self.record.interval * MOST_RECORDS < self.solver.end_time:
             raise ValueError(
                 f"record.interval = {self.record.interval} s must be at least "

@@ -15,7 +15,7 @@ import numpy as np
 from ringsim.engine.solve import SOLVERS
 from ringsim.scene import Scene
 from ringsim.theory.ideal_fidelity import run_ideal, run_ideal_many
-from ringsim.variables import Fidelity, Outcome
+from ringsim.variables import Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,8 +38,11 @@ def run(scene: Scene) -> Outcome:
         status other than OK and the reason; it never raises.
     """
     wall, cpu = time.perf_counter(), time.process_time()
-    finish = SOLVERS[type(scene.structure)](scene)
-    outcome = finish(wall_time=time.perf_counter() - wall, cpu_time=time.process_time() - cpu)
+    try:
+        finish = SOLVERS[type(scene.structure)](scene)
+        outcome = finish(wall_time=time.perf_counter() - wall, cpu_time=time.process_time() - cpu)
+    except Exception as error:  # whatever broke, a campaign goes on and the user learns of it
+        outcome = Outcome(Status.ERROR, f"{type(error).__name__}: {error}")
     outcome.values["fidelity"] = np.array(int(Fidelity.FULL))
     return outcome
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import click
+import numpy as np
 
 from ringsim.choice import kind_of
 from ringsim.overrides import parse_assignment
@@ -66,7 +67,7 @@ def command(
         ("wall time", "wall_time", "s", "10.2f"),
     ]
     for label, name, unit, style in rows:
-        if name in values:
+        if name in values and np.isfinite(values[name].item()):
             click.echo(f"  {label:20s}{format(values[name].item(), style)} {unit}".rstrip())
     dataset = to_dataset(outcome, chosen)
     save(dataset, target)
@@ -74,7 +75,7 @@ def command(
     if plot:
         from ringsim.plots.run import draw_run
 
-        for picture in draw_run(dataset, target.parent):
+        for picture in draw_run(dataset, target.parent, prefix=f"{target.stem}-"):
             click.echo(f"wrote {picture}")
     if outcome.status >= Status.SOLVER_FAILED:
         sys.exit(EXIT_FAILED)

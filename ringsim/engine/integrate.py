@@ -104,7 +104,9 @@ class Integration:
             if solver.InitializeSolver(self._system, self._settings):
                 solver.SolveSteps(self._system, self._settings)
         except exu.ExudynError as error:
-            if history.status != Status.DIVERGED:
+            if math.isfinite(self._settled_at):
+                history.reason += f"; settling was cut short at {history.times[-1]:.6g} s"
+            elif history.status != Status.DIVERGED:
                 history.status = Status.SOLVER_FAILED
                 history.reason = self._explain(error)
         if history.status == Status.UNFINISHED and not history.reason:
@@ -236,6 +238,9 @@ class Integration:
         most = self._scene.solver.step_limit
         if len(self.history.times) <= most:
             return False
+        if math.isfinite(self._settled_at):
+            self.history.reason += f"; settling was cut short at {time:.6g} s"
+            return True
         self.history.status = Status.SOLVER_FAILED
         self.history.reason = (
             f"solver.step_limit = {most} steps took the run to {time:.6g} s only, the last of "

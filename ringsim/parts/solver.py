@@ -13,7 +13,7 @@ class Solver(Model):
     """Generalised-alpha with a step that follows the motion.
 
     With ``step_control = "motion"`` the step keeps the local error of the mean opening angle,
-    expressed as a relative error in time, near ``tolerance``, between step / 200 and ``step``;
+    expressed as a relative error in time, near ``tolerance``, between step / 400 and ``step``;
     with "constant" every step is ``step``.
     """
 

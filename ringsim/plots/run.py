@@ -52,7 +52,7 @@ TRUSS_PICTURES = (
 _OF_KIND = {PantographRing: PICTURES + CABLE_PICTURES, PlanarTruss: TRUSS_PICTURES}
 
 
-def draw_run(dataset: xr.Dataset, folder: str | Path) -> list[Path]:
+def draw_run(dataset: xr.Dataset, folder: str | Path, prefix: str = "") -> list[Path]:
     """Write every figure for which the run recorded something, as PNG.
 
     Parameters
@@ -61,6 +61,8 @@ def draw_run(dataset: xr.Dataset, folder: str | Path) -> list[Path]:
         One run, finished or not, as ``ringsim.dataset.to_dataset`` makes it.
     folder
         Where the files go; it is created if it does not exist.
+    prefix
+        What the files' names begin with, so that several runs share a folder.
 
     Returns
     -------
@@ -77,7 +79,7 @@ def draw_run(dataset: xr.Dataset, folder: str | Path) -> list[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for picture in _pictures(dataset):
-            path = folder / f"{picture.name}.png"
+            path = folder / f"{prefix}{picture.name}.png"
             style.write(picture.draw(dataset), path)
             written.append(path)
     except OSError as error:

@@ -6,10 +6,14 @@ import math
 
 from scipy.optimize import brentq
 
+from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.ideal_ring import IdealRing
+
+_WIDEST = 179.0
+"""Largest opening angle that is tried, deg."""
 
 
 def opening_angle_for(scene: Scene, time: float) -> float:
@@ -22,7 +26,18 @@ def opening_angle_for(scene: Scene, time: float) -> float:
     InputError
         If no angle between 1 and 179 deg gives that time.
     """
+    if not isinstance(scene.structure, PantographRing):
+        raise InputError(
+            f"scene {scene.name} is no pantograph ring: only those have a stowed angle to find"
+        )
+    if not (math.isfinite(time) and time > 0.0):
+        raise InputError(f"a deployment time of {time:g} s must be finite and above 0 s")
     ring = IdealRing.of(scene)
+    if ring.acceleration_from_rest(0.5 * (math.pi - math.radians(_WIDEST))) >= 0.0:
+        raise InputError(
+            f"scene {scene.name} does not open by its loads: give it loads.force > 0 "
+            "(cables are not part of this calculation)"
+        )
 
     def excess(angle: float) -> float:
         try:
@@ -30,7 +45,7 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         except ValueError:
             return math.inf
 
-    widest = 179.0
+    widest = _WIDEST
     if excess(widest) > 0.0:
         raise InputError(
             f"a deployment time of {time:g} s is too short: from {widest:g} deg the ideal ring "

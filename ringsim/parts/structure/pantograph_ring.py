@@ -44,6 +44,11 @@ class PantographRing(Structure):
                 f"half_bar = {self.half_bar} m must be below half_diagonal = "
                 f"{self.half_diagonal} m: the diagonals could not span the deployed section"
             )
+        if self.hinge_offset >= self.half_bar:
+            raise ValueError(
+                f"hinge_offset = {self.hinge_offset} m must be below half_bar = {self.half_bar} m: "
+                "a hinge assembly is smaller than a section"
+            )
         if self.closed and self.sections < 3:
             raise ValueError(
                 f"sections = {self.sections} must be at least 3 for a closed ring "
