@@ -7,6 +7,7 @@ of rigid rods (``run_ideal``), which knows neither asynchrony nor stress and cos
 from __future__ import annotations
 
 import time
+import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -42,6 +43,7 @@ def run(scene: Scene) -> Outcome:
         finish = SOLVERS[type(scene.structure)](scene)
         outcome = finish(wall_time=time.perf_counter() - wall, cpu_time=time.process_time() - cpu)
     except Exception as error:  # whatever broke, a campaign goes on and the user learns of it
+        traceback.print_exc()  # a campaign keeps it in the sample's log
         outcome = Outcome(Status.ERROR, f"{type(error).__name__}: {error}")
     outcome.values["fidelity"] = np.array(int(Fidelity.FULL))
     return outcome
