@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.engine.assembly import Assembly, Frame
-from ringsim.engine.rods import Formulation, Rod, add_rod, beam_section
+from ringsim.engine.rods import Formulation, Rod, add_rod
 from ringsim.geometry.ring import Fold, RingGeometry
 from ringsim.parts.boom.rigid import RigidBoom
 from ringsim.parts.persection import spread
@@ -131,8 +131,9 @@ def _add_section(model: RingModel, release: _Release, section: int, young: float
             model.formulation,
             (frames[0], frames[1]),
             halves * rods.elements,
-            beam_section(rods, tube, young),
+            rods,
             tube,
+            young,
         )
 
     def pin(side: int, plane: int) -> tuple[Array, Array]:

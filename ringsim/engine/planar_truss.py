@@ -145,12 +145,17 @@ def _add_beams(model: TrussModel, axis: Any, bar: Any) -> None:
 
 def _add_beam(model: TrussModel, start: Array, end: Array, shares: Array) -> Beam:
     assembly, rods = model.assembly, model.scene.rods
-    section = beam_section(rods, rods.bar, float(np.max(rods.young_modulus)))
+    young = float(np.max(rods.young_modulus))
     axes = _axes_along(end - start)
     nodes = [assembly.add_rigid_node(Frame(start + s * (end - start), axes)) for s in shares]
     places = shares * float(np.linalg.norm(end - start))
     elements = [
-        FORMULATION.add_element(assembly, nodes[k : k + 2], float(length), section)
+        FORMULATION.add_element(
+            assembly,
+            nodes[k : k + 2],
+            float(length),
+            beam_section(rods, rods.bar, young, constant_over=float(length)),
+        )
         for k, length in enumerate(np.diff(places))
     ]
     assembly.bodies += elements

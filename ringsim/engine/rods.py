@@ -30,8 +30,6 @@ class Rod:
         Initial frame, columns in global coordinates, shape (3, 3).
     tube
         Cross-section.
-    stiffness
-        Diagonal of the sectional stiffness (EA, kGA, kGA, GJ, EI, EI), N and N m^2.
     length
         Length of one element, m.
 
@@ -41,7 +39,6 @@ class Rod:
     elements: list[Any]
     axes: Array
     tube: Tube
-    stiffness: Array
     length: float
 
 
@@ -61,6 +58,8 @@ class Formulation(Protocol):
     """
 
     has_strains: bool
+    constant_curvature: bool
+    """Whether the curvature is constant in an element."""
 
     def add_node(self, assembly: Assembly, frame: Frame) -> Any:
         """A node of this formulation."""
@@ -75,16 +74,31 @@ class Formulation(Protocol):
         """Frames of nodes from their total coordinates and rates, shape (n, coordinates)."""
 
 
-def beam_section(rods: Rods, tube: Tube, young_modulus: float) -> Any:
-    """Exudyn's section data: stiffness diag(EA, kGA, kGA, GJ, EI, EI) and inertia."""
+def beam_section(rods: Rods, tube: Tube, young_modulus: float, constant_over: float = 0.0) -> Any:
+    """Exudyn's section data: stiffness diag(EA, kGA, kGA, GJ, EI, EI) and inertia.
+
+    An element of constant curvature misses the bending by the part of the moment that is linear
+    along it: a cantilever of one element is a quarter too stiff.  Its residual flexibility
+    L^2 / 12 EI belongs to the shear force alone, so it is given to the shear, 1 / kGA +
+    L^2 / 12 EI; the nodes of a rod that is loaded at its nodes are then exact with any number of
+    elements (MacNeal, A simple quadrilateral shell element, 1978).
+
+    Parameters
+    ----------
+    young_modulus
+        Pa.
+    constant_over
+        Length over which the curvature is constant, m; 0 for elements that bend by themselves.
+    """
     area, second = tube.area, tube.second_moment
     shear = young_modulus * rods.shear_modulus_ratio
-    factor = tube.shear_factor(rods.poisson_ratio)
+    direct = tube.shear_factor(rods.poisson_ratio) * shear * area
+    across = 1.0 / (1.0 / direct + constant_over**2 / (12.0 * young_modulus * second))
     stiffness = np.diag(
         [
             young_modulus * area,
-            factor * shear * area,
-            factor * shear * area,
+            across,
+            across,
             shear * 2.0 * second,
             young_modulus * second,
             young_modulus * second,
@@ -103,11 +117,15 @@ def add_rod(
     formulation: Formulation,
     ends: tuple[Frame, Frame],
     elements: int,
-    section: Any,
+    rods: Rods,
     tube: Tube,
+    young_modulus: float,
 ) -> Rod:
     """A straight rod between two frames that share their axes; motion is interpolated."""
     first, last = ends
+    length = float(np.linalg.norm(last.position - first.position)) / elements
+    constant_over = length if formulation.constant_curvature else 0.0
+    section = beam_section(rods, tube, young_modulus, constant_over)
     frames = [
         Frame(
             (1 - share) * first.position + share * last.position,
@@ -118,11 +136,9 @@ def add_rod(
         for share in np.linspace(0.0, 1.0, elements + 1)
     ]
     nodes = [formulation.add_node(assembly, frame) for frame in frames]
-    length = float(np.linalg.norm(last.position - first.position)) / elements
     objects = [
         formulation.add_element(assembly, nodes[k : k + 2], length, section)
         for k in range(elements)
     ]
     assembly.bodies += objects
-    stiffness = np.diag(np.array(section.stiffnessMatrix))
-    return Rod(nodes, objects, first.axes, tube, stiffness, length)
+    return Rod(nodes, objects, first.axes, tube, length)

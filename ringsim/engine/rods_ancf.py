@@ -18,6 +18,7 @@ class Ancf:
     """Formulation of ``AncfRods``: 9 coordinates a node, 18 an element."""
 
     has_strains = False
+    constant_curvature = False
 
     def add_node(self, assembly: Assembly, frame: Frame) -> Any:
         """A node with position and the slope vectors along y and z."""

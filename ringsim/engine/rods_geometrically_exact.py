@@ -19,6 +19,7 @@ class GeometricallyExact:
     """Formulation of ``GeometricallyExactRods``."""
 
     has_strains = True
+    constant_curvature = True
 
     def add_node(self, assembly: Assembly, frame: Frame) -> Any:
         """A node with position and Euler parameters."""

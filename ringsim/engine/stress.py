@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import exudyn as exu
@@ -14,10 +15,15 @@ from ringsim.variables import RODS
 Array = NDArray[np.float64]
 _FORCE = exu.OutputVariableType.ForceLocal
 _TORQUE = exu.OutputVariableType.TorqueLocal
+_MIDDLE = [0.0, 0.0, 0.0]
 
 
 class StressMeter:
-    """Stress |N| / A + |M| r / I of every rod half: the largest over both ends of its elements."""
+    """Stress |N| / A + |M| r / I of every rod half: the larger of its two ends.
+
+    exudyn gives the moment in the middle of an element; along it the moment follows the shear
+    force, dM_z/dx = -Q_y and dM_y/dx = Q_z.
+    """
 
     def __init__(self, model: RingModel) -> None:
         self._output = model.assembly.system.GetObjectOutputBody
@@ -36,15 +42,16 @@ class StressMeter:
                 middle = len(elements) // 2
                 elements = elements[:middle] if name.endswith("left") else elements[middle:]
             length = model.assembly.system.GetObjectParameter(elements[0], "length")
-            ends = [(elements[0], [-0.5 * length, 0.0, 0.0]), (elements[-1], [0.5 * length, 0, 0])]
+            ends = [(elements[0], -0.5 * length), (elements[-1], 0.5 * length)]
             rows.append((ends, rod.tube))
         return rows
 
     def _worst(self, ends: Any, tube: Any) -> float:
         worst = 0.0
-        for element, place in ends:
-            force = self._output(element, _FORCE, place)
-            torque = self._output(element, _TORQUE, place)
-            bending = float(np.hypot(torque[1], torque[2])) * 0.5 * tube.outer_diameter
+        for element, x in ends:
+            force = self._output(element, _FORCE, _MIDDLE)
+            torque = self._output(element, _TORQUE, _MIDDLE)
+            moment = math.hypot(torque[1] + force[2] * x, torque[2] - force[1] * x)
+            bending = moment * 0.5 * tube.outer_diameter
             worst = max(worst, abs(force[0]) / tube.area + bending / tube.second_moment)
         return worst
