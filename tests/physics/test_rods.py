@@ -32,6 +32,7 @@ def test_a_cantilever_bends_as_it_should(elements: int) -> None:
     system.AddLoad(item.LoadForceVector(markerNumber=tip, loadVector=[0.0, push, -2.0 * push]))
     system.Assemble()
     settings = exu.SimulationSettings()
+    settings.solution.file.write = False
     settings.staticSolver.newton.relativeTolerance = 1e-7
     settings.staticSolver.newton.absoluteTolerance = 1e-9
     settings.staticSolver.verboseMode = 0
