@@ -133,25 +133,44 @@ class ChainState:
         return np.asarray(self.lengths * (1.0 - taut[rope] * self.shares - loose[rope]))
 
     @property
-    def friction_loss(self) -> Array:
-        """Power lost on each pulley, in W, never negative, shape (pulleys,).
+    def held_beyond(self) -> Array:
+        """Rope between each pulley and its rope's far end, in m, shape (pulleys,).
 
-        (T_before - T_behind) * speed of the stretched rope, with
+        Natural length at the mean strain; its decrease is what slips over the pulley.
+        """
+        rope = self.ropes.of_pulley
+        total = np.append(0.0, np.cumsum(self.lengths))
+        beyond = total[self.ropes.ends[rope]] - total[self.ropes.behind]
+        return np.asarray(beyond * (self.natural / self.paths)[rope])
+
+    @property
+    def friction_forces(self) -> Array:
+        """Loss of tension over each pulley, in N per speed of the rope, shape (pulleys,).
+
+        (T_before - T_behind) times the stretch of the rope that passes, with
         T_behind = T_before exp(exponent * log_decay).
         """
         before = self.tensions[self.ropes.behind - 1] * self.ropes.slips
         lost = -np.expm1(self.exponents * self.log_decays)
-        stretched = 1.0 + self.strains[self.ropes.of_pulley]
-        return np.asarray(before * lost * self.speeds * stretched)
+        return np.asarray(before * lost * (1.0 + self.strains[self.ropes.of_pulley]))
+
+    @property
+    def friction_loss(self) -> Array:
+        """Power lost on each pulley, in W, never negative, shape (pulleys,)."""
+        return self.friction_forces * self.speeds
+
+    @property
+    def viscous_forces(self) -> Array:
+        """Viscous part of each rope's mean tension, in N, shape (ropes,)."""
+        elastic = self.material.axial_stiffness * self.strains
+        return self.mean_tensions - self.ropes.alive * slack.tension(
+            elastic, self.material.slack_width
+        )
 
     @property
     def damping_loss(self) -> Array:
         """Power lost inside each rope, in W, never negative, shape (ropes,)."""
-        elastic = self.material.axial_stiffness * self.strains
-        viscous = self.mean_tensions - self.ropes.alive * slack.tension(
-            elastic, self.material.slack_width
-        )
-        return np.asarray(viscous * self.strain_rates * self.natural)
+        return np.asarray(self.viscous_forces * self.strain_rates * self.natural)
 
     def viscous_slope(self, rope: int) -> float:
         """Derivative of a rope's mean tension after the rate of its path, in N s/m."""
@@ -182,10 +201,15 @@ class ChainState:
         return self.energy_density * self.wound_rates
 
     @property
+    def winch_forces(self) -> Array:
+        """Force of the winches at both ends of each cable per natural length, in N, (cables, 2)."""
+        strain = np.stack([self.strains[self.ropes.first], self.strains[self.ropes.last]], axis=-1)
+        return self.winch_tensions * (1.0 + strain)
+
+    @property
     def winch_power(self) -> Array:
         """Power that the winches at both ends of each cable put in, in W, shape (cables, 2)."""
-        strain = np.stack([self.strains[self.ropes.first], self.strains[self.ropes.last]], axis=-1)
-        return self.winch_tensions * (1.0 + strain) * self.wound_rate
+        return self.winch_forces * self.wound_rate
 
     def reading(self, cable: int, end: int = 0, path_slope: float = 0.0) -> WinchReading:
         """What the winch at an end (0 first, 1 far) of a cable (from 0) knows of its rope."""

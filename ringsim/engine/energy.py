@@ -14,27 +14,28 @@ from ringsim.engine.joints import friction_torque, stop_torque
 from ringsim.engine.net import HubNet, net_forces
 from ringsim.engine.pantograph_ring import RingModel
 from ringsim.engine.readings import JointGroup, State
+from ringsim.engine.work import StepWork, rod_damping
 from ringsim.parts.joints import JointFriction
 
 Array = NDArray[np.float64]
 _KINETIC = exu.OutputVariableType.KineticEnergy
 _POTENTIAL = exu.OutputVariableType.PotentialEnergy
-_VELOCITY = exu.OutputVariableType.VelocityLocal
-_ANGULAR_VELOCITY = exu.OutputVariableType.AngularVelocityLocal
+Damping = tuple[Array, Array]
+"""Damping forces and the rates that they act against."""
+_NOTHING: Damping = (np.zeros(0), np.zeros(0))
 
 
 class Energies(NamedTuple):
-    """Energies in J and the power lost in W at one instant; ``lost_in_rods`` is the energy in J
-    that the rods' own damping took since the reading before, ``winch_power`` in W what the
-    winches put in less the strain energy that they wind up.
+    """Energies in J: kinetic, elastic and work of the loads at one instant; since the reading
+    before, what was lost in friction, dampers and stops, and what the winches put in less the
+    strain energy that they wind up.
     """
 
     kinetic: float
     elastic: float
     work: float
-    loss: float
-    lost_in_rods: float
-    winch_power: float = 0.0
+    lost: float
+    driven: float = 0.0
 
 
 class EnergyMeter:
@@ -54,7 +55,7 @@ class EnergyMeter:
             [[assembly.coordinates_of(j.gap[0])[2] for j in plane] for plane in model.vjoints]
         )
         self._friction = self._friction_groups()
-        self._power: tuple[float, float] | None = None
+        self._since = StepWork()
         if net is not None:
             self._corners = np.array(
                 [assembly.coordinates_of(node)[:3] for _, node in model.hinges[0]]
@@ -83,41 +84,35 @@ class EnergyMeter:
         kinetic = sum(self._output(body, _KINETIC) for body in self._model.assembly.bodies)
         elastic = float(sum(self._output(element, _POTENTIAL) for element in self._elements))
         lifted = (state.position - state.reference)[self._lifts]
-        loss = 0.0
+        damped = [self._rods_damping(), self._stop_damping(angles, rates, latched)]
         for law, group, sections in self._friction:
             rate = group.rate(state)
-            loss += float(np.sum(friction_torque(law, group.sections, sections, rate) * rate))
-        stored, lost = self._stops(angles, rates, latched)
-        net_stored, net_lost = self._net_energy(state)
-        loss += lost + net_lost
-        elastic += stored + net_stored
-        winch_power = 0.0
+            damped.append((friction_torque(law, group.sections, sections, rate), rate))
+        stored, net_damping = self._net_energy(state)
+        damped.append(net_damping)
+        elastic += stored + self._stored_in_stops(angles, latched)
         if chain is not None:
-            loss += float(chain.friction_loss.sum() + chain.damping_loss.sum())
             elastic += float(chain.elastic_energy.sum())
-            winch_power = float(chain.winch_power.sum() - chain.drum_power.sum())
+        passed = self._since.since(
+            time,
+            np.concatenate([force for force, _ in damped]),
+            np.concatenate([rate for _, rate in damped]),
+            chain,
+        )
         return Energies(
             float(kinetic),
-            float(elastic),
+            elastic,
             float(np.sum(self._forces * lifted)),
-            float(loss),
-            self._lost_in_rods(time),
-            winch_power,
+            passed.lost,
+            passed.driven,
         )
 
-    def _lost_in_rods(self, time: float) -> float:
-        """Trapezoid of the dampers' power since the reading before; NaN if nobody knows it."""
+    def _rods_damping(self) -> Damping:
         if self._model.scene.rods.damping == 0.0:
-            return 0.0
+            return _NOTHING
         if not self._model.formulation.has_strains:
-            return math.nan
-        read = self._model.assembly.system.GetObjectOutput
-        power = 0.0
-        for damper, matrix in self._model.assembly.dampers:
-            rate = np.concatenate([read(damper, _VELOCITY), read(damper, _ANGULAR_VELOCITY)])
-            power += float(rate @ matrix @ rate)
-        before, self._power = self._power, (time, power)
-        return 0.0 if before is None else 0.5 * (power + before[1]) * (time - before[0])
+            return np.full(1, math.nan), np.zeros(1)
+        return rod_damping(self._model.assembly)
 
     def _friction_groups(self) -> list[tuple[JointFriction, JointGroup, int]]:
         laws = self._model.scene.joints
@@ -129,25 +124,28 @@ class EnergyMeter:
                 found.append((law, group, self._model.geometry.sections))
         return found
 
-    def _stops(self, angles: Array, rates: Array, latched: Array) -> tuple[float, float]:
+    def _stored_in_stops(self, angles: Array, latched: Array) -> float:
         stop = self._model.scene.stop
         if stop is None:
-            return 0.0, 0.0
-        folded, turning = np.pi - angles, -rates
+            return 0.0
+        folded = np.pi - angles
         stowed = np.pi - np.radians(stop.stowed_angle)
         ends = np.maximum(-folded, 0.0) + np.maximum(folded - stowed, 0.0)
-        depth = np.where(latched, folded, ends)
+        return 0.5 * stop.stiffness * float(np.sum(np.where(latched, folded, ends) ** 2))
+
+    def _stop_damping(self, angles: Array, rates: Array, latched: Array) -> Damping:
+        stop = self._model.scene.stop
+        if stop is None:
+            return _NOTHING
+        folded, turning = np.pi - angles, -rates
         spring = stop_torque(stop, folded, np.zeros_like(turning), latched)
         torque = stop_torque(stop, folded, turning, latched)
-        return (
-            0.5 * stop.stiffness * float(np.sum(depth**2)),
-            float(np.sum((torque - spring) * turning)),
-        )
+        return (torque - spring).ravel(), turning.ravel()
 
-    def _net_energy(self, state: State) -> tuple[float, float]:
+    def _net_energy(self, state: State) -> tuple[float, Damping]:
         net = self._model.scene.net
         if self._net is None or net is None:
-            return 0.0, 0.0
+            return 0.0, _NOTHING
         arms = state.position[self._corners] - state.position[self._hub]
         moving = state.velocity[self._corners] - state.velocity[self._hub]
         lengths = np.linalg.norm(arms, axis=1)
@@ -155,4 +153,4 @@ class EnergyMeter:
         spring, damper = net_forces(
             stretch, rate, self._net.stiffness, net.damping, two_sided=net.two_sided
         )
-        return 0.5 * float(np.sum(spring * stretch)), float(np.sum(damper * rate))
+        return 0.5 * float(np.sum(spring * stretch)), (damper, rate)

@@ -178,11 +178,9 @@ class Integration:
         if self._built.faults.strike(time, angles, chain):
             chain = self._read_cables(time)
             after = self._energy.read(time, state, angles, rates, self._latched, chain)
-            # Powers jump at a fault: half the step before it belongs to those from before.
-            power = (reading.loss - reading.winch_power) - (after.loss - after.winch_power)
-            before = 0.5 * (time - history.times[-2]) if len(history.times) > 1 else 0.0
-            released = reading.elastic - after.elastic + before * power
-            reading = after._replace(lost_in_rods=reading.lost_in_rods + released)
+            # What a fault lets go is lost; nothing moves while it strikes.
+            released = reading.elastic - after.elastic
+            reading = after._replace(lost=reading.lost + released, driven=reading.driven)
         history.energies.append(reading)
         if chain is not None:
             history.tensions.append(chain.tensions)

@@ -104,11 +104,9 @@ def add_energies(
 ) -> None:
     """Energies and joint gaps (m) over time, what the balance lacks, and the largest gap."""
     energies = np.array(readings)
-    between = 0.5 * np.diff(times) * (energies[1:, 3] + energies[:-1, 3]) + energies[1:, 4]
-    lost = np.concatenate([[0.0], np.cumsum(between)])
-    driven = 0.5 * np.diff(times) * (energies[1:, 5] + energies[:-1, 5])
     kinetic, elastic = energies[:, 0], energies[:, 1]
-    work = energies[:, 2] + np.concatenate([[0.0], np.cumsum(driven)])
+    lost = np.cumsum(energies[:, 3])
+    work = energies[:, 2] + np.cumsum(energies[:, 4])
     for name, series in (
         ("kinetic_energy", kinetic),
         ("elastic_energy", elastic),

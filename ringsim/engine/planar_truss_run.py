@@ -20,14 +20,13 @@ from ringsim.engine.energy import Energies
 from ringsim.engine.planar_truss import TrussModel, rest_force
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.settings import solver_settings
+from ringsim.engine.work import StepWork, rod_damping
 from ringsim.variables import Status
 
 Array = NDArray[np.float64]
 _KINETIC = exu.OutputVariableType.KineticEnergy
 _POTENTIAL = exu.OutputVariableType.PotentialEnergy
 _TORQUE = exu.OutputVariableType.TorqueLocal
-_VELOCITY = exu.OutputVariableType.VelocityLocal
-_ANGULAR_VELOCITY = exu.OutputVariableType.AngularVelocityLocal
 _RECOVERY = 10
 """Steps after which a halved step may grow again."""
 
@@ -175,7 +174,7 @@ class TrussReader:
         rods = model.scene.rods
         second = rods.bar.second_moment
         self._per_moment = 0.5 * rods.bar.outer_diameter / (np.max(rods.young_modulus) * second)
-        self._damped: tuple[float, float] | None = None
+        self._since = StepWork()
 
     def read(self, time: float, history: TrussHistory) -> bool:
         """Append the current state to a history; False if it is not finite."""
@@ -224,19 +223,11 @@ class TrussReader:
         elastic += 0.5 * spring.stiffness * (strut - spring.free_length) ** 2
         elastic += 0.5 * rest.stiffness * max(room - distance, 0.0) ** 2
         elastic += float(chain.elastic_energy.sum())
-        loss = spring.damping * closing**2 + (held - push) * rate
-        loss += float(chain.friction_loss.sum() + chain.damping_loss.sum())
-        winch = float(chain.winch_power.sum() - chain.drum_power.sum())
-        return Energies(kinetic, elastic, 0.0, loss, self._lost_in_beams(time), winch)
-
-    def _lost_in_beams(self, time: float) -> float:
-        """Trapezoid of the dampers' power since the reading before, J."""
-        read, power = self._model.assembly.system.GetObjectOutput, 0.0
-        for damper, matrix in self._model.assembly.dampers:
-            rate = np.concatenate([read(damper, _VELOCITY), read(damper, _ANGULAR_VELOCITY)])
-            power += float(rate @ matrix @ rate)
-        before, self._damped = self._damped, (time, power)
-        return 0.0 if before is None else 0.5 * (power + before[1]) * (time - before[0])
+        in_beams, beam_rates = rod_damping(model.assembly)
+        forces = np.concatenate([[spring.damping * closing, held - push], in_beams])
+        rates = np.concatenate([[closing, rate], beam_rates])
+        passed = self._since.since(time, forces, rates, chain)
+        return Energies(kinetic, elastic, 0.0, passed.lost, passed.driven)
 
     def _gap(self, position: Array) -> float:
         """Largest distance of points that a joint holds together, m."""

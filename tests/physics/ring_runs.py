@@ -75,8 +75,7 @@ class Run:
     def balance(self) -> Array:
         """Energy that is missing from the balance at every step over the work so far, largest."""
         energies = np.array(self.history.energies)
-        between = 0.5 * np.diff(self.times) * (energies[1:, 3] + energies[:-1, 3])
-        lost = np.concatenate([[0.0], np.cumsum(between + energies[1:, 4])])
+        lost = np.cumsum(energies[:, 3])
         missing = energies[:, 0] + energies[:, 1] - energies[0, 1] + lost - energies[:, 2]
         return np.asarray(missing / np.abs(energies[:, 2]).max())
 

@@ -1,0 +1,63 @@
+"""Energy that passes between two readings of a run: lost in the structure, put in by winches."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.cable.state import ChainState
+from ringsim.cable.work import ChainWork, work_between
+from ringsim.engine.assembly import Assembly
+
+Array = NDArray[np.float64]
+_VELOCITY = exu.OutputVariableType.VelocityLocal
+_ANGULAR_VELOCITY = exu.OutputVariableType.AngularVelocityLocal
+
+
+class StepWork:
+    """Sums of mean force times displacement since the reading before.
+
+    The displacement of a damper is the mean of its rates times the step, which differs from that
+    of generalised-alpha by a hundredth of the rates' change over the step at most.
+    """
+
+    def __init__(self) -> None:
+        self._before: tuple[float, Array, Array, ChainState | None] | None = None
+
+    def since(
+        self, time: float, forces: Array, rates: Array, chain: ChainState | None
+    ) -> ChainWork:
+        """Energies in J since the last call.
+
+        Parameters
+        ----------
+        time
+            Of the reading, s.
+        forces, rates
+            Of everything that damps, N or N m against m/s or rad/s, in the same order each time.
+        chain
+            The cables, if there are any.
+        """
+        before, self._before = self._before, (time, forces, rates, chain)
+        if before is None:
+            return ChainWork(0.0, 0.0)
+        begin, old_forces, old_rates, old_chain = before
+        lost = 0.25 * (time - begin) * float((forces + old_forces) @ (rates + old_rates))
+        if chain is None or old_chain is None:
+            return ChainWork(0.0, lost)
+        driven, lost_in_cables = work_between(old_chain, chain)
+        return ChainWork(driven, lost + lost_in_cables)
+
+
+def rod_damping(assembly: Assembly) -> tuple[Array, Array]:
+    """Forces and rates of the rods' dampers, shape (6 dampers,) each."""
+    read: Any = assembly.system.GetObjectOutput
+    forces, rates = [np.zeros(0)], [np.zeros(0)]
+    for damper, matrix in assembly.dampers:
+        rate = np.concatenate([read(damper, _VELOCITY), read(damper, _ANGULAR_VELOCITY)])
+        forces.append(matrix @ rate)
+        rates.append(rate)
+    return np.concatenate(forces), np.concatenate(rates)
