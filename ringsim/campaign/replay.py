@@ -55,13 +55,13 @@ def stored(campaign: Folder, sample: int) -> Stored | None:
                 latest = (shard.finished[row], shard.path, row)
     if latest is None:
         return None
-    names = ["status", "reason", "solver_step", *VARIABLES]
+    names = ["status", "reason", "largest_step", *VARIABLES]
     values = rows_of(latest[1], names, np.array([latest[2]]))
     first = {name: each[0] for name, each in values.items()}
     return Stored(
         Status(int(first.pop("status"))),
         str(first.pop("reason")),
-        float(first.pop("solver_step")),
+        float(first.pop("largest_step")),
         first,
     )
 

@@ -28,7 +28,7 @@ PER_SAMPLE = {
         Variable("reason", (), "1", "why the run ended so", "str"),
         Variable("log", (), "1", "end of what a failed run printed", "str"),
         Variable("attempts", (), "1", "runs that were made of the sample", "i4"),
-        Variable("solver_step", (), "s", "largest time step of the run that counts"),
+        Variable("largest_step", (), "s", "largest time step of the run that counts"),
     )
 }
 """What is known of every sample beside its outputs."""

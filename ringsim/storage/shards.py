@@ -102,7 +102,7 @@ def _fill(path: Path, ordered: list[Result], campaign: str) -> None:
             add_coordinate(file, name, values)
         for name, definition in (PER_SAMPLE | _TIMES).items():
             column = blank(definition, (len(ordered),))
-            column[:] = [getattr(result, "step" if name == "solver_step" else name)
+            column[:] = [getattr(result, "step" if name == "largest_step" else name)
                          for result in ordered]  # fmt: skip
             add_variable(file, definition, compression=0)[:] = column
         for name, definition in VARIABLES.items():

@@ -81,7 +81,7 @@ def test_smaller_step_is_tried_and_recorded(bench):
     result = bench.result("out")
     assert result.attempts.values.tolist() == [1, 2, 3]
     assert result.status.values.tolist() == [Status.OK, Status.OK, Status.SOLVER_FAILED]
-    np.testing.assert_allclose(result.solver_step.values, [0.2, 0.1, 0.05])
+    np.testing.assert_allclose(result.largest_step.values, [0.2, 0.1, 0.05])
     assert "attempt 2, with a smaller step; first: Newton does not converge" in str(
         result.reason.values[1]
     )
