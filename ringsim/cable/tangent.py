@@ -179,32 +179,28 @@ def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent
     elastic = stiffness + viscous * float(state.wound_rates[rope]) / natural
     material = share[:, None, None] * (elastic * unit + viscous * swing)
 
-    by_length, by_rate, by_angle = _distribution(state, spans, inner, rope)
-    by_length += 1.0 / path - share / path
-    decay = by_length[:, :, None] * unit + by_rate[:, :, None] * swing
-    before, behind = _angle_gradients(unit, length)
-    decay[:, :-1] += by_angle[:, :, None] * before
-    decay[:, 1:] += by_angle[:, :, None] * behind
-    damping = share[:, None, None] * (viscous * unit)
-    scaled = tension[:, None, None]
+    spread, by_place, by_velocity = _distribution(state, spans, inner, rope, swing)
+    flat = (tension[:, None] * spread) @ np.stack([by_place, by_velocity]).reshape(2, -1, unit.size)
+    decay, drag = flat.reshape(2, len(unit), *unit.shape)
+    decay += tension[:, None, None] * (((1.0 - share) / path)[:, None] * unit)
     return RopeTangent(
         points=points,
         directions=unit,
         by_mean=material,
-        by_share=scaled * decay,
-        by_velocity=damping + scaled * by_rate[:, :, None] * unit,
-        by_direction=scaled * projector,
+        by_share=decay,
+        by_velocity=share[:, None, None] * (viscous * unit) + drag,
+        by_direction=tension[:, None, None] * projector,
     )
 
 
 def _distribution(
-    state: ChainState, spans: slice, inner: NDArray[np.bool_], rope: int
+    state: ChainState, spans: slice, inner: NDArray[np.bool_], rope: int, swing: Array
 ) -> tuple[Array, Array, Array]:
-    """Derivatives of ln(c_i) - sum omega_k ln(c_k) after lengths, rates and angles.
-
-    Shapes (spans, spans), (spans, spans) and (spans, pulleys).
+    """Derivatives of ln(c_i) - sum omega_k ln(c_k) as a product: spread (spans, pulleys) times
+    the derivatives of each pulley's logarithm after the differences of points (1/m) and after
+    those of velocities (s/m), shape (pulleys, spans, 3) each.
     """
-    length, rate = state.lengths[spans], state.rates[spans]
+    length, rate, unit = state.lengths[spans], state.rates[spans], state.directions[spans]
     path, path_rate = float(state.paths[rope]), float(state.path_rates[rope])
     ratio = float(state.natural[rope]) / path
     weight = state.shares[spans] * length / path
@@ -216,18 +212,19 @@ def _distribution(
     exponent = state.exponents[inner]
     sensitivity = state.log_decays[inner] * (1.0 - exponent**2) / state.slip_speeds[inner]
     steadily = float(state.wound_rates[rope]) + ratio * path_rate
-    speed_by_length = beyond_less_share * (steadily / path)
-    speed_by_length += (ratio / path * (share_rate - share * path_rate))[:, None]
-    speed_by_rate = -ratio * beyond_less_share
+    by_length = (sensitivity * (steadily / path))[:, None] * beyond_less_share
+    by_length += (sensitivity * (ratio / path) * (share_rate - share * path_rate))[:, None]
+    by_rate = (-ratio * sensitivity)[:, None] * beyond_less_share
 
-    def accumulated(by_pulley: Array) -> Array:
-        logs = np.zeros((count, by_pulley.shape[1]))
-        np.cumsum(sensitivity[:, None] * by_pulley, axis=0, out=logs[1:])
-        return np.asarray(logs - weight @ logs)
-
-    behind = weight[::-1].cumsum()[::-1][1:]
-    by_angle = (beyond.T - behind) * (exponent * state.log_slopes[inner])
-    return accumulated(speed_by_length), accumulated(speed_by_rate), by_angle
+    by_place = by_length[:, :, None] * unit
+    by_place += by_rate[:, :, None] * swing
+    before, behind = _angle_gradients(unit, length)
+    turned = (exponent * state.log_slopes[inner])[:, None]
+    pulley = np.arange(count - 1)
+    by_place[pulley, pulley] += turned * before
+    by_place[pulley, pulley + 1] += turned * behind
+    remaining = weight[::-1].cumsum()[::-1][1:]
+    return beyond.T - remaining, by_place, by_rate[:, :, None] * unit
 
 
 def _angle_gradients(unit: Array, length: Array) -> tuple[Array, Array]:
