@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.tangent import RopeTangent, mean_tangent, rope_tangent
-from ringsim.engine.cable_path import WIDTH, CablePath, Placed, cross, gyration, skew
+from ringsim.engine.cable_path import WIDTH, CablePath, Placed
+from ringsim.engine.rotations import cross, skew
 
 Array = NDArray[np.float64]
 _PER_SPAN = 4
@@ -61,15 +62,24 @@ class JacobianPattern:
         turn_columns = turn[self._second][:, None] + np.arange(4)
         single = turn[:, None] + np.arange(4)
         every = np.arange(self._size, self._size + auxiliary)
-        self._static = [
+        turned = np.ones((len(self._leg), WIDTH, 3), dtype=bool)
+        turned[:, :3] = path.leg_carries[self._leg, None, None] > 0.0
+        shifted = turned.copy()
+        shifted[:, :3] &= np.eye(3, dtype=bool)
+        places = [
             _pairs(differences, own),
             _pairs(own, tension[:, None]),
             _pairs(own, differences),
             _pairs(turn_rows, turn_columns),
             _pairs(single, single),
-            (every, every),
         ]
-        self._ones = np.ones(len(every))
+        rows, columns = (np.concatenate([place[k] for place in places]) for k in (0, 1))
+        filled = [shifted.transpose(0, 2, 1), turned[:, :, :1], turned]
+        mask = np.concatenate([part.ravel() for part in filled])
+        # Explicit zeros would fill the factors of the system's matrix.
+        self._kept = np.concatenate([np.flatnonzero(mask), np.arange(len(mask), len(rows))])
+        self._rows, self._columns = rows[self._kept], columns[self._kept]
+        self._empty: Array = np.stack([every, every, np.ones(len(every))], axis=1, dtype=float)
 
     def _difference(self, span: NDArray[np.int64]) -> NDArray[np.int64]:
         return np.asarray(self._size + 3 * span[:, None] + np.arange(3))
@@ -82,8 +92,7 @@ class JacobianPattern:
 
     def empty(self) -> Array:
         """Entries of a cable that pulls nothing, shape (entries, 3)."""
-        every, _ = self._static[-1]
-        return np.stack([every, every, self._ones], axis=1)
+        return self._empty
 
     def triplets(
         self,
@@ -100,31 +109,30 @@ class JacobianPattern:
         ``left`` is the share of each rope's stiffness that its winches do not answer.
         """
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
-        units = state.directions[self._span]
-        values = [-maps, np.einsum("lij,li->lj", maps, units)]
+        turned = maps.transpose(0, 2, 1)
         directions = np.empty((self._spans, 3, 3))
-        places, blocks = list(self._static), []
+        parts: list[Array] = [self._empty * [1.0, 1.0, by_q]]
         for rope in range(len(state.natural)):
             spans = slice(int(state.ropes.starts[rope]), int(state.ropes.ends[rope]))
             share = 1.0 if left is None else float(left[rope])
             if not exact and self._steady(state, rope):
                 mean, directions[spans] = mean_tangent(state, placed.velocities, rope)
-                entries = self._steady_rope(state, rope, share * mean, by_q, by_rate)
+                parts += self._steady_rope(state, rope, share * mean, by_q, by_rate)
             else:
                 tangent = rope_tangent(state, placed.velocities, rope)
                 directions[spans] = tangent.by_direction
-                entries = self._rope(state, tangent, rope, by_q, by_rate, exact=exact, left=share)
+                parts += self._rope(state, tangent, rope, by_q, by_rate, exact=exact, left=share)
                 if exact:
-                    entries += self._swinging(placed, tangent, spans, by_q)
-            for place, block in entries:
-                places.append(place)
-                blocks.append(block)
-        values.append(np.einsum("lij,lik->ljk", maps, directions[self._span]))
-        values += [*self._turning(state, placed), self._ones]
-        flat = [by_q * np.asarray(value).ravel() for value in values] + blocks
-        rows = np.concatenate([r for r, _ in places])
-        columns = np.concatenate([c for _, c in places])
-        return np.stack([rows, columns, np.concatenate(flat)], axis=1)
+                    parts.append(self._swinging(placed, tangent, spans, by_q))
+        blocks = [
+            -maps,
+            turned @ state.directions[self._span, :, None],
+            turned @ directions[self._span],
+            *self._turning(state, placed),
+        ]
+        values = np.concatenate([block.ravel() for block in blocks])[self._kept]
+        parts.append(np.stack([self._rows, self._columns, by_q * values], axis=1))
+        return np.concatenate(parts)
 
     @staticmethod
     def _steady(state: ChainState, rope: int) -> bool:
@@ -134,15 +142,15 @@ class JacobianPattern:
 
     def _steady_rope(
         self, state: ChainState, rope: int, mean_slope: Array, by_q: float, by_rate: float
-    ) -> list[tuple[tuple[NDArray[np.int64], NDArray[np.int64]], Array]]:
+    ) -> list[Array]:
         """The same with the shares of its spans held: the mean tension alone moves."""
         spans = np.arange(state.ropes.starts[rope], state.ropes.ends[rope])
         tension, difference = self._tension(spans)[None], self._difference(spans).reshape(1, -1)
         viscous = state.viscous_slope(rope) * state.directions[spans]
         mean = self._mean(rope)
         return [
-            (_pairs(tension, mean), -by_q * state.shares[spans]),
-            (_pairs(mean, difference), -(by_q * mean_slope + by_rate * viscous).ravel()),
+            _entries(tension.T, mean, -by_q * state.shares[spans]),
+            _entries(mean, difference, -(by_q * mean_slope + by_rate * viscous)),
         ]
 
     def _rope(
@@ -155,7 +163,7 @@ class JacobianPattern:
         *,
         exact: bool,
         left: float,
-    ) -> list[tuple[tuple[NDArray[np.int64], NDArray[np.int64]], Array]]:
+    ) -> list[Array]:
         """How a rope's span tensions follow its mean tension and the differences of its points."""
         spans = np.arange(state.ropes.starts[rope], state.ropes.ends[rope])
         tension, difference = self._tension(spans)[:, None], self._difference(spans).reshape(1, -1)
@@ -174,14 +182,12 @@ class JacobianPattern:
         row, column = np.nonzero(kept)
         mean = self._mean(rope)
         return [
-            (_pairs(tension.T, mean), -by_q * shares),
-            (_pairs(mean, difference), -(by_q * by_mean + by_rate * viscous)),
-            ((tension[row, 0], difference[0, column]), -flat[row, column]),
+            _entries(tension, mean, -by_q * shares),
+            _entries(mean, difference, -(by_q * by_mean + by_rate * viscous)),
+            np.stack([tension[row, 0], difference[0, column], -flat[row, column]], axis=1),
         ]
 
-    def _swinging(
-        self, placed: Placed, tangent: RopeTangent, spans: slice, by_q: float
-    ) -> list[tuple[tuple[NDArray[np.int64], NDArray[np.int64]], Array]]:
+    def _swinging(self, placed: Placed, tangent: RopeTangent, spans: slice, by_q: float) -> Array:
         """How a rope's span tensions follow velocities that turn with the nodes at fixed rates.
 
         Against the rest it is of the order of a node's turn within one step.
@@ -192,8 +198,8 @@ class JacobianPattern:
         values = -by_q * np.einsum("slj,ljk->slk", by_velocity, swings)
         tension = self._tension(np.arange(spans.start, spans.stop))
         columns = self._path.leg_node[self._leg[own], None] * WIDTH + np.arange(WIDTH)
-        rows = np.broadcast_to(tension[:, None, None], values.shape).ravel()
-        return [((rows, np.broadcast_to(columns, values.shape).ravel()), values.ravel())]
+        places = np.broadcast_arrays(tension[:, None, None], columns, values)
+        return np.stack([place.ravel() for place in places], axis=1)
 
     def _turning(self, state: ChainState, placed: Placed) -> list[Array]:
         """Change of the moments arm x F at fixed F with the turns of the nodes."""
@@ -201,19 +207,25 @@ class JacobianPattern:
         forces = state.point_forces[path.leg_point]
         arms = placed.arms[path.leg_point]
         along = np.einsum("li,li->l", arms, forces)
-        kernel = arms[:, :, None] * forces[:, None, :] - along[:, None, None] * np.eye(3)
+        kernel = arms[:, :, None] * forces[:, None, :]
+        kernel[:, range(3), range(3)] -= along[:, None]
         shares = path.leg_share
-        gyrations = gyration(placed.turns[path.leg_node])
-        first, second = self._first, self._second
-        weight = (shares[first] * shares[second])[:, None, None]
-        pairs = np.einsum(
-            "lia,lij,ljb->lab", gyrations[first], weight * kernel[first], gyrations[second]
-        )
+        gyrations = shares[:, None, None] * placed.gyrations[path.leg_node]
+        carried = gyrations.transpose(0, 2, 1) @ kernel
+        pairs = carried[self._first] @ gyrations[self._second]
         moments = shares[:, None] * cross(arms, forces)
         own = np.zeros((len(moments), 4, 4))
         own[:, 0, 1:], own[:, 1:, 0] = -2.0 * moments, 2.0 * moments
         own[:, 1:, 1:] = 2.0 * skew(moments)
         return [-pairs, -own]
+
+
+def _entries(rows: NDArray[np.int64], columns: NDArray[np.int64], values: Array) -> Array:
+    """Entries of a block with (a, 1) rows and (1, b) columns, shape (a b, 3)."""
+    found = np.empty((len(rows), columns.shape[1], 3))
+    found[:, :, 0], found[:, :, 1] = rows, columns
+    found[:, :, 2] = values.reshape(found.shape[:2])
+    return found.reshape(-1, 3)
 
 
 def _pairs(

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,6 +25,7 @@ from scipy.sparse import csr_array
 from ringsim.cable.cables import Cables
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.pantograph_ring import RingModel
+from ringsim.engine.rotations import cross, first_axes, gyration, rotated, skew, spin
 from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
@@ -54,6 +56,11 @@ class Placed:
     turns: Array
     turn_rates: Array
     turning: Array
+
+    @cached_property
+    def gyrations(self) -> Array:
+        """Angular velocity after the rates of the Euler parameters, shape (nodes, 3, 4)."""
+        return gyration(self.turns)
 
 
 class Carrier(Protocol):
@@ -175,7 +182,7 @@ class CablePath:
         maps = np.zeros((len(self.leg_point), 3, WIDTH))
         maps[:, range(3), range(3)] = self.leg_carries[:, None]
         arms = self.leg_share[:, None] * placed.arms[self.leg_point]
-        maps[:, :, 3:] = -skew(arms) @ gyration(placed.turns[self.leg_node])
+        maps[:, :, 3:] = -skew(arms) @ placed.gyrations[self.leg_node]
         return maps
 
     def leg_swings(self, placed: Placed) -> Array:
@@ -187,7 +194,7 @@ class CablePath:
         swings = np.zeros((len(self.leg_point), 3, WIDTH))
         arms = skew(self.leg_share[:, None] * placed.arms[self.leg_point])
         turning = skew(placed.turning[self.leg_point])
-        carried = turning @ arms @ gyration(placed.turns[self.leg_node])
+        carried = turning @ arms @ placed.gyrations[self.leg_node]
         swings[:, :, 3:] = arms @ gyration(placed.turn_rates[self.leg_node]) - carried
         return swings
 
@@ -208,57 +215,6 @@ class CablePath:
             self._register[key] = len(self.nodes)
             self.nodes.append(node)
         return self._register[key]
-
-
-def gyration(turns: Array) -> Array:
-    """G = 2 [-v, w I + skew(v)] of quaternions (w, v): angular velocity = G q_dot."""
-    found = np.empty((len(turns), 3, 4))
-    found[:, :, 0] = -2.0 * turns[:, 1:]
-    found[:, :, 1:] = 2.0 * skew(turns[:, 1:])
-    found[:, range(3), range(1, 4)] += 2.0 * turns[:, :1]
-    return found
-
-
-def spin(turns: Array, rates: Array) -> Array:
-    """Angular velocity G q_dot, shape (n, 3), of quaternions (w, v) and their rates."""
-    vector, by_vector = turns[:, 1:], rates[:, 1:]
-    return 2.0 * (turns[:, :1] * by_vector - rates[:, :1] * vector + cross(vector, by_vector))
-
-
-def rotated(turns: Array, vectors: Array) -> Array:
-    """Vectors turned by unit quaternions (w, v): a + 2 w v x a + 2 v x (v x a)."""
-    vector = turns[:, 1:]
-    once = 2.0 * cross(vector, vectors)
-    return vectors + turns[:, :1] * once + cross(vector, once)
-
-
-def first_axes(turns: Array) -> tuple[Array, Array]:
-    """First and second column of the rotation matrices of unit quaternions, shape (n, 3)."""
-    w, x, y, z = turns.T
-    along, across = np.empty((len(turns), 3)), np.empty((len(turns), 3))
-    along[:, 0] = 1.0 - 2.0 * (y * y + z * z)
-    along[:, 1], along[:, 2] = 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
-    across[:, 1] = 1.0 - 2.0 * (x * x + z * z)
-    across[:, 0], across[:, 2] = 2.0 * (x * y - w * z), 2.0 * (y * z + w * x)
-    return along, across
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Cross products row by row; numpy's own costs four times as much on small arrays."""
-    found = np.empty_like(b)
-    found[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
-    found[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
-    found[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return found
-
-
-def skew(vectors: Array) -> Array:
-    """Matrices of the cross product, shape (n, 3, 3)."""
-    found = np.zeros((len(vectors), 3, 3))
-    x, y, z = vectors.T
-    found[:, 0, 1], found[:, 0, 2], found[:, 1, 2] = -z, y, -x
-    found[:, 1, 0], found[:, 2, 0], found[:, 2, 1] = z, -y, x
-    return found
 
 
 def ring_path(model: RingModel, cables: Cables) -> CablePath:

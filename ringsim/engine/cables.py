@@ -6,7 +6,7 @@ Jacobian that of ringsim.engine.cable_jacobian.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import exudyn as exu
 import exudyn.itemInterface as item
@@ -21,6 +21,16 @@ from ringsim.engine.cable_path import WIDTH, CablePath, Carrier, Placed
 from ringsim.engine.winches import Winches
 
 Array = NDArray[np.float64]
+
+
+class _Answered(NamedTuple):
+    """The state of the nodes last asked for (shape (nodes, 7), s), and what it gave."""
+
+    time: float
+    place: Array
+    rates: Array
+    chain: ChainState
+    placed: Placed
 
 
 class CableDrive:
@@ -49,6 +59,7 @@ class CableDrive:
         self.ropes = self.chain.start(start.points)
         self.winches = Winches(self.chain.cables)
         self._size = len(self.path.nodes) * WIDTH
+        self._answered: _Answered | None = None
         most_ropes = len(present) + len(model.scene.faults)
         self.auxiliary = auxiliary_unknowns(self.ropes.spans, most_ropes)
         self.exact_tangent = False
@@ -83,6 +94,7 @@ class CableDrive:
             Derivative of each cable's ideal path length after the opening angle, m/rad.
         """
         del duration
+        self._answered = None
         self.winches.advance(time, state, slopes)
 
     def _left(self, state: ChainState, time: float) -> Array | None:
@@ -135,11 +147,26 @@ class CableDrive:
         place = np.asarray(q[: self._size]).reshape(shape) + self._reference
         return place, np.asarray(q_t[: self._size]).reshape(shape)
 
+    def _answer(self, q: Any, q_t: Any, time: float) -> tuple[ChainState, Placed]:
+        """The chain at a state of the object; Newton asks twice for force and Jacobian."""
+        place, rates = self._split(q, q_t)
+        known = self._answered
+        if (
+            known is None
+            or known.time != time
+            or known.chain.ropes is not self.ropes
+            or not np.array_equal(known.place, place)
+            or not np.array_equal(known.rates, rates)
+        ):
+            known = _Answered(time, place, rates.copy(), *self.evaluate(place, rates, time))
+            self._answered = known
+        return known.chain, known.placed
+
     def _force(self, mbs: Any, t: float, number: int, q: Any, q_t: Any) -> Array:
         force = np.zeros(self._size + self.auxiliary)
         try:
             with np.errstate(all="ignore"):
-                state, placed = self.evaluate(*self._split(q, q_t), t)
+                state, placed = self._answer(q, q_t, t)
                 force[: self._size] = self.path.generalised(placed, state.point_forces).ravel()
         except ValueError as error:
             # A stray Newton iterate, or no rope left: no number makes Newton take a smaller step.
@@ -154,7 +181,7 @@ class CableDrive:
         size = self._size + self.auxiliary
         try:
             with np.errstate(all="ignore"):
-                state, placed = self.evaluate(*self._split(q, q_t), t)
+                state, placed = self._answer(q, q_t, t)
                 triplets = self.pattern.triplets(
                     state,
                     placed,
