@@ -22,7 +22,8 @@ from ringsim.cable.tangent import tangents
 from ringsim.engine.build import build
 from ringsim.engine.cable_path import WIDTH
 from ringsim.engine.cables import CableDrive
-from ringsim.engine.integrate import History, Integration
+from ringsim.engine.history import History
+from ringsim.engine.integrate import Integration
 from ringsim.scene import Scene, load_scene
 
 
@@ -47,9 +48,11 @@ class DenseDrive:
         for tangent in tangents(state, placed.velocities):
             part = points[3 * tangent.points.start : 3 * tangent.points.stop]
             inner -= part.T @ ((f * tangent.stiffness + g * tangent.damping) @ part)
-        turning = pattern._turning(state, placed)
-        for (rows, columns), values in zip(pattern._static[3:5], turning, strict=True):
-            np.add.at(inner, (rows, columns), f * values.ravel())
+        turns = path.leg_node[:, None] * WIDTH + np.arange(3, WIDTH)
+        first, second = path.turning_pairs()
+        pairs, single = pattern._turning(state, placed)
+        np.add.at(inner, (turns[first][:, :, None], turns[second][:, None]), f * pairs)
+        np.add.at(inner, (turns[:, :, None], turns[:, None]), f * single)
         row, column = np.nonzero(inner)
         rest = np.arange(own, size)
         filled = np.stack([row, column, inner[row, column]], axis=1)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.state import ChainState
+from ringsim.engine.faults import Faults
 from ringsim.engine.joints import friction_torque, stop_torque
 from ringsim.engine.net import HubNet, net_forces
 from ringsim.engine.pantograph_ring import RingModel
@@ -26,7 +27,7 @@ _NOTHING: Damping = (np.zeros(0), np.zeros(0))
 
 
 class Energies(NamedTuple):
-    """Energies in J: kinetic, elastic and work of the loads at one instant; since the reading
+    """Energies in J: kinetic, elastic and work of the loads at one instant; since the instant
     before, what was lost in friction, dampers and stops, and what the winches put in less the
     strain energy that they wind up.
     """
@@ -46,8 +47,8 @@ class EnergyMeter:
     damp inside and do not tell, so with damping their balance is unknown (NaN).
     """
 
-    def __init__(self, model: RingModel, net: HubNet | None, forces: Array) -> None:
-        self._model, self._net, self._forces = model, net, forces
+    def __init__(self, model: RingModel, net: HubNet | None, forces: Array, faults: Faults) -> None:
+        self._model, self._net, self._forces, self._faults = model, net, forces, faults
         assembly = model.assembly
         self._output = assembly.system.GetObjectOutputBody
         self._elements = [e for rods in model.rods.values() for rod in rods for e in rod.elements]
@@ -71,7 +72,7 @@ class EnergyMeter:
         latched: Array,
         chain: ChainState | None = None,
     ) -> Energies:
-        """Energies at the current state.
+        """Energies at the current state, and what passed since the one that was kept last.
 
         Parameters
         ----------
@@ -89,8 +90,9 @@ class EnergyMeter:
             rate = group.rate(state)
             damped.append((friction_torque(law, group.sections, sections, rate), rate))
         stored, net_damping = self._net_energy(state)
-        damped.append(net_damping)
-        elastic += stored + self._stored_in_stops(angles, latched)
+        stuck, stuck_damping = self._faults.stuck_energy(angles, rates)
+        damped += [net_damping, stuck_damping]
+        elastic += stored + stuck + self._stored_in_stops(angles, latched)
         if chain is not None:
             elastic += float(chain.elastic_energy.sum())
         passed = self._since.since(
@@ -106,6 +108,10 @@ class EnergyMeter:
             passed.lost,
             passed.driven,
         )
+
+    def keep(self) -> None:
+        """Count from the last reading on."""
+        self._since.keep()
 
     def _rods_damping(self) -> Damping:
         if self._model.scene.rods.damping == 0.0:

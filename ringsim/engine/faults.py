@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,15 @@ from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 Array = NDArray[np.float64]
 
 
+@dataclass
+class _Stuck:
+    """A V-joint that sticks, its place, and the angle that it is held at (rad) once it does."""
+
+    fault: StuckVJoint
+    place: tuple[int, int]
+    angle: float | None = None
+
+
 class Faults:
     """The faults of a scene, in the order of their times.
 
@@ -28,9 +38,12 @@ class Faults:
         self._model, self._drive = model, drive
         self._waiting = sorted(model.scene.faults, key=lambda fault: fault.time)
         self._springs: dict[int, Any] = {}
+        self._joints: list[_Stuck] = []
         for fault in self._waiting:
             if isinstance(fault, StuckVJoint):
-                joint = model.vjoints[("upper", "lower").index(fault.plane)][fault.section - 1]
+                plane = ("upper", "lower").index(fault.plane)
+                joint = model.vjoints[plane][fault.section - 1]
+                self._joints.append(_Stuck(fault, (plane, fault.section - 1)))
                 self._springs[id(fault)] = model.assembly.torsion_spring(
                     *joint.markers,
                     stiffness=fault.stiffness,
@@ -59,11 +72,30 @@ class Faults:
             self._strike(fault, angles, state)
         return bool(due)
 
+    def stuck_energy(self, angles: Array, rates: Array) -> tuple[float, tuple[Array, Array]]:
+        """Elastic energy in J that stuck V-joints store, their damping (N m) and its rates.
+
+        Parameters
+        ----------
+        angles, rates
+            Opening angles and their rates, shape (2, sections), rad and rad/s.
+        """
+        stored, forces = 0.0, np.zeros(len(self._joints))
+        turning = np.array([rates[stuck.place] for stuck in self._joints])
+        for number, stuck in enumerate(self._joints):
+            if stuck.angle is not None:
+                turned = float(angles[stuck.place]) - stuck.angle
+                stored += 0.5 * stuck.fault.stiffness * turned**2
+                forces[number] = stuck.fault.damping * turning[number]
+        return stored, (forces, turning)
+
     def _strike(self, fault: Fault, angles: Array, state: ChainState | None) -> None:
         if isinstance(fault, StuckVJoint):
             plane = ("upper", "lower").index(fault.plane)
             sense = 1.0 if plane == 0 else -1.0
             folded = math.pi - float(angles[plane, fault.section - 1])
+            stuck = next(stuck for stuck in self._joints if stuck.fault is fault)
+            stuck.angle = math.pi - folded
             spring, system = self._springs[id(fault)], self._model.assembly.system
             system.SetObjectParameter(spring, "offset", sense * folded)
             system.SetObjectParameter(spring, "activeConnector", True)

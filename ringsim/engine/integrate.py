@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import exudyn as exu
 import numpy as np
@@ -14,52 +13,30 @@ from ringsim.cable.section_path import path_slope
 from ringsim.cable.state import ChainState
 from ringsim.engine.build import Built
 from ringsim.engine.energy import Energies, EnergyMeter
-from ringsim.engine.joints import latch
+from ringsim.engine.energy_control import EnergyControl
+from ringsim.engine.history import History
+from ringsim.engine.locks import Locks
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import JointGroup, Openings, State
-from ringsim.engine.scales import contact_step, residual_tolerance, usual_rate
+from ringsim.engine.scales import contact_step, residual_tolerance, slight_energy, usual_rate
 from ringsim.engine.settings import solver_settings
-from ringsim.engine.stepping import StepControl, StopContact
+from ringsim.engine.stepping import StepControl
 from ringsim.engine.stress import StressMeter
 from ringsim.variables import Status
 
 Array = NDArray[np.float64]
-_NEAR = 0.1
-"""A locked V-joint counts as resting on its stop within this angle of it, rad."""
+_REFUSE = 10.0
+"""Error that makes exudyn repeat a step; its tolerance is 1."""
 
 
-@dataclass
-class History:
-    """What was read at every accepted step; lists of equal length.
+class _Reading(NamedTuple):
+    """The state at the end of a step: time (s), angles (rad), rates (rad/s), energies, cables."""
 
-    Attributes
-    ----------
-    angles, rates
-        Opening angles and rates, rad and rad/s, shape (2, sections) each.
-    gaps
-        Largest joint gap, m.
-    stresses
-        Shape (8, sections) each, Pa; empty unless recorded.
-    tensions, slack, wound
-        Tension of every span of all cables behind one another (N), whether each cable is
-        slack at its winch, and the rope that its winches have wound (m); empty without cables.
-
-    """
-
-    times: list[float] = field(default_factory=list)
-    angles: list[Array] = field(default_factory=list)
-    rates: list[Array] = field(default_factory=list)
-    energies: list[Energies] = field(default_factory=list)
-    gaps: list[float] = field(default_factory=list)
-    stresses: list[Array] = field(default_factory=list)
-    tensions: list[Array] = field(default_factory=list)
-    slack: list[Array] = field(default_factory=list)
-    wound: list[Array] = field(default_factory=list)
-    status: Status = Status.UNFINISHED
-    reason: str = ""
-    newton_iterations: int = 0
-    jacobians: int = 0
-    halvings: int = 0
+    time: float
+    angles: Array
+    rates: Array
+    energies: Energies
+    chain: ChainState | None
 
 
 class Integration:
@@ -73,23 +50,27 @@ class Integration:
         self._settings = solver_settings(scene, residual_tolerance(built))
         self._state = State(ring)
         self._openings = Openings(ring)
-        self._energy = EnergyMeter(ring, built.net, built.forces)
+        self._energy = EnergyMeter(ring, built.net, built.forces, built.faults)
         self._stress = StressMeter(ring) if scene.record.stress else None
         families = {joint.family for joint in ring.joints}
         self._gaps = [
             JointGroup(ring, [j for j in ring.joints if j.family == family])
             for family in sorted(families)
         ]
-        sections = ring.geometry.sections
-        self._latched = np.zeros((2, sections), dtype=bool)
-        self._locked = np.zeros((2, sections), dtype=bool)
+        self._state.refresh()
+        self._locks = Locks(built, self._openings.read(self._state)[0])
         self._settled_at = math.inf
         self._steps = StepControl(
             scene.solver,
             contact_step(built),
             usual_rate=usual_rate(scene),
         )
+        self._control: EnergyControl | None = None
+        if built.cables is not None and scene.solver.step_control != "constant":
+            self._control = EnergyControl(scene.solver, slight_energy(built.cables))
         self._fresh = True
+        self._weighed: _Reading | None = None
+        self._shorter: float | None = None
         self._chain: ChainState | None = None
         self.history = History()
 
@@ -99,6 +80,9 @@ class Integration:
         solver.SetUserFunctionUpdateCurrentTime(self._system, self._update_time)
         self._system.SetPostStepUserFunction(self._after_step)
         self._system.SetPreNewtonResidualUserFunction(Predictor(ring.assembly, solver).apply)
+        if self._control is not None:
+            self._settings.timeIntegration.discontinuous.ignoreMaxIterations = False
+            self._system.SetPostNewtonUserFunction(self._weigh)
         self._read(0.0)
         try:
             if solver.InitializeSolver(self._system, self._settings):
@@ -134,6 +118,8 @@ class Integration:
         """Set the step: the one chosen after the last step, or the reduced one of a retry."""
         if self._fresh:
             now = self.history.times[-1]
+            if self._control is not None:
+                self._steps.step = min(self._steps.step, self._control.limit)
             left = min(self._scene.solver.end_time, self._built.faults.next_time) - now
             step = min(self._steps.step, left)
             solver.it.currentStepSize = step
@@ -142,7 +128,10 @@ class Integration:
                 self._built.cables.advance(now, step, self._chain, self._path_slopes())
         else:
             self.history.halvings += 1
+            if self._shorter is not None:
+                solver.it.currentStepSize = self._shorter
             self._steps.step = solver.it.currentStepSize
+        self._weighed = self._shorter = None
         solver.it.currentTime = solver.it.currentTime + solver.it.currentStepSize
         system.systemData.SetTime(solver.it.currentTime, exu.ConfigurationType.Current)
 
@@ -154,40 +143,67 @@ class Integration:
         if not self._read(time):
             return False
         angles, rates = self.history.angles[-1], self.history.rates[-1]
-        self._note_locks(angles, time)
+        self._locks.note(angles)
+        self._note_end(time)
         if time >= self._settled_at or self._finished(time) or self._exhausted(time):
             return False
-        self._steps.advance(time, float(np.mean(rates)), self._stop_contact(angles, rates))
+        self._steps.advance(time, float(np.mean(rates)), self._locks.contact(angles, rates))
         return True
 
+    def _weigh(self, system: Any, time: float) -> list[float]:
+        """Have exudyn repeat a step that has converged to a state that lacks energy."""
+        before, control = self.history.times[-1], self._control
+        if time > before and self._weighed is None and control is not None:
+            self._weighed = self._measure(time)
+            if self._weighed is not None:
+                self._shorter = control.shorter(
+                    time - before, self.history.energies[-1], self._weighed.energies
+                )
+        return [0.0 if self._shorter is None else _REFUSE, -1.0]
+
+    def _measure(self, time: float) -> _Reading | None:
+        """The current state; None if it is not finite."""
+        self._state.refresh()
+        if not self._state.finite():
+            return None
+        angles, rates = self._openings.read(self._state)
+        chain = self._read_cables(time)
+        return _Reading(time, angles, rates, self._energies(time, angles, rates, chain), chain)
+
+    def _energies(
+        self, time: float, angles: Array, rates: Array, chain: ChainState | None
+    ) -> Energies:
+        return self._energy.read(time, self._state, angles, rates, self._locks.latched, chain)
+
     def _read(self, time: float) -> bool:
-        history, state = self.history, self._state
-        state.refresh()
-        if not state.finite():
+        history = self.history
+        found = self._weighed or self._measure(time)
+        if found is None:
             history.status = Status.DIVERGED
             history.reason = (
                 f"the state is not finite at {time:.6g} s: reduce solver.step or solver.tolerance"
             )
             return False
-        angles, rates = self._openings.read(state)
+        _, angles, rates, energies, chain = found
+        if self._control is not None and history.times:
+            self._control.accept(time - history.times[-1], history.energies[-1], energies)
+        if self._built.faults.strike(time, angles, chain):
+            chain = self._read_cables(time)
+            after = self._energies(time, angles, rates, chain)
+            # What a fault lets go is lost; nothing moves while it strikes.
+            released = energies.elastic - after.elastic
+            energies = after._replace(lost=energies.lost + released, driven=energies.driven)
+        self._energy.keep()
         history.times.append(time)
         history.angles.append(angles)
         history.rates.append(rates)
-        chain = self._read_cables(time)
-        reading = self._energy.read(time, state, angles, rates, self._latched, chain)
-        if self._built.faults.strike(time, angles, chain):
-            chain = self._read_cables(time)
-            after = self._energy.read(time, state, angles, rates, self._latched, chain)
-            # What a fault lets go is lost; nothing moves while it strikes.
-            released = reading.elastic - after.elastic
-            reading = after._replace(lost=reading.lost + released, driven=reading.driven)
-        history.energies.append(reading)
+        history.energies.append(energies)
         if chain is not None:
             history.tensions.append(chain.tensions)
             history.slack.append(chain.is_slack[chain.ropes.first].astype(float))
             history.wound.append(chain.wound.sum(axis=1))
             self._chain = chain
-        history.gaps.append(max(float(group.gaps(state).max()) for group in self._gaps))
+        history.gaps.append(max(float(group.gaps(self._state).max()) for group in self._gaps))
         if self._stress is not None:
             history.stresses.append(self._stress.read())
         return True
@@ -198,36 +214,30 @@ class Integration:
             return None
         return cables.current(self._state.position, self._state.velocity, time)
 
-    def _note_locks(self, angles: Array, time: float) -> None:
-        stop, history = self._scene.stop, self.history
-        deployed = angles >= math.pi
-        fresh = deployed & ~self._locked
-        self._locked |= deployed
-        if stop is not None and stop.latch:
-            for plane, section in np.argwhere(fresh):
-                latch(self._built.ring, self._built.stops[plane][section])
-                self._latched[plane, section] = True
+    def _note_end(self, time: float) -> None:
+        """Let the run end once all V-joints have reached the same stop."""
         if math.isfinite(self._settled_at):
             return
-        settling = self._scene.solver.settling_time if stop is not None else 0.0
-        stowed = 0.0 if stop is None else math.radians(stop.stowed_angle)
-        if self._locked.all():
-            history.status, history.reason = Status.OK, "all V-joints have reached 180 deg"
-            self._settled_at = time + settling
-        elif np.all(angles <= stowed):
-            history.status = Status.OK
-            history.reason = "all V-joints have reached the stowed stop"
-            self._settled_at = time + settling
+        for reached, where in (
+            (self._locks.deployed, "180 deg"),
+            (self._locks.stowed, "the stowed stop"),
+        ):
+            if reached.all():
+                self.history.status = Status.OK
+                self.history.reason = f"all V-joints have reached {where}"
+                settling = self._scene.solver.settling_time
+                self._settled_at = time + (0.0 if self._scene.stop is None else settling)
+                return
 
     def _finished(self, time: float) -> bool:
         end = self._scene.solver.end_time
         if time < end * (1.0 - 1e-12):
             return False
         if self.history.status == Status.UNFINISHED:
-            locked = int(self._locked.sum())
+            locked = int(self._locks.deployed.sum())
             self.history.reason = (
                 f"solver.end_time = {end:g} s was reached with {locked} of "
-                f"{self._locked.size} V-joints locked"
+                f"{self._locks.deployed.size} V-joints locked"
             )
         return True
 
@@ -245,24 +255,6 @@ class Integration:
             f"{time - self.history.times[-2]:.1e} s: raise solver.tolerance or solver.step_limit"
         )
         return True
-
-    def _stop_contact(self, angles: Array, rates: Array) -> StopContact:
-        """V-joints that are about to meet a stop, and those that rest on one."""
-        stop = self._scene.stop
-        stowed = 0.0 if stop is None else math.radians(stop.stowed_angle)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            opening = np.where((rates > 0.0) & ~self._locked, (math.pi - angles) / rates, math.inf)
-            folding = np.where(
-                (rates < 0.0) & (angles > stowed), (stowed - angles) / rates, math.inf
-            )
-        waiting = np.minimum(opening, folding)
-        first = np.unravel_index(int(np.argmin(waiting)), waiting.shape)
-        resting = self._locked & (angles > math.pi - _NEAR)
-        return StopContact(
-            time_to_next=float(waiting[first]),
-            rate_of_next=float(abs(rates[first])),
-            resting_rate=float(np.max(np.abs(rates), where=resting, initial=0.0)),
-        )
 
     def _explain(self, error: Exception) -> str:
         time = self.history.times[-1]

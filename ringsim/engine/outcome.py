@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ringsim.cable.cables import pulleys_of
 from ringsim.engine.energy import Energies
-from ringsim.engine.integrate import History
+from ringsim.engine.history import History
 from ringsim.scene import Scene
 from ringsim.variables import PLANES, RODS, Outcome
 

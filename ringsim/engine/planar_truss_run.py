@@ -227,6 +227,7 @@ class TrussReader:
         forces = np.concatenate([[spring.damping * closing, held - push], in_beams])
         rates = np.concatenate([[closing, rate], beam_rates])
         passed = self._since.since(time, forces, rates, chain)
+        self._since.keep()
         return Energies(kinetic, elastic, 0.0, passed.lost, passed.driven)
 
     def _gap(self, position: Array) -> float:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ringsim.engine.build import Built
+from ringsim.engine.cables import CableDrive
 from ringsim.scene import Scene
 from ringsim.theory.ideal_ring import IdealRing
 
@@ -17,6 +18,13 @@ def usual_rate(scene: Scene) -> float:
     travel = math.pi - math.radians(ring.opening_angle)
     pull = 2.0 * abs(IdealRing.of(scene).acceleration_from_rest(ring.initial_phi))
     return max(math.sqrt(0.5 * pull * travel), travel / scene.solver.end_time)
+
+
+def slight_energy(cables: CableDrive) -> float:
+    """Energy in J that does not matter: a tenth of the slack width pulled along every path."""
+    content = np.abs(cables.ropes.content)
+    widths = np.array([cable.slack_width for cable in cables.chain.cables])
+    return 0.1 * float(np.sum(widths * content))
 
 
 def contact_step(built: Built) -> float:

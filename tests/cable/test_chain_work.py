@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -32,10 +34,10 @@ def states(steps, law):
 def missing(steps, law):
     """Energy in J that the balance lacks after so many steps, and what the winches put in."""
     found, points = states(steps, law)
-    works = np.array([work_between(a, b) for a, b in zip(found, found[1:], strict=False)])
+    works = np.array([work_between(a, b) for a, b in pairwise(found)])
     pulls = sum(
         0.5 * np.sum((a.point_forces + b.point_forces) * (there - here))
-        for a, b, here, there in zip(found, found[1:], points, points[1:], strict=False)
+        for (a, b), (here, there) in zip(pairwise(found), pairwise(points), strict=True)
     )
     stored = found[-1].elastic_energy.sum() - found[0].elastic_energy.sum()
     driven, lost = works.sum(axis=0)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from ringsim.engine.build import build
-from ringsim.engine.integrate import History, Integration
+from ringsim.engine.history import History
+from ringsim.engine.integrate import Integration
 from ringsim.engine.outcome import lock_times
 from ringsim.scene import Scene, load_scene
 from ringsim.theory.energy_quadrature import opening_time

@@ -1,0 +1,81 @@
+"""Steps that conjure up or swallow energy are repeated with a smaller one.
+
+A rope becomes taut within a small part of the step that the motion asks for, and throws what it
+pulls.  A step across that balances neither the work of the winch nor the energy of the rope: the
+integrator swallows what it cannot resolve.  The imbalance of a step,
+
+    change of kinetic and elastic energy + lost - work of loads and winches,
+
+is known from its two ends.  It falls with the third power of the step where the step resolves
+the motion, so that a refused step is repeated with h (allowed / imbalance)^(1/3), and the next
+one may be no larger than that.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ringsim.engine.energy import Energies
+from ringsim.parts.solver import Solver
+
+_SHARE = 0.3
+"""Imbalance allowed in a step over the tolerance times the energy exchanged so far."""
+_REFUSED = 2.0
+"""Imbalance over the allowed one from which on a step is repeated."""
+_SAFETY = 0.8
+_FALL, _RISE = 0.2, 1.5
+"""Smallest and largest ratio of successive steps."""
+_FINEST = 1e-4
+"""No step is repeated below this share of the largest step."""
+
+
+class EnergyControl:
+    """Judges steps by their energy balance.
+
+    Attributes
+    ----------
+    limit
+        Largest next step in s; infinite before the first.
+    refused
+        Number of steps that were repeated.
+    """
+
+    def __init__(self, solver: Solver, slight: float) -> None:
+        """``slight``: energy in J that does not matter; it counts as exchanged from the start."""
+        self.limit, self.refused = math.inf, 0
+        self._allowed = _SHARE * solver.tolerance
+        self._least = _FINEST * solver.step
+        self._exchanged, self._work = slight, 0.0
+        self._stored: float | None = None
+
+    def shorter(self, step: float, before: Energies, after: Energies) -> float | None:
+        """A smaller step in s to repeat this one with, or None if it is good enough."""
+        ratio = self._ratio(before, after)
+        if not ratio > _REFUSED or step <= self._least:
+            return None
+        self.refused += 1
+        share = max(_FALL, _SAFETY * math.pow(ratio, -1.0 / 3.0))
+        return max(step * share, self._least)
+
+    def accept(self, step: float, before: Energies, after: Energies) -> None:
+        """Learn from a step that was taken."""
+        ratio = max(self._ratio(before, after), 1e-3)
+        growth = min(max(_SAFETY * math.pow(ratio, -1.0 / 3.0), _FALL), _RISE)
+        self.limit = max(step * growth, self._least) if math.isfinite(ratio) else math.inf
+        self._exchanged = self._exchange(before, after)
+        self._work += after.work - before.work + after.driven
+        if self._stored is None:
+            self._stored = before.elastic
+
+    def _exchange(self, before: Energies, after: Energies) -> float:
+        """Largest energy exchanged up to the end of a step, J."""
+        work = self._work + after.work - before.work + after.driven
+        stored = before.elastic if self._stored is None else self._stored
+        return max(self._exchanged, abs(work), after.kinetic, abs(after.elastic - stored))
+
+    def _ratio(self, before: Energies, after: Energies) -> float:
+        """Imbalance of a step over what is allowed; NaN where the balance is unknown."""
+        stored = after.kinetic - before.kinetic + after.elastic - before.elastic
+        supplied = after.work - before.work + after.driven
+        allowed = self._allowed * self._exchange(before, after)
+        return abs(stored + after.lost - supplied) / allowed
