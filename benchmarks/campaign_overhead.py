@@ -107,15 +107,29 @@ def overhead():
         )
 
 
+def bare_loops(seconds):
+    """Elapsed time of two processes that do nothing but use so much processor time each."""
+    code = f"import time\nwhile time.process_time() < {seconds}: sum(range(1000))"
+    begin = time.perf_counter()
+    both = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(2)]
+    assert [process.wait() for process in both] == [0, 0]
+    return time.perf_counter() - begin
+
+
 def efficiency():
-    samples = 40
+    few, many = 10, 70
     for workers, ranks in ((2, 0), (0, 2)):
-        wall, _, watch = run(samples, 1.0, "busy", workers=workers, ranks=ranks)
+        short, _, _ = run(few, 1.0, "busy", workers=workers, ranks=ranks)
+        bare = bare_loops((many - few) // 4)
+        wall, _, watch = run(many, 1.0, "busy", workers=workers, ranks=ranks)
+        bare += bare_loops((many - few) // 4)
         supervising = sum(s for pid, s in watch.seconds.items() if is_supervisor(watch, pid))
         print(
-            f"{samples} samples of 1 s of processor time, {who(workers, ranks)}: {wall:.1f} s "
-            f"elapsed, efficiency {samples / 2 / wall:.3f} with start and merge; all supervising "
-            f"processes together {supervising:.1f} s",
+            f"{many - few} samples of 1 s of processor time, {who(workers, ranks)}: "
+            f"{wall - short:.1f} s, two bare loops of the same work {bare:.1f} s, efficiency "
+            f"{bare / (wall - short):.3f}; starting and merging take "
+            f"{short - few * (wall - short) / (many - few):.1f} s once; all supervising "
+            f"processes together {supervising:.1f} s of {wall:.0f} s",
             flush=True,
         )
 

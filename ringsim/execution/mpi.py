@@ -18,8 +18,7 @@ from ringsim.refusal import InputError
 from ringsim.storage.record import Result
 
 _TO_WORKER, _TO_RANK_0 = 11, 12
-_SHORTEST, _LONGEST = 1e-4, 5e-3
-_LONGEST_OF_WORKER = 2e-2
+_SHORTEST, _LONGEST = 1e-4, 2e-2
 _AHEAD_SECONDS, _MOST_AHEAD = 0.02, 32
 
 
@@ -148,7 +147,7 @@ class Mpi:
             if work.stop() and not told:
                 self._tell(("stop", work.stop()))
                 told = True
-            delay = min(1.5 * delay, _LONGEST_OF_WORKER if slot.busy else _LONGEST)
+            delay = min(1.5 * delay, _LONGEST)
             _rest(slot, delay)
 
     def _tell(self, message: Any) -> None:
@@ -157,7 +156,7 @@ class Mpi:
     def _wait_for_the_end(self) -> None:
         while True:
             while not self.communicator.iprobe(source=0, tag=_TO_WORKER):
-                time.sleep(_LONGEST_OF_WORKER)
+                time.sleep(_LONGEST)
             if self.communicator.recv(source=0, tag=_TO_WORKER) is None:
                 return
 
