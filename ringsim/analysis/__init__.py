@@ -1,0 +1,1 @@
+"""Reading results: datasets in, datasets out; nothing here runs a simulation."""

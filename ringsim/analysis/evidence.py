@@ -1,0 +1,165 @@
+"""Settings that were measured to be worth their cost, and picking one for a wanted accuracy.
+
+An accuracy study leaves the efficient frontier of the motion behind as a small table; those of
+the built-in scenes come with the package.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+import xarray as xr
+
+from ringsim.analysis.accuracy import GROUPS
+from ringsim.analysis.accuracy_text import changes
+from ringsim.choice import kind_of
+from ringsim.refusal import InputError
+from ringsim.scene import Scene
+
+JUDGED_BY = "motion"
+"""The errors that a setting is picked by: deployment time, opening angle and asynchrony."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One setting with what it was measured to give.
+
+    Attributes
+    ----------
+    values
+        By scene path; what is not named stays as the scene has it.
+    errors
+        Relative, by output.
+    seconds
+        Processor time of the run, s.
+    """
+
+    values: Mapping[str, Any]
+    errors: Mapping[str, float]
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The settings on the frontier of one scene, cheapest first."""
+
+    scene: str
+    settings: tuple[Setting, ...]
+
+    def pick(self, accuracy: float) -> Setting:
+        """The cheapest setting whose motion is as accurate as that.
+
+        Raises
+        ------
+        InputError
+            If none was measured to be.
+        """
+        for setting in self.settings:
+            if setting.errors[JUDGED_BY] <= accuracy:
+                return setting
+        best = min(setting.errors[JUDGED_BY] for setting in self.settings)
+        raise InputError(
+            f"--accuracy {accuracy:g}: the best setting measured with {self.scene} gives "
+            f"{best:.1e}: ask for that, or set solver.tolerance yourself"
+        )
+
+
+def evidence_of(found: xr.Dataset) -> Evidence:
+    """The frontier of a study's motion (of its opening angle, if nothing locks).
+
+    Parameters
+    ----------
+    found
+        From :func:`ringsim.analysis.accuracy.judge`; its scene is the attribute ``scene``.
+    """
+    outputs = [str(name) for name in found.output.values]
+    column = outputs.index(JUDGED_BY)
+    full = found.ladder.values != "fidelity"
+    kept = np.flatnonzero(_best(found, column) & full)
+    settings = []
+    for rung in kept[np.argsort(found.cpu_time.values[kept])]:
+        errors = {
+            name: float(f"{found.error.values[rung, k]:.2e}")
+            for k, name in enumerate(outputs)
+            if np.isfinite(found.error.values[rung, k])
+        }
+        seconds = float(f"{found.cpu_time.values[rung]:.3g}")
+        settings.append(Setting(changes(found, int(rung)), errors, seconds))
+    return Evidence(str(tomllib.loads(found.attrs["scene"])["name"]), tuple(settings))
+
+
+def _best(found: xr.Dataset, column: int) -> Any:
+    """The frontier among full runs alone: the ideal fidelity must not hide them."""
+    full = found.ladder.values != "fidelity"
+    error = np.where(full, found.error.values[:, column], np.nan)
+    cost = found.cpu_time.values
+    return [
+        bool(np.isfinite(error[k]) and not ((cost < cost[k]) & (error <= error[k])).any())
+        for k in range(len(error))
+    ]
+
+
+def to_toml(evidence: Evidence) -> str:
+    """As a file."""
+    table = {
+        "scene": evidence.scene,
+        "judged_by": [JUDGED_BY, *GROUPS[JUDGED_BY]],
+        "settings": [
+            {"seconds": s.seconds, "values": dict(s.values), "errors": dict(s.errors)}
+            for s in evidence.settings
+        ],
+    }
+    return tomli_w.dumps(table)
+
+
+def read_evidence(path: Path) -> Evidence:
+    """The settings.toml of a study.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    return _from_toml(text, str(path))
+
+
+def evidence_for(scene: Scene) -> Evidence:
+    """What the package knows of the built-in scene that is most like a scene."""
+    file = resources.files("ringsim") / "scenes" / "evidence" / f"{likest(scene)}.toml"
+    return _from_toml(file.read_text(encoding="utf-8"), file.name)
+
+
+def likest(scene: Scene) -> str:
+    """Name of the built-in scene with the same kind of structure and drive."""
+    if kind_of(scene.structure) == "planar-truss":
+        return "planar-truss"
+    if scene.cables is None:
+        return "ring18"
+    return "ring18-cable" if scene.structure.closed else "truss2"
+
+
+def _from_toml(text: str, name: str) -> Evidence:
+    try:
+        table = tomllib.loads(text)
+        settings = tuple(
+            Setting(s["values"], s["errors"], float(s["seconds"])) for s in table["settings"]
+        )
+        if not settings or any(JUDGED_BY not in s.errors for s in settings):
+            raise KeyError(JUDGED_BY)
+        return Evidence(str(table["scene"]), settings)
+    except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{name}: not the settings of an accuracy study ({error}): make it with "
+            "ringsim accuracy"
+        ) from None

@@ -1,0 +1,98 @@
+"""Error against cost: the work-precision figure of an accuracy study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ringsim.plots import style
+
+_LOOKS = {
+    "as it stands": (style.INK, "*"),
+    "constant step": (style.SKY, "s"),
+    "tolerance": (style.BLUE, "o"),
+    "elements": (style.GREEN, "D"),
+    "formulation": (style.ORANGE, "^"),
+    "dissipation": (style.PURPLE, "v"),
+    "newton": (style.VERMILLION, "P"),
+    "combined": (style.GREY, "X"),
+    "fidelity": (style.INK, "h"),
+}
+_TITLES = {
+    "deployment_time": "Deployment time",
+    "opening_angle": "Opening angle",
+    "asynchrony": "Asynchrony",
+    "peak_tension": "Peak tension",
+    "peak_rod_stress": "Peak rod stress",
+    "peak_bending_strain": "Peak bending strain",
+    "energy": "Energy balance",
+}
+
+
+@style.styled
+def accuracy(found: xr.Dataset) -> Figure:
+    """One panel an output: relative error over processor time, the frontier as a line.
+
+    Parameters
+    ----------
+    found
+        From ``ringsim.analysis.accuracy.judge``.
+    """
+    outputs = [name for name in _TITLES if name in found.output.values]
+    columns = min(3, len(outputs))
+    rows = -(-len(outputs) // columns)
+    figure = style.new_figure(3.6 * columns, 3.0 * rows + 0.9)
+    panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+    for panel, name in zip(panels, outputs, strict=False):
+        _panel(panel, found.sel(output=name))
+        style.name_panel(panel, _TITLES[name])
+    for panel in panels[len(outputs) :]:
+        panel.set_visible(False)
+    for k, panel in enumerate(panels[: len(outputs)]):
+        if k % columns == 0:
+            panel.set_ylabel("Relative error")
+        if k + columns >= len(outputs):
+            panel.set_xlabel("Processor time of the run (s)")
+            panel.tick_params(labelbottom=True)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=5)
+    figure.suptitle(str(found.attrs.get("title", "Accuracy")), x=0.012, ha="left")
+    return figure
+
+
+def _panel(axes: Axes, found: xr.Dataset) -> None:
+    cost, error = found.cpu_time.values, found.error.values
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for name, (colour, marker) in _LOOKS.items():
+        own = (found.ladder.values == name) & np.isfinite(error) & (error > 0.0)
+        if (found.ladder.values == name).any():
+            size = 150 if marker == "*" else 34
+            axes.scatter(
+                cost[own], error[own], s=size, color=colour, marker=marker, label=name,
+                linewidths=0.0, alpha=0.9, zorder=4 if marker == "*" else 3,
+            )  # fmt: skip
+    best = np.flatnonzero(found.frontier.values & (error > 0.0))
+    best = best[np.argsort(cost[best])]
+    axes.step(
+        cost[best], error[best], where="post", color=style.INK, linewidth=1.1,
+        label="efficient frontier", zorder=2,
+    )  # fmt: skip
+    floor = float(found.uncertainty)
+    if floor > 0.0:
+        lowest = min(0.3 * floor, axes.get_ylim()[0])
+        axes.axhspan(lowest, floor, color=style.PALE, zorder=0.5)
+        axes.set_ylim(bottom=lowest)
+    known = error[np.isfinite(error) & (error > 0.0)]
+    if known.size:
+        axes.set_ylim(top=12.0 * known.max())
+
+
+def draw_accuracy(found: xr.Dataset, path: Path) -> Path:
+    """Write the figure as PNG."""
+    style.write(accuracy(found), path)
+    return path
