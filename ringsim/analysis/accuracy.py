@@ -74,9 +74,8 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     Returns
     -------
     xr.Dataset
-        ``error`` (rung, output): relative; ``order`` (rung, output): observed between a rung and
-        the one before it on its ladder, NaN where errors come near the reference's own;
-        ``uncertainty`` (output): of the reference, relative; ``frontier`` (rung, output): whether
+        ``error`` (rung, output): relative; ``order`` (graded, output): observed along a ladder of
+        steps or elements, NaN where errors come near the reference's own; ``uncertainty`` (output): of the reference, relative; ``frontier`` (rung, output): whether
         no other setting is both cheaper and better; ``cheapest`` (target, output): the rung, -1 if
         none will do; ``cpu_time``, ``residual_evaluations``, ``steps``, ``status`` (rung); and for
         each truth its distance from the reference and from every rung.
@@ -94,7 +93,9 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     for name in OUTPUTS:
         if name in results and np.isfinite(results[name].isel(rung=slice(-3, None))).any():
             errors[name], floors[name] = _against_reference(results, name)
-    errors["energy"], floors["energy"] = results.energy_error.to_numpy(), 0.0
+    full = np.array([rung.ladder != "fidelity" for rung in rungs])
+    errors["energy"] = np.where(full, results.energy_error.to_numpy(), np.nan)
+    floors["energy"] = 0.0
     for group, members in GROUPS.items():
         present = [m for m in members if m in errors]
         if present:
@@ -107,10 +108,11 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     cost = results.cpu_time.to_numpy()[:-REFERENCES]
     work = results.newton_iterations.to_numpy() + results.steps.to_numpy()
     own = rungs[:-REFERENCES]
+    graded, orders = _orders(tried, floor, own)
     found = xr.Dataset(
         {
             "error": (("rung", "output"), tried, _words("error relative to the reference", "1")),
-            "order": (("rung", "output"), _orders(tried, floor, own), _words("order", "1")),
+            "order": (("graded", "output"), orders, _words("observed order", "1")),
             "uncertainty": ("output", floor, _words("uncertainty of the reference", "1")),
             "frontier": (("rung", "output"), _frontier(cost, tried)),
             "cheapest": (("target", "output"), _cheapest(cost, tried)),
@@ -123,7 +125,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
             "ladder": ("rung", [rung.ladder for rung in own]),
             "label": ("rung", [rung.label for rung in own]),
         },
-        coords={"output": outputs, "target": list(TARGETS)},
+        coords={"output": outputs, "target": list(TARGETS), "graded": graded},
     )  # fmt: skip
     for path in PATHS:
         found[path.replace(".", "_")] = ("rung", [rung.values[path] for rung in own])
@@ -166,18 +168,22 @@ def _scale(results: xr.Dataset, name: str, best: xr.DataArray) -> float:
     return float(abs(best).max())
 
 
-def _orders(error: Array, floor: Array, rungs: Sequence[Rung]) -> Array:
-    """Observed orders between neighbours of a ladder, where errors stand clear of the floor."""
-    found = np.full(error.shape, np.nan)
-    for k in range(1, len(rungs)):
-        before, here = rungs[k - 1], rungs[k]
-        if before.ladder != here.ladder or here.size in (0.0, before.size):
-            continue
-        ratio = np.log(before.size / here.size)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            order = np.log(error[k - 1] / error[k]) / ratio
-        found[k] = np.where(error[k] > 3.0 * floor, order, np.nan)
-    return found
+def _orders(error: Array, floor: Array, rungs: Sequence[Rung]) -> tuple[list[str], Array]:
+    """Observed order of each ladder that has one: the slope of log error over log size.
+
+    Only errors that stand clear of the reference's own count, and two of them make no order.
+    """
+    names = list(dict.fromkeys(rung.ladder for rung in rungs if rung.size > 0.0))
+    found = np.full((len(names), error.shape[1]), np.nan)
+    for row, name in enumerate(names):
+        places = np.array([k for k, rung in enumerate(rungs) if rung.ladder == name])
+        sizes = np.log([rungs[k].size for k in places])
+        for column in range(error.shape[1]):
+            own = error[places, column]
+            clear = np.isfinite(own) & (own > max(3.0 * floor[column], 1e-15))
+            if clear.sum() >= 3:
+                found[row, column] = np.polyfit(sizes[clear], np.log(own[clear]), 1)[0]
+    return names, found
 
 
 def _frontier(cost: Array, error: Array) -> NDArray[np.bool_]:

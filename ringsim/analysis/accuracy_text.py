@@ -21,6 +21,7 @@ _SHORT = {
     "motion": "all motion",
     "loads": "all loads",
 }
+_THEORY = {"constant step": "2", "tolerance": "2", "elements": "2", "formulation": "2"}
 
 
 def tables(found: xr.Dataset, title: str) -> str:
@@ -36,6 +37,7 @@ def tables(found: xr.Dataset, title: str) -> str:
     outputs = [str(name) for name in found.output.values]
     single = [name for name in outputs if name not in GROUPS]
     parts = [f"# {title}", "", *_advice(found, outputs), "", *_errors(found, single)]
+    parts += ["", *_orders(found, single)]
     if "from_truth" in found:
         parts += ["", *_truths(found)]
     return "\n".join(parts) + "\n"
@@ -81,11 +83,10 @@ def _advice(found: xr.Dataset, outputs: Sequence[str]) -> list[str]:
 
 
 def _errors(found: xr.Dataset, outputs: Sequence[str]) -> list[str]:
-    """Errors with the observed order behind them; what lies on a frontier is bold."""
+    """Errors and cost of every setting; what lies on a frontier is bold."""
     head = " | ".join(_SHORT.get(name, name) for name in outputs)
     lines = [
-        "Errors and, behind them, observed orders; bold where no other setting is both cheaper "
-        "and better:",
+        "Errors, bold where no other setting is both cheaper and better:",
         "",
         f"| setting | steps | residuals | processor time | {head} |",
         "|---|---|---|---|" + "---|" * len(outputs),
@@ -107,13 +108,27 @@ def _errors(found: xr.Dataset, outputs: Sequence[str]) -> list[str]:
 
 def _cell(found: xr.Dataset, rung: int, output: str) -> str:
     at = {"rung": rung, "output": list(found.output.values).index(output)}
-    error, order = float(found.error.isel(at)), float(found.order.isel(at))
+    error = float(found.error.isel(at))
     if not np.isfinite(error):
         return ""
-    text = f"{error:.1e}"
-    if bool(found.frontier.isel(at)):
-        text = f"**{text}**"
-    return text if not np.isfinite(order) else f"{text} ({order:.1f})"
+    return f"**{error:.1e}**" if bool(found.frontier.isel(at)) else f"{error:.1e}"
+
+
+def _orders(found: xr.Dataset, outputs: Sequence[str]) -> list[str]:
+    head = " | ".join(_SHORT.get(name, name) for name in outputs)
+    lines = [
+        "Observed orders (slope of the error over the step, the root of the tolerance or the "
+        "length of an element, where it stands clear of the reference's own; a dash where it "
+        "does not):",
+        "",
+        f"| ladder | theory | {head} |",
+        "|---|---|" + "---|" * len(outputs),
+    ]
+    for name in found.graded.values:
+        orders = [float(found.order.sel(graded=name, output=output)) for output in outputs]
+        cells = [f"{order:.1f}" if np.isfinite(order) else "-" for order in orders]
+        lines.append(f"| {name} | {_THEORY.get(str(name), '')} | {' | '.join(cells)} |")
+    return lines
 
 
 def _truths(found: xr.Dataset) -> list[str]:

@@ -26,7 +26,7 @@ PATHS = (
 _TOLERANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5)
 _FINE = 1e-5
 """Tolerance of the reference runs."""
-_MOVING_STEPS = (0.8, 0.4, 0.2)
+_MOVING_STEPS = (0.4, 0.2, 0.1)
 _CONSTANT_STEPS = (4.0, 2.0, 1.0, 0.5)
 """Constant steps over solver.step, for scenes whose step moves and for those whose does not."""
 

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ringsim.plots import style
 
@@ -68,6 +69,9 @@ def _panel(axes: Axes, found: xr.Dataset) -> None:
     cost, error = found.cpu_time.values, found.error.values
     axes.set_xscale("log")
     axes.set_yscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     for name, (colour, marker) in _LOOKS.items():
         own = (found.ladder.values == name) & np.isfinite(error) & (error > 0.0)
         if (found.ladder.values == name).any():
