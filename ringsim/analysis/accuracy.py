@@ -75,10 +75,11 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     -------
     xr.Dataset
         ``error`` (rung, output): relative; ``order`` (graded, output): observed along a ladder of
-        steps or elements, NaN where errors come near the reference's own; ``uncertainty`` (output): of the reference, relative; ``frontier`` (rung, output): whether
-        no other setting is both cheaper and better; ``cheapest`` (target, output): the rung, -1 if
-        none will do; ``cpu_time``, ``residual_evaluations``, ``steps``, ``status`` (rung); and for
-        each truth its distance from the reference and from every rung.
+        steps or elements, NaN where errors come near the reference's own; ``uncertainty``
+        (output): of the reference, relative; ``frontier`` (rung, output): whether no other setting
+        is both cheaper and better; ``cheapest`` (target, output): the rung, -1 if none will do;
+        ``cpu_time``, ``residual_evaluations``, ``steps``, ``status`` (rung); and for each truth
+        its distance from the reference and from every rung.
 
     Raises
     ------

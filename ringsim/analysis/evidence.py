@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 import tomli_w
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsim.analysis.accuracy import GROUPS
-from ringsim.analysis.accuracy_text import changes
+from ringsim.analysis.ladder import PATHS
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
@@ -34,7 +35,7 @@ class Setting:
     Attributes
     ----------
     values
-        By scene path; what is not named stays as the scene has it.
+        By scene path; the largest step of a moving one is the scene's own affair.
     errors
         Relative, by output.
     seconds
@@ -81,8 +82,7 @@ def evidence_of(found: xr.Dataset) -> Evidence:
     """
     outputs = [str(name) for name in found.output.values]
     column = outputs.index(JUDGED_BY)
-    full = found.ladder.values != "fidelity"
-    kept = np.flatnonzero(_best(found, column) & full)
+    kept = np.flatnonzero(_best(found, column))
     settings = []
     for rung in kept[np.argsort(found.cpu_time.values[kept])]:
         errors = {
@@ -91,19 +91,26 @@ def evidence_of(found: xr.Dataset) -> Evidence:
             if np.isfinite(found.error.values[rung, k])
         }
         seconds = float(f"{found.cpu_time.values[rung]:.3g}")
-        settings.append(Setting(changes(found, int(rung)), errors, seconds))
+        settings.append(Setting(_values(found, int(rung)), errors, seconds))
     return Evidence(str(tomllib.loads(found.attrs["scene"])["name"]), tuple(settings))
 
 
-def _best(found: xr.Dataset, column: int) -> Any:
-    """The frontier among full runs alone: the ideal fidelity must not hide them."""
-    full = found.ladder.values != "fidelity"
-    error = np.where(full, found.error.values[:, column], np.nan)
+def _best(found: xr.Dataset, column: int) -> NDArray[np.bool_]:
+    """The frontier among full runs of the scene's own rods."""
+    others = np.isin(found.ladder.values, ["fidelity", "formulation"])
+    error = np.where(others, np.inf, np.nan_to_num(found.error.values[:, column], nan=np.inf))
     cost = found.cpu_time.values
-    return [
-        bool(np.isfinite(error[k]) and not ((cost < cost[k]) & (error <= error[k])).any())
-        for k in range(len(error))
-    ]
+    beaten = [((cost < cost[k]) & (error <= error[k])).any() for k in range(len(error))]
+    return np.asarray(np.isfinite(error) & ~np.array(beaten))
+
+
+def _values(found: xr.Dataset, rung: int) -> dict[str, Any]:
+    values = {path: found[path.replace(".", "_")].values[rung] for path in PATHS}
+    values = {path: getattr(value, "item", lambda v=value: v)() for path, value in values.items()}
+    del values["rods.kind"]
+    if values["solver.step_control"] == "motion":
+        del values["solver.step"]
+    return values
 
 
 def to_toml(evidence: Evidence) -> str:
@@ -135,7 +142,19 @@ def read_evidence(path: Path) -> Evidence:
 
 
 def evidence_for(scene: Scene) -> Evidence:
-    """What the package knows of the built-in scene that is most like a scene."""
+    """What the package knows of the built-in scene that is most like a scene.
+
+    Raises
+    ------
+    InputError
+        If the scene has rods of another formulation.
+    """
+    if kind_of(scene.rods) != "geometrically-exact":
+        raise InputError(
+            f'rods.kind = "{kind_of(scene.rods)}": the settings that come with ringsim were '
+            "measured with geometrically-exact rods: use these, or give --evidence from "
+            "ringsim accuracy on your scene"
+        )
     file = resources.files("ringsim") / "scenes" / "evidence" / f"{likest(scene)}.toml"
     return _from_toml(file.read_text(encoding="utf-8"), file.name)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from ringsim.choice import kind_of
 from ringsim.overrides import parse_assignment
 from ringsim.refusal import InputError
-from ringsim.scene import load_scene
+from ringsim.scene import Scene, load_scene
 
 EXIT_FAILED = 3
 
@@ -32,14 +33,38 @@ EXIT_FAILED = 3
     show_default=True,
     help="Full model, or the ideal ring of rigid rods (in a second; no asynchrony, no stress).",
 )
+@click.option(
+    "--accuracy",
+    type=click.FloatRange(1e-8, 1.0),
+    help="Relative error of deployment time, opening angle and asynchrony to aim at: picks the "
+    "cheapest settings measured to give it.",
+)
+@click.option(
+    "--evidence",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="settings.toml of ringsim accuracy (default: that of the built-in scene most alike).",
+)
 @click.option("--plot", is_flag=True, help="Draw figures beside the netCDF file.")
 def command(
-    scene: str, settings: tuple[str, ...], out: Path | None, fidelity: str, *, plot: bool
+    scene: str,
+    settings: tuple[str, ...],
+    out: Path | None,
+    fidelity: str,
+    accuracy: float | None,
+    evidence: Path | None,
+    *,
+    plot: bool,
 ) -> None:
     """Run SCENE (a built-in name or a TOML file) and write SCENE.nc."""
     chosen = load_scene(scene)
-    if settings:
-        chosen = chosen.with_values(dict(parse_assignment(text) for text in settings))
+    given = dict(parse_assignment(text) for text in settings)
+    if accuracy is not None:
+        chosen = _with_accuracy(chosen, accuracy, evidence, given, fidelity)
+    elif evidence is not None:
+        raise InputError(f"--evidence {evidence}: says nothing without --accuracy; give both")
+    if given:
+        chosen = chosen.with_values(given)
     if fidelity == "ideal" and chosen.record.stress:
         chosen = chosen.with_values({"record.stress": False})
         click.echo("stress is left out: the rods of the ideal ring are rigid")
@@ -79,6 +104,29 @@ def command(
             click.echo(f"wrote {picture}")
     if outcome.status >= Status.SOLVER_FAILED:
         sys.exit(EXIT_FAILED)
+
+
+def _with_accuracy(
+    scene: Scene, accuracy: float, file: Path | None, given: dict[str, Any], fidelity: str
+) -> Scene:
+    """The scene with the cheapest settings that were measured to be so accurate."""
+    from ringsim.analysis.evidence import evidence_for, read_evidence
+
+    if fidelity != "full":
+        raise InputError(
+            f"--accuracy {accuracy:g}: the ideal fidelity keeps its own tolerances: leave out one "
+            "of --accuracy and --fidelity"
+        )
+    known = read_evidence(file) if file is not None else evidence_for(scene)
+    picked = known.pick(accuracy)
+    clash = sorted(set(picked.values) & set(given))
+    if clash:
+        raise InputError(f"--set {clash[0]}: --accuracy chooses it: leave out one of the two")
+    words = ", ".join(f"{path} = {value}" for path, value in picked.values.items())
+    errors = ", ".join(f"{name.replace('_', ' ')} {e:.0e}" for name, e in picked.errors.items())
+    click.echo(f"settings for {accuracy:g}: {words or 'as the scene has them'}")
+    click.echo(f"  measured with {known.scene}: {errors}")
+    return scene.with_values(dict(picked.values))
 
 
 def _require_folder(target: Path) -> None:

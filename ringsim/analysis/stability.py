@@ -1,0 +1,279 @@
+"""The stability map: how each cell ended, why, and whether "ok" was true.
+
+A cell is one run.  It is "ok" if it ended well with its errors within their tolerances, "ended"
+if its status and reason name a cause, and "wrong" if it says ok and is not, or fails without a
+cause.  Random ok cells are run again with smaller steps; one that differs by more than it
+promises is wrong.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ringsim.parts.solver import Solver
+from ringsim.variables import Status
+
+Array = NDArray[np.float64]
+
+OK, ENDED, WRONG = "ok", "ended", "wrong"
+CAUSES = (
+    ("step limit", "solver.step_limit = "),
+    ("energy grew", "energy from nothing"),
+    ("energy lost", "energy got lost"),
+    ("blow-up", "blew up"),
+    ("blow-up", "not finite"),
+    ("stop passed", "past its stop"),
+    ("joint gap", "joints came apart"),
+    ("Newton", "the solver gave up"),
+    ("end time", "solver.end_time = "),
+    ("time limit", "limits.timeout = "),
+    ("memory", "limits.memory = "),
+    ("refused", "InputError"),
+)
+"""Word of a cause, and the words by which a reason names it; the first that occurs counts."""
+
+TIME_PROMISE, ANGLE_PROMISE, TENSION_PROMISE = 0.01, 0.5, 0.05
+"""What an ok cell promises: relative error of the deployment time, error in degree of the mean
+angle where a run ended before, and error of the largest tension over itself."""
+ENERGY_PROMISE = Solver().energy_tolerance
+"""Largest energy error of an ok cell."""
+
+_SCALARS = (
+    "energy_error", "constraint_error", "restarts", "steps", "cpu_time", "deployment_time",
+    "final_time", "peak_tension",
+)  # fmt: skip
+
+
+def cause_of(reason: str) -> str:
+    """The word for a run's reason; empty if it names none of ``CAUSES``.
+
+    Of a run that started anew the last start counts.
+    """
+    last = re.sub(r"\s*\((start|attempt) \d.*", "", reason, flags=re.DOTALL)
+    return next((word for word, phrase in CAUSES if phrase in last), "")
+
+
+def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr.Dataset:
+    """The cells of one campaign.
+
+    Parameters
+    ----------
+    campaign
+        A merged campaign.
+    x, y
+        Values of the two axes for each of its samples.
+
+    Returns
+    -------
+    xr.Dataset
+        Over ``cell``: ``x``, ``y``, ``status`` (code), ``reason``, ``cause``, ``final_angle`` (mean
+        opening angle at the last output time that was reached, degree) and the run's numbers.
+    """
+    count = campaign.sizes["sample"]
+    reasons = [str(reason) for reason in campaign["reason"].values]
+    status = campaign["status"].values.astype(int)
+    found: dict[str, tuple[str, object]] = {
+        "x": ("cell", np.asarray(x, dtype=float)),
+        "y": ("cell", np.asarray(y, dtype=float)),
+        "status": ("cell", status),
+        "reason": ("cell", np.array(reasons, dtype=object)),
+        "cause": ("cell", np.array([_cause(*one) for one in zip(status, reasons, strict=True)])),
+        "final_angle": ("cell", _final_angle(campaign)),
+    }
+    for name in _SCALARS:
+        known = name in campaign
+        values = campaign[name].values.astype(float) if known else np.full(count, np.nan)
+        if known and campaign[name].dtype.kind == "i":
+            values[values < 0.0] = np.nan
+        found[name] = ("cell", values)
+    return xr.Dataset(found)
+
+
+def _cause(status: int, reason: str) -> str:
+    return "" if status == Status.OK else cause_of(reason) or Status(status).word
+
+
+def _final_angle(campaign: xr.Dataset) -> Array:
+    if "opening_angle" not in campaign:
+        return np.full(campaign.sizes["sample"], np.nan)
+    angle = campaign["opening_angle"].transpose("sample", "time", ...).values
+    mean = angle.reshape(*angle.shape[:2], -1).mean(axis=2)
+    known = np.isfinite(mean)
+    last = np.where(known.any(axis=1), mean.shape[1] - 1 - known[:, ::-1].argmax(axis=1), 0)
+    found: Array = mean[np.arange(len(mean)), last]
+    return found
+
+
+def judged(cells: xr.Dataset) -> xr.Dataset:
+    """Add the ``verdict`` of every cell.
+
+    A cell that ended before its goal is "ended", sound as its motion may be.  One that is ok with
+    an energy error over its tolerance, or whose check (see :func:`checked`) failed, is "wrong".
+    """
+    status = cells["status"].values
+    verdict = np.where(status == Status.OK, OK, ENDED).astype(object)
+    nameless = [Status(code).word for code in status] == cells["cause"].values
+    crashed = np.isin(status, (Status.ERROR, Status.CRASHED)) & (cells["cause"] != "refused").values
+    verdict[(status != Status.OK) & nameless | crashed] = WRONG
+    verdict[(status == Status.OK) & (cells["energy_error"] > ENERGY_PROMISE).values] = WRONG
+    if "check" in cells:
+        verdict[(cells["check"] == "differs").values] = WRONG
+    return cells.assign(verdict=("cell", verdict.astype(str)))
+
+
+def chosen_for_check(cells: xr.Dataset, share: float, seed: int) -> NDArray[np.int64]:
+    """Cells to run again with smaller steps: a random share of those that are ok, at least one.
+
+    Parameters
+    ----------
+    cells
+        The judged map.
+    share
+        Between 0 and 1.
+    seed
+        Of the choice.
+    """
+    good = np.flatnonzero((cells["verdict"] == OK).values)
+    count = min(len(good), max(1, round(share * len(good))))
+    picked = np.random.default_rng(seed).choice(good, count, replace=False)
+    return np.sort(picked).astype(np.int64)
+
+
+def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> xr.Dataset:
+    """Compare cells with the same ones run with smaller steps.
+
+    Parameters
+    ----------
+    cells
+        The map.
+    which
+        Numbers of the cells that were run again.
+    finer
+        Those cells, in this order, as :func:`cells_of` gives them.
+
+    Returns
+    -------
+    xr.Dataset
+        The map with ``time_difference`` (relative), ``angle_difference`` (degree) and
+        ``tension_difference`` (relative) of those cells, and ``check``: "" (not checked),
+        "holds", "differs", or "unproven" where the finer run did not end.
+    """
+    found = cells.copy()
+    for name in ("time_difference", "angle_difference", "tension_difference"):
+        found[name] = ("cell", np.full(cells.sizes["cell"], np.nan))
+    mine = cells.isel(cell=which)
+    ended = (finer["status"] == Status.OK).values
+    for name, variable in (("time", "deployment_time"), ("tension", "peak_tension")):
+        there = finer[variable].values
+        change = np.abs(mine[variable].values - there) / np.abs(there)
+        found[f"{name}_difference"].values[which] = change
+    angles = np.abs(mine["final_angle"].values - finer["final_angle"].values)
+    timed = np.isfinite(finer["deployment_time"].values)
+    found["angle_difference"].values[which] = np.where(timed, np.nan, angles)
+    over = np.zeros(len(which), dtype=bool)
+    for name, promise in (
+        ("time", TIME_PROMISE), ("angle", ANGLE_PROMISE), ("tension", TENSION_PROMISE),
+    ):  # fmt: skip
+        over |= found[f"{name}_difference"].values[which] > promise
+    check = np.full(cells.sizes["cell"], "", dtype=object)
+    check[which] = np.where(~ended, "unproven", np.where(over, "differs", "holds"))
+    found["check"] = ("cell", check.astype(str))
+    return judged(found)
+
+
+def joined(groups: Sequence[tuple[dict[str, str], xr.Dataset]]) -> xr.Dataset:
+    """One map of all groups.
+
+    Parameters
+    ----------
+    groups
+        Name, title and the axes' labels and units (``name``, ``title``, ``x_label``, ``x_units``,
+        ``y_label``, ``y_units``), and the cells of each group.
+
+    Returns
+    -------
+    xr.Dataset
+        Dimensions ``group`` and ``cell``; ``of_group`` is the number of each cell's group.
+    """
+    parts = [
+        cells.assign(of_group=("cell", np.full(cells.sizes["cell"], number)))
+        for number, (_, cells) in enumerate(groups)
+    ]
+    whole = xr.concat(parts, dim="cell")
+    for key in groups[0][0]:
+        whole[key] = ("group", np.array([words[key] for words, _ in groups], dtype=object))
+    return judged(whole)
+
+
+def share_ok(cells: xr.Dataset, axis: str) -> tuple[Array, Array, list[str]]:
+    """For every value of an axis of one group: share of ok cells, and the commonest other cause.
+
+    Parameters
+    ----------
+    cells
+        The cells of one group.
+    axis
+        "x" or "y".
+    """
+    values, place = np.unique(cells[axis].values, return_inverse=True)
+    fine = (cells["verdict"] == OK).values
+    shares = np.array([fine[place == k].mean() for k in range(len(values))])
+    causes = []
+    for k in range(len(values)):
+        others = cells["cause"].values[(place == k) & ~fine]
+        words, counts = np.unique(others.astype(str), return_counts=True)
+        causes.append(str(words[counts.argmax()] or WRONG) if len(words) else "")
+    return values, shares, causes
+
+
+def borders(whole: xr.Dataset) -> xr.Dataset:
+    """Between which values of each axis runs are ok, and what lies beyond.
+
+    Returns
+    -------
+    xr.Dataset
+        Over ``border``, one for each axis of each group: ``of_group``, ``axis``, ``lowest_ok`` and
+        ``highest_ok`` (end values at which any cell is ok), ``lowest_sure`` and ``highest_sure``
+        (the longest range in which all cells are; NaN if there is none), ``below`` and ``above``
+        (the commonest cause just beyond that range; empty at the axis' end).
+    """
+    rows = []
+    for number in range(whole.sizes["group"]):
+        cells = whole.isel(cell=(whole["of_group"] == number).values)
+        for axis in ("x", "y"):
+            values, shares, causes = share_ok(cells, axis)
+            some = np.flatnonzero(shares > 0.0)
+            sure = _longest(shares == 1.0)
+            low, high = (some[0], some[-1]) if len(some) else (len(values), -1)
+            rows.append(
+                {
+                    "of_group": number,
+                    "axis": axis,
+                    "lowest_ok": values[low] if len(some) else np.nan,
+                    "highest_ok": values[high] if len(some) else np.nan,
+                    "lowest_sure": values[sure[0]] if sure else np.nan,
+                    "highest_sure": values[sure[-1]] if sure else np.nan,
+                    "below": _beyond(causes, sure[0] - 1) if sure else "",
+                    "above": _beyond(causes, sure[-1] + 1) if sure else "",
+                }
+            )
+    return xr.Dataset({key: ("border", [row[key] for row in rows]) for key in rows[0]})
+
+
+def _beyond(causes: Sequence[str], place: int) -> str:
+    return causes[place] if 0 <= place < len(causes) else ""
+
+
+def _longest(held: NDArray[np.bool_]) -> list[int]:
+    """The longest run of neighbours that hold."""
+    best: list[int] = []
+    now: list[int] = []
+    for place, holds in enumerate(held):
+        now = [*now, place] if holds else []
+        best = now if len(now) > len(best) else best
+    return best
