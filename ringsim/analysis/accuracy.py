@@ -19,6 +19,8 @@ REFERENCES = 3
 """Rungs at the end of a ladder that the reference is made of."""
 _RICHARDSON = 4.0 / 3.0
 """Change from h to h / 2 times this is the change to h = 0, at second order."""
+_MATTERS = 2.0
+"""Ratio of the errors along a ladder from which on it shows an order."""
 
 OUTPUTS = {
     "deployment_time": "deployment time",
@@ -172,7 +174,8 @@ def _scale(results: xr.Dataset, name: str, best: xr.DataArray) -> float:
 def _orders(error: Array, floor: Array, rungs: Sequence[Rung]) -> tuple[list[str], Array]:
     """Observed order of each ladder that has one: the slope of log error over log size.
 
-    Only errors that stand clear of the reference's own count, and two of them make no order.
+    Only errors that stand clear of the reference's own count, two of them make no order, and
+    neither do errors that come from elsewhere and hardly change along the ladder.
     """
     names = list(dict.fromkeys(rung.ladder for rung in rungs if rung.size > 0.0))
     found = np.full((len(names), error.shape[1]), np.nan)
@@ -182,7 +185,7 @@ def _orders(error: Array, floor: Array, rungs: Sequence[Rung]) -> tuple[list[str
         for column in range(error.shape[1]):
             own = error[places, column]
             clear = np.isfinite(own) & (own > max(3.0 * floor[column], 1e-15))
-            if clear.sum() >= 3:
+            if clear.sum() >= 3 and own[clear].max() > _MATTERS * own[clear].min():
                 found[row, column] = np.polyfit(sizes[clear], np.log(own[clear]), 1)[0]
     return names, found
 

@@ -119,7 +119,7 @@ def _orders(found: xr.Dataset, outputs: Sequence[str]) -> list[str]:
     lines = [
         "Observed orders (slope of the error over the step, the root of the tolerance or the "
         "length of an element, where it stands clear of the reference's own; a dash where it "
-        "does not):",
+        "does not, or where the ladder hardly matters):",
         "",
         f"| ladder | theory | {head} |",
         "|---|---|" + "---|" * len(outputs),

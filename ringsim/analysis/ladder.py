@@ -90,7 +90,7 @@ def ladder(scene: Scene) -> list[Rung]:
     one = scene.rods.elements
     for elements in (one, 2 * one, 4 * one):
         add("elements", f"{elements}", 1.0 / elements, rods__elements=elements)
-    if kind_of(scene.structure) == "pantograph-ring":
+    if kind_of(scene.structure) == "pantograph-ring" and scene.cables is None:
         other = "ancf" if kind_of(scene.rods) != "ancf" else "geometrically-exact"
         for elements in (one, 2 * one):
             label = f"{other}, {elements}"

@@ -1,0 +1,158 @@
+"""Errors, orders, frontier and advice of a made-up study whose answers are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from ringsim.analysis.accuracy import NEEDED, Truth, judge
+from ringsim.analysis.accuracy_text import in_words, tables
+from ringsim.analysis.evidence import evidence_of, likest, read_evidence, to_toml
+from ringsim.analysis.ladder import PATHS, ladder
+from ringsim.refusal import InputError
+from ringsim.scene import builtin_scenes, load_scene
+
+SCENE = load_scene("ring18")
+RUNGS = ladder(SCENE)
+TRUE_TIME, TRUE_STRESS = 10.0, 2e6
+
+
+def errors_of(values: dict[str, object]) -> tuple[float, float]:
+    """Relative errors in time and in space of a model of second order in both."""
+    if values["solver.step_control"] == "constant":
+        in_time = (float(values["solver.step"]) / 0.2) ** 2
+    else:
+        in_time = 10.0 * float(values["solver.tolerance"])
+    return in_time, 1e-6 / float(values["rods.elements"]) ** 2
+
+
+def made_up() -> xr.Dataset:
+    times = np.linspace(0.0, 12.0, 121)
+    rows = []
+    for rung in RUNGS:
+        error = sum(errors_of(dict(rung.values)))
+        angle = np.clip(90.0 + 9.0 * times * (1.0 + error), None, 180.0)
+        known = times <= TRUE_TIME * (1.0 + error)
+        rows.append(
+            {
+                "deployment_time": TRUE_TIME * (1.0 + error),
+                "opening_angle": np.where(known, angle, np.nan)[None, None],
+                "asynchrony": np.where(known, times * (1.0 + error), np.nan),
+                "peak_rod_stress": TRUE_STRESS * (1.0 - error),
+                "energy_error": error,
+                "cpu_time": 1.0 / np.sqrt(error),
+                "steps": 100.0 / np.sqrt(error),
+                "newton_iterations": 300.0 / np.sqrt(error),
+                "status": 0,
+                "final_time": 12.0,
+            }
+        )
+    dims = {"opening_angle": ("plane", "section", "time"), "asynchrony": ("time",)}
+    data = {
+        name: (
+            ("rung", *dims.get(name, ())),
+            np.array([row.get(name, np.nan) for row in rows]),
+        )
+        for name in NEEDED
+    }
+    return xr.Dataset(data, coords={"time": times})
+
+
+@pytest.fixture(scope="module")
+def study() -> xr.Dataset:
+    source = "a closed form"
+    found = judge(made_up(), RUNGS, [Truth("deployment_time", source, TRUE_TIME * 1.01)])
+    return found.assign_attrs(scene=SCENE.to_toml())
+
+
+def test_the_extrapolated_reference_is_the_truth(study: xr.Dataset) -> None:
+    """Both errors are of second order, so Richardson's extrapolation leaves nothing."""
+    expected = [sum(errors_of(dict(rung.values))) for rung in RUNGS[:-3]]
+    for output in ("deployment_time", "peak_rod_stress"):
+        np.testing.assert_allclose(study.error.sel(output=output), expected, rtol=1e-6)
+    # What it corrects is what it may be wrong by: a third of both changes, 3/4 of the errors.
+    fine = errors_of(dict(RUNGS[-3].values))
+    own = float(study.uncertainty.sel(output="deployment_time"))
+    assert own == pytest.approx(0.25 * sum(fine), rel=1e-6)
+
+
+def test_orders(study: xr.Dataset) -> None:
+    """Steps show their order; elements too few errors that stand clear of the steps'."""
+    order = study.order.sel(output="deployment_time")
+    assert float(order.sel(graded="constant step")) == pytest.approx(2.0, abs=0.1)
+    assert float(order.sel(graded="tolerance")) == pytest.approx(2.0, abs=0.1)
+    assert np.isnan(order.sel(graded="elements"))
+
+
+def test_the_frontier_holds_every_setting_that_is_worth_its_cost(study: xr.Dataset) -> None:
+    """Here cost falls with the error alone: all settings are on the frontier of all outputs."""
+    for output in ("deployment_time", "asynchrony", "motion"):
+        best = study.frontier.sel(output=output).to_numpy()
+        cost, error = study.cpu_time.to_numpy(), study.error.sel(output=output).to_numpy()
+        for k in np.flatnonzero(~best):
+            assert ((cost <= cost[k]) & (error <= error[k])).sum() > 1
+        assert best[np.argmin(cost)]
+        assert best[np.nanargmin(error)]
+
+
+def test_a_failed_setting_is_never_recommended() -> None:
+    results = made_up()
+    cheapest = int(judge(results, RUNGS, []).cheapest.sel(target=1e-2, output="motion"))
+    results.status[cheapest] = 2
+    again = judge(results, RUNGS, [])
+    assert int(again.cheapest.sel(target=1e-2, output="motion")) != cheapest
+    assert np.isnan(again.error[cheapest]).all()
+
+
+def test_a_failed_reference_is_refused() -> None:
+    results = made_up()
+    results.status[-1] = 2
+    with pytest.raises(ValueError, match="reference"):
+        judge(results, RUNGS, [])
+
+
+def test_the_distance_from_the_truth_is_not_an_error(study: xr.Dataset) -> None:
+    assert float(study.reference_from_truth[0]) == pytest.approx(0.01 / 1.01, rel=0.05)
+
+
+def test_tables_name_settings_as_overrides(study: xr.Dataset) -> None:
+    text = tables(study, "A study")
+    assert text.startswith("# A study")
+    assert "| peak stress |" in text
+    assert "closed form" in text
+    assert "nan" not in text
+    rung = next(k for k, r in enumerate(RUNGS) if r.label == "0.0003")
+    assert in_words(study, rung) == "`--set solver.tolerance=0.0003`"
+    assert in_words(study, 0) == "as it stands"
+
+
+def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tmp_path) -> None:
+    evidence = evidence_of(study)
+    file = tmp_path / "settings.toml"
+    file.write_text(to_toml(evidence))
+    assert read_evidence(file) == evidence
+    seconds = [s.seconds for s in evidence.settings]
+    assert seconds == sorted(seconds)
+    picked = evidence.pick(0.01)
+    assert picked.errors["motion"] <= 0.01
+    assert all(s.errors["motion"] > 0.01 for s in evidence.settings if s.seconds < picked.seconds)
+    assert (
+        SCENE.with_values(dict(picked.values)).solver.tolerance == picked.values["solver.tolerance"]
+    )
+    with pytest.raises(InputError, match="best setting"):
+        evidence.pick(1e-8)
+    file.write_text("settings = 3")
+    with pytest.raises(InputError, match="not the settings"):
+        read_evidence(file)
+
+
+@pytest.mark.parametrize("name", builtin_scenes())
+def test_every_rung_of_every_scene_is_a_scene(name: str) -> None:
+    scene = load_scene(name)
+    rungs = ladder(scene)
+    assert len({(rung.ladder, rung.label) for rung in rungs}) == len(rungs)
+    for rung in rungs:
+        assert set(rung.values) == set(PATHS)
+        scene.with_values(dict(rung.values))
+    assert likest(scene) == name
