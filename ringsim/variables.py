@@ -114,6 +114,7 @@ _ALL = (
     Variable("steps", (), "1", "time steps", "i4"),
     Variable("newton_iterations", (), "1", "Newton iterations", "i4"),
     Variable("jacobians", (), "1", "Jacobian factorisations", "i4"),
+    Variable("restarts", (), "1", "new starts with a smaller step after a run that failed", "i4"),
     Variable("final_time", (), "s", "time at which the run ended"),
     Variable("fidelity", (), "1", "model: 0 full multibody, 1 ideal ring of rigid rods", "i4"),
     Variable("status", (), "1", "how the run ended", "i1"),

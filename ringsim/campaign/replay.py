@@ -87,7 +87,8 @@ def replay(campaign: Folder, sample: int, *, step: float | None = None) -> Resul
     shrink = 1.0
     if step is not None and np.isfinite(step):
         shrink = step / scene.solver.step
-    task = Task(sample, campaign.table.values_of(sample), shrink)
+    values, own = campaign.table.values_of(sample), campaign.retry.times == 0
+    task = Task(sample, values, shrink, restarts=own)
     return solve(load_solver(campaign.solver), campaign.scene, task)
 
 

@@ -14,11 +14,18 @@ from ringsim.cable.state import ChainState
 from ringsim.engine.build import Built
 from ringsim.engine.energy import Energies, EnergyMeter
 from ringsim.engine.energy_control import EnergyControl
+from ringsim.engine.guard import Guard
 from ringsim.engine.history import History
 from ringsim.engine.locks import Locks
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import JointGroup, Openings, State
-from ringsim.engine.scales import contact_step, residual_tolerance, slight_energy, usual_rate
+from ringsim.engine.scales import (
+    contact_step,
+    residual_tolerance,
+    slight_energy,
+    usual_energy,
+    usual_rate,
+)
 from ringsim.engine.settings import solver_settings
 from ringsim.engine.stepping import StepControl
 from ringsim.engine.stress import StressMeter
@@ -68,6 +75,9 @@ class Integration:
         self._control: EnergyControl | None = None
         if built.cables is not None and scene.solver.step_control != "constant":
             self._control = EnergyControl(scene.solver, slight_energy(built.cables))
+        self._guard = Guard(
+            scene.solver.energy_tolerance, usual_energy(scene), scene.structure.half_bar
+        )
         self._fresh = True
         self._weighed: _Reading | None = None
         self._shorter: float | None = None
@@ -96,6 +106,7 @@ class Integration:
         if history.status == Status.UNFINISHED and not history.reason:
             history.status = Status.SOLVER_FAILED  # exudyn may give up without raising
             history.reason = self._explain(RuntimeError("it stopped before the end"))
+        self._guard.conclude(history)
         history.newton_iterations = int(solver.it.newtonStepsCount)
         history.jacobians = int(solver.it.newtonJacobiCount)
         return history
@@ -206,7 +217,7 @@ class Integration:
         history.gaps.append(max(float(group.gaps(self._state).max()) for group in self._gaps))
         if self._stress is not None:
             history.stresses.append(self._stress.read())
-        return True
+        return not self._guard.stops(history, self._locks.overrun(angles))
 
     def _read_cables(self, time: float) -> ChainState | None:
         cables = self._built.cables

@@ -55,6 +55,10 @@ class Locks:
         self.stowed |= self._away & (angles <= self._stowed_angle)
         self._away |= angles > self._stowed_angle + _NEAR
 
+    def overrun(self, angles: Array) -> float:
+        """Largest angle by which a V-joint is past its stops, rad; 0 if none is."""
+        return max(float(angles.max()) - math.pi, self._stowed_angle - float(angles.min()), 0.0)
+
     def contact(self, angles: Array, rates: Array) -> StopContact:
         """V-joints that are about to meet a stop, and those that rest on one.
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ringsim.cable.state import ChainState
 from ringsim.engine import quaternions
 from ringsim.engine.energy import Energies
+from ringsim.engine.guard import Guard
 from ringsim.engine.planar_truss import TrussModel, rest_force
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.settings import solver_settings
@@ -29,6 +30,8 @@ _POTENTIAL = exu.OutputVariableType.PotentialEnergy
 _TORQUE = exu.OutputVariableType.TorqueLocal
 _RECOVERY = 10
 """Steps after which a halved step may grow again."""
+_SLIGHT = 1e-3
+"""Energy that does not matter, over the spring's largest force along a beam."""
 
 
 @dataclass
@@ -75,6 +78,8 @@ class TrussIntegration:
         time.numberOfSteps = math.ceil(solver.end_time / solver.step * (1.0 - 1e-12))
         time.adaptiveStepRecoverySteps = _RECOVERY
         self._reader = TrussReader(model)
+        slight = _SLIGHT * self._push() * model.truss.beam_length
+        self._guard = Guard(solver.energy_tolerance, slight, model.truss.beam_length)
         self.history = TrussHistory()
 
     def run(self) -> TrussHistory:
@@ -95,6 +100,7 @@ class TrussIntegration:
             else:
                 history.status = Status.OK
                 history.reason = f"the cable was wound until solver.end_time = {end:g} s"
+        self._guard.conclude(history)
         history.newton_iterations = int(solver.it.newtonStepsCount)
         history.jacobians = int(solver.it.newtonJacobiCount)
         return history
@@ -116,10 +122,10 @@ class TrussIntegration:
 
     def _read(self, time: float) -> bool:
         if self._reader.read(time, self.history):
-            step = self._model.scene.solver.step
             chain, slope = self._reader.chain, self._reader.path_slope
+            step = self._model.scene.solver.step
             self._model.cable.advance(time, step, chain, np.array([slope]))
-            return True
+            return not self._guard.stops(self.history)
         self.history.status = Status.DIVERGED
         self.history.reason = f"the state is not finite at {time:.6g} s: reduce solver.step"
         return False
@@ -131,14 +137,17 @@ class TrussIntegration:
         times coordinates of order 1 m, per coordinate.
         """
         model, rods = self._model, self._model.scene.rods
-        truss = model.truss
-        shortest = float(truss.geometry().strut(truss.stowed_angle))
-        push = truss.spring.stiffness * abs(truss.spring.free_length - shortest)
         element = float(np.diff(model.upper.places).min())
         stiffest = float(np.max(rods.young_modulus)) * rods.bar.area / element
         size = self._system.systemData.ODE2Size()
         round_off = 4.0 * float(np.finfo(float).eps) * stiffest * math.sqrt(size)
-        return max(model.scene.solver.newton_tolerance * push, round_off)
+        return max(model.scene.solver.newton_tolerance * self._push(), round_off)
+
+    def _push(self) -> float:
+        """The spring's largest force, N."""
+        truss = self._model.truss
+        shortest = float(truss.geometry().strut(truss.stowed_angle))
+        return float(truss.spring.stiffness * abs(truss.spring.free_length - shortest))
 
 
 class TrussReader:

@@ -20,6 +20,13 @@ def usual_rate(scene: Scene) -> float:
     return max(math.sqrt(0.5 * pull * travel), travel / scene.solver.end_time)
 
 
+def usual_energy(scene: Scene) -> float:
+    """Kinetic energy in J of the ideal ring, as stowed, at its usual rate."""
+    ring = scene.structure
+    inertia = float(IdealRing.of(scene).motion(ring.initial_phi).inertia)
+    return 0.5 * inertia * (0.5 * usual_rate(scene)) ** 2
+
+
 def slight_energy(cables: CableDrive) -> float:
     """Energy in J that does not matter: a tenth of the slack width pulled along every path."""
     content = np.abs(cables.ropes.content)

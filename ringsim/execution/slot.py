@@ -186,7 +186,8 @@ class Slot:
             time.sleep(0.05)
             return self._give_up(
                 Status.TIMEOUT,
-                f"still running after limits.timeout = {self._limits.timeout:g} s",
+                f"still running after limits.timeout = {self._limits.timeout:g} s: raise it, or "
+                "raise solver.tolerance",
             )
         if _resident(process.pid) > self._limits.memory:
             return self._give_up(Status.MEMORY, self._too_much())

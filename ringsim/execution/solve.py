@@ -57,6 +57,8 @@ def solve(solver: Solver, base: Scene, task: Task) -> Result:
         scene = base.with_values(task.values)
         if task.shrink != 1.0:
             scene = scene.with_values({"solver.step": scene.solver.step * task.shrink})
+        if not task.restarts:
+            scene = scene.with_values({"solver.restarts": 0})
         step = scene.solver.step
         outcome = solver(scene)
         arrays, body = pack(outcome.coordinates | outcome.values)

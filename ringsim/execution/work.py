@@ -26,7 +26,11 @@ class Limits(Model):
 
 
 class Retry(Model):
-    """Repeating a run that the solver could not finish, each time with a smaller step."""
+    """Repeating a run that the solver could not finish, each time with a smaller step.
+
+    Where it does, runs do not start anew by themselves (``solver.restarts``): a sample is
+    attempted 1 + times times, not (1 + times) (1 + restarts) times.
+    """
 
     times: Annotated[int, Field(ge=0, le=10)] = 0
     step_factor: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
@@ -41,6 +45,8 @@ class Task:
     values: dict[str, Any]
     shrink: float = 1.0
     """Factor on the scene's largest step."""
+    restarts: bool = True
+    """Whether the run may start anew by itself (``solver.restarts``)."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +83,7 @@ class Work:
 
     def task(self, sample: int) -> Task:
         """The first run of a sample."""
-        return Task(sample, self.values_of(sample))
+        return Task(sample, self.values_of(sample), restarts=self.retry.times == 0)
 
 
 class Scheduler(Protocol):

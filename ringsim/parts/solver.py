@@ -8,6 +8,10 @@ from pydantic import Field, model_validator
 
 from ringsim.units import Model, Ratio, Second, SecondOrZero
 
+_FINER = 0.25
+"""Factor on the step from one start of a run to the next."""
+_LEAST_STEP, _LEAST_TOLERANCE = 1e-9, 1e-8
+
 
 class Solver(Model):
     """Generalised-alpha with a step that follows the motion.
@@ -24,7 +28,7 @@ class Solver(Model):
     step: Second = 0.2
     """Largest step, or the step if it is constant."""
     step_control: Literal["motion", "constant"] = "motion"
-    tolerance: Annotated[float, Field(ge=1e-8, le=0.1)] = 1e-4
+    tolerance: Annotated[float, Field(ge=_LEAST_TOLERANCE, le=0.1)] = 1e-4
     spectral_radius: Ratio = 0.8
     """High-frequency amplification per step: 1 keeps every vibration, lower damps it."""
     newton_tolerance: Annotated[float, Field(ge=1e-12, le=1e-2)] = 1e-5
@@ -32,6 +36,13 @@ class Solver(Model):
 
     step_limit: Annotated[int, Field(ge=1, le=10_000_000)] = 20_000
     """A run that has not ended after so many steps is given up."""
+
+    energy_tolerance: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.1
+    """Imbalance of energy over the largest energy exchanged at which a run counts as diverged."""
+
+    restarts: Annotated[int, Field(ge=0, le=5)] = 2
+    """How often a run that failed or diverged starts anew, each time with a quarter of the step
+    and a sixteenth of the tolerance."""
 
     @model_validator(mode="after")
     def _usable(self) -> Solver:
@@ -43,6 +54,18 @@ class Solver(Model):
                 "numerical damping (0.9 is nearly undamped)"
             )
         return self
+
+    def refined(self, times: int) -> Solver:
+        """The settings of a restart: a quarter of every step, ``times`` times over.
+
+        Steps go with the square root of the tolerance, so that takes a sixteenth of it.
+        """
+        return self.model_copy(
+            update={
+                "step": max(self.step * _FINER**times, _LEAST_STEP),
+                "tolerance": max(self.tolerance * _FINER ** (2 * times), _LEAST_TOLERANCE),
+            }
+        )
 
 
 class Record(Model):

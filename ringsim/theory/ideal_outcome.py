@@ -64,6 +64,7 @@ def to_outcome(course: Course, scene: Scene, *, wall_time: float, cpu_time: floa
         "steps": sum(len(piece.time) for piece in course.pieces),
         "newton_iterations": course.newton_iterations,
         "jacobians": course.tries,
+        "restarts": 0,
         "fidelity": int(Fidelity.IDEAL),
     }
     values.update({name: np.array(number) for name, number in counts.items()})

@@ -1,0 +1,155 @@
+"""Guards of a run: blow-up, energy growth and loss, joints that come apart, stops passed.
+
+They judge every accepted step and stop the run at the first that cannot be sound.  What they
+compare is the balance
+
+    B = kinetic + elastic - both at the start + lost - work of loads and winches
+
+with the energy X exchanged so far, the largest of |work| and of the changes of kinetic and
+elastic energy.  Generalised-alpha takes energy out of what it does not resolve (B < 0) and puts
+in none, so that growth (B > 0) means more than loss.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from ringsim.engine.energy import Energies
+from ringsim.variables import Status
+
+GROWTH, LOSS = 2.0, 5.0
+"""B / X at which a run is stopped, over ``solver.energy_tolerance``.  Larger than at the end,
+since X still grows: an error made early may be small beside all that follows."""
+BLOW_UP = 10.0
+"""Kinetic and elastic energy over what start, loads and winches could give."""
+GAP = 1e-4
+"""Largest gap of a joint over the length of a bar."""
+OVERRUN = math.radians(30.0)
+"""Angle by which a V-joint may pass its stop: beyond it neither stop nor model mean anything."""
+_CURE = "reduce solver.step or solver.tolerance"
+
+
+class Watched(Protocol):
+    """What a guard reads and writes of a run's history."""
+
+    times: list[float]
+    energies: list[Energies]
+    gaps: list[float]
+    status: Status
+    reason: str
+
+
+class Guard:
+    """Watches one run from its first reading on."""
+
+    def __init__(self, energy_tolerance: float, least_energy: float, bar: float) -> None:
+        """Set the bounds.
+
+        Parameters
+        ----------
+        energy_tolerance
+            Largest |B| / X of a sound run.
+        least_energy
+            X counts as this much at least, J.
+        bar
+            Length in m against which gaps are measured.
+        """
+        self._tolerance, self._least, self._bar = energy_tolerance, least_energy, bar
+        self._start: Energies | None = None
+        self._lost = self._driven = 0.0
+        self._low = self._high = np.zeros(3)
+        self._worst = (0.0, 0.0)
+
+    def stops(self, history: Watched, overrun: float = 0.0) -> bool:
+        """Judge the last reading of a run; note in its history why it must stop there, if so.
+
+        Parameters
+        ----------
+        history
+            Of the run.
+        overrun
+            Largest angle by which a V-joint has passed its stops, rad.
+        """
+        reason = self.judge(history.times[-1], history.energies[-1], history.gaps[-1], overrun)
+        if reason:
+            history.status, history.reason = Status.DIVERGED, reason
+        return bool(reason)
+
+    def conclude(self, history: Watched) -> None:
+        """Note in the history of a run that ended by itself if it is not sound after all."""
+        reason = self.verdict()
+        if reason and history.status in (Status.OK, Status.UNFINISHED):
+            history.status, history.reason = Status.DIVERGED, reason
+
+    def judge(self, time: float, now: Energies, gap: float, overrun: float = 0.0) -> str:
+        """Why the run must stop here: cause, measured value, bound and cure; empty if it may go on.
+
+        Parameters
+        ----------
+        time
+            Of the reading, s.
+        now
+            Its energies.
+        gap
+            Largest gap in any joint, m.
+        overrun
+            Largest angle by which a V-joint has passed its stops, rad.
+        """
+        start = self._start = self._start or now
+        self._lost += now.lost
+        self._driven += now.driven
+        work = now.work + self._driven
+        stored = now.kinetic + now.elastic
+        balance = stored - start.kinetic - start.elastic + self._lost - work
+        changes = [now.kinetic - start.kinetic, now.elastic - start.elastic, work]
+        self._low, self._high = np.fmin(self._low, changes), np.fmax(self._high, changes)
+        if abs(balance) > abs(self._worst[1]):
+            self._worst = (time, balance)
+
+        available = max(abs(work), self._least) + start.kinetic + start.elastic
+        if stored > BLOW_UP * available:
+            return (
+                f"the motion blew up at {time:.6g} s: {now.kinetic:.3g} J of kinetic and "
+                f"{now.elastic:.3g} J of elastic energy, more than {BLOW_UP:g} times the "
+                f"{available:.3g} J that start, loads and winches have given: {_CURE}"
+            )
+        if gap > GAP * self._bar:
+            return (
+                f"the joints came apart by {gap:.2g} m at {time:.6g} s, more than "
+                f"{GAP * self._bar:.2g} m: {_CURE}"
+            )
+        if overrun > OVERRUN:
+            return (
+                f"a V-joint swung {math.degrees(overrun):.3g} deg past its stop at {time:.6g} s, "
+                f"more than {math.degrees(OVERRUN):.0f} deg: raise stop.stiffness, or lower what "
+                "drives it"
+            )
+        factor = GROWTH if balance > 0.0 else LOSS
+        if abs(balance) > factor * self._tolerance * self._exchanged:
+            return self._unbalanced(time, balance, f"{factor:g} times solver.energy_tolerance")
+        return ""
+
+    def verdict(self) -> str:
+        """Why a run that ended by itself is not sound after all; empty if it is."""
+        time, balance = self._worst
+        if abs(balance) <= self._tolerance * self._exchanged:
+            return ""
+        return self._unbalanced(time, balance, "solver.energy_tolerance")
+
+    @property
+    def _exchanged(self) -> float:
+        """X, J."""
+        work = max(self._high[2], -self._low[2])
+        return float(max(self._least, work, *(self._high - self._low)[:2]))
+
+    def _unbalanced(self, time: float, balance: float, bound: str) -> str:
+        exchanged = self._exchanged
+        what = "came as energy from nothing" if balance > 0.0 else "is energy got lost in the steps"
+        return (
+            f"{abs(balance):.3g} J, {100.0 * abs(balance) / exchanged:.3g} % of the energy "
+            f"exchanged, {what} until {time:.6g} s, more than {bound} "
+            f"({100.0 * self._tolerance:g} %): {_CURE}"
+        )

@@ -1,0 +1,102 @@
+"""Guards stop what cannot be sound, name the cause, and leave sound runs alone."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from ringsim.analysis.stability import cause_of
+from ringsim.engine.energy import Energies
+from ringsim.engine.guard import BLOW_UP, GAP, GROWTH, LOSS, OVERRUN, Guard
+
+TOLERANCE, LEAST, BAR = 0.02, 1e-3, 0.3
+
+
+def guard() -> Guard:
+    """One that has seen a ring at rest."""
+    fresh = Guard(TOLERANCE, LEAST, BAR)
+    assert fresh.judge(0.0, Energies(0.0, 0.0, 0.0, 0.0), 0.0) == ""
+    return fresh
+
+
+def after(work: float, created: float) -> Energies:
+    """Everything that the loads put in moves, and what came from nothing besides."""
+    return Energies(work + created, 0.0, work, 0.0)
+
+
+def test_a_balanced_motion_goes_on_and_is_sound() -> None:
+    watching = guard()
+    for k in range(1, 100):
+        moving = Energies(0.8 * k, 0.1 * k, 1.0 * k, 0.2, 0.1)
+        assert watching.judge(0.1 * k, moving, 1e-9, 0.01) == ""
+    assert watching.verdict() == ""
+
+
+@pytest.mark.parametrize(("factor", "sign"), [(GROWTH, 1.0), (LOSS, -1.0)])
+def test_energy_that_comes_or_goes_stops_the_run_at_its_bound(factor, sign) -> None:
+    """X is the work where energy is lost, and the kinetic energy where it came from nothing."""
+    share = sign * factor * TOLERANCE
+    exact = share / (1.0 - share) if sign > 0.0 else share
+    assert guard().judge(1.0, after(1.0, 0.999 * exact), 0.0) == ""
+    reason = guard().judge(1.0, after(1.0, 1.001 * exact), 0.0)
+    assert cause_of(reason) == ("energy grew" if sign > 0.0 else "energy lost")
+    assert "1 s" in reason
+    assert "solver.energy_tolerance" in reason
+    assert "reduce solver.step" in reason
+
+
+@pytest.mark.parametrize("created", [0.03, -0.03])
+def test_a_run_that_ends_with_too_large_an_imbalance_is_not_sound(created) -> None:
+    watching = guard()
+    assert watching.judge(1.0, after(1.0, created), 0.0) == ""
+    assert watching.judge(2.0, after(1.0, 0.0), 0.0) == ""
+    assert cause_of(watching.verdict()) == ("energy grew" if created > 0.0 else "energy lost")
+    assert "until 1 s" in watching.verdict()
+
+
+def test_an_early_imbalance_is_small_beside_all_that_follows() -> None:
+    watching = guard()
+    watching.judge(1.0, after(1.0, 0.03), 0.0)
+    watching.judge(2.0, after(10.0, 0.03), 0.0)
+    assert watching.verdict() == ""
+
+
+def test_next_to_no_energy_does_not_count() -> None:
+    watching = guard()
+    assert watching.judge(1.0, after(0.0, 0.5 * TOLERANCE * LEAST), 0.0) == ""
+    assert watching.verdict() == ""
+
+
+def test_more_energy_than_there_can_be_is_a_blow_up() -> None:
+    stored = (BLOW_UP + 1.0) * 2.0
+    reason = guard().judge(0.5, Energies(stored, 0.0, 2.0, 0.0), 0.0)
+    assert cause_of(reason) == "blow-up"
+    assert f"{stored:.3g} J of kinetic" in reason
+
+
+def test_energy_of_the_start_is_available() -> None:
+    watching = Guard(TOLERANCE, LEAST, BAR)
+    assert watching.judge(0.0, Energies(0.0, 5.0, 0.0, 0.0), 0.0) == ""
+    assert watching.judge(1.0, Energies(5.0, 0.0, 0.0, 0.0), 0.0) == ""
+    assert watching.verdict() == ""
+
+
+def test_a_gap_of_a_joint_stops_the_run() -> None:
+    assert guard().judge(1.0, after(1.0, 0.0), 0.99 * GAP * BAR) == ""
+    reason = guard().judge(1.0, after(1.0, 0.0), 1.01 * GAP * BAR)
+    assert cause_of(reason) == "joint gap"
+    assert f"{1.01 * GAP * BAR:.2g} m" in reason
+
+
+def test_a_joint_far_beyond_its_stop_stops_the_run() -> None:
+    assert guard().judge(1.0, after(1.0, 0.0), 0.0, 0.99 * OVERRUN) == ""
+    reason = guard().judge(1.0, after(1.0, 0.0), 0.0, 1.01 * OVERRUN)
+    assert cause_of(reason) == "stop passed"
+    assert "raise stop.stiffness" in reason
+
+
+def test_an_unknown_balance_stops_nothing() -> None:
+    watching = guard()
+    assert watching.judge(1.0, Energies(1.0, 0.0, 1.0, math.nan), 0.0) == ""
+    assert watching.verdict() == ""
