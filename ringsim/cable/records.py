@@ -9,13 +9,7 @@ from pydantic import Field, model_validator
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.friction.family import PulleyFriction
 from ringsim.cable.friction.frictionless import Frictionless
-from ringsim.cable.winding.family import (
-    FeedbackWinding,
-    PrescribedWinding,
-    WinchReading,
-    WinchState,
-    Winding,
-)
+from ringsim.cable.winding.family import PrescribedWinding, WinchState, Winding
 from ringsim.choice import load_package, one_of
 from ringsim.units import (
     AxialStiffness,
@@ -61,7 +55,7 @@ class Winch(Model):
 
     @property
     def feedback(self) -> bool:
-        """Whether ``advance`` needs readings."""
+        """Whether its law answers to the rope (``ringsim.cable.winches``)."""
         return self.winding.feedback
 
     def turns(self, time: float) -> bool:
@@ -80,18 +74,6 @@ class Winch(Model):
             rate = self.winding.wound_rate(clock) if self.turns(time) else 0.0
             return WinchState(time, self.winding.wound(clock), rate)
         return state.at(time)
-
-    def advance(
-        self, time: float, duration: float, reading: WinchReading | None, state: WinchState
-    ) -> WinchState:
-        """The state to hold from ``time`` for a step of ``duration``; call once per step."""
-        if isinstance(self.winding, FeedbackWinding):
-            if not self.turns(time):
-                return WinchState(time, state.at(time).wound, 0.0)
-            if reading is None:
-                raise ValueError(f"{type(self.winding).__name__} needs a reading of its rope")
-            return self.winding.advance(time, duration, reading, state)
-        return self.at(time, state)
 
 
 class Cable(Model):

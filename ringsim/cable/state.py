@@ -216,8 +216,6 @@ class ChainState:
         rope = int((self.ropes.last if end else self.ropes.first)[cable])
         present = float(self.wound_rate[cable, end])
         return WinchReading(
-            stretch=float(self.paths[rope] - self.natural[rope]),
-            natural_length=float(self.natural[rope]),
             axial_stiffness=float(self.material.axial_stiffness[rope]),
             damping_time=float(self.material.damping_time[rope]),
             slack_width=float(self.material.slack_width[rope]),

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from ringsim.cable.cables import Cables
 from ringsim.cable.chain import Chain
 from ringsim.cable.state import ChainState
+from ringsim.cable.winches import Winches
 from ringsim.engine.cable_jacobian import JacobianPattern, auxiliary_unknowns
 from ringsim.engine.cable_path import WIDTH, CablePath, Carrier, Placed
-from ringsim.engine.winches import Winches
 
 Array = NDArray[np.float64]
 

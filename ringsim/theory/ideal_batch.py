@@ -73,6 +73,17 @@ class Equation:
             total += pull @ self.copies
         return np.asarray(total / inertia)
 
+    def paths(self, phi: Array, rate: Array) -> tuple[Array, Array]:
+        """Path of each rope and its rate, shape (samples, instants, ropes), m and m/s."""
+        if self.chain is None or self.cables is None or self.ropes is None:
+            return np.zeros((*phi.shape, 0)), np.zeros((*phi.shape, 0))
+        lengths, slopes, _ = self.chain.lengths(self.cables, phi)
+        starts = self.ropes.starts
+        return (
+            np.add.reduceat(lengths, starts, axis=-1),
+            np.add.reduceat(slopes * rate[..., None], starts, axis=-1),
+        )
+
     def nudges(self) -> tuple[Array, Array]:
         """Increments of angle and rate over which Q is as good as linear, shape (samples,).
 

@@ -19,7 +19,7 @@ from ringsim.cable.faults.family import CableFault
 from ringsim.theory import radau
 from ringsim.theory.ideal_batch import Batch, Equation
 from ringsim.theory.ideal_course import Course, Piece
-from ringsim.theory.ideal_winches import Winches
+from ringsim.theory.ideal_winches import Winches, Winding
 from ringsim.variables import Status
 
 Array = NDArray[np.float64]
@@ -86,12 +86,9 @@ class Integration:
         return self.courses
 
     def _strike(self, sample: int, fault: CableFault) -> None:
-        place = np.array([sample]), np.array([[self.time[sample]]])
-        wound, speed = self._winches.at(*place)
-        ropes = self._batch.ropes
-        state = self._batch.chain_state(
-            sample, self.phi[sample], self.rate[sample], wound[0, 0], speed[0, 0]
-        )
+        ropes, equation = self._batch.ropes, self._batch.equation().take(np.array([sample]))
+        place = float(self.time[sample]), float(self.phi[sample]), float(self.rate[sample])
+        state = self._winches.chain_now(equation, sample, *place)
         ropes[sample] = fault.strike(ropes[sample], state)
         self._restart(sample)
 
@@ -121,17 +118,14 @@ class Integration:
         wanted = np.minimum(self._step[who], self._most[who])
         left = target - time
         step = np.where(1.01 * wanted >= left, left, wanted)
-        for row, sample in enumerate(who):
-            self._winches.choose(
-                int(sample), float(time[row]), float(step[row]), phi[row], rate[row]
-            )
+        self._winches.begin(equation, who, time, phi, rate)
         latched = self._latched[who][:, None]
         moments = time[:, None] + step[:, None] * np.array([0.0, *radau.NODES[:2], 1.0 - 1e-9])
-        wound, speed = self._winches.at(who, moments)
+        winding = Winding(self._winches, equation, who, moments)
         nudge = equation.nudges()
 
         def force(x: Array, v: Array, instants: list[int]) -> Array:
-            return equation.acceleration(x, v, wound[:, instants], speed[:, instants], latched)
+            return equation.acceleration(x, v, *winding.at(x, v, instants), latched)
 
         def at_stages(x: Array, v: Array) -> Array:
             return force(x, v, [1, 2, 3] * (x.shape[1] // 3))
@@ -172,6 +166,7 @@ class Integration:
         kept = who[rows]
         taken.sample.append(kept)
         whole = [np.column_stack([b, s]) for b, s in ((phi, xs), (rate, vs), (start[0], pull))]
+        wound, speed = winding.taken(whole[0], whole[1])
         columns = (time, step, *whole, wound, speed, self._latched[who])
         taken.columns.append(tuple(column[rows] for column in columns))
         self.time[kept] = np.where(step[rows] == left[rows], target[rows], (time + step)[rows])

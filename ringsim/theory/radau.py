@@ -39,6 +39,7 @@ _MU = 3.0 + 3.0 ** (2 / 3) - 3.0 ** (1 / 3)
 _MOST_ITERATIONS = 12
 _CLOSE = 1e-3
 """Newton stops at this fraction of the tolerance."""
+_RATES = np.linalg.inv(A)
 _EXTRAPOLATE = np.linalg.inv(np.vander(NODES, 3, increasing=True))
 
 
@@ -49,6 +50,14 @@ def stage_states(x: Array, v: Array, h: Array, a: Array) -> tuple[Array, Array]:
         x[:, None] + step * NODES * v[:, None] + step**2 * (a @ AA.T),
         v[:, None] + step * (a @ A.T),
     )
+
+
+def stage_rates(changes: Array, h: float) -> Array:
+    """Rates at the stages of a quantity that has changed so much since the step's beginning.
+
+    Their quadrature over the step is the change at its end.  Stages come first, shape (3, ...).
+    """
+    return np.asarray(np.tensordot(_RATES, changes, axes=1) / h)
 
 
 def extrapolated(a: Array, ratio: Array) -> Array:

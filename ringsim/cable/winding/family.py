@@ -6,9 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from ringsim.cable.slack import tension
 from ringsim.units import Model
 
 
@@ -31,10 +28,6 @@ class WinchReading:
 
     Attributes
     ----------
-    stretch
-        Path length minus natural length of the rope, in metre; negative when slack.
-    natural_length
-        Rope not yet wound, in metre.
     axial_stiffness, damping_time, slack_width
         EA (N), Kelvin-Voigt time (s) and smoothing width (N) of the rope.
     tension_ratio
@@ -49,25 +42,12 @@ class WinchReading:
 
     """
 
-    stretch: float
-    natural_length: float
     axial_stiffness: float
     damping_time: float
     slack_width: float
     tension_ratio: Callable[[float], float]
     path_rate: float = 0.0
     path_slope: float = 0.0
-
-    def tension_after(self, duration: float, speed: float) -> float:
-        """Tension at the winch (N) once it has wound at ``speed`` for ``duration``.
-
-        The structure is taken to move on at its present rate.
-        """
-        rate = speed + self.path_rate
-        stretch = self.stretch + rate * duration + self.damping_time * rate
-        force = np.asarray(self.axial_stiffness * stretch / self.natural_length)
-        mean = float(tension(force, np.asarray(self.slack_width)))
-        return self.tension_ratio(speed) * mean
 
 
 class Winding(Model):
@@ -92,12 +72,12 @@ class PrescribedWinding(Winding):
 
 
 class FeedbackWinding(Winding):
-    """A law whose speed answers to the rope, chosen anew for every step and held through it.
+    """A law whose speed answers to the rope, within the step that it is chosen for.
 
     The rope is so stiff that a speed chosen from the present tension would overshoot within
-    one step.  The law therefore answers to the tension at the END of the step, predicted by
-    the reading: speed v solves v = command(T(v)).  T grows with v and the command falls with
-    T, so there is one solution for any EA and step, and the loop cannot run away.
+    one step.  The law therefore answers to the tension at the end of the step, see
+    ``ringsim.cable.winches``: T grows with the speed and the command falls with T, so there is
+    one solution for any EA and step, and the loop cannot run away.
     """
 
     feedback: ClassVar[bool] = True
@@ -109,28 +89,3 @@ class FeedbackWinding(Winding):
     def limits(self) -> tuple[float, float]:
         """Lowest and highest speed that the motor can run at, in m/s."""
         raise NotImplementedError
-
-    def advance(
-        self, time: float, duration: float, reading: WinchReading, state: WinchState
-    ) -> WinchState:
-        """The state at ``time`` with the speed to hold for ``duration``.
-
-        The equation is solved by bisection to 1e-12 of the motor's range.
-        """
-        slowest, fastest = low, high = self.limits()
-
-        def excess(speed: float) -> float:
-            wanted = self.command(reading.tension_after(duration, speed), reading)
-            return speed - min(max(wanted, slowest), fastest)
-
-        if excess(high) <= 0.0:
-            low = high
-        for _ in range(40):
-            if low == high:
-                break
-            middle = 0.5 * (low + high)
-            if excess(middle) <= 0.0:
-                low = middle
-            else:
-                high = middle
-        return WinchState(time, state.at(time).wound, low)

@@ -5,16 +5,19 @@ end of the step, which depends on the rope wound during the step and on where th
 to: with V the speed of all such winches of a rope, h the time into the step, S its path and M its
 natural length without V,
 
-    V = sum_i command_i(r_i q(y)),   y = EA (S / (M - V h) - 1 + t_d de/dt),
+    V = sum_i command_i(r_i(V) q(y)),   y = EA (S / (M - V h) - 1 + t_d de/dt),
 
-r_i the ratio of the tension at a winch to the rope's mean tension, taken from the step before.
-Commands fall with the tension and y grows with V, so there is one solution for any EA and step.
+r_i(V) the ratio of the tension at a winch to the rope's mean tension, were the n winches of the
+rope to turn at V / n each while the structure moves as at the beginning of the step: a motor that
+comes to rest takes the friction of its pulleys with it.  Commands fall with the tension and y
+grows with V, so there is one solution for any EA and step.
 A law that follows the structure knows the path taken up so far in the step, S_0 - S, not the rate
 at its start: its tension then answers to its own correction alone, whatever the structure does.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -24,7 +27,6 @@ from scipy.optimize import brentq
 
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.ropes import Ropes
-from ringsim.cable.slack import tension
 from ringsim.cable.state import ChainState
 from ringsim.cable.winding.family import FeedbackWinding, WinchReading, WinchState
 
@@ -40,7 +42,6 @@ class _Member:
     number: int
     law: FeedbackWinding
     reading: WinchReading
-    ratio: float
 
 
 @dataclass(frozen=True)
@@ -67,22 +68,23 @@ class _Rope:
         elapsed, count = time - self.start, len(self.members)
         follow = (path - self.path) / elapsed if elapsed > 0.0 else rate
         laws = [
-            (m.law, replace(m.reading, path_rate=(follow + rest) / count), m.ratio, m.law.limits())
+            (m.law, replace(m.reading, path_rate=(follow + rest) / count), m.law.limits())
             for m in self.members
         ]
         material = self.members[0].reading
-        width = np.asarray(material.slack_width)
+        stiffness, width = material.axial_stiffness, material.slack_width
 
         def commands(total: float) -> list[float]:
             left = natural - total * elapsed
             strain_rate = (rate + path / left * (total + rest)) / left
-            force = material.axial_stiffness * (
-                path / left - 1.0 + material.damping_time * strain_rate
-            )
-            mean = float(tension(np.asarray(force), width))
+            force = stiffness * (path / left - 1.0 + material.damping_time * strain_rate)
+            mean = max(force, 0.0) + width * math.log1p(math.exp(-abs(force) / width))
             return [
-                min(max(law.command(ratio * mean, reading), limits[0]), limits[1])
-                for law, reading, ratio, limits in laws
+                min(
+                    max(law.command(mean * reading.tension_ratio(total / count), reading), least),
+                    most,
+                )
+                for law, reading, (least, most) in laws
             ]
 
         low = sum(limits[0] for *_, limits in laws)
@@ -180,9 +182,8 @@ class Winches:
                 self._held[place] = WinchState(time, self._held[place].wound, 0.0)
                 continue
             reading = state.reading(number, end, float(slopes[number]))
-            ratio = reading.tension_ratio(float(state.wound_rate[number, end]))
             rope = int((state.ropes.last if end else state.ropes.first)[number])
-            members.setdefault(rope, []).append(_Member(place, law, reading, ratio))
+            members.setdefault(rope, []).append(_Member(place, law, reading))
         self._ropes = [
             _Rope(rope, tuple(found), time, float(state.paths[rope]))
             for rope, found in members.items()
