@@ -135,13 +135,19 @@ class Scene(Model):
         return tomli_w.dumps(self.to_table())
 
 
-def _length_of(path: str, sections: int, pulleys: int, *, closed: bool) -> int | None:
-    """Values in a list at ``path``: one per section, corner or pulley; None if any number."""
+def place_of(path: str, *, closed: bool) -> str | None:
+    """What a list at ``path`` has one value for: a section, corner or pulley; None if nothing."""
     if path == "net.stiffness" and not closed:
-        return sections + 1
+        return "corner"
     if path.startswith("cables."):
-        return pulleys if path.endswith(".coefficient") else None
-    return sections
+        return "pulley" if path.endswith(".coefficient") else None
+    return "section"
+
+
+def _length_of(path: str, sections: int, pulleys: int, *, closed: bool) -> int | None:
+    """Values in a list at ``path``; None if any number."""
+    lengths = {"section": sections, "corner": sections + 1, "pulley": pulleys}
+    return lengths.get(place_of(path, closed=closed) or "")
 
 
 def _check_faults(scene: Scene) -> None:

@@ -108,6 +108,6 @@ def _inputs(table: Table) -> list[str]:
             extent = f"{values.min():.6g} to {values.max():.6g}{unit}"
         else:
             extent = ", ".join(sorted({str(value) for value in values.ravel()}))
-        each = f", for each {column.dim}" if column.dim else ""
+        each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
         lines.append(f"{column.path}: {extent}{each}")
     return lines

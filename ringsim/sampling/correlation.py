@@ -47,15 +47,21 @@ def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correl
     InputError
         If a pair names what is not drawn, or if the pairs contradict each other.
     """
-    matrix = np.eye(len(paths))
-    for pair in correlations:
-        for first, second in _columns(paths, pair):
-            matrix[first, second] = matrix[second, first] = pair.coefficient
-    moved = np.flatnonzero((matrix != np.eye(len(paths))).any(axis=1))
-    if moved.size == 0:
+    pairs = {
+        (first, second): pair.coefficient
+        for pair in correlations
+        for first, second in _columns(paths, pair)
+    }
+    moved = sorted({axis for axes in pairs for axis in axes})
+    if not moved:
         return points
+    place = {axis: k for k, axis in enumerate(moved)}
+    matrix = np.eye(len(moved))
+    for (one, other), coefficient in pairs.items():
+        first, second = place[one], place[other]
+        matrix[first, second] = matrix[second, first] = coefficient
     try:
-        lower = np.linalg.cholesky(matrix[np.ix_(moved, moved)])
+        lower = np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError:
         raise InputError(
             "correlations: the coefficients contradict each other (their matrix is not positive "

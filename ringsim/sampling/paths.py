@@ -12,11 +12,14 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.units import Unit
 
-FIXED = ("name", "title", "structure.sections", "structure.closed", "solver.end_time", "record")
+FIXED = (
+    "name", "title", "structure.kind", "structure.sections", "structure.closed", "solver.end_time",
+    "record",
+)  # fmt: skip
 """Paths that give a result its shape or its name: all samples of a campaign share them."""
 
 
-def refuse_fixed(path: str) -> None:
+def refuse_fixed(scene: Scene, path: str) -> None:
     """Refuse a path that would change the shape of a result.
 
     Raises
@@ -24,7 +27,7 @@ def refuse_fixed(path: str) -> None:
     InputError
         If all samples of a campaign must share this value.
     """
-    for fixed in FIXED:
+    for fixed in (*FIXED, *scene.structure.shaping):
         if path == fixed or path.startswith((f"{fixed}.", f"{fixed}[")):
             raise InputError(
                 f"inputs: {path} must be the same for all samples, because it shapes the result: "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Axis, Design
 from ringsim.sampling.distributions.family import Distribution
 from ringsim.sampling.paths import each_of, field_at, refuse_fixed, unit_at
-from ringsim.scene import Scene
+from ringsim.scene import Scene, place_of
 from ringsim.variables import COORDINATES, VARIABLES
 
 for _package in ("distributions", "distributions.continuous", "designs"):
@@ -42,14 +43,14 @@ class Column:
     path
         Scene path that the values are written to.
     dim
-        Second dimension of ``values``, or empty: "section", or "place_k" for lists of another
-        length k.
+        Second dimension of ``values``, or empty: what there is a value for, "section", "corner"
+        or "pulley", or "place_k" for lists of any other length k.
     units
         SI unit of the field.
     origin
         The distribution, in words.
     values
-        Shape (samples,), or (samples, k) with a value for each section.
+        Shape (samples,), or (samples, k) with a value for each place.
     """
 
     name: str
@@ -123,7 +124,7 @@ def draw(
     """
     axes: list[Axis] = []
     for path, distribution in inputs.items():
-        refuse_fixed(path)
+        refuse_fixed(base, path)
         middle = distribution.quantile(np.array([0.5]))[0].item()
         if distribution.each_section:
             count = each_of(base, path, middle)
@@ -131,19 +132,22 @@ def draw(
         else:
             base.with_values({path: middle})
             axes.append(Axis(path, distribution))
+    twice = [path for path, count in Counter(axis.path for axis in axes).items() if count > 1]
+    if twice:
+        raise InputError(f"inputs: {twice[0]} is drawn twice: leave out one of its inputs")
     drawn = design.table(axes, correlations, seed=seed, folder=folder)
     samples = len(next(iter(drawn.values()))) if drawn else getattr(design, "samples", 1)
     columns: list[Column] = []
+    taken = set(VARIABLES) | {c.name for c in COORDINATES}
     for path in dict.fromkeys([*inputs, *(p for p in drawn if not axes)]):
-        refuse_fixed(path)
+        refuse_fixed(base, path)
         grouped = path in inputs and inputs[path].each_section
         names = [p for p in drawn if p.startswith(f"{path}[")] if grouped else [path]
         values = np.stack([drawn[p] for p in names], axis=1) if grouped else drawn[path]
         column = _column(base, path, values, inputs.get(path), design)
-        if column.name in {c.name for c in columns} | set(VARIABLES) | {
-            c.name for c in COORDINATES
-        }:
+        if column.name in taken:
             raise InputError(f"inputs: {path} would be named {column.name}, which is taken")
+        taken.add(column.name)
         columns.append(column)
     table = Table(tuple(columns), _seeds(seed, samples))
     _check_extremes(base, table)
@@ -157,8 +161,7 @@ def _column(
     scene = base.with_values({path: first})
     dim = ""
     if values.ndim == 2:
-        count = values.shape[1]
-        dim = "section" if count == scene.structure.sections else f"place_{count}"
+        dim = place_of(path, closed=scene.structure.closed) or f"place_{values.shape[1]}"
     name = path.replace(".", "_").replace("[", "_").removesuffix("]")
     words = "listed in a file" if origin is None else origin.model_dump_json(exclude_none=True)
     found = field_at(scene, path)

@@ -252,3 +252,60 @@ def test_unusable_lists_are_refused(text, words, base, tmp_path):
         (tmp_path / "cases.csv").write_text(text)
     with pytest.raises(InputError, match=words):
         drawn(base, {"kind": "list", "file": "cases.csv"}, {}, folder=tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("scene", "shared", "path", "dim", "count"),
+    [
+        ("ring18", {}, "rods.young_modulus", "section", 6),
+        ("ring18", {}, "net.stiffness", "section", 6),
+        ("ring18", {"structure.closed": False}, "net.stiffness", "corner", 7),
+        ("ring18-cable", {}, "cables.upper.friction.coefficient", "pulley", 17),
+        ("planar-truss", None, "cables.upper.friction.coefficient", "pulley", 1),
+    ],
+)
+def test_values_of_a_list_are_named_after_their_places(scene, shared, path, dim, count):
+    base = load_scene(scene)
+    if shared is not None:
+        base = base.with_values({"structure.sections": 6, "boom": "none", **shared})
+    if scene == "planar-truss":
+        base = base.with_values({"cables.upper.friction": {"kind": "bearing", "coefficient": 1e-4}})
+    inputs = {path: {"kind": "uniform", "low": 2e-4, "high": 4e-4, "each_section": True}}
+    if path.startswith("rods"):
+        inputs[path] = THREE[path] | {"each_section": True}
+    (column,) = drawn(base, {"kind": "random", "samples": 3}, inputs).columns
+    assert column.dim == dim
+    assert column.values.shape == (3, count)
+
+
+@pytest.mark.parametrize("path", ["structure.beam_length", "rods.elements"])
+def test_what_moves_the_stations_of_a_truss_is_the_same_for_all(path):
+    inputs = {path: {"kind": "discrete", "values": [4, 5]}}
+    with pytest.raises(InputError, match=f"{path} must be the same for all samples"):
+        drawn(load_scene("planar-truss"), {"kind": "random", "samples": 2}, inputs)
+
+
+def test_input_that_is_drawn_twice_is_refused(base):
+    modulus = THREE["rods.young_modulus"]
+    inputs = {
+        "rods.young_modulus": modulus | {"each_section": True},
+        "rods.young_modulus[3]": modulus,
+    }
+    with pytest.raises(InputError, match=r"rods\.young_modulus\[3\] is drawn twice"):
+        drawn(base, {"kind": "random", "samples": 2}, inputs)
+
+
+def test_a_thousand_columns_are_drawn_and_correlated_in_little_memory(base):
+    """72 sections with 215 pulleys in either plane: the matrix is that of the correlated ones."""
+    large = load_scene("ring18-cable").with_values({"structure.sections": 72, "boom": "none"})
+    friction = {"kind": "uniform", "low": 1e-4, "high": 8e-4, "each_section": True}
+    inputs = {f"cables.{plane}.friction.coefficient": friction for plane in ("upper", "lower")}
+    inputs["rods.young_modulus"] = THREE["rods.young_modulus"] | {"each_section": True}
+    pair = Correlation(between=tuple(inputs)[:2], coefficient=0.9)
+    design = {"kind": "random", "samples": 40}
+    plain, correlated = (drawn(large, design, inputs, correlations=c) for c in ((), (pair,)))
+    upper, lower, modulus = (column.values for column in correlated.columns)
+    assert upper.shape == lower.shape == (40, 215)
+    assert np.corrcoef(upper.ravel(), lower.ravel())[0, 1] > 0.8
+    np.testing.assert_array_equal(modulus, plain.columns[2].values)
+    large.with_values(correlated.values_of(39))

@@ -18,6 +18,8 @@ class Structure(Model):
     """Planes that a cable can run in."""
     long_names: ClassVar[dict[str, str]] = {}
     """What variables of a result mean for this kind, where it differs from the ring."""
+    shaping: ClassVar[tuple[str, ...]] = ()
+    """Scene paths that decide where results are given: all samples of a campaign share them."""
 
     def check(self, scene: Any) -> None:
         """Refuse a scene whose other parts do not go with this structure.

@@ -72,6 +72,7 @@ class PlanarTruss(Structure):
     long_names: ClassVar[dict[str, str]] = {
         "opening_angle": "angle between the beams and the fixed axis",
     }
+    shaping: ClassVar[tuple[str, ...]] = ("structure.beam_length", "rods.elements")
 
     kind: Literal["planar-truss"] = "planar-truss"
     beam_length: Metre = 0.627
