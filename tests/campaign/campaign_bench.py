@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -9,11 +10,19 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
+
+from ringsim.campaign.folder import open_folder
+from ringsim.storage.layout import NOT_RUN
+from ringsim.storage.store import survey
 
 HERE = Path(__file__).parent
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 """Where programs of the virtual environment are found, also if it is not activated."""
+
+MODULES = os.pathsep.join(filter(None, [str(HERE), os.environ.get("PYTHONPATH", "")]))
+"""Where the stand-ins for the solver are found."""
 
 MPIEXEC = shutil.which("mpiexec", path=PATH)
 NOT_COMPARED = ("wall_time", "cpu_time", "log")
@@ -102,7 +111,7 @@ class Bench:
         return [*front, *map(str, arguments), *end]
 
     def environment(self):
-        return os.environ | {"PYTHONPATH": str(HERE)} | self.extra
+        return os.environ | {"PYTHONPATH": MODULES} | self.extra
 
     def start(self, *arguments, ranks=0, solver="fake_solver:run"):
         process = subprocess.Popen(
@@ -138,6 +147,43 @@ def opened(path):
         return found.load()
 
 
+def finished(out):
+    """Samples that have a result on file, in a shard or in a journal."""
+    if not (out / "design.nc").exists():
+        return set()
+    folder = open_folder(out)
+    found = survey(out, folder.identity, folder.table.samples, set_aside=False)
+    return set(np.flatnonzero(found.status != NOT_RUN).tolist())
+
+
 def comparable(dataset):
     """Every value, without what differs between two runs of the same thing."""
     return dataset.drop_vars([n for n in NOT_COMPARED if n in dataset]).drop_attrs()
+
+
+SHARDS = "[output]\nshard_samples = 4\n"
+START = ("campaign", "small.toml", "--workers", 2, "--out", "out")
+"""Runs the campaign of the fixtures ``whole`` and ``copied``."""
+
+
+def assert_same(bench, other):
+    """The merged files of two benches have the same values."""
+    xr.testing.assert_identical(comparable(bench.result("out")), comparable(other.result("out")))
+
+
+def shards(bench):
+    return sorted((bench.folder / "out" / "shards").iterdir())
+
+
+def ranks_of(bench, number):
+    """Processes of the bench that are a certain rank of an MPI world."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            pairs = (path / "environ").read_bytes().split(b"\0")
+            words = dict(pair.split(b"=", 1) for pair in pairs if b"=" in pair)
+            here = os.readlink(path / "cwd") == str(bench.folder)
+            python = b"ringsim" in (path / "cmdline").read_bytes()
+            if here and python and words.get(b"PMI_RANK") == number:
+                found.append(int(path.name))
+    return found

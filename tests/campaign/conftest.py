@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
+
 import pytest
 
-from campaign_bench import MPIEXEC, Bench
+from campaign_bench import MPIEXEC, SHARDS, START, Bench
 
 
 @pytest.fixture
@@ -18,3 +20,19 @@ def bench(tmp_path):
 def mpi():
     if MPIEXEC is None:
         pytest.skip("there is no mpiexec: install ringsim[mpich]")
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory):
+    """A finished campaign with five shards; look, but do not change it."""
+    bench = Bench(tmp_path_factory.mktemp("whole"))
+    bench.write(more=SHARDS)
+    bench.run(*START)
+    return bench
+
+
+@pytest.fixture
+def copied(whole, tmp_path):
+    """A copy of the finished campaign."""
+    shutil.copytree(whole.folder, tmp_path, dirs_exist_ok=True)
+    return Bench(tmp_path)

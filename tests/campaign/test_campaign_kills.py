@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
+import shutil
 import signal
-import subprocess
 import time
+from collections import Counter, deque
 from pathlib import Path
 
 import pytest
 import xarray as xr
 
-from campaign_bench import Bench, comparable
+from campaign_bench import Bench, comparable, finished
 
-SAMPLES = 240
+SAMPLES = 300
 SMALL_SHARDS = "[output]\nshard_samples = 16\n"
+LOCAL = ("solver", "all solvers", "manager", "tree")
+MPI = ("solver", "rank", "launcher", "tree")
 
 
 def children_of(pid):
@@ -27,11 +31,12 @@ def children_of(pid):
     return [deep for child in direct for deep in [*children_of(int(child)), int(child)]]
 
 
-def kill(pid):
+def alive(pid):
     try:
-        os.kill(pid, signal.SIGKILL)
-    except ProcessLookupError:
-        return
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state not in "ZX"
 
 
 def is_solver(pid):
@@ -41,22 +46,38 @@ def is_solver(pid):
         return False
 
 
-def strike(process, victim, chance):
+def targets_of(process, kind, chance):
+    """Processes that a kill is meant for."""
     below = children_of(process.pid)
-    match victim:
+    solvers = [pid for pid in below if is_solver(pid)]
+    match kind:
         case "solver":
-            solvers = [pid for pid in below if is_solver(pid)]
-            if solvers:
-                kill(chance.choice(solvers))
+            return chance.sample(solvers, min(1, len(solvers)))
+        case "all solvers":
+            return solvers
         case "rank":
             ranks = [pid for pid in below if any(map(is_solver, children_of(pid)))]
-            if ranks:
-                kill(chance.choice(ranks))
-        case "manager":
-            kill(process.pid)
-        case "tree":
-            for pid in [*below, process.pid]:
-                kill(pid)
+            return chance.sample(ranks, min(1, len(ranks)))
+        case "manager" | "launcher" | "tree":
+            return [process.pid]
+
+
+def strike(targets, bystanders):
+    """Kill; says whether every target was there to be killed, and died."""
+    hit = bool(targets) and all(map(alive, targets))
+    for pid in [*bystanders, *targets]:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+    return hit and until(lambda: not any(map(alive, targets)))
+
+
+def until(condition, seconds=20.0):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.005)
+    return False
 
 
 @pytest.fixture(scope="module")
@@ -66,49 +87,102 @@ def undisturbed(tmp_path_factory):
     return bench.result("out")
 
 
-def gone(pids, seconds=10.0):
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if not any(is_solver(pid) for pid in pids):
-            return True
-        time.sleep(0.05)
-    return False
+class Drill:
+    """Starts a campaign again and again, kills its processes, and counts what it hit.
+
+    A campaign that is through in spite of all is compared, and another one begins.
+    """
+
+    def __init__(self, bench, undisturbed, *, ranks, seed):
+        self.bench, self.undisturbed, self.ranks = bench, undisturbed, ranks
+        self.chance = random.Random(seed)
+        self.hits, self.hits_here = Counter(), 0
+        self.out, self.trace = bench.folder / "out", bench.folder / "trace"
+        bench.extra["TRACE"] = str(self.trace)
+        file = bench.write(SAMPLES, more=SMALL_SHARDS)
+        self.command = ["campaign", file, "--out", "out", *(() if ranks else ("--workers", 2))]
+        self.process = None
+
+    def solved(self):
+        return self.trace.stat().st_size if self.trace.exists() else 0
+
+    def kill_all(self, kinds):
+        todo = deque(kinds)
+        while todo:
+            if self.process is None:
+                self.process = self.bench.start(
+                    *self.command, ranks=self.ranks, solver="fake_solver:traced"
+                )
+            wanted = self.solved() + self.chance.randint(1, 40)
+            assert until(
+                lambda wanted=wanted: self.solved() >= wanted or self.process.poll() is not None,
+                seconds=60.0,
+            )
+            if self.process.poll() is not None:
+                self.compare()
+            elif self.kill(todo[0]):
+                self.hits[todo.popleft()] += 1
+                self.hits_here += 1
+        if self.process is not None:
+            self.process.communicate(timeout=60)
+        if self.out.exists():
+            self.bench.run(*self.command, ranks=self.ranks, solver="fake_solver:traced")
+            self.compare()
+
+    def kill(self, kind):
+        """One kill; whatever was on file before it must be there afterwards."""
+        solvers = [pid for pid in children_of(self.process.pid) if is_solver(pid)]
+        before = finished(self.out)
+        bystanders = children_of(self.process.pid) if kind == "tree" else []
+        hit = strike(targets_of(self.process, kind, self.chance), bystanders)
+        if kind not in ("solver", "all solvers") and hit:
+            self.process.communicate(timeout=60)
+            assert self.process.returncode != 0
+            assert until(lambda: not any(map(alive, solvers))), "solvers outlived their parent"
+            self.process = None
+        assert before <= finished(self.out), f"lost by killing {kind}"
+        return hit
+
+    def compare(self):
+        """The campaign is through: nothing is missing, little was done twice, all is as it was."""
+        if self.process is not None:
+            assert self.process.returncode == 0, self.process.communicate()[0]
+            self.process.communicate()
+            self.process = None
+        xr.testing.assert_identical(
+            comparable(self.bench.result("out")), comparable(self.undisturbed)
+        )
+        assert 0 <= self.solved() - SAMPLES <= 2 * self.hits_here
+        assert not list((self.out / "journals").iterdir())
+        shutil.rmtree(self.out)
+        self.trace.unlink()
+        self.hits_here = 0
 
 
-def survive(bench, victims, *, ranks, seed, undisturbed):
-    """Kill and start again; returns the number of runs that had to be repeated."""
-    chance = random.Random(seed)
-    bench.extra["TRACE"] = str(bench.folder / "trace")
-    file = bench.write(SAMPLES, more=SMALL_SHARDS)
-    start = ["campaign", file, "--out", "out", *(() if ranks else ("--workers", 2))]
-    kills = 0
-    for victim in victims:
-        process = bench.start(*start, ranks=ranks, solver="fake_solver:traced")
-        try:
-            process.communicate(timeout=chance.uniform(0.5, 1.6))
-        except subprocess.TimeoutExpired:
-            solvers = [pid for pid in children_of(process.pid) if is_solver(pid)]
-            strike(process, victim, chance)
-            kills += 1
-            process.communicate(timeout=60)
-            assert gone(solvers), "solver processes outlived their parent"
-        if process.returncode == 0:
-            xr.testing.assert_identical(comparable(bench.result("out")), comparable(undisturbed))
-            break
-    bench.run(*start, ranks=ranks, solver="fake_solver:traced")
-    xr.testing.assert_identical(comparable(bench.result("out")), comparable(undisturbed))
-    repeated = (bench.folder / "trace").stat().st_size - SAMPLES
-    assert 0 <= repeated <= 2 * (kills + 1)
-    assert not list((bench.folder / "out" / "journals").iterdir())
+def drill(kinds, *, ranks, seed, bench, undisturbed):
+    kinds = random.Random(seed).sample(kinds, len(kinds))
+    found = Drill(bench, undisturbed, ranks=ranks, seed=seed)
+    found.kill_all(kinds)
+    assert found.hits == Counter(kinds)
+    return sum(found.hits.values())
 
 
-@pytest.mark.parametrize("seed", range(7))
-def test_killed_local_campaigns_go_on_where_they_were(seed, bench, undisturbed):
-    victims = random.Random(seed).sample(["solver", "manager", "tree"], 3)
-    survive(bench, victims, ranks=0, seed=seed, undisturbed=undisturbed)
+def test_six_kills_cost_a_local_campaign_nothing(bench, undisturbed):
+    kinds = [*LOCAL, "solver", "manager"]
+    assert drill(kinds, ranks=0, seed=1, bench=bench, undisturbed=undisturbed) == 6
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_killed_mpi_campaigns_go_on_where_they_were(seed, bench, undisturbed, mpi):
-    victims = random.Random(seed).sample(["solver", "rank", "tree"], 3)
-    survive(bench, victims, ranks=2, seed=seed, undisturbed=undisturbed)
+def test_four_kills_cost_an_mpi_campaign_nothing(bench, undisturbed, mpi):
+    assert drill([*MPI], ranks=2, seed=2, bench=bench, undisturbed=undisturbed) == 4
+
+
+@pytest.mark.slow
+def test_thirty_kills_cost_a_local_campaign_nothing(bench, undisturbed):
+    kinds = [*LOCAL * 7, "manager", "tree"]
+    assert drill(kinds, ranks=0, seed=3, bench=bench, undisturbed=undisturbed) == 30
+
+
+@pytest.mark.slow
+def test_thirty_kills_cost_an_mpi_campaign_nothing(bench, undisturbed, mpi):
+    kinds = [*MPI * 7, "rank", "rank"]
+    assert drill(kinds, ranks=2, seed=4, bench=bench, undisturbed=undisturbed) == 30
