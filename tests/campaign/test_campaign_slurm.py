@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
+import signal
 import time
 from pathlib import Path
 
@@ -11,12 +13,11 @@ import pytest
 import xarray as xr
 
 import slurm_cluster
-from campaign_bench import HERE, PATH, Bench, comparable
+from campaign_bench import MODULES, PATH, Bench, comparable, ranks_of
 from ringsim.storage.journal import read_journal
 
 SCRIPTS = Path(__file__).parents[2] / "slurm"
 SAMPLES = 60
-SLEEPY = {"shared": '"rods.damping" = 0.3'}
 
 
 @pytest.fixture(scope="module")
@@ -44,12 +45,12 @@ def local(tmp_path_factory):
     return bench.result("out")
 
 
-def submit(cluster, bench, script, *options):
-    file = str(bench.write(SAMPLES, **SLEEPY))
+def submit(cluster, bench, script, *options, seconds=0.3):
+    file = str(bench.write(SAMPLES, shared=f'"rods.damping" = {seconds}'))
     answer = cluster.ask(
         "sbatch", "--parsable", *options, str(SCRIPTS / script), file,
         "--out", "out", "--solver", "fake_solver:slow",
-        cwd=bench.folder, extra={"PYTHONPATH": str(HERE), "PATH": PATH},
+        cwd=bench.folder, extra={"PYTHONPATH": MODULES, "PATH": PATH, "SLURM_WAIT": "5"},
     )  # fmt: skip
     assert answer.isdigit(), answer
     return answer
@@ -78,10 +79,11 @@ def printed(bench):
     return "\n".join(path.read_text() for path in bench.folder.glob("ringsim-*.out"))
 
 
-def finish(cluster, bench, job):
+def finish(cluster, bench, job, seconds=120):
     wait_for(
         lambda: set(cluster.states(job)) == {"COMPLETED"} or "FAILED" in cluster.states(job),
         "the job to end",
+        seconds,
     )
     assert set(cluster.states(job)) == {"COMPLETED"}, printed(bench)
 
@@ -105,4 +107,42 @@ def test_array_tasks_are_warned_leave_are_requeued_and_merge(cluster, bench, loc
     cluster.ask("scancel", "--signal=USR1", "--batch", f"{job}_2")
     wait_for(lambda: "stopped by SIGUSR1" in printed(bench), "a task to stop")
     finish(cluster, bench, job)
+    xr.testing.assert_identical(comparable(bench.result("out")), comparable(local))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("script", "option", "seconds"),
+    [("mpi.sbatch", "--ntasks=2", 3.0), ("array.sbatch", "--array=1-2", 3.0)],
+)
+def test_job_at_its_time_limit_is_requeued_until_all_is_done(
+    script, option, seconds, cluster, bench, local
+):
+    """Nobody cancels anything: Slurm itself warns of the end of the minute."""
+    job = submit(cluster, bench, script, option, "--time=1", "--signal=B:USR1@30", seconds=seconds)
+    wait_for(lambda: "stopped by SIGUSR1" in printed(bench), "the time limit")
+    kept = done_in_all(bench)
+    assert 0 < kept < SAMPLES
+    finish(cluster, bench, job, seconds=400)
+    told = printed(bench)
+    print(told)
+    assert "the same command goes on" in told
+    record = cluster.ask("scontrol", "show", "job", job)
+    print(record)
+    assert max(map(int, re.findall(r"Restarts=(\d+)", record))) >= 1
+    xr.testing.assert_identical(comparable(bench.result("out")), comparable(local))
+
+
+@pytest.mark.slow
+def test_job_that_loses_a_rank_ends_and_goes_on_when_submitted_again(cluster, bench, local, mpi):
+    """Without its other half a rank would wait until the time limit."""
+    job = submit(cluster, bench, "mpi.sbatch")
+    wait_for(lambda: done(bench, "all-rank1-*") >= 2, "the first samples")
+    (rank,) = ranks_of(bench, b"1")
+    os.kill(rank, signal.SIGKILL)
+    wait_for(lambda: set(cluster.states(job)) <= {"FAILED", "NODE_FAIL"}, "the job to end")
+    kept = done_in_all(bench)
+    assert kept >= 2
+    finish(cluster, bench, submit(cluster, bench, "mpi.sbatch"))
+    assert f"{kept} of {SAMPLES} samples done" in printed(bench)
     xr.testing.assert_identical(comparable(bench.result("out")), comparable(local))
