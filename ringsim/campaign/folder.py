@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -15,7 +16,7 @@ from ringsim.refusal import InputError
 from ringsim.sampling.table import Table
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.design_file import NAME, read_design, write_design
-from ringsim.storage.files import unwritable
+from ringsim.storage.files import DRAFT, busy, locked, tries, unwritable
 from ringsim.storage.layout import Output
 from ringsim.storage.provenance import provenance
 from ringsim.storage.shards import ASIDE, FOLDER
@@ -91,25 +92,60 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> Folder:
     Raises
     ------
     InputError
-        If the folder belongs to another campaign, or cannot be written.
+        If the folder belongs to another campaign, is in use, or cannot be written.
     """
+    try:
+        os.fspath(path).encode("utf-8")
+    except UnicodeEncodeError:
+        raise InputError(
+            f"{path}: its name is not UTF-8: choose another folder with --out"
+        ) from None
     table = campaign.draw()
-    identity = _identity(campaign, table, solver)
+    try:
+        for _ in tries():
+            found = _as_it_is(campaign, path, table, solver)
+            if found is not None:
+                return found
+            create_folders(path)
+            with locked(path / "lock") as alone:
+                if alone:
+                    found = _as_it_is(campaign, path, table, solver)
+                    return found or _write(campaign, path, table, solver)
+    except OSError as error:
+        raise unwritable(path / NAME, error) from error
+    raise busy(path)
+
+
+def _as_it_is(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder | None:
+    """The folder, if there is nothing to write to it; None if it is new or its design grows."""
     if not (path / NAME).exists():
-        strangers = sorted(entry.name for entry in _entries(path) if not _ours(entry.name))
-        if strangers:
+        _refuse_strangers(path)
+        return None
+    old = open_folder(path)
+    refuse_another(campaign, old, table, solver)
+    same = old.table.samples == table.samples and old.attributes["campaign"] == campaign.text
+    return old if same else None
+
+
+def _refuse_strangers(path: Path) -> None:
+    strangers = sorted(entry.name for entry in _entries(path) if not _ours(entry.name))
+    if strangers:
+        raise InputError(
+            f"{path}: this folder holds {strangers[0]} and no campaign: choose a new one with --out"
+        )
+    for inside, results in ((FOLDER, "shard-*.nc"), (JOURNALS, "*.journal")):
+        if any((path / inside).glob(results)):
             raise InputError(
-                f"{path}: this folder holds {strangers[0]} and no campaign: choose a new one with "
-                "--out"
+                f"{path}: this folder holds results in {inside}, but its {NAME} is gone, so nobody "
+                f"knows which campaign they belong to: bring {NAME} back, or choose a new folder "
+                "with --out"
             )
-    else:
-        old = open_folder(path)
-        refuse_another(campaign, old, table, solver)
-        if old.table.samples == table.samples and old.attributes["campaign"] == campaign.text:
-            return old
+
+
+def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder:
     wanted = campaign.specification
     attributes = provenance(name=wanted.name, title=wanted.title, action="designed") | {
-        "identity": identity,
+        "identity": _identity(campaign, table, solver),
         "seed": wanted.seed,
         "solver": solver,
         "campaign": campaign.text,
@@ -118,11 +154,9 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> Folder:
         "output": wanted.output.model_dump_json(),
         "retry": wanted.retry.model_dump_json(),
     }
-    try:
-        create_folders(path)
-        write_design(path, table, attributes)
-    except OSError as error:
-        raise unwritable(path / NAME, error) from error
+    for draft in path.glob(f".{NAME}.*{DRAFT}"):
+        draft.unlink(missing_ok=True)
+    write_design(path, table, attributes)
     return open_folder(path)
 
 

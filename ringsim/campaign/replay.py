@@ -14,7 +14,7 @@ from ringsim.execution.work import Task
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.storage.record import Result
-from ringsim.storage.shards import rows_of
+from ringsim.storage.shards import latest, rows_of
 from ringsim.storage.store import survey
 from ringsim.variables import COORDINATES, TIMINGS, VARIABLES, Outcome, Status
 
@@ -48,15 +48,11 @@ def sample_scene(campaign: Folder, sample: int) -> Scene:
 def stored(campaign: Folder, sample: int) -> Stored | None:
     """The stored result of one sample, if it is in a shard."""
     found = survey(campaign.path, campaign.identity, campaign.table.samples, set_aside=False)
-    latest = None
-    for shard in found.shards:
-        for row in np.flatnonzero(shard.samples == sample):
-            if latest is None or shard.finished[row] > latest[0]:
-                latest = (shard.finished[row], shard.path, row)
-    if latest is None:
+    owner, row = latest(found.shards, campaign.table.samples)
+    if owner[sample] < 0:
         return None
     names = ["status", "reason", "largest_step", *VARIABLES]
-    values = rows_of(latest[1], names, np.array([latest[2]]))
+    values = rows_of(found.shards[owner[sample]].path, names, row[sample : sample + 1])
     first = {name: each[0] for name, each in values.items()}
     return Stored(
         Status(int(first.pop("status"))),

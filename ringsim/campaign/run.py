@@ -11,15 +11,13 @@ from typing import Any
 import numpy as np
 
 from ringsim.campaign.folder import Folder, open_folder
+from ringsim.campaign.merging import merge
 from ringsim.campaign.watch import Progress, Stop, stopping_on_signals
 from ringsim.execution.cost import longest_first, relative_cost
 from ringsim.execution.launch import polite_barrier
 from ringsim.execution.work import Limits, Scheduler, Work
 from ringsim.refusal import InputError
-from ringsim.storage.files import reserved, unwritable
-from ringsim.storage.merge import NAME as MERGED
-from ringsim.storage.merge import merge_shards
-from ringsim.storage.provenance import provenance
+from ringsim.storage.files import reserved
 from ringsim.storage.record import Result
 from ringsim.storage.store import Store, Survey, recover, survey
 
@@ -94,7 +92,7 @@ def run_campaign(folder: Path, choices: Choices) -> int:
     -------
     int
         Exit code: 0 all samples have run, 3 too many (or all) of them failed, 130 stopped by a
-        signal.
+        signal, or samples are left.
 
     Raises
     ------
@@ -102,49 +100,55 @@ def run_campaign(folder: Path, choices: Choices) -> int:
         If the folder is in use or cannot be written.
     """
     with contextlib.ExitStack() as held:
-        fault = ""
+        stop, fault = held.enter_context(stopping_on_signals()), ""
         if choices.rank == 0:
             try:
                 held.enter_context(reserved(folder, choices.part.writer, alone=choices.part.whole))
-                prefix = "" if choices.part.whole else f"{choices.part.writer}-"
-                recover(folder, open_folder(folder).identity, prefix)
+                share = "" if choices.part.whole else choices.part.writer
+                recover(folder, open_folder(folder).identity, share)
             except InputError as error:
                 fault = str(error)
         if choices.communicator is not None:
             fault = choices.communicator.bcast(fault)
         if fault:
             raise InputError(fault)
-        return _run_prepared(open_folder(folder), choices)
+        campaign = open_folder(folder)
+        _run_missing(campaign, choices, stop)
+        try:
+            return _conclude(campaign, choices, stop) if choices.rank == 0 else DONE
+        finally:
+            # Until rank 0 has merged: a signal would end the others, and they the whole job.
+            if choices.communicator is not None:
+                polite_barrier(choices.communicator)
 
 
-def _run_prepared(campaign: Folder, choices: Choices) -> int:
+def _run_missing(campaign: Folder, choices: Choices, stop: Stop) -> None:
     writer = f"{choices.part.writer}-rank{choices.rank}"
     store = Store(campaign.path, campaign.identity, writer, campaign.output.shard_samples)
     before = _survey(campaign, choices)
-    with stopping_on_signals() as stop:
-        progress = _progress(campaign, choices, before) if before is not None else None
-        reason = fault = ""
-        try:
-            reason = choices.scheduler.run(
-                _to_run(campaign, choices, before), _work(campaign, choices, store, stop, progress)
-            )
-        except InputError as error:
-            fault = str(error)
-        try:
-            store.close()
-        except InputError as error:
-            fault = fault or str(error)
-        if choices.communicator is not None:
-            polite_barrier(choices.communicator)
-            faults = choices.communicator.allgather(fault)
-            fault = next((each for each in faults if each), "")
-        if progress is not None:
-            progress.close("failed" if fault else "stopped" if reason else "finished")
+    progress = _progress(campaign, choices, before) if before is not None else None
+    reason = fault = ""
+    try:
+        reason = choices.scheduler.run(
+            _to_run(campaign, choices, before),
+            _work(campaign, choices, store, stop, progress, _failed_elsewhere(choices, before)),
+        )
+    except InputError as error:
+        fault = str(error)
+    try:
+        store.close()
+    except InputError as error:
+        fault = fault or str(error)
+    if choices.communicator is not None:
+        polite_barrier(choices.communicator)
+        faults = choices.communicator.allgather(fault)
+        fault = next((each for each in faults if each), "")
+    if reason:
+        stop.note(reason, signalled=True)  # another rank was told to stop
+    if progress is not None:
+        progress.close("failed" if fault else "stopped" if reason else "finished")
     if fault:
         raise InputError(fault)
-    if choices.rank != 0:
-        return DONE
-    return _conclude(campaign, choices, reason, stop)
 
 
 def _survey(campaign: Folder, choices: Choices) -> Survey | None:
@@ -165,6 +169,13 @@ def _to_run(campaign: Folder, choices: Choices, before: Survey | None) -> list[i
     return longest_first(samples, relative_cost(campaign.table, campaign.scene))
 
 
+def _failed_elsewhere(choices: Choices, before: Survey | None) -> int:
+    """Failed samples of other parts, which count against ``max_failed`` too."""
+    if before is None or choices.retry_failed:
+        return 0
+    return int((~choices.part.holds(before.failed)).sum())
+
+
 def _progress(campaign: Folder, choices: Choices, before: Survey) -> Progress:
     mine = np.arange(campaign.table.samples)
     mine = mine[choices.part.holds(mine)]
@@ -182,20 +193,31 @@ def _progress(campaign: Folder, choices: Choices, before: Survey) -> Progress:
 
 
 def _work(
-    campaign: Folder, choices: Choices, store: Store, stop: Stop, progress: Progress | None
+    campaign: Folder,
+    choices: Choices,
+    store: Store,
+    stop: Stop,
+    progress: Progress | None,
+    failed_elsewhere: int,
 ) -> Work:
     most = choices.max_failed
 
     def check_budget() -> None:
-        if progress is not None and most is not None and progress.failed > most:
-            stop.reason = (
-                stop.reason or f"{progress.failed} samples failed, more than max_failed = {most}"
-            )
+        if progress is not None and most is not None:
+            failed = progress.failed + failed_elsewhere
+            if failed > most:
+                why = f"{failed} samples failed, more than max_failed = {most}"
+                stop.note(why, signalled=False)
 
     def finished(result: Result) -> None:
         if progress is not None:
             progress.finished(result)
             check_budget()
+
+    def asked() -> str:
+        if progress is not None:
+            progress.refresh()
+        return stop.asked()
 
     check_budget()
     return Work(
@@ -207,63 +229,40 @@ def _work(
         keep=store.keep,
         started=progress.started if progress is not None else lambda sample: None,
         finished=finished,
-        stop=stop.asked,
+        stop=asked,
     )
 
 
-def _conclude(campaign: Folder, choices: Choices, reason: str, stop: Stop) -> int:
-    after = _survey(campaign, choices)
-    if after is None:
-        raise RuntimeError("only rank 0 concludes a campaign")
-    left, failed = len(after.missing), len(after.failed)
-    if left == 0:
-        path = merge(campaign, after, execution=choices.description)
-        print(f"{path}: {campaign.table.samples} samples, {failed} failed", file=sys.stderr)
-    elif reason:
-        print(
-            f"{reason}; {left} samples are left: the same command goes on with them",
-            file=sys.stderr,
-        )
-    else:
-        print(f"this part is done; {left} samples of other parts are left", file=sys.stderr)
-    if stop.signalled and left:
-        return INTERRUPTED
-    if reason or failed == campaign.table.samples:
-        return TOO_MANY_FAILED
-    return DONE
-
-
-def merge(campaign: Folder, found: Survey, *, execution: str) -> Path:
-    """Write ``campaign.nc`` from the shards of a folder.
-
-    Parameters
-    ----------
-    campaign
-        The folder.
-    found
-        What it holds.
-    execution
-        Who computed it, in words.
-
-    Raises
-    ------
-    InputError
-        If the shards do not fit together, or the disk is full.
-    """
-    kept = (
-        "identity", "seed", "solver", "campaign", "campaign_name", "scene", "output",
-    )  # fmt: skip
-    attributes = provenance(
-        name=campaign.attributes["campaign_name"],
-        title=campaign.attributes["title"],
-        action="merged",
-    )
-    attributes |= {name: campaign.attributes[name] for name in kept if name in campaign.attributes}
-    attributes["execution"] = execution
-    attributes["history"] += f"\n{campaign.attributes['history']}"
+def _conclude(campaign: Folder, choices: Choices, stop: Stop) -> int:
+    """Merge if nothing is left, say how it ended, and choose the exit code."""
+    stop.at_once = True
     try:
-        return merge_shards(
-            campaign.path, found.shards, campaign.table, campaign.output, attributes
+        merged = merge(
+            campaign, execution=choices.description, set_aside=choices.part.whole, partly=False
         )
-    except OSError as error:
-        raise unwritable(campaign.path / MERGED, error) from error
+    except KeyboardInterrupt:
+        _tell(f"{stop.reason}; the samples are not merged yet: the same command goes on with that")
+        return INTERRUPTED
+    finally:
+        stop.at_once = False
+    left, failed = merged.left, merged.failed
+    over_budget = bool(stop.reason) and not stop.signalled
+    if merged.path is not None:
+        _tell(f"{merged.path}: {campaign.table.samples} samples, {failed} failed")
+    if over_budget:
+        _tell(
+            f"{stop.reason}; {left} samples are left: raise max_failed, or mend what fails and "
+            "give the same command with --retry-failed"
+        )
+    elif left and (stop.signalled or choices.part.whole):
+        why = stop.reason or "some results were lost"
+        _tell(f"{why}; {left} samples are left: the same command goes on with them")
+    elif left:
+        _tell(f"this part is done; {left} samples of other parts are left")
+    if over_budget or failed == campaign.table.samples:
+        return TOO_MANY_FAILED
+    return INTERRUPTED if left and (stop.signalled or choices.part.whole) else DONE
+
+
+def _tell(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)

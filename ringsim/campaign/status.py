@@ -17,6 +17,8 @@ from ringsim.storage.layout import NOT_RUN
 from ringsim.storage.store import Survey, survey
 from ringsim.variables import Status
 
+_TOLD = {"state", "host", "pid", "workers", "elapsed", "updated", "done", "done_before", "running"}
+
 
 @dataclass(frozen=True)
 class Standing:
@@ -92,13 +94,14 @@ def standing(campaign: Folder) -> Standing:
         writer = path.stem.removeprefix("progress-")
         if state == "running" and not in_use(campaign.path, writer):
             state = "killed"
+        # Clocks jump, and differ between hosts: durations are the writer's own.
+        since = max(0.0, now - told["updated"])
         if state == "running":
-            running |= {int(sample): now - begin for sample, begin in told["running"].items()}
-            elapsed = max(now - told["begin"], 1e-9)
-            rate += (told["done"] - told["done_before"]) / elapsed
+            running |= {int(sample): lasts + since for sample, lasts in told["running"].items()}
+            rate += (told["done"] - told["done_before"]) / max(told["elapsed"] + since, 1e-9)
         processes.append(
             f"{writer:<14} {state}, {told['workers']} workers, "
-            f"process {told['pid']} on {told['host']}, {now - told['updated']:.0f} s ago"
+            f"process {told['pid']} on {told['host']}, {since:.0f} s ago"
         )
     left = len(found.missing)
     return Standing(
@@ -119,7 +122,9 @@ def _counted(found: Survey) -> dict[str, int]:
 
 
 def _read(path: Path) -> Any:
+    """Content of a progress file; None if it cannot be read or is of another version."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        told = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
+    return told if isinstance(told, dict) and told.keys() >= _TOLD else None

@@ -25,14 +25,30 @@ _FILE_SECONDS = 1.0
 
 @dataclass
 class Stop:
-    """Whether the campaign is to stop, and why; falsy text means go on."""
+    """Whether the campaign is to stop, and why; falsy text means go on.
+
+    Attributes
+    ----------
+    reason
+        Why.
+    signalled
+        Whether a signal asked for it.
+    at_once
+        Whether a signal interrupts what is being done, instead of waiting to be asked for.
+    """
 
     reason: str = ""
     signalled: bool = False
+    at_once: bool = False
 
     def asked(self) -> str:
         """The reason to stop, or an empty string."""
         return self.reason
+
+    def note(self, reason: str, *, signalled: bool) -> None:
+        """Wish for a stop; the first reason counts."""
+        if not self.reason:
+            self.reason, self.signalled = reason, signalled
 
 
 @contextlib.contextmanager
@@ -41,10 +57,11 @@ def stopping_on_signals() -> Iterator[Stop]:
     stop = Stop()
 
     def note(number: int, _frame: Any) -> None:
-        stop.reason = f"stopped by {signal.Signals(number).name}"
-        stop.signalled = True
+        stop.note(f"stopped by {signal.Signals(number).name}", signalled=True)
         for each in STOPPERS:
             signal.signal(each, before[each])
+        if stop.at_once:
+            raise KeyboardInterrupt
 
     before = {each: signal.signal(each, note) for each in STOPPERS}
     try:
@@ -78,9 +95,10 @@ class Progress:
     workers: int
     running: dict[int, float] = field(default_factory=dict)
     _before: int = 0
-    _begin: float = field(default_factory=time.time)
+    _begin: float = field(default_factory=time.monotonic)
     _told: float = field(default_factory=time.monotonic)
-    _written: float = 0.0
+    _written: float = -_FILE_SECONDS
+    _news: bool = False
     _bar: Any = None
 
     def __post_init__(self) -> None:
@@ -96,8 +114,9 @@ class Progress:
 
     def started(self, sample: int) -> None:
         """Note that a sample runs."""
-        self.running[sample] = time.time()
-        self._save(state="running")
+        self.running[sample] = time.monotonic()
+        self._news = True
+        self.refresh()
 
     def finished(self, result: Result) -> None:
         """Note that a sample has ended."""
@@ -111,33 +130,37 @@ class Progress:
             self._told = time.monotonic()
             print(f"{self.name}: {self.done} of {self.total} done, {self.failed} failed",
                   file=sys.stderr, flush=True)  # fmt: skip
-        self._save(state="running")
+        self._news = True
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Write the progress file if there are news, not more often than each second."""
+        if self._news and time.monotonic() - self._written >= _FILE_SECONDS:
+            self._save(state="running")
 
     def close(self, state: str) -> None:
         """Say how it ended."""
         if self._bar is not None:
             self._bar.close()
         self.running.clear()
-        self._written = 0.0
         self._save(state=state)
 
     def _save(self, state: str) -> None:
-        """Write the progress file, not more often than each second; never fail because of it."""
-        if time.monotonic() - self._written < _FILE_SECONDS:
-            return
-        self._written = time.monotonic()
+        """Write the progress file; never fail because of it."""
+        now = self._written = time.monotonic()
+        self._news = False
         content = {
             "state": state,
             "host": platform.node(),
             "pid": os.getpid(),
             "workers": self.workers,
-            "begin": self._begin,
+            "elapsed": now - self._begin,
             "updated": time.time(),
             "total": self.total,
             "done": self.done,
             "done_before": self._before,
             "failed": self.failed,
-            "running": self.running,
+            "running": {sample: now - begin for sample, begin in self.running.items()},
         }
         draft = self.path.with_name(f"{self.path.name}.{os.getpid()}")
         with contextlib.suppress(OSError):

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from pathlib import Path
 
 import click
 
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.run import merge
-from ringsim.storage.files import locked
-from ringsim.storage.store import recover, survey
+from ringsim.campaign.merging import merge
+from ringsim.storage.files import locked, unwritable
+from ringsim.storage.store import recover
 
 
 @click.command()
@@ -23,12 +24,15 @@ def command(folder: Path) -> None:
     """
     logging.basicConfig(format="%(message)s")
     campaign = open_folder(folder)
-    with locked(folder / "lock") as alone:
+    with contextlib.ExitStack() as held:
+        try:
+            alone = held.enter_context(locked(folder / "lock"))
+        except OSError as error:
+            raise unwritable(folder / "lock", error) from error
         if alone:
             recover(folder, campaign.identity, "")
-        found = survey(folder, campaign.identity, campaign.table.samples, set_aside=alone)
-    path = merge(campaign, found, execution="merged on its own")
+    merged = merge(campaign, execution="merged on its own", set_aside=alone, partly=True)
     click.echo(
-        f"{path}: {campaign.table.samples} samples, {len(found.missing)} not run, "
-        f"{len(found.failed)} failed"
+        f"{merged.path}: {campaign.table.samples} samples, {merged.left} not run, "
+        f"{merged.failed} failed"
     )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import faulthandler
+import io
 import os
 import resource
 import signal
@@ -42,14 +44,28 @@ def _serve(pipe: Connection, setup: dict[str, Any]) -> None:
     _limit(resource.RLIMIT_DATA, int(setup["memory"]))
     _limit(resource.RLIMIT_FSIZE, _MOST_LOG_BYTES)
     _limit(resource.RLIMIT_CORE, 0)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(line_buffering=True)  # a crash would take buffered lines with it
     pipe.send("")
     while True:
         task = pipe.recv()
         os.ftruncate(1, 0)
+        _flush()  # what did not fit into the log before
+        os.ftruncate(1, 0)
         signal.setitimer(signal.ITIMER_REAL, setup["backstop"])
         result = solve(solver, base, task)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
+        _flush()
         pipe.send(result)
+
+
+def _flush() -> None:
+    """Let what was printed appear in the log of its own sample, not in that of the next."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+    ctypes.CDLL(None).fflush(None)
 
 
 def _limit(what: int, most: int) -> None:

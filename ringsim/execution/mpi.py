@@ -65,10 +65,6 @@ class Mpi:
                     if not mine:
                         work.started(batch[0])
                     mine.extend(batch)
-            if queue and not slot.busy:
-                sample = queue.popleft()
-                slot.submit(work.task(sample))
-                work.started(sample)
             while self.communicator.iprobe(tag=_TO_RANK_0):
                 moved = True
                 rank, message = self.communicator.recv(tag=_TO_RANK_0)
@@ -86,6 +82,10 @@ class Mpi:
                         fault = fault or text
                         del held[rank]
             try:
+                if queue and not slot.busy:
+                    sample = queue.popleft()
+                    slot.submit(work.task(sample))
+                    work.started(sample)
                 result = slot.poll() if slot.busy else None
                 if result is not None:
                     moved = True
@@ -136,14 +136,14 @@ class Mpi:
                 if result is not None:
                     work.keep(result)
                     self._tell(replace(result, arrays=(), body=b""))
+                if queue and not slot.busy:
+                    slot.submit(work.task(queue.popleft()))
+                    delay = _SHORTEST
             except InputError as error:
                 slot.close()
                 self._tell(("gone", str(error)))
                 self._wait_for_the_end()
                 return str(error)
-            if queue and not slot.busy:
-                slot.submit(work.task(queue.popleft()))
-                delay = _SHORTEST
             if work.stop() and not told:
                 self._tell(("stop", work.stop()))
                 told = True

@@ -28,10 +28,17 @@ TICK = 0.2
 
 _ADDRESS = re.compile(r"0x[0-9a-fA-F]+")
 _START_SECONDS = 120.0
+_END_SECONDS = 10.0
+_PAUSE_SECONDS = 1.0
+"""Nobody looked for so long: a batch system suspended the job, or the machine is overloaded."""
 _MOST_DEATHS_FROM_OUTSIDE = 2
 _OF_MPI = ("PMI", "PMIX", "OMPI", "OPAL", "PRTE", "HYDRA", "HYDI", "MPI", "I_MPI", "MPIR")
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-_FROM_OUTSIDE = (-signal.SIGKILL, -signal.SIGTERM, -signal.SIGHUP, -signal.SIGINT)
+_FROM_OUTSIDE = (
+    -signal.SIGKILL, -signal.SIGTERM, -signal.SIGHUP, -signal.SIGINT, -signal.SIGUSR1,
+)  # fmt: skip
+"""Signals that others send: the kernel, batch systems, and the stop signals of a campaign, which
+a process that is just starting does not ignore yet."""
 
 
 class Slot:
@@ -67,7 +74,13 @@ class Slot:
         return self._pipe
 
     def submit(self, task: Task) -> None:
-        """Start a sample; the slot must not be busy."""
+        """Start a sample; the slot must not be busy.
+
+        Raises
+        ------
+        InputError
+            If the solver process cannot be started.
+        """
         self._begin, self._attempts, self._deaths = time.monotonic(), 1, 0
         self._first_failure = ""
         self._send(task)
@@ -97,6 +110,8 @@ class Slot:
         now = time.monotonic()
         if self._task is None or now < self._look:
             return None
+        if now - self._look > _PAUSE_SECONDS:
+            self._deadline += now - self._look  # this process has been asleep, and the run perhaps
         self._look = now + TICK
         return self._check(now)
 
@@ -105,7 +120,8 @@ class Slot:
         if self._process is not None:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(self._process.pid, signal.SIGKILL)
-            self._process.wait()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_END_SECONDS)  # the kernel may hold it, waiting for a disk
         if self._pipe is not None:
             self._pipe.close()
         if self._scratch is not None:
@@ -115,7 +131,14 @@ class Slot:
     def _send(self, task: Task) -> None:
         if self._process is None or self._runs >= self._limits.recycle:
             self.close()
-            self._start()
+            try:
+                self._start()
+            except OSError as error:
+                self.close()
+                raise InputError(
+                    f"the solver process cannot be started: {error}; use fewer workers, or make "
+                    f"room in {tempfile.gettempdir()} (TMPDIR)"
+                ) from error
         self._task = task
         self._runs += 1
         now = time.monotonic()
@@ -127,6 +150,7 @@ class Slot:
     def _start(self) -> None:
         self._scratch = Path(tempfile.mkdtemp(prefix="ringsim-"))
         mine, other = socket.socketpair()
+        self._pipe = Connection(mine.detach())
         environment = {
             name: value for name, value in os.environ.items() if not name.startswith(_OF_MPI)
         }
@@ -144,7 +168,6 @@ class Slot:
                 pass_fds=[other.fileno()],
                 start_new_session=True,
             )
-        self._pipe = Connection(mine.detach())
         self._ready, self._runs = False, 0
         with contextlib.suppress(BrokenPipeError):
             self._pipe.send(self._setup)
@@ -159,7 +182,8 @@ class Slot:
             self._first_failure = self._first_failure or result.reason
             self._send(replace(task, shrink=task.shrink * self._retry.step_factor))
             return None
-        reason = retold(result.reason, self._attempts, self._first_failure)
+        told = self._too_much() if result.status is Status.MEMORY else result.reason
+        reason = retold(told, self._attempts, self._first_failure)
         log = result.log
         if result.status.failed:
             log = (self._printed() + log)[-LOG_CHARACTERS:]

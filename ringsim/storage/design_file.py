@@ -64,11 +64,18 @@ def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
                 for variable in file.variables.values()
                 if "path" in variable.ncattrs()
             )
-            return Table(columns, file["sample_seed"][:]), attributes
-    except (OSError, KeyError, IndexError) as error:
+            seeds = file["sample_seed"][:]
+    except (OSError, RuntimeError, KeyError, IndexError, AttributeError) as error:
         raise InputError(
             f"{path}: cannot be read: {error}; choose another folder, or delete this one"
         ) from None
+    for name in ("identity", "scene", "solver"):
+        if name not in attributes:
+            raise InputError(
+                f"{path}: this is not the design of a campaign, it has no attribute {name}: choose "
+                "another folder"
+            )
+    return Table(columns, seeds), attributes
 
 
 def add_inputs(file: Any, table: Table, *, compression: int) -> None:

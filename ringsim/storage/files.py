@@ -52,12 +52,24 @@ def digest(path: Path) -> str:
 
 
 @contextlib.contextmanager
-def locked(path: Path, *, shared: bool = False) -> Iterator[bool]:
+def locked(path: Path, *, shared: bool = False, unsure: bool = True) -> Iterator[bool]:
     """Hold an advisory lock; gives False at once if another process holds it.
 
-    On file systems without locks everybody gets it.
+    Parameters
+    ----------
+    path
+        The file that carries the lock; created if it is not there.
+    shared
+        Whether others may hold it at the same time, shared as well.
+    unsure
+        What is given on a file system without locks.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be created.
     """
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    descriptor = _open_lock(path)
     try:
         try:
             fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
@@ -65,10 +77,38 @@ def locked(path: Path, *, shared: bool = False) -> Iterator[bool]:
         except BlockingIOError:
             held = False
         except OSError:
-            held = True
+            held = unsure
         yield held
     finally:
         os.close(descriptor)
+
+
+@contextlib.contextmanager
+def in_turn(path: Path) -> Iterator[None]:
+    """Wait for an advisory lock and hold it.
+
+    Raises
+    ------
+    OSError
+        If the file that carries the lock cannot be created.
+    """
+    descriptor = _open_lock(path)
+    try:
+        with contextlib.suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _open_lock(path: Path) -> int:
+    """A descriptor for a lock; one for reading does as well, in folders that are read-only."""
+    try:
+        return os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError:
+        if not path.exists():
+            raise
+        return os.open(path, os.O_RDONLY)
 
 
 @contextlib.contextmanager
@@ -87,17 +127,35 @@ def reserved(folder: Path, writer: str, *, alone: bool) -> Iterator[None]:
     Raises
     ------
     InputError
-        If another process runs them already.
+        If another process runs them already, or if the folder cannot be written to.
     """
-    for _ in range(_LOCK_TRIES):
-        with contextlib.ExitStack() as held:
-            if held.enter_context(locked(folder / "lock", shared=not alone)) and (
-                held.enter_context(locked(folder / f"lock-{writer}"))
-            ):
-                yield
-                return
+    with contextlib.ExitStack() as held:
+        for _ in tries():
+            with contextlib.ExitStack() as wanted:
+                try:
+                    free = wanted.enter_context(locked(folder / "lock", shared=not alone)) and (
+                        wanted.enter_context(locked(folder / f"lock-{writer}"))
+                    )
+                except OSError as error:
+                    raise unwritable(folder / f"lock-{writer}", error) from error
+                if free:
+                    held.enter_context(wanted.pop_all())
+                    break
+        else:
+            raise busy(folder)
+        yield
+
+
+def tries() -> Iterator[int]:
+    """Count up, with pauses, for as long as it pays to wait for a lock."""
+    for number in range(_LOCK_TRIES):
+        yield number
         time.sleep(_LOCK_PAUSE)
-    raise InputError(
+
+
+def busy(folder: Path) -> InputError:
+    """The refusal for a campaign that another process runs."""
+    return InputError(
         f"{folder}: another process runs this campaign just now: wait for it, or stop it (ringsim "
         "status tells which it is)"
     )

@@ -8,8 +8,9 @@ from typing import Annotated, Any
 import netCDF4
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from ringsim.refusal import known_or_nearest
 from ringsim.storage.record import MISSING_COUNT
 from ringsim.units import Model
 from ringsim.variables import COORDINATES, VARIABLES, Status, Variable
@@ -48,6 +49,14 @@ class Output(Model):
     shard_samples: Annotated[int, Field(ge=1, le=100_000)] = 256
     """Samples in a shard, at most."""
 
+    @model_validator(mode="after")
+    def _known(self) -> Output:
+        for name in [*self.significant_digits, *self.leave_out]:
+            if name not in VARIABLES:
+                hint = known_or_nearest(name, VARIABLES)
+                raise ValueError(f"{name} is not an output variable ({hint})")
+        return self
+
 
 def add_dimension(file: Any, name: str, size: int) -> None:
     """Create a dimension, unless it is there."""
@@ -83,6 +92,7 @@ def add_variable(
     *,
     compression: int,
     digits: int | None = None,
+    chunk_bytes: int = CHUNK_BYTES,
     attributes: Mapping[str, Any] | None = None,
 ) -> Any:
     """Create a variable over ``sample`` and its own dimensions.
@@ -97,6 +107,8 @@ def add_variable(
         Level of zlib (with shuffle); 0 for none.
     digits
         Significant decimal digits to keep.
+    chunk_bytes
+        Size of what is read and compressed at once, about.
     attributes
         Further attributes.
     """
@@ -109,7 +121,7 @@ def add_variable(
     else:
         size = np.dtype(kind).itemsize
         row = max(1, int(np.prod(shape[1:], dtype=np.int64)) * size)
-        rows = max(1, min(shape[0], CHUNK_BYTES // row))
+        rows = max(1, min(shape[0], chunk_bytes // row))
         options["chunksizes"] = (rows, *(max(1, n) for n in shape[1:]))
         options["compression"] = "zlib" if compression else None
         options["complevel"] = compression or None

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.refusal import InputError
 from ringsim.sampling.table import Table
 from ringsim.storage.design_file import add_inputs
 from ringsim.storage.files import whole
@@ -23,11 +22,16 @@ from ringsim.storage.layout import (
     blank,
     open_new,
 )
-from ringsim.storage.shards import Shard, rows_of, shapes_in
-from ringsim.variables import VARIABLES, Variable
+from ringsim.storage.shards import Shard, latest, rows_of, shapes_in
+from ringsim.variables import VARIABLES, Status, Variable
 
 NAME = "campaign.nc"
 BLOCK_BYTES = 64 << 20
+UNFIT = (
+    "its output times or places differ from those of the first samples: do not vary what shapes "
+    "the result"
+)
+"""Reason of samples that cannot stand in one file with the others."""
 
 
 def merge_shards(
@@ -36,11 +40,11 @@ def merge_shards(
     table: Table,
     output: Output,
     attributes: Mapping[str, Any],
-) -> Path:
+) -> int:
     """Write ``campaign.nc``, whole or not at all.
 
     Samples that have not been run have the status "not_run" and missing values.  Of a sample
-    that was run twice the later result counts.
+    that was run twice the result of greater precedence counts.
 
     Parameters
     ----------
@@ -55,24 +59,24 @@ def merge_shards(
     attributes
         Global attributes.
 
+    Returns
+    -------
+    int
+        Samples that count as failed because their coordinates differ from the others'.
+
     Raises
     ------
-    InputError
-        If the shards do not fit together, or ``output`` names an unknown variable.
     OSError
         If the disk is full; an older file stays.
     """
-    axes, names = _common(shards)
-    for name in [*output.significant_digits, *output.leave_out]:
-        if name not in VARIABLES:
-            raise InputError(f"output: {name} is not an output variable")
+    axes, names, fits = _common(shards)
     scalars = {n for n, v in VARIABLES.items() if not v.dims and not v.needs}
     wanted = {
         name: variable
         for name, variable in VARIABLES.items()
         if name in names | scalars and name not in PER_SAMPLE and name not in output.leave_out
     } | PER_SAMPLE
-    owner, row = _latest(shards, table.samples)
+    owner, row = latest(shards, table.samples)
     path = folder / NAME
     with whole(path) as draft:
         try:
@@ -85,50 +89,37 @@ def merge_shards(
                 for name, variable in wanted.items():
                     digits = output.significant_digits.get(name)
                     add_variable(file, variable, compression=output.compression, digits=digits)
-                _copy(file, shards, owner, row, wanted)
+                _copy(file, shards, fits, (owner, row), wanted)
         except RuntimeError as error:
             raise OSError(str(error)) from error
-    return path
+    return int((~fits[owner[owner >= 0]]).sum())
 
 
-def _common(shards: Sequence[Shard]) -> tuple[dict[str, NDArray[Any]], set[str]]:
-    """Coordinates that the shards share, and the outputs that occur in any."""
+def _common(
+    shards: Sequence[Shard],
+) -> tuple[dict[str, NDArray[Any]], set[str], NDArray[np.bool_]]:
+    """Coordinates of the first samples, the outputs that occur, and which shards fit."""
     axes: dict[str, NDArray[Any]] = {}
     names: set[str] = set()
-    for shard in shards:
-        found, outputs = shapes_in(shard.path)
-        names |= outputs
-        for name, values in found.items():
-            if not np.array_equal(axes.setdefault(name, values), values):
-                raise InputError(
-                    f"{shard.path}: its {name} differs from that of the shards before: it was made "
-                    "by another version; delete it and run the campaign again"
-                )
-    return axes, names
-
-
-def _latest(shards: Sequence[Shard], samples: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Shard and row that hold each sample, -1 for those that have not been run."""
-    owner = np.full(samples, -1, dtype=np.int64)
-    row = np.full(samples, -1, dtype=np.int64)
-    when = np.full(samples, -np.inf)
-    for number, shard in enumerate(shards):
-        valid = np.flatnonzero(shard.samples < samples)
-        ids = shard.samples[valid]
-        newer = shard.finished[valid] > when[ids]
-        owner[ids[newer]], row[ids[newer]] = number, valid[newer]
-        when[ids[newer]] = shard.finished[valid][newer]
-    return owner, row
+    fits = np.ones(len(shards), dtype=bool)
+    for number in sorted(range(len(shards)), key=lambda k: int(shards[k].samples[0])):
+        found, outputs = shapes_in(shards[number].path)
+        fits[number] = all(np.array_equal(axes.get(n, v), v) for n, v in found.items())
+        if fits[number]:
+            names |= outputs
+            axes |= found
+    return axes, names, fits
 
 
 def _copy(
     file: Any,
     shards: Sequence[Shard],
-    owner: NDArray[np.int64],
-    row: NDArray[np.int64],
+    fits: NDArray[np.bool_],
+    place: tuple[NDArray[np.int64], NDArray[np.int64]],
     wanted: Mapping[str, Variable],
 ) -> None:
     """Fill blocks of samples, each read from the shards that hold them."""
+    owner, row = place
     sizes = {dim: d.size for dim, d in file.dimensions.items()}
     shapes = {n: tuple(sizes[dim] for dim in v.dims) for n, v in wanted.items()}
     bytes_each = sum(8 * int(np.prod(shape, dtype=np.int64)) for shape in shapes.values())
@@ -141,8 +132,11 @@ def _copy(
             if number < 0:
                 continue
             here = np.flatnonzero(owner[start:stop] == number)
-            read = rows_of(shards[number].path, list(wanted), row[start + here])
+            names = list(wanted if fits[number] else PER_SAMPLE)
+            read = rows_of(shards[number].path, names, row[start + here])
             for name, values in read.items():
                 blocks[name][here] = values
+            if not fits[number]:
+                blocks["status"][here], blocks["reason"][here] = Status.ERROR, UNFIT
         for name, values in blocks.items():
             file[name][start:stop] = values

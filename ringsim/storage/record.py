@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,6 +14,10 @@ from numpy.typing import NDArray
 from ringsim.variables import COORDINATES, VARIABLES, Status
 
 _DEFINED = {v.name: v for v in COORDINATES} | VARIABLES
+_COORDINATES = {v.name for v in COORDINATES}
+_DIGITS = 12
+"""Coordinates are rounded to so many digits: the last bits would differ between samples."""
+
 MISSING_COUNT = -1
 """Stands for a missing whole number."""
 
@@ -79,6 +84,25 @@ _FIELDS = (
 )  # fmt: skip
 
 
+def precedence(status: Any, finished: Any) -> Any:
+    """Which of several results of one sample counts: that with the greatest number.
+
+    A run that went well counts before one that failed, whatever the clocks said; otherwise the
+    later one does.
+
+    Parameters
+    ----------
+    status, finished
+        Of the results, numbers or arrays.
+    """
+    return np.asarray(finished) + 1e12 * (np.asarray(status) < Status.SOLVER_FAILED)
+
+
+def plain(text: str) -> str:
+    """The text without what cannot be stored in a file: half characters and zero bytes."""
+    return text.encode("utf-8", "replace").decode("utf-8").replace("\0", " ")
+
+
 def from_header(header: bytes, body: bytes) -> Result:
     """The result whose :meth:`Result.header` is given."""
     table = json.loads(header)
@@ -95,8 +119,9 @@ def pack(
     Raises
     ------
     ValueError
-        If a name has no definition, or an array has not the defined dimensions.
+        If a name has no definition, or an array does not span its coordinates.
     """
+    sizes = {name: np.shape(values) for name, values in arrays.items() if name in _COORDINATES}
     described: list[tuple[str, str, tuple[int, ...]]] = []
     parts: list[bytes] = []
     for name, values in arrays.items():
@@ -108,12 +133,27 @@ def pack(
             raise ValueError(
                 f"{name} has shape {array.shape}, but its dimensions are {wanted.dims}"
             )
+        for dim, length in zip(wanted.dims, array.shape, strict=True):
+            if sizes.get(dim) != (length,):
+                raise ValueError(
+                    f"{name} has {length} values along {dim}, whose coordinate has the shape "
+                    f"{sizes.get(dim, 'of nothing: it is missing')}"
+                )
         if wanted.dtype == "str":
             array = array.astype(str)
         elif np.dtype(wanted.dtype).kind in "iu" and array.dtype.kind == "f":
             array = np.where(np.isfinite(array), array, MISSING_COUNT).astype(wanted.dtype)
         else:
             array = array.astype(wanted.dtype)
+            if name in _COORDINATES and array.dtype.kind == "f":
+                array = _rounded(array)
         described.append((name, array.dtype.str, array.shape))
         parts.append(np.ascontiguousarray(array).tobytes())
     return tuple(described), b"".join(parts)
+
+
+def _rounded(values: NDArray[Any]) -> NDArray[Any]:
+    largest = float(np.abs(values).max(initial=0.0))
+    if not 0.0 < largest < np.inf:
+        return values
+    return np.round(values, _DIGITS - math.ceil(math.log10(largest)))

@@ -6,7 +6,7 @@ import logging
 import os
 import secrets
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,16 +24,21 @@ from ringsim.storage.layout import (
     blank,
     open_new,
 )
-from ringsim.storage.record import Result
-from ringsim.variables import VARIABLES, Status, Variable
+from ringsim.storage.record import Result, plain, precedence
+from ringsim.variables import VARIABLES, Variable
 
 FOLDER = "shards"
 ASIDE = "set-aside"
 _COMPRESSION = 1
+_CHUNK_BYTES = 1 << 16
+"""Small, so that a few samples of a shard can be read without the others."""
 _TIMES = {
     "finished": Variable("finished", (), "s", "end of the run, since 1970-01-01T00:00:00Z"),
     "seconds": Variable("seconds", (), "s", "elapsed time of all runs of the sample"),
 }
+_ROW_BYTES = 100_000
+"""Reading one row takes as long as reading so many bytes of rows that stand together."""
+
 _log = logging.getLogger(__name__)
 
 
@@ -48,11 +53,12 @@ class Shard:
     seconds: NDArray[np.float64]
 
 
-def write_shard(folder: Path, results: Iterable[Result], campaign: str) -> Path | None:
-    """Write results to a new shard, in the order of their samples.
+def write_shards(folder: Path, results: Iterable[Result], campaign: str) -> list[Path]:
+    """Write results to new shards, in the order of their samples.
 
-    The file is named after its first sample and the checksum of its bytes, and appears under
-    that name when all of it is on the disk.
+    A file is named after its first sample and the checksum of its bytes, and appears under that
+    name when all of it is on the disk.  Results with different coordinates (or none) go to
+    different files.
 
     Parameters
     ----------
@@ -66,12 +72,20 @@ def write_shard(folder: Path, results: Iterable[Result], campaign: str) -> Path 
     Raises
     ------
     OSError
-        If the disk is full; no file is left behind.
+        If the disk is full; no broken file is left behind.
     """
-    ordered = sorted(results, key=lambda result: result.sample)
-    if not ordered:
-        return None
-    shards = folder / FOLDER
+    groups: dict[Any, list[Result]] = {}
+    for result in sorted(results, key=lambda result: result.sample):
+        groups.setdefault(_axes_key(result), []).append(result)
+    return [_write(folder / FOLDER, members, campaign) for members in groups.values()]
+
+
+def _axes_key(result: Result) -> Any:
+    arrays = result.unpack()
+    return tuple((n, arrays[n].shape, arrays[n].tobytes()) for n in COORDINATE if n in arrays)
+
+
+def _write(shards: Path, ordered: list[Result], campaign: str) -> Path:
     draft = shards / f".{secrets.token_hex(6)}{DRAFT}"
     try:
         _fill(draft, ordered, campaign)
@@ -88,43 +102,29 @@ def write_shard(folder: Path, results: Iterable[Result], campaign: str) -> Path 
 
 def _fill(path: Path, ordered: list[Result], campaign: str) -> None:
     arrays = [result.unpack() for result in ordered]
-    axes: dict[str, NDArray[Any]] = {}
-    for k, found in enumerate(arrays):
-        mine = {name: values for name, values in found.items() if name in COORDINATE}
-        if all(np.array_equal(values, axes.get(name, values)) for name, values in mine.items()):
-            axes |= mine
-        else:
-            ordered[k], arrays[k] = _unfit(ordered[k]), {}
     with open_new(path) as file:
         file.campaign = campaign
         add_samples(file, np.array([result.sample for result in ordered], dtype=np.int64))
-        for name, values in axes.items():
-            add_coordinate(file, name, values)
+        for name in COORDINATE:
+            if name in arrays[0]:
+                add_coordinate(file, name, arrays[0][name])
         for name, definition in (PER_SAMPLE | _TIMES).items():
+            found = [getattr(r, "step" if name == "largest_step" else name) for r in ordered]
             column = blank(definition, (len(ordered),))
-            column[:] = [getattr(result, "step" if name == "largest_step" else name)
-                         for result in ordered]  # fmt: skip
+            column[:] = [plain(text) for text in found] if definition.dtype == "str" else found
             add_variable(file, definition, compression=0)[:] = column
         for name, definition in VARIABLES.items():
             first = next((found[name] for found in arrays if name in found), None)
             if first is None or name in PER_SAMPLE:
                 continue
             block = blank(definition, (len(ordered), *first.shape))
-            for k, found in enumerate(arrays):
-                if name in found:
-                    block[k] = found[name]
-            add_variable(file, definition, compression=_COMPRESSION)[:] = block
-
-
-def _unfit(result: Result) -> Result:
-    return replace(
-        result,
-        status=Status.ERROR,
-        reason="its output times or sections differ from those of the other samples: do not vary "
-        "what shapes the result",
-        arrays=(),
-        body=b"",
-    )
+            for k, values in enumerate(arrays):
+                if name in values:
+                    block[k] = values[name]
+            variable = add_variable(
+                file, definition, compression=_COMPRESSION, chunk_bytes=_CHUNK_BYTES
+            )
+            variable[:] = block
 
 
 def read_shards(folder: Path, campaign: str, *, set_aside: bool) -> list[Shard]:
@@ -148,14 +148,20 @@ def read_shards(folder: Path, campaign: str, *, set_aside: bool) -> list[Shard]:
                 found.append(shard)
                 continue
             fault = "it belongs to another campaign"
-        if set_aside:
-            aside = folder / ASIDE
-            aside.mkdir(exist_ok=True)
-            os.replace(path, aside / path.name)
+        if set_aside and _moved(path, folder / ASIDE):
             _log.warning("%s: %s; set aside, its samples run again", path.name, fault)
         else:
             _log.warning("%s: %s; ignored", path.name, fault)
     return found
+
+
+def _moved(path: Path, aside: Path) -> bool:
+    try:
+        aside.mkdir(exist_ok=True)
+        os.replace(path, aside / path.name)
+    except OSError:
+        return False
+    return True
 
 
 def _fault(path: Path) -> str:
@@ -173,11 +179,44 @@ def _read(path: Path) -> tuple[Shard, str]:
         return Shard(path, *columns), str(file.campaign)
 
 
+def latest(shards: Sequence[Shard], samples: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Shard and row of the result that counts of each sample, -1 where there is none."""
+    owner = np.full(samples, -1, dtype=np.int64)
+    row = np.full(samples, -1, dtype=np.int64)
+    best = np.full(samples, -np.inf)
+    for number, shard in enumerate(shards):
+        weight = precedence(shard.status, shard.finished)
+        rows = np.flatnonzero((shard.samples >= 0) & (shard.samples < samples))
+        rows = rows[np.argsort(weight[rows], kind="stable")]
+        rows = rows[weight[rows] > best[shard.samples[rows]]]
+        ids = shard.samples[rows]
+        owner[ids], row[ids], best[ids] = number, rows, weight[rows]
+    return owner, row
+
+
 def rows_of(path: Path, names: Sequence[str], rows: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
-    """Rows of some variables of a shard; variables that it does not have are left out."""
+    """Rows of some variables of a shard; variables that it does not have are left out.
+
+    Parameters
+    ----------
+    path
+        The shard.
+    names
+        Variables.
+    rows
+        Which rows, in any order.
+    """
     with netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
-        return {name: file[name][:][rows] for name in names if name in file.variables}
+        return {name: _rows(file[name], rows) for name in names if name in file.variables}
+
+
+def _rows(variable: Any, rows: NDArray[np.int64]) -> NDArray[Any]:
+    """Read rows one by one where that is cheaper than reading all of them."""
+    each = int(np.prod(variable.shape[1:], dtype=np.int64)) * 8
+    if variable.dtype is str or len(rows) * _ROW_BYTES >= variable.shape[0] * each:
+        return np.asarray(variable[:][rows])
+    return np.stack([np.asarray(variable[int(row)]) for row in rows])
 
 
 def shapes_in(path: Path) -> tuple[dict[str, NDArray[Any]], set[str]]:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import secrets
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.storage.files import unwritable
+from ringsim.storage.files import DRAFT, locked, unwritable
 from ringsim.storage.journal import Journal, read_journal
 from ringsim.storage.layout import NOT_RUN
-from ringsim.storage.record import Result
-from ringsim.storage.shards import FOLDER, Shard, read_shards, write_shard
+from ringsim.storage.record import Result, precedence
+from ringsim.storage.shards import FOLDER, Shard, latest, read_shards, write_shards
 from ringsim.variables import Status
 
 JOURNALS = "journals"
@@ -29,7 +30,7 @@ class Store:
     campaign
         Identity of the campaign.
     writer
-        Name of this process among those that write to the folder.
+        Share of the samples that this process runs, and its number among those that run it.
     shard_samples
         Samples in a shard, at most; large results make shards with fewer.
     """
@@ -37,7 +38,8 @@ class Store:
     def __init__(self, folder: Path, campaign: str, writer: str, shard_samples: int) -> None:
         self._shard_samples = shard_samples
         self._folder, self._campaign = folder, campaign
-        self._path = folder / JOURNALS / f"{writer}.journal"
+        # No two processes share a journal, even where the file system has no locks.
+        self._path = folder / JOURNALS / f"{writer}-{secrets.token_hex(4)}.journal"
         self._journal: Journal | None = None
 
     def keep(self, result: Result) -> None:
@@ -73,7 +75,7 @@ class Store:
     def _seal(self) -> None:
         if self._journal is None:
             return
-        write_shard(self._folder, read_journal(self._path), self._campaign)
+        write_shards(self._folder, self._journal.records(), self._campaign)
         self._journal.remove()
         self._journal = None
 
@@ -84,7 +86,7 @@ def create_folders(folder: Path) -> None:
         (folder / name).mkdir(parents=True, exist_ok=True)
 
 
-def recover(folder: Path, campaign: str, prefix: str) -> None:
+def recover(folder: Path, campaign: str, share: str) -> None:
     """Make shards of the journals that killed writers left behind.
 
     Parameters
@@ -93,23 +95,34 @@ def recover(folder: Path, campaign: str, prefix: str) -> None:
         The campaign's folder.
     campaign
         Identity of the campaign.
-    prefix
-        Start of the writers' names; none of them may be running.
+    share
+        The share of samples that the caller has reserved, empty if it is alone in the folder;
+        journals of other shares are taken up where nobody runs them.
 
     Raises
     ------
     InputError
         If the disk is full.
     """
-    for draft in (folder / FOLDER).glob(".*.draft"):
-        if not prefix:
+    if not share:
+        for draft in (folder / FOLDER).glob(f".*{DRAFT}"):
             draft.unlink(missing_ok=True)
-    for path in sorted((folder / JOURNALS).glob(f"{prefix}*.journal")):
+    for path in sorted((folder / JOURNALS).glob("*.journal")):
+        owner = path.name.rpartition("-rank")[0]
         try:
-            write_shard(folder, read_journal(path), campaign)
-            path.unlink(missing_ok=True)
+            if share in ("", owner):
+                _adopt(path, folder, campaign)
+                continue
+            with locked(folder / f"lock-{owner}", unsure=False) as free:
+                if free:
+                    _adopt(path, folder, campaign)
         except OSError as error:
             raise unwritable(path, error) from error
+
+
+def _adopt(path: Path, folder: Path, campaign: str) -> None:
+    write_shards(folder, read_journal(path), campaign)
+    path.unlink(missing_ok=True)
 
 
 @dataclass(frozen=True)
@@ -122,12 +135,15 @@ class Survey:
         Status of each sample, NOT_RUN where there is no result.
     seconds
         Elapsed time of each sample, NaN where there is no result.
+    sealed
+        Whether the result of each sample is in a shard, not only in a journal.
     shards
         The whole shards.
     """
 
     status: NDArray[np.int8]
     seconds: NDArray[np.float64]
+    sealed: NDArray[np.bool_]
     shards: list[Shard]
 
     @property
@@ -142,7 +158,7 @@ class Survey:
 
 
 def survey(folder: Path, campaign: str, samples: int, *, set_aside: bool) -> Survey:
-    """Look through shards and journals; of a sample that was run twice the later result counts.
+    """Look through shards and journals; see :func:`precedence` for samples that were run twice.
 
     Parameters
     ----------
@@ -156,17 +172,24 @@ def survey(folder: Path, campaign: str, samples: int, *, set_aside: bool) -> Sur
         Move broken shards out of the way.
     """
     status = np.full(samples, NOT_RUN, dtype=np.int8)
-    seconds, when = np.full(samples, np.nan), np.full(samples, -np.inf)
+    seconds, best = np.full(samples, np.nan), np.full(samples, -np.inf)
+    # Journals first: one that becomes a shard meanwhile is met twice rather than never.
+    journalled = [
+        replace(result, log="")
+        for path in sorted((folder / JOURNALS).glob("*.journal"))
+        for result in read_journal(path, bodies=False)
+        if 0 <= result.sample < samples
+    ]
     shards = read_shards(folder, campaign, set_aside=set_aside)
-    for shard in shards:
-        rows = np.flatnonzero(shard.samples < samples)
-        rows = rows[shard.finished[rows] > when[shard.samples[rows]]]
-        ids = shard.samples[rows]
+    owner, row = latest(shards, samples)
+    for number, shard in enumerate(shards):
+        ids = np.flatnonzero(owner == number)
+        rows = row[ids]
         status[ids], seconds[ids] = shard.status[rows], shard.seconds[rows]
-        when[ids] = shard.finished[rows]
-    for path in sorted((folder / JOURNALS).glob("*.journal")):
-        for result in read_journal(path, bodies=False):
-            if result.sample < samples and result.finished > when[result.sample]:
-                status[result.sample], seconds[result.sample] = result.status, result.seconds
-                when[result.sample] = result.finished
-    return Survey(status, seconds, shards)
+        best[ids] = precedence(shard.status[rows], shard.finished[rows])
+    for result in journalled:
+        weight = float(precedence(result.status, result.finished))
+        if weight > best[result.sample]:
+            status[result.sample], seconds[result.sample] = result.status, result.seconds
+            best[result.sample] = weight
+    return Survey(status, seconds, owner >= 0, shards)

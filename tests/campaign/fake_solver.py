@@ -72,7 +72,7 @@ def poisoned(scene: Scene) -> Outcome:
             return outcome
         case 7:
             outcome = run(scene)
-            outcome.values["lock_time"] = np.array([[lambda: 0]], dtype=object)
+            outcome.values["lock_time"] = np.full((2, 6), lambda: 0, dtype=object)
             return outcome
         case 8:
             sys.exit(5)
@@ -91,6 +91,30 @@ def _eat() -> Outcome:
     hoard = []
     while True:
         hoard.append(np.ones(1 << 22))
+
+
+def loud(scene: Scene) -> Outcome:
+    """Prints 100 MB, and a last line that it does not flush; every other run fails."""
+    for _ in range(100):
+        sys.stdout.write("x" * (1 << 20))
+    print(f"force {scene.loads.force}", end="")
+    if scene.rods.poisson_ratio < 0.25:
+        raise ValueError("a name that is no text: \udcff and a zero byte \0")
+    return run(scene)
+
+
+def shapeless(scene: Scene) -> Outcome:
+    """Other output times for strong forces, an array without its axis for the strongest."""
+    outcome = run(scene)
+    if scene.loads.force > 0.0125:
+        times = outcome.coordinates["time"][:-1]
+        outcome = Outcome(
+            Status.OK, "shorter", outcome.coordinates | {"time": times},
+            {"asynchrony": np.zeros(len(times))},
+        )  # fmt: skip
+    if scene.loads.force > 0.0135:
+        outcome.values["asynchrony"] = np.zeros(3)
+    return outcome
 
 
 def traced(scene: Scene) -> Outcome:

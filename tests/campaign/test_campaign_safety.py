@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from campaign_bench import Bench, comparable, opened
+from campaign_bench import MODULES, Bench, comparable, opened
 from ringsim.storage.journal import read_journal
 
 SHARDS = "[output]\nshard_samples = 8\n"
@@ -190,6 +190,31 @@ def test_running_campaign_tells_its_status_and_keeps_others_out(bench):
     process.kill()
     process.communicate()
     assert "killed, 2 workers" in bench.run("status", "out")
+
+
+def test_status_names_all_samples_that_run(bench):
+    """Three begin within a second, and nothing happens after that."""
+    file = bench.write(3, shared='"rods.damping" = 60.0')
+    start = ("campaign", file, "--workers", 3, "--out", "out")
+    process = bench.start(*start, solver="fake_solver:slow")
+    end, told = time.monotonic() + 60.0, ""
+    while "running        3: " not in told:
+        assert time.monotonic() < end, told
+        assert process.poll() is None
+        time.sleep(0.3)
+        if (bench.folder / "out" / "design.nc").exists():
+            told = bench.run("status", "out")
+
+
+@pytest.mark.parametrize("ranks", [0, 2])
+def test_solver_process_that_cannot_start_is_told_and_nobody_waits(ranks, bench, request):
+    if ranks:
+        request.getfixturevalue("mpi")
+    (bench.folder / "sitecustomize.py").write_text("import sys\nsys.executable = '/no/python'\n")
+    bench.extra["PYTHONPATH"] = f"{bench.folder}{os.pathsep}{MODULES}"
+    printed = bench.run("campaign", bench.write(4), "--out", "out", ranks=ranks, code=2)
+    assert printed.count("the solver process cannot be started") == 1
+    assert "Traceback" not in printed
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ import pytest
 
 from ringsim.execution.slot import Slot
 from ringsim.execution.work import Limits, Retry, Task
+from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 from ringsim.variables import Status
 
@@ -75,6 +76,34 @@ def test_process_killed_by_somebody_else_runs_its_sample_again(slots):
     result = awaited(slot)
     assert result.status is Status.OK
     assert process_of(result) != first
+
+
+def test_run_that_was_suspended_with_its_supervisor_is_no_hang(slots):
+    """As by a batch system: nobody ran, so the time does not count."""
+    slot = slots("slot_solver:sleep", limits=Limits(timeout=1.0))
+    process = process_of(result_of(slot))
+    slot.submit(Task(1, {}))
+    slot.poll()
+    os.kill(process, signal.SIGSTOP)
+    time.sleep(2.0)
+    assert slot.poll() is None
+    os.kill(process, signal.SIGCONT)
+    assert awaited(slot).status is Status.OK
+
+
+def test_process_that_cannot_be_started_is_refused(slots, monkeypatch):
+    slot = slots()
+    monkeypatch.setattr(sys, "executable", "/no/python")
+    with pytest.raises(InputError, match=r"cannot be started.*use fewer workers"):
+        slot.submit(Task(0, {}))
+    slot.close()
+
+
+def test_stop_signal_to_a_process_that_is_just_starting_is_not_its_fault(slots):
+    slot = slots()
+    slot.submit(Task(0, {"loads.force": 0.015}))
+    os.kill(slot._process.pid, signal.SIGUSR1)
+    assert awaited(slot).status is Status.OK
 
 
 def test_process_that_is_killed_again_and_again_is_given_up(slots):

@@ -1,0 +1,165 @@
+"""Signals, commands at the same time, strange folders: nothing is lost or mixed up."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from campaign_bench import SHARDS, START, assert_same, finished, ranks_of, shards
+from ringsim.campaign.folder import open_folder
+from ringsim.campaign.run import Choices, run_campaign
+from ringsim.execution.serial import Serial
+from ringsim.execution.work import Limits
+from ringsim.storage.files import in_turn, locked
+
+
+def blocked(pid):
+    """Whether a process waits for a lock."""
+    lines = Path("/proc/locks").read_text().splitlines()
+    return any("->" in line and str(pid) in line.split() for line in lines)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+def test_stop_signal_interrupts_a_merge_and_the_next_run_merges(number, copied, whole):
+    out = copied.folder / "out"
+    (out / "campaign.nc").unlink()
+    (out / ".campaign.nc.0123.draft").write_text("left by a merge that was killed")
+    with in_turn(out / "lock-merge"):
+        process = copied.start(*START)
+        end = time.monotonic() + 60.0
+        while not blocked(process.pid):
+            assert time.monotonic() < end
+            assert process.poll() is None
+            time.sleep(0.05)
+        process.send_signal(number)
+        printed, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, printed
+    assert f"stopped by {number.name}; the samples are not merged yet" in printed
+    assert not (out / "campaign.nc").exists()
+    copied.run(*START)
+    assert_same(copied, whole)
+    assert not list(out.glob(".*.draft"))
+
+
+class SignalledAtTheEnd(Serial):
+    """Hears of the end of its time just when everything is done."""
+
+    def run(self, samples, work):
+        super().run(samples, work)
+        signal.raise_signal(signal.SIGTERM)
+        return work.stop()
+
+
+def test_signal_after_the_last_sample_is_no_failure(copied, whole):
+    out = copied.folder / "out"
+    shards(copied)[0].unlink()
+    (out / "campaign.nc").unlink()
+    assert run_campaign(out, Choices(SignalledAtTheEnd(), 1, Limits())) == 0
+    assert_same(copied, whole)
+
+
+def test_signal_to_one_rank_stops_all_of_them(bench, mpi):
+    start = ("campaign", bench.write(60, shared='"rods.damping" = 0.1'), "--out", "out")
+    process = bench.start(*start, ranks=3, solver="fake_solver:slow")
+    out = bench.folder / "out"
+    end = time.monotonic() + 60.0
+    while not finished(out):
+        assert time.monotonic() < end
+        assert process.poll() is None
+        time.sleep(0.1)
+    (rank,) = ranks_of(bench, b"2")
+    os.kill(rank, signal.SIGUSR1)
+    printed, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, printed
+    assert "stopped by SIGUSR1" in printed
+    bench.run(*start, ranks=3, solver="fake_solver:slow")
+    assert (bench.result("out").status == 0).all()
+
+
+def test_two_commands_at_once_share_nothing_and_lose_nothing(bench, whole):
+    """The same campaign twice, and another one, begin in one new folder at the same moment."""
+    mine = bench.write(more=SHARDS)
+    other = bench.write(more=SHARDS, name="other.toml")
+    other.write_text(other.read_text().replace("seed = 7", "seed = 8"))
+    processes = {
+        bench.start("campaign", file, "--out", "out"): file for file in (mine, mine, other)
+    }
+    codes = {}
+    for process, file in processes.items():
+        printed, _ = process.communicate(timeout=60)
+        codes.setdefault(file, []).append(process.returncode)
+        assert process.returncode in (0, 2), printed
+        assert process.returncode == 0 or "another" in printed
+    winners = [file for file, found in codes.items() if 0 in found]
+    assert len(winners) == 1
+    bench.run("campaign", winners[0], "--out", "out")
+    if winners == [mine]:
+        assert_same(bench, whole)
+    assert (bench.result("out").status == 0).all()
+
+
+def test_growing_a_campaign_that_runs_is_refused(copied):
+    with locked(copied.folder / "out" / "lock") as held:
+        assert held
+        printed = copied.run("campaign", copied.write(30, more=SHARDS), "--out", "out", code=2)
+    assert "another process runs this campaign" in printed
+    assert open_folder(copied.folder / "out").table.samples == 20
+
+
+@pytest.fixture
+def read_only(copied):
+    """A finished campaign on a file system that nobody can write to."""
+    out = copied.folder / "out"
+    here = str(out)
+    if (
+        shutil.which("mount") is None
+        or subprocess.run(["mount", "--bind", here, here], capture_output=True).returncode
+    ):
+        pytest.skip("a folder cannot be mounted here: needs the right to mount")
+    try:
+        subprocess.run(["mount", "-o", "remount,ro,bind", here], check=True)
+        yield copied
+    finally:
+        subprocess.run(["umount", "-l", here], check=True)
+
+
+def test_read_only_folder_can_be_looked_at_and_refuses_the_rest(read_only):
+    told = read_only.run("status", "out")
+    assert "20 of 20 samples done" in told
+    assert "identical to the stored result" in read_only.run("replay", "out", 3)
+    assert "nothing is left to run" in read_only.run(*START, "--dry-run")
+    for verb in (START, ("merge", "out"), ("campaign", "small.toml", "--part", "1/2", *START[-2:])):
+        printed = read_only.run(*verb, code=2)
+        line = printed.splitlines()[-1]
+        assert "cannot be written: Read-only file system" in line
+        assert "Traceback" not in printed
+
+
+def test_one_sample_is_a_campaign(bench):
+    file = bench.write(1)
+    bench.run("campaign", file, "--workers", 4, "--out", "out")
+    result = bench.result("out")
+    assert result.sizes["sample"] == 1
+    assert result.status.values.tolist() == [0]
+    assert "1 of 1 samples done, 0 left" in bench.run("status", "out")
+
+
+@pytest.mark.parametrize(
+    "name", ["a b", "ü-Ω", "100%", "a#mode=bytes", "[x]*", "file:name", "-x", "a\nb", "'quote\""]
+)
+def test_folder_may_have_any_name(name, bench):
+    bench.run("campaign", bench.write(3), f"--out={name}")
+    (bench.folder / name / "campaign.nc").rename(bench.folder / "found.nc")
+    bench.run("campaign", bench.folder / "small.toml", f"--out={name}")
+    bench.run("merge", "--", name)
+    assert "3 of 3" in bench.run("status", "--", name)
+    with xr.open_dataset(bench.folder / "found.nc") as found:
+        assert np.isfinite(found.deployment_time.values).all()
