@@ -83,7 +83,13 @@ _ALL = (
         "peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod", needs="stress"
     ),
     Variable("cable_tension", ("plane", "span", "time"), "N", "tension of a cable's span"),
-    Variable("peak_tension", (), "N", "largest tension of any span of any cable", needs="cables"),
+    Variable(
+        "peak_tension",
+        (),
+        "N",
+        "largest tension of any span of any cable up to the deployment time",
+        needs="cables",
+    ),
     Variable("peak_tension_time", (), "s", "time of the largest tension", needs="cables"),
     Variable(
         "slack_duration",

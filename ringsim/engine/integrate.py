@@ -17,6 +17,7 @@ from ringsim.engine.energy_control import EnergyControl
 from ringsim.engine.guard import Guard
 from ringsim.engine.history import History
 from ringsim.engine.locks import Locks
+from ringsim.engine.outcome import lock_times
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import JointGroup, Openings, State
 from ringsim.engine.scales import (
@@ -131,7 +132,8 @@ class Integration:
             now = self.history.times[-1]
             if self._control is not None:
                 self._steps.step = min(self._steps.step, self._control.limit)
-            left = min(self._scene.solver.end_time, self._built.faults.next_time) - now
+            ends = (self._scene.solver.end_time, self._built.faults.next_time, self._settled_at)
+            left = min(ends) - now
             step = min(self._steps.step, left)
             solver.it.currentStepSize = step
             self._fresh = False
@@ -237,8 +239,19 @@ class Integration:
                 self.history.status = Status.OK
                 self.history.reason = f"all V-joints have reached {where}"
                 settling = self._scene.solver.settling_time
-                self._settled_at = time + (0.0 if self._scene.stop is None else settling)
+                last = self._last_lock(time) + (0.0 if self._scene.stop is None else settling)
+                self._settled_at = last if last > time * (1.0 + 1e-12) else time
                 return
+
+    def _last_lock(self, time: float) -> float:
+        """When the last V-joint reached 180 deg within the step that ends at ``time``, s.
+
+        Settling counts from there: what happens after it must not depend on where steps end.
+        """
+        history = self.history
+        two = (np.array(part[-2:]) for part in (history.times, history.angles, history.rates))
+        locks = lock_times(*two)
+        return float(np.nanmax(locks)) if np.isfinite(locks).any() else time
 
     def _finished(self, time: float) -> bool:
         end = self._scene.solver.end_time

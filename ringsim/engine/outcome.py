@@ -74,7 +74,7 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
         stresses = np.array(history.stresses)
         values["rod_stress"] = np.moveaxis(on_grid(grid, times, stresses), 0, -1)
         values["peak_rod_stress"] = np.array(stresses.max())
-    _add_cables(values, history, scene, grid)
+    _add_cables(values, history, scene, grid, deployed)
     counts = {
         "steps": len(times) - 1,
         "newton_iterations": history.newton_iterations,
@@ -121,8 +121,14 @@ def add_energies(
     values["constraint_error"] = np.array(max(gaps))
 
 
-def _add_cables(values: dict[str, Array], history: History, scene: Scene, grid: Array) -> None:
-    """Tensions by plane and span; a plane without a cable is NaN."""
+def _add_cables(
+    values: dict[str, Array], history: History, scene: Scene, grid: Array, deployed: float
+) -> None:
+    """Tensions by plane and span; a plane without a cable is NaN.
+
+    The peak counts up to the deployment time (s; NaN for the whole run): winches that go on
+    pulling at a locked ring raise the tension for as long as one cares to simulate.
+    """
     if scene.cables is None or not history.tensions:
         return
     times = np.array(history.times)
@@ -141,8 +147,13 @@ def _add_cables(values: dict[str, Array], history: History, scene: Scene, grid: 
     values["cable_tension"] = by_plane
     values["slack_duration"] = loose
     values["wound_length"] = wound
-    values["peak_tension"] = np.array(tensions.max())
-    values["peak_tension_time"] = np.array(times[np.argmax(tensions.max(axis=1))])
+    largest = tensions.max(axis=1)
+    if math.isfinite(deployed):
+        until = times <= deployed
+        last = on_grid(np.array([deployed]), times, tensions).max()
+        times, largest = np.append(times[until], deployed), np.append(largest[until], last)
+    values["peak_tension"] = np.array(largest.max())
+    values["peak_tension_time"] = np.array(times[np.argmax(largest)])
 
 
 def on_grid(grid: Array, times: Array, series: Array, rates: Array | None = None) -> Array:
