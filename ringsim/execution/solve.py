@@ -13,7 +13,7 @@ import numpy as np
 from ringsim.execution.work import Task
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.storage.record import Result, pack
+from ringsim.storage.record import Result, pack, plain
 from ringsim.variables import VARIABLES, Outcome, Status
 
 Solver = Callable[[Scene], Outcome]
@@ -75,8 +75,8 @@ def solve(solver: Solver, base: Scene, task: Task) -> Result:
     return Result(
         sample=task.sample,
         status=status,
-        reason=" ".join(reason.split())[:1000],
-        log=log,
+        reason=plain(" ".join(reason.split())[:1000]),
+        log=plain(log),
         step=step,
         seconds=time.monotonic() - begin,
         finished=time.time(),
