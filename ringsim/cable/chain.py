@@ -42,6 +42,7 @@ the model.  T_j-1 - T_j has the sign of s_j: friction never feeds energy in.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,7 +143,7 @@ class Chain:
         winding = ropes.per_rope(wound_rate)
 
         angles = _angles(directions, ropes)
-        log_decays, log_slopes = self._friction(angles, ropes)
+        log_decays = self._log_decays(angles, ropes)
         speeds = _speeds(ropes, lengths, rates, paths, path_rates, natural, winding, wound_rate)
         exponents = np.tanh(speeds / self._slip_speed)
 
@@ -167,7 +168,7 @@ class Chain:
             directions=directions,
             angles=angles,
             log_decays=log_decays,
-            log_slopes=log_slopes,
+            friction_slopes=partial(self._log_slopes, angles, ropes),
             speeds=speeds,
             exponents=exponents,
             slip_speeds=self._slip_speed,
@@ -183,13 +184,19 @@ class Chain:
             wound_rate=wound_rate,
         )
 
-    def _friction(self, angles: Array, ropes: Ropes) -> tuple[Array, Array]:
-        decays, slopes = np.empty_like(angles), np.empty_like(angles)
+    def _log_decays(self, angles: Array, ropes: Ropes) -> Array:
+        found = np.empty_like(angles)
         for number, cable in enumerate(self.cables):
             own = ropes.pulleys(number)
-            decays[own] = cable.friction.log_decay(angles[own], cable.pulley_radius)
-            slopes[own] = cable.friction.log_slope(angles[own], cable.pulley_radius)
-        return decays, slopes
+            found[own] = cable.friction.log_decay(angles[own], cable.pulley_radius)
+        return found
+
+    def _log_slopes(self, angles: Array, ropes: Ropes) -> Array:
+        found = np.empty_like(angles)
+        for number, cable in enumerate(self.cables):
+            own = ropes.pulleys(number)
+            found[own] = cable.friction.log_slope(angles[own], cable.pulley_radius)
+        return found
 
     def _rope_material(self, ropes: Ropes) -> RopeMaterial:
         if self._ropes is not ropes:

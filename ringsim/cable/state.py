@@ -36,8 +36,10 @@ class ChainState:
         Unit vectors away from the winch, shape (spans, 3).
     angles
         Angle between the two pulls on each pulley (rad), shape (pulleys,).
-    log_decays, log_slopes
-        Logarithm of the full decay at each pulley and its derivative, shape (pulleys,).
+    log_decays
+        Logarithm of the full decay at each pulley, shape (pulleys,).
+    friction_slopes
+        Computes its derivative after the angle; forces do not need it.
     speeds
         Rope over each pulley (m/s, towards the winch positive), shape (pulleys,).
     exponents
@@ -68,7 +70,7 @@ class ChainState:
     directions: Array
     angles: Array
     log_decays: Array
-    log_slopes: Array
+    friction_slopes: Callable[[], Array]
     speeds: Array
     exponents: Array
     slip_speeds: Array

@@ -219,7 +219,7 @@ def _distribution(
     by_place = by_length[:, :, None] * unit
     by_place += by_rate[:, :, None] * swing
     before, behind = _angle_gradients(unit, length)
-    turned = (exponent * state.log_slopes[inner])[:, None]
+    turned = (exponent * state.friction_slopes()[inner])[:, None]
     pulley = np.arange(count - 1)
     by_place[pulley, pulley] += turned * before
     by_place[pulley, pulley + 1] += turned * behind

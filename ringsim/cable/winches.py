@@ -113,6 +113,7 @@ class Winches:
         self._held = [WinchState() for _ in self._winches]
         self._ropes: list[_Rope] = []
         self._speeds: dict[int, float] = {}
+        self._prescribed: tuple[float, Array, Array] | None = None
 
     @property
     def answering(self) -> bool:
@@ -129,6 +130,8 @@ class Winches:
         paths, rates
             Path of each rope and its rate, m and m/s; not needed if no winch answers.
         """
+        if not self._ropes and self._prescribed is not None and self._prescribed[0] == time:
+            return self._prescribed[1:]
         wound, speed = np.zeros((self._cables, 2)), np.zeros((self._cables, 2))
         answering = {m.number for rope in self._ropes for m in rope.members}
         for place, ((number, end, winch), held) in enumerate(
@@ -137,6 +140,7 @@ class Winches:
             state = WinchState(time, held.wound) if place in answering else winch.at(time, held)
             wound[number, end], speed[number, end] = state.wound, state.speed
         if not self._ropes or paths is None or rates is None:
+            self._prescribed = time, wound, speed
             return wound, speed
         natural, rest = ropes.content - ropes.per_rope(wound), ropes.per_rope(speed)
         for rope in self._ropes:
@@ -169,6 +173,7 @@ class Winches:
         slopes
             Derivative of each cable's ideal path length after the opening angle, m/rad.
         """
+        self._prescribed = None
         self._held = [
             WinchState(time, float(state.wound[number, end]), self._speeds.get(place, 0.0))
             for place, (number, end, _) in enumerate(self._winches)

@@ -20,7 +20,6 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from ringsim.cable.cables import Cables
 from ringsim.engine.assembly import Assembly
@@ -106,8 +105,8 @@ class CablePath:
     per_cable
         Number of points of each cable.
     leg_point, leg_node, leg_share
-        Every dependence of a point on a node: the point, the node's place in ``nodes``, and the
-        share of the node's turn that turns the point's arm.
+        Every dependence of a point on a node, in the order of the nodes: the point, the node's
+        place in ``nodes``, and the share of the node's turn that turns the point's arm.
     """
 
     def __init__(self, paths: Sequence[Sequence[Stop]]) -> None:
@@ -130,6 +129,7 @@ class CablePath:
         self._block_point = np.array([b[0] for b in block], dtype=np.int64)
         self._left = np.array([b[1] for b in block], dtype=np.int64)
         self._right = np.array([b[2] for b in block], dtype=np.int64)
+        self._halves = np.concatenate([self._left, self._right])
         self._sense = np.array([b[3] for b in block], dtype=float)[:, None]
         self._offset = np.array([b[4] for b in block], dtype=float)[:, None]
         self.leg_point = np.concatenate([self._hinge_point, self._block_point, self._block_point])
@@ -138,13 +138,13 @@ class CablePath:
         halves = np.full(len(block), 0.5)
         self.leg_share = np.concatenate([ones, halves, halves])
         self.leg_carries = np.concatenate([ones, np.ones(len(block)), np.zeros(len(block))])
+        order = np.argsort(self.leg_node, kind="stable")
+        self.leg_point, self.leg_node = self.leg_point[order], self.leg_node[order]
+        self.leg_share, self.leg_carries = self.leg_share[order], self.leg_carries[order]
+        self._first_leg = np.searchsorted(self.leg_node, np.arange(len(self.nodes)))
         self._carrier = np.empty(count, dtype=np.int64)
         self._carrier[self._hinge_point] = self._hinge_node
         self._carrier[self._block_point] = self._left
-        legs = np.arange(len(self.leg_node))
-        self._gather = csr_array(
-            (np.ones(len(legs)), (self.leg_node, legs)), shape=(len(self.nodes), len(legs))
-        )
 
     def place(self, coordinates: Array, rates: Array) -> Placed:
         """Points and velocities from the nodes' coordinates and rates, shape (nodes, 7)."""
@@ -152,10 +152,9 @@ class CablePath:
         spins = spin(turns, rates[:, 3:])
         arms = np.empty((self.count, 3))
         arms[self._hinge_point] = rotated(turns[self._hinge_node], self._hinge_arm)
-        left, right = turns[self._left], turns[self._right]
-        x_left, y_left = first_axes(left)
-        x_right, y_right = first_axes(right)
-        bisector = y_left + y_right + self._sense * (x_right - x_left)
+        x, y = first_axes(turns[self._halves])
+        count = len(self._left)
+        bisector = y[:count] + y[count:] + self._sense * (x[count:] - x[:count])
         size = np.sqrt(np.einsum("ij,ij->i", bisector, bisector))
         arms[self._block_point] = (-self._sense * self._offset / size[:, None]) * bisector
         turning = np.empty((self.count, 3))
@@ -175,7 +174,7 @@ class CablePath:
         scalar, vector = turns[:, :1], turns[:, 1:]
         by_leg[:, 3] = -2.0 * np.einsum("ij,ij->i", vector, moments)
         by_leg[:, 4:] = 2.0 * (scalar * moments - cross(vector, moments))
-        return np.asarray(self._gather @ by_leg)
+        return np.asarray(np.add.reduceat(by_leg, self._first_leg, axis=0))
 
     def leg_maps(self, placed: Placed) -> Array:
         """Derivative of each leg's point after its node's coordinates, shape (legs, 3, 7)."""
