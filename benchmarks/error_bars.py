@@ -4,7 +4,7 @@ Run: python benchmarks/error_bars.py [scenes] [processes]
 
 Each scene is drawn from a seed of its own: closed rings and open arcs, driven by forces or by
 cables, free or clamped, soft and stiff, with and without net, friction and damping.  The truth of
-a scene is a run with a twenty-fifth of its tolerance, twice the elements and a hundredth of
+a scene is a run with a sixteenth of its tolerance, twice the elements and a hundredth of
 Newton's tolerance.  Printed per output: how often the bar covers the error, and the ratios of bar
 to error.
 """
@@ -35,7 +35,7 @@ def random_scene(seed: int) -> Scene:
     cables = bool(rng.random() < 0.5)
     closed = bool(rng.random() < 0.7)
     values: dict[str, Any] = {
-        "structure.sections": int(rng.integers(3, 9) if closed else rng.integers(2, 5)),
+        "structure.sections": int(rng.integers(3, 6) if closed else rng.integers(2, 4)),
         "structure.closed": closed,
         "structure.aspect_ratio": float(rng.uniform(0.8, 1.0)) if closed else 1.0,
         "structure.opening_angle": float(rng.uniform(15.0, 90.0)),
@@ -55,7 +55,7 @@ def random_scene(seed: int) -> Scene:
                 f"cables.{end}.friction.coefficient": float(rng.uniform(0.0, 8e-4)),
                 f"cables.{end}.axial_stiffness": log_uniform(rng, 1e4, 5e5),
             }
-        speed = log_uniform(rng, 0.02, 0.1)
+        speed = log_uniform(rng, 0.04, 0.15)
         winch = {"kind": "ramp", "speed": speed, "duration": float(rng.uniform(0.3, 2.0))}
         for end in ("upper", "lower"):
             values |= {f"cables.{end}.winch.winding.{name}": v for name, v in winch.items()}
@@ -73,7 +73,7 @@ def finer(scene: Scene) -> Scene:
     """The truth of a scene."""
     return scene.with_values(
         {
-            "solver.tolerance": scene.solver.tolerance / 25.0,
+            "solver.tolerance": scene.solver.tolerance / 16.0,
             "solver.newton_tolerance": scene.solver.newton_tolerance / 100.0,
             "rods.elements": 2 * scene.rods.elements,
             "solver.step_limit": 200_000,

@@ -114,6 +114,9 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
 def _wanted(variable: Variable, scene: Scene) -> bool:
     """Whether a scene asks for what a variable says."""
     holds = {"": True, "stress": scene.record.stress, "cables": scene.cables is not None}
+    bars = scene.solver.error_bars
+    holds |= {f"error bars of {part}": bars and there for part, there in holds.items() if part}
+    holds["error bars"] = bars
     holds[kind_of(scene.structure)] = True
     return holds.get(variable.needs, False)
 

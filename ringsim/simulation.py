@@ -16,8 +16,9 @@ import numpy as np
 
 from ringsim.engine.solve import SOLVERS
 from ringsim.scene import Scene
+from ringsim.theory.error_bars import error_bars
 from ringsim.theory.ideal_fidelity import run_ideal, run_ideal_many
-from ringsim.variables import Fidelity, Outcome, Status
+from ringsim.variables import TIMINGS, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +40,8 @@ def run(scene: Scene) -> Outcome:
     Outcome
         Arrays on the scene's output grid, of the last start; ``restarts`` says how many there
         were, and its times count all of them.  A solve that fails or does not reach its goal has
-        a status other than OK and the reason; it never raises.
+        a status other than OK and the reason; it never raises.  With ``solver.error_bars`` it
+        holds the error bars of its main numbers, and the times of both runs.
     """
     begin = (time.perf_counter(), time.process_time())
     outcome, first, restarts = _attempt(scene, begin), "", 0
@@ -52,6 +54,12 @@ def run(scene: Scene) -> Outcome:
         if finer.step_control != "constant":
             how += f" and solver.tolerance = {finer.tolerance:.2g}"
         outcome = replace(outcome, reason=f"{outcome.reason} ({how}; start 1: {first})")
+    if scene.solver.error_bars and outcome.status == Status.OK:
+        longer = scene.solver.refined(restarts).coarsened()
+        coarse = _attempt(scene.model_copy(update={"solver": longer}), begin)
+        outcome.values.update(error_bars(outcome, coarse))
+        for name in TIMINGS:
+            outcome.values[name] = coarse.values.get(name, outcome.values[name])
     outcome.values["fidelity"] = np.array(int(Fidelity.FULL))
     outcome.values["restarts"] = np.array(restarts)
     return outcome

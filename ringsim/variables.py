@@ -49,7 +49,8 @@ class Variable:
     long_name: str
     dtype: str = "f8"
     needs: str = ""
-    """What a scene must hold for it: "stress" output, "cables", a kind of structure, or nothing."""
+    """What a scene must hold for it: "stress" output, "cables", "error bars" (of one of these), a
+    kind of structure, or nothing."""
 
 
 PLANES = ("upper", "lower")
@@ -115,6 +116,16 @@ _ALL = (
     Variable("work", ("time",), "J", "work done on the structure by forces and winches"),
     Variable("dissipation", ("time",), "J", "energy lost in joints, dampers and stops"),
     Variable("energy_error", (), "1", "largest energy imbalance over the largest energy exchanged"),
+    *(
+        Variable(f"{name}_error", (), units, f"what the {words} may be wrong by", needs=needs)
+        for name, units, words, needs in (
+            ("deployment_time", "s", "deployment time", "error bars"),
+            ("opening_angle", "degree", "opening angles", "error bars"),
+            ("asynchrony_max", "degree", "largest asynchrony", "error bars"),
+            ("peak_tension", "N", "largest tension", "error bars of cables"),
+            ("peak_rod_stress", "Pa", "largest stress", "error bars of stress"),
+        )
+    ),
     Variable("constraint_violation", ("time",), "m", "largest gap in any joint"),
     Variable("constraint_error", (), "m", "largest gap in any joint at any step"),
     Variable("steps", (), "1", "time steps", "i4"),

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 from ringsim.execution.work import Limits, Retry
 from ringsim.refusal import InputError, explain, known_or_nearest
 from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.table import AnyDesign, AnyDistribution, Table, draw
+from ringsim.sampling.table import AnyDesign, AnyDistribution, Table, draw, with_error_bars
 from ringsim.scene import Scene, builtin_scenes, load_scene
 from ringsim.storage.layout import Output
 from ringsim.units import Model
@@ -61,6 +61,8 @@ class Specification(Model):
     retry: Retry = Retry()
     fidelity: Literal["full", "ideal"] = "full"
     """full: the flexible multibody model; ideal: rigid rods, one coordinate."""
+    error_bars_every: Annotated[int, Field(ge=0)] = 0
+    """One sample in so many states its error bars (``solver.error_bars``); 0 for none."""
     max_failed: Annotated[int, Field(ge=0)] | None = None
     """The campaign stops when more samples than this have failed."""
     output: Output = Output()
@@ -97,7 +99,7 @@ class Campaign:
         """
         wanted = self.specification
         try:
-            return draw(
+            table = draw(
                 self.scene,
                 wanted.inputs,
                 wanted.correlations,
@@ -105,6 +107,7 @@ class Campaign:
                 seed=wanted.seed,
                 folder=self.file.parent,
             )
+            return with_error_bars(table, wanted.error_bars_every)
         except InputError as error:
             raise InputError(f"{self.file.name}: {error}") from None
 

@@ -44,6 +44,10 @@ class Solver(Model):
     """How often a run that failed or diverged starts anew, each time with a quarter of the step
     and a sixteenth of the tolerance."""
 
+    error_bars: bool = False
+    """Run the scene a second time with steps twice as long, and state what the main numbers may
+    be wrong by."""
+
     @model_validator(mode="after")
     def _usable(self) -> Solver:
         if self.step > self.end_time:
@@ -66,6 +70,13 @@ class Solver(Model):
                 "tolerance": max(self.tolerance * _FINER ** (2 * times), _LEAST_TOLERANCE),
             }
         )
+
+    def coarsened(self) -> Solver:
+        """The settings of the second run of ``error_bars``: every step twice as long."""
+        tolerance = min(4.0 * self.tolerance, 0.1)
+        longer = self.step_control == "constant"
+        step = min(2.0 * self.step, self.end_time) if longer else self.step
+        return self.model_copy(update={"step": step, "tolerance": tolerance})
 
 
 class Record(Model):

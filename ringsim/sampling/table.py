@@ -195,6 +195,24 @@ def _check_extremes(base: Scene, table: Table) -> None:
             raise InputError(f"sample {sample}: {error}; change or truncate the inputs") from None
 
 
+def with_error_bars(table: Table, every: int) -> Table:
+    """Add an input that has one sample in ``every`` state its error bars; none if that is 0.
+
+    Raises
+    ------
+    InputError
+        If the inputs say already which samples do.
+    """
+    if every == 0:
+        return table
+    path = "solver.error_bars"
+    if any(column.path == path for column in table.columns):
+        raise InputError(f"error_bars_every = {every}: {path} is an input already: leave out one")
+    chosen = np.arange(table.samples) % every == 0
+    column = Column(path.replace(".", "_"), path, "", "1", f"one sample in {every}", chosen)
+    return dataclasses.replace(table, columns=(*table.columns, column))
+
+
 def first_samples(table: Table, count: int) -> Table:
     """The design cut down to its first samples."""
     cut = tuple(dataclasses.replace(c, values=c.values[:count]) for c in table.columns)
