@@ -78,8 +78,11 @@ class JacobianPattern:
         mask = np.concatenate([part.ravel() for part in filled])
         # Explicit zeros would fill the factors of the system's matrix.
         self._kept = np.concatenate([np.flatnonzero(mask), np.arange(len(mask), len(rows))])
-        self._rows, self._columns = rows[self._kept], columns[self._kept]
-        self._empty: Array = np.stack([every, every, np.ones(len(every))], axis=1, dtype=float)
+        self._unknowns = auxiliary
+        self._known = auxiliary + len(self._kept)
+        self._entries = np.ones((self._known, 3))
+        self._entries[:, 0] = np.concatenate([every, rows[self._kept]])
+        self._entries[:, 1] = np.concatenate([every, columns[self._kept]])
 
     def _difference(self, span: NDArray[np.int64]) -> NDArray[np.int64]:
         return np.asarray(self._size + 3 * span[:, None] + np.arange(3))
@@ -92,7 +95,9 @@ class JacobianPattern:
 
     def empty(self) -> Array:
         """Entries of a cable that pulls nothing, shape (entries, 3)."""
-        return self._empty
+        empty = self._entries[: self._unknowns].copy()
+        empty[:, 2] = 1.0
+        return empty
 
     def triplets(
         self,
@@ -104,14 +109,14 @@ class JacobianPattern:
         exact: bool,
         left: Array | None = None,
     ) -> Array:
-        """All entries as (row, column, value), shape (entries, 3).
+        """All entries as (row, column, value), shape (entries, 3), until the next call.
 
         ``left`` is the share of each rope's stiffness that its winches do not answer.
         """
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
         turned = maps.transpose(0, 2, 1)
         directions = np.empty((self._spans, 3, 3))
-        parts: list[Array] = [self._empty * [1.0, 1.0, by_q]]
+        parts: list[Array] = []
         for rope in range(len(state.natural)):
             spans = slice(int(state.ropes.starts[rope]), int(state.ropes.ends[rope]))
             share = 1.0 if left is None else float(left[rope])
@@ -130,9 +135,20 @@ class JacobianPattern:
             turned @ directions[self._span],
             *self._turning(state, placed),
         ]
-        values = np.concatenate([block.ravel() for block in blocks])[self._kept]
-        parts.append(np.stack([self._rows, self._columns, by_q * values], axis=1))
-        return np.concatenate(parts)
+        values = np.concatenate([block.ravel() for block in blocks])
+        entries = self._with_room(self._known + sum(len(part) for part in parts))
+        entries[: self._unknowns, 2] = by_q
+        np.multiply(values[self._kept], by_q, out=entries[self._unknowns : self._known, 2])
+        np.concatenate(parts, out=entries[self._known :])
+        return entries
+
+    def _with_room(self, count: int) -> Array:
+        """So many entries of a buffer that is kept: the places of the first ones stay the same."""
+        if len(self._entries) < count:
+            kept = self._entries
+            self._entries = np.empty((count + count // 4, 3))
+            self._entries[: self._known] = kept[: self._known]
+        return self._entries[:count]
 
     @staticmethod
     def _steady(state: ChainState, rope: int) -> bool:
