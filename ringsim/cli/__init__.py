@@ -19,6 +19,7 @@ VERBS = {
     "status": "Tell how far a campaign is.",
     "merge": "Put the results of a campaign into one file.",
     "replay": "Run one sample of a campaign again, in the foreground.",
+    "stability": "Map where the solver is sound, and how runs end where it is not.",
     "accuracy": "Compare numerical settings of a scene: error against run time.",
 }
 """Verb and its line of help; the command ``VERB`` lives in ringsim.cli.VERB as ``command``."""

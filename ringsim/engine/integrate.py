@@ -27,7 +27,7 @@ from ringsim.engine.scales import (
     usual_energy,
     usual_rate,
 )
-from ringsim.engine.settings import solver_settings
+from ringsim.engine.settings import raise_own, solver_settings
 from ringsim.engine.stepping import StepControl
 from ringsim.engine.stress import StressMeter
 from ringsim.variables import Status
@@ -99,6 +99,7 @@ class Integration:
             if solver.InitializeSolver(self._system, self._settings):
                 solver.SolveSteps(self._system, self._settings)
         except exu.ExudynError as error:
+            raise_own(error, self._refusal())
             if math.isfinite(self._settled_at):
                 history.reason += f"; settling was cut short at {history.times[-1]:.6g} s"
             elif history.status != Status.DIVERGED:

@@ -20,7 +20,7 @@ from ringsim.engine.energy import Energies
 from ringsim.engine.guard import Guard
 from ringsim.engine.planar_truss import TrussModel, rest_force
 from ringsim.engine.predictor import Predictor
-from ringsim.engine.settings import solver_settings
+from ringsim.engine.settings import raise_own, solver_settings
 from ringsim.engine.work import StepWork, rod_damping
 from ringsim.variables import Status
 
@@ -92,6 +92,7 @@ class TrussIntegration:
             if solver.InitializeSolver(self._system, self._settings):
                 solver.SolveSteps(self._system, self._settings)
         except exu.ExudynError as error:
+            raise_own(error, self._model.cable.refusal)
             self._fail(str(error).strip().splitlines()[0][:200])
         end = self._model.scene.solver.end_time
         if history.status == Status.UNFINISHED:

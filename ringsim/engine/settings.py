@@ -37,3 +37,18 @@ def solver_settings(scene: Scene, tolerance: float) -> Any:
     time.newton.relativeTolerance = 1e-14
     time.newton.absoluteTolerance = tolerance
     return settings
+
+
+def raise_own(error: Exception, refusal: str) -> None:
+    """Raise again what one of our own functions raised inside exudyn, which calls it a failure of
+    the solver; smaller steps would not help.
+
+    Parameters
+    ----------
+    error
+        What exudyn raised.
+    refusal
+        What the cables could not answer; they say so by an exception that is none of these.
+    """
+    if "USER FUNCTION" in str(error) and not refusal:
+        raise RuntimeError(" ".join(str(error).split())) from error

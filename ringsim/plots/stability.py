@@ -1,0 +1,125 @@
+"""The stability map: one panel per group, one square per cell."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Rectangle
+
+from ringsim.plots import style
+
+_GOOD, _AGAIN = "ok", "ok, after a new start"
+_LOOKS: dict[str, tuple[str, str]] = {
+    _GOOD: ("#cfe6f5", ""),
+    _AGAIN: (style.SKY, "r"),
+    "end time": ("#d9d9d9", "t"),
+    "energy lost": (style.ORANGE, "L"),
+    "energy grew": (style.VERMILLION, "G"),
+    "blow-up": ("#7f0000", "B"),
+    "stop passed": (style.PURPLE, "P"),
+    "joint gap": ("#9970ab", "J"),
+    "Newton": (style.GREEN, "N"),
+    "step limit": ("#f0e442", "S"),
+    "time limit": ("#8c6d31", "T"),
+    "refused": ("#5e5e5e", "X"),
+    "wrong": ("black", "!"),
+}
+"""Colour and letter of each kind of cell; the letter tells what the colour may not."""
+_OTHER = ("#5e5e5e", "?")
+_COLUMNS = 3
+
+
+@style.styled
+def stability(whole: xr.Dataset) -> Figure:
+    """Panels over the values of two axes; values are listed, not to scale.
+
+    Parameters
+    ----------
+    whole
+        A judged map (``ringsim.analysis.stability.joined``).
+    """
+    groups = whole.sizes["group"]
+    rows = math.ceil(groups / _COLUMNS)
+    figure = style.new_figure(13.5, 3.5 * rows + 1.0)
+    panels = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
+    seen: dict[str, tuple[str, str]] = {}
+    for number, axes in enumerate(panels):
+        if number >= groups:
+            axes.set_axis_off()
+            continue
+        cells = whole.isel(cell=(whole["of_group"] == number).values)
+        seen |= _panel(axes, cells, whole.isel(group=number))
+    handles = [
+        Patch(facecolor=seen[word][0], edgecolor=style.GREY, label=_legend(word, seen[word][1]))
+        for word in sorted(seen, key=_order)
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 7))
+    figure.suptitle(
+        f"Stability map: {whole.sizes['cell']} runs and how they ended", x=0.012, ha="left"
+    )
+    return figure
+
+
+def _panel(axes: Axes, cells: xr.Dataset, group: xr.Dataset) -> dict[str, tuple[str, str]]:
+    """Draw the cells of a group; returns the kinds of cells that occur, with their looks."""
+    x, column = np.unique(cells["x"].values, return_inverse=True)
+    y, row = np.unique(cells["y"].values, return_inverse=True)
+    seen = {}
+    for k in range(cells.sizes["cell"]):
+        word = _kind(cells.isel(cell=k))
+        colour, letter = seen[word] = _LOOKS.get(word, _OTHER)
+        place = (float(column[k]) - 0.5, float(row[k]) - 0.5)
+        axes.add_patch(Rectangle(place, 1.0, 1.0, facecolor=colour, edgecolor="white", zorder=2))
+        ink = "white" if _dark(colour) else style.INK
+        axes.text(
+            column[k], row[k], letter, ha="center", va="center", fontsize=8, color=ink, zorder=3
+        )
+    axes.set_xlim(-0.5, len(x) - 0.5)
+    axes.set_ylim(-0.5, len(y) - 0.5)
+    axes.set_xticks(range(len(x)), [_short(v) for v in x], fontsize=8)
+    axes.set_yticks(range(len(y)), [_short(v) for v in y], fontsize=8)
+    axes.grid(visible=False)
+    axes.set_title(str(group["title"].values), color=style.INK, weight="bold")
+    axes.set_xlabel(_label(group, "x"), fontsize=9)
+    axes.set_ylabel(_label(group, "y"), fontsize=9)
+    return seen
+
+
+def _kind(cell: xr.Dataset) -> str:
+    verdict = str(cell["verdict"].values)
+    if verdict == "ok":
+        return _AGAIN if float(cell["restarts"]) > 0.0 else _GOOD
+    return verdict if verdict == "wrong" else str(cell["cause"].values)
+
+
+def _order(word: str) -> int:
+    return list(_LOOKS).index(word) if word in _LOOKS else len(_LOOKS)
+
+
+def _legend(word: str, letter: str) -> str:
+    return f"{letter}  {word}" if letter else word
+
+
+def _label(group: xr.Dataset, axis: str) -> str:
+    label, units = (str(group[f"{axis}_{word}"].values) for word in ("label", "units"))
+    whole = label[:1].upper() + label[1:] + ("" if units == "1" else f" ({units})")
+    return textwrap.fill(whole, 44 if axis == "x" else 32)
+
+
+def _short(value: float) -> str:
+    """A number as short as it is clear: 1e5, 0.03, 179.9."""
+    if value == 0.0 or 1e-3 <= abs(value) < 1e4:
+        return f"{value:g}"
+    digits, power = f"{value:.1e}".split("e")
+    return f"{digits.removesuffix('.0')}e{int(power)}"
+
+
+def _dark(colour: str) -> bool:
+    red, green, blue = to_rgb(colour)
+    return 0.3 * red + 0.59 * green + 0.11 * blue < 0.47

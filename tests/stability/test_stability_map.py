@@ -1,0 +1,170 @@
+"""The map says how each cell ended, where the borders are, and which ok was not true."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from ringsim.analysis.stability import (
+    ENDED,
+    OK,
+    TENSION_PROMISE,
+    TIME_PROMISE,
+    WRONG,
+    borders,
+    cause_of,
+    cells_of,
+    checked,
+    chosen_for_check,
+    joined,
+    judged,
+)
+from ringsim.analysis.stability_text import summary, to_markdown
+from ringsim.campaign.stability import _pieces
+from ringsim.campaign.stability_groups import GROUPS, QUICK
+from ringsim.parts.solver import Solver
+from ringsim.plots.stability import stability
+from ringsim.variables import Status
+
+NEWTON = "the solver gave up at 1 s after 9 reductions of the step: reduce solver.step"
+ENDS = {
+    "all V-joints have reached 180 deg": Status.OK,
+    "solver.end_time = 4 s was reached with 0 of 4 V-joints locked": Status.UNFINISHED,
+    NEWTON: Status.SOLVER_FAILED,
+    "still running after limits.timeout = 90 s: raise it": Status.TIMEOUT,
+    "KeyError: 'x'": Status.ERROR,
+    "the solver process died of SIGSEGV": Status.CRASHED,
+}
+
+
+def campaign(*reasons: str, **values: list[float]) -> xr.Dataset:
+    """A merged campaign whose samples ended for these reasons."""
+    count = len(reasons)
+    angle = np.full((count, 2, 3, 4), np.nan)
+    angle[..., :2] = [60.0, 90.0]
+    numbers = {
+        "energy_error": [1e-4] * count, "restarts": [0] * count, "deployment_time": [3.0] * count,
+        "peak_tension": [10.0] * count, "cpu_time": [1.0] * count,
+    }  # fmt: skip
+    found = {name: ("sample", np.array(v)) for name, v in (numbers | values).items()}
+    found["status"] = ("sample", np.array([int(ENDS[r]) for r in reasons], dtype="i1"))
+    found["reason"] = ("sample", np.array(reasons, dtype=object))
+    found["opening_angle"] = (("sample", "plane", "section", "time"), angle)
+    return xr.Dataset(found)
+
+
+GOOD = next(iter(ENDS))
+WORDS = {
+    "name": "g", "title": "group", "x_label": "stiffness", "x_units": "N", "y_label": "speed",
+    "y_units": "m/s",
+}  # fmt: skip
+
+
+def cells(*reasons: str, **values: list[float]) -> xr.Dataset:
+    count = len(reasons)
+    return cells_of(campaign(*reasons, **values), range(count), [0.0] * count)
+
+
+def test_every_end_has_its_verdict_and_its_cause() -> None:
+    found = judged(cells(*ENDS))
+    assert found["cause"].values.tolist() == [
+        "", "end time", "Newton", "time limit", "error", "crashed",
+    ]  # fmt: skip
+    assert found["verdict"].values.tolist() == [OK, ENDED, ENDED, ENDED, WRONG, WRONG]
+
+
+def test_ok_with_an_energy_error_over_its_tolerance_is_wrong() -> None:
+    most = Solver().energy_tolerance
+    found = judged(cells(GOOD, GOOD, energy_error=[0.99 * most, 1.01 * most]))
+    assert found["verdict"].values.tolist() == [OK, WRONG]
+
+
+def test_the_cause_is_that_of_the_last_start() -> None:
+    told = (
+        "solver.end_time = 4 s was reached with 0 of 4 (start 2 with solver.step = 1 s; start 1: "
+    )
+    assert cause_of(f"{told}{NEWTON})") == "end time"
+    assert cause_of(f"{NEWTON} (start 2 with solver.step = 1 s; start 1: not finite)") == "Newton"
+
+
+def test_the_final_angle_is_the_last_that_was_recorded() -> None:
+    np.testing.assert_allclose(cells(GOOD)["final_angle"], 90.0)
+
+
+def test_the_choice_is_repeatable_and_of_ok_cells_alone() -> None:
+    whole = judged(cells(*([GOOD, NEWTON] * 50)))
+    first, again = (chosen_for_check(whole, 0.2, seed=4) for _ in range(2))
+    np.testing.assert_array_equal(first, again)
+    assert len(first) == len(set(first)) == 10
+    assert np.all(first % 2 == 0)
+    assert len(chosen_for_check(judged(cells(NEWTON)), 0.5, seed=4)) == 0
+    assert chosen_for_check(judged(cells(NEWTON, GOOD)), 0.01, seed=4).tolist() == [1]
+
+
+@pytest.mark.parametrize(
+    ("changed", "check", "verdict"),
+    [
+        ({}, "holds", OK),
+        ({"deployment_time": [3.0 / (1.0 + 1.1 * TIME_PROMISE)]}, "differs", WRONG),
+        ({"deployment_time": [3.0 / (1.0 + 0.9 * TIME_PROMISE)]}, "holds", OK),
+        ({"peak_tension": [10.0 / (1.0 + 1.1 * TENSION_PROMISE)]}, "differs", WRONG),
+        ({"peak_tension": [np.nan]}, "holds", OK),
+    ],
+)
+def test_a_finer_run_proves_or_refutes_a_cell(changed, check, verdict) -> None:
+    whole = judged(cells(NEWTON, GOOD))
+    found = checked(whole, np.array([1]), cells(GOOD, **changed))
+    assert found["check"].values.tolist() == ["", check]
+    assert found["verdict"].values.tolist() == [ENDED, verdict]
+
+
+def test_a_finer_run_that_does_not_end_proves_nothing() -> None:
+    found = checked(judged(cells(GOOD)), np.array([0]), cells(NEWTON))
+    assert found["check"].values.tolist() == ["unproven"]
+
+
+def test_borders_name_the_ranges_and_what_lies_beyond() -> None:
+    ends = [
+        NEWTON,
+        GOOD,
+        GOOD,
+        GOOD,
+        "solver.end_time = 4 s was reached with 0 of 4 V-joints locked",
+    ]
+    group = cells(*ends, *ends[1:], GOOD)
+    group["x"].values[:] = [1, 2, 3, 4, 5] * 2
+    group["y"].values[:] = [7] * 5 + [8] * 5
+    ends_of = {row["axis"]: row for row in _rows(borders(joined([(WORDS, group)])))}
+    along = ends_of["x"]
+    assert (along["lowest_sure"], along["highest_sure"]) == (2.0, 3.0)
+    assert (along["lowest_ok"], along["highest_ok"]) == (1.0, 5.0)
+    assert (along["below"], along["above"]) == ("Newton", "end time")
+    assert np.isnan(ends_of["y"]["lowest_sure"])
+
+
+def _rows(table: xr.Dataset) -> list[dict]:
+    return [
+        {name: variable.values[k] for name, variable in table.items()}
+        for k in range(table.sizes["border"])
+    ]
+
+
+def test_text_and_figure_tell_every_kind_of_cell() -> None:
+    whole = joined([(WORDS, cells(*ENDS)), (WORDS | {"title": "other"}, cells(GOOD, restarts=[1]))])
+    text = to_markdown(whole)
+    assert "7 cells in 2 groups: 3 ended, 2 ok, 2 wrong" in text
+    assert "1 of the ok ones after a new start" in summary(whole)
+    assert NEWTON in text
+    figure = stability(whole)
+    legend = [entry.get_text() for entry in figure.legends[0].get_texts()]
+    assert legend == ["ok", "r  ok, after a new start", "t  end time", "N  Newton",
+                      "T  time limit", "!  wrong"]  # fmt: skip
+    assert "Stiffness (N)" in [axes.get_xlabel() for axes in figure.axes]
+
+
+def test_the_map_is_large_and_its_scenes_are_valid() -> None:
+    sizes = [len(piece.cells) for group in GROUPS for piece in _pieces(group)]
+    assert sum(sizes) >= 500
+    assert 10 <= sum(len(piece.cells) for group in QUICK for piece in _pieces(group)) <= 14
+    assert len({group.name for group in GROUPS}) == len(GROUPS)
