@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import subprocess
 import sys
 import time
 import traceback
@@ -12,7 +13,17 @@ from typing import Any
 
 from ringsim.refusal import InputError
 
+OF_MPI = ("PMI", "PMIX", "OMPI", "OPAL", "PRTE", "HYDRA", "HYDI", "MPI", "I_MPI", "MPIR")
+"""How names of variables begin by which launchers and libraries speak to each other."""
+
 _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
+_OPEN_MPI = "Open MPI"
+_LIBRARY = """
+import mpi4py
+mpi4py.rc.initialize = False
+from mpi4py import MPI
+print(MPI.Get_library_version())
+"""
 _POLITE = 5e-3
 
 
@@ -34,6 +45,11 @@ def mpi_world() -> Any:
         If there is no MPI library, or if it does not belong to the launcher.
     """
     expected = launched_size()
+    if "OMPI_COMM_WORLD_SIZE" in os.environ:
+        # Other libraries do not even start under this launcher: they end the process.
+        library = _library()
+        if library and not library.startswith(_OPEN_MPI):
+            raise _stranger(expected, library)
     try:
         from mpi4py import MPI
     except (ImportError, RuntimeError) as error:
@@ -43,13 +59,27 @@ def mpi_world() -> Any:
         ) from None
     world = MPI.COMM_WORLD
     if world.Get_size() != expected:
-        library = MPI.Get_library_version().split("\n")[0].strip()
-        raise InputError(
-            f"the launcher has started {expected} processes, but each is alone in its MPI world: "
-            f"the launcher belongs to another MPI than the one loaded ({library}); use that one's "
-            "mpiexec (under Slurm: srun --mpi=pmi2)"
-        )
+        raise _stranger(expected, MPI.Get_library_version())
     return world
+
+
+def _library() -> str:
+    """Version of the MPI library, which is not started for that; empty if it cannot be loaded."""
+    environment = {name: v for name, v in os.environ.items() if not name.startswith(OF_MPI)}
+    told = subprocess.run(
+        [sys.executable, "-c", _LIBRARY], env=environment, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    return told.stdout.strip()
+
+
+def _stranger(expected: int, library: str) -> InputError:
+    name = library.splitlines()[0].strip(" \0")
+    return InputError(
+        f"the launcher has started {expected} processes, but each is alone in its MPI world: the "
+        f"launcher belongs to another MPI than the one loaded ({name}); use that one's mpiexec "
+        "(under Slurm: srun --mpi=pmi2)"
+    )
 
 
 def describe(communicator: Any) -> str:

@@ -17,6 +17,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from ringsim.execution.launch import OF_MPI
 from ringsim.execution.solve import LOG_CHARACTERS, retold
 from ringsim.execution.work import Limits, Retry, Task
 from ringsim.refusal import InputError
@@ -32,7 +33,6 @@ _END_SECONDS = 10.0
 _PAUSE_SECONDS = 1.0
 """Nobody looked for so long: a batch system suspended the job, or the machine is overloaded."""
 _MOST_DEATHS_FROM_OUTSIDE = 2
-_OF_MPI = ("PMI", "PMIX", "OMPI", "OPAL", "PRTE", "HYDRA", "HYDI", "MPI", "I_MPI", "MPIR")
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _FROM_OUTSIDE = (
     -signal.SIGKILL, -signal.SIGTERM, -signal.SIGHUP, -signal.SIGINT, -signal.SIGUSR1,
@@ -152,7 +152,7 @@ class Slot:
         mine, other = socket.socketpair()
         self._pipe = Connection(mine.detach())
         environment = {
-            name: value for name, value in os.environ.items() if not name.startswith(_OF_MPI)
+            name: value for name, value in os.environ.items() if not name.startswith(OF_MPI)
         }
         environment |= dict.fromkeys(_ONE_THREAD, "1")
         environment["PYTHONPATH"] = os.pathsep.join(os.path.abspath(path) for path in sys.path)

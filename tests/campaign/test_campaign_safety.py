@@ -253,11 +253,22 @@ def test_full_disk_stops_the_campaign_and_loses_no_finished_sample(
     xr.testing.assert_identical(comparable(mine), comparable(other))
 
 
-def test_launcher_of_another_mpi_is_refused(bench):
-    bench.extra["OMPI_COMM_WORLD_SIZE"] = "4"
+LAUNCHERS = {
+    "none that is known": {"SLURM_STEP_NUM_TASKS": "4"},
+    # Open MPI 5: the library of MPICH would end the process when it is started.
+    "Open MPI": {"OMPI_COMM_WORLD_SIZE": "4", "PMIX_NAMESPACE": "prterun-1", "PMIX_RANK": "0"},
+}
+
+
+@pytest.mark.parametrize("launcher", LAUNCHERS)
+def test_launcher_of_another_mpi_is_refused(launcher, bench, mpi):
+    bench.extra |= LAUNCHERS[launcher]
     printed = bench.run("campaign", bench.write(), "--out", "out", code=2)
-    assert "4 " in printed
-    assert "mpiexec" in printed or "cannot be loaded" in printed
+    (line,) = printed.splitlines()
+    assert "started 4 processes, but each is alone in its MPI world" in line
+    assert "MPICH" in line
+    assert "mpiexec" in line
+    assert not (bench.folder / "out").exists()
 
 
 def test_workers_under_mpi_are_refused(bench, mpi):
