@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 
-from campaign_bench import SHARDS, START, assert_same, finished, ranks_of, shards
+from campaign_bench import SHARDS, START, assert_same, finished, opened, ranks_of, shards
 from ringsim.campaign.folder import open_folder
+from ringsim.campaign.merging import merge
 from ringsim.campaign.run import Choices, run_campaign
 from ringsim.execution.serial import Serial
 from ringsim.execution.work import Limits
@@ -152,14 +152,18 @@ def test_one_sample_is_a_campaign(bench):
     assert "1 of 1 samples done, 0 left" in bench.run("status", "out")
 
 
-@pytest.mark.parametrize(
-    "name", ["a b", "ü-Ω", "100%", "a#mode=bytes", "[x]*", "file:name", "-x", "a\nb", "'quote\""]
-)
+@pytest.mark.parametrize("name", ["ü-Ω 100%", "a#mode=bytes", "[x]*", "file:name", "-x\n'\""])
 def test_folder_may_have_any_name(name, bench):
+    out = bench.folder / name
     bench.run("campaign", bench.write(3), f"--out={name}")
-    (bench.folder / name / "campaign.nc").rename(bench.folder / "found.nc")
-    bench.run("campaign", bench.folder / "small.toml", f"--out={name}")
-    bench.run("merge", "--", name)
-    assert "3 of 3" in bench.run("status", "--", name)
-    with xr.open_dataset(bench.folder / "found.nc") as found:
-        assert np.isfinite(found.deployment_time.values).all()
+    assert finished(out) == {0, 1, 2}
+    merged = merge(open_folder(out), execution="again", set_aside=True, partly=False)
+    assert (merged.left, merged.failed) == (0, 0)
+    # Not every library that only reads takes every name.
+    (out / "campaign.nc").rename(bench.folder / "found.nc")
+    assert np.isfinite(opened(bench.folder / "found.nc").deployment_time.values).all()
+
+
+def test_folder_whose_name_is_no_text_is_refused(bench):
+    printed = bench.run("campaign", bench.write(1), "--out", os.fsdecode(b"a\xffb"), code=2)
+    assert "its name is not UTF-8" in printed
