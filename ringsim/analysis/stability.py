@@ -16,7 +16,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.parts.solver import Solver
-from ringsim.variables import Status
+from ringsim.variables import VARIABLES, Status
 
 Array = NDArray[np.float64]
 
@@ -47,6 +47,19 @@ _SCALARS = (
     "energy_error", "constraint_error", "restarts", "steps", "cpu_time", "deployment_time",
     "final_time", "peak_tension",
 )  # fmt: skip
+_MEANING = {
+    "x": ("1", "value on the first axis, in the units of the cell's group"),
+    "y": ("1", "value on the second axis, in the units of the cell's group"),
+    "of_group": ("1", "number of the cell's group"),
+    "reason": ("1", "why the run ended so"),
+    "cause": ("1", "the reason in a word"),
+    "verdict": ("1", "ok, ended with a cause, or wrong"),
+    "check": ("1", "whether a finer run held what ok promises"),
+    "final_angle": ("degree", "mean opening angle at the last output time"),
+    "time_difference": ("1", "change of the deployment time in a finer run, over itself"),
+    "angle_difference": ("degree", "change of the mean opening angle in a finer run"),
+    "tension_difference": ("1", "change of the largest tension in a finer run, over itself"),
+}
 
 
 def cause_of(reason: str) -> str:
@@ -91,7 +104,20 @@ def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr
         if known and campaign[name].dtype.kind == "i":
             values[values < 0.0] = np.nan
         found[name] = ("cell", values)
-    return xr.Dataset(found)
+    return _described(xr.Dataset(found))
+
+
+def _described(cells: xr.Dataset) -> xr.Dataset:
+    """Add what each variable means, and its unit."""
+    for name, variable in cells.items():
+        words = _MEANING.get(str(name))
+        if words is None and str(name) in VARIABLES:
+            words = (VARIABLES[str(name)].units, VARIABLES[str(name)].long_name)
+        if words is not None:
+            variable.attrs["long_name"] = words[1]
+            if variable.dtype.kind in "fi":
+                variable.attrs["units"] = words[0]
+    return cells
 
 
 def _cause(status: int, reason: str) -> str:
@@ -183,7 +209,7 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
     check = np.full(cells.sizes["cell"], "", dtype=object)
     check[which] = np.where(~ended, "unproven", np.where(over, "differs", "holds"))
     found["check"] = ("cell", check.astype(str))
-    return judged(found)
+    return judged(_described(found))
 
 
 def joined(groups: Sequence[tuple[dict[str, str], xr.Dataset]]) -> xr.Dataset:
@@ -207,73 +233,4 @@ def joined(groups: Sequence[tuple[dict[str, str], xr.Dataset]]) -> xr.Dataset:
     whole = xr.concat(parts, dim="cell")
     for key in groups[0][0]:
         whole[key] = ("group", np.array([words[key] for words, _ in groups], dtype=object))
-    return judged(whole)
-
-
-def share_ok(cells: xr.Dataset, axis: str) -> tuple[Array, Array, list[str]]:
-    """For every value of an axis of one group: share of ok cells, and the commonest other cause.
-
-    Parameters
-    ----------
-    cells
-        The cells of one group.
-    axis
-        "x" or "y".
-    """
-    values, place = np.unique(cells[axis].values, return_inverse=True)
-    fine = (cells["verdict"] == OK).values
-    shares = np.array([fine[place == k].mean() for k in range(len(values))])
-    causes = []
-    for k in range(len(values)):
-        others = cells["cause"].values[(place == k) & ~fine]
-        words, counts = np.unique(others.astype(str), return_counts=True)
-        causes.append(str(words[counts.argmax()] or WRONG) if len(words) else "")
-    return values, shares, causes
-
-
-def borders(whole: xr.Dataset) -> xr.Dataset:
-    """Between which values of each axis runs are ok, and what lies beyond.
-
-    Returns
-    -------
-    xr.Dataset
-        Over ``border``, one for each axis of each group: ``of_group``, ``axis``, ``lowest_ok`` and
-        ``highest_ok`` (end values at which any cell is ok), ``lowest_sure`` and ``highest_sure``
-        (the longest range in which all cells are; NaN if there is none), ``below`` and ``above``
-        (the commonest cause just beyond that range; empty at the axis' end).
-    """
-    rows = []
-    for number in range(whole.sizes["group"]):
-        cells = whole.isel(cell=(whole["of_group"] == number).values)
-        for axis in ("x", "y"):
-            values, shares, causes = share_ok(cells, axis)
-            some = np.flatnonzero(shares > 0.0)
-            sure = _longest(shares == 1.0)
-            low, high = (some[0], some[-1]) if len(some) else (len(values), -1)
-            rows.append(
-                {
-                    "of_group": number,
-                    "axis": axis,
-                    "lowest_ok": values[low] if len(some) else np.nan,
-                    "highest_ok": values[high] if len(some) else np.nan,
-                    "lowest_sure": values[sure[0]] if sure else np.nan,
-                    "highest_sure": values[sure[-1]] if sure else np.nan,
-                    "below": _beyond(causes, sure[0] - 1) if sure else "",
-                    "above": _beyond(causes, sure[-1] + 1) if sure else "",
-                }
-            )
-    return xr.Dataset({key: ("border", [row[key] for row in rows]) for key in rows[0]})
-
-
-def _beyond(causes: Sequence[str], place: int) -> str:
-    return causes[place] if 0 <= place < len(causes) else ""
-
-
-def _longest(held: NDArray[np.bool_]) -> list[int]:
-    """The longest run of neighbours that hold."""
-    best: list[int] = []
-    now: list[int] = []
-    for place, holds in enumerate(held):
-        now = [*now, place] if holds else []
-        best = now if len(now) > len(best) else best
-    return best
+    return _described(judged(whole))

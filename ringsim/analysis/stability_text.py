@@ -13,8 +13,8 @@ from ringsim.analysis.stability import (
     TENSION_PROMISE,
     TIME_PROMISE,
     WRONG,
-    borders,
 )
+from ringsim.analysis.stability_borders import borders
 
 
 def to_markdown(whole: xr.Dataset) -> str:

@@ -69,8 +69,8 @@ def _for_cables(leaf: str, value: Any) -> dict[str, Any]:
     return dict.fromkeys(_of_cables(leaf), value)
 
 
-_STEPS = 1500
-"""Steps of a cell at most: several times what a sound one needs, and the same on any machine,
+_STEPS = 800
+"""Steps of a cell at most: twice what a sound one needs, and the same on any machine,
 unlike a limit on time."""
 _RECORD = {"record.interval": 0.25}
 _WOUND = {

@@ -12,7 +12,6 @@ from ringsim.analysis.stability import (
     TENSION_PROMISE,
     TIME_PROMISE,
     WRONG,
-    borders,
     cause_of,
     cells_of,
     checked,
@@ -20,6 +19,7 @@ from ringsim.analysis.stability import (
     joined,
     judged,
 )
+from ringsim.analysis.stability_borders import borders
 from ringsim.analysis.stability_text import summary, to_markdown
 from ringsim.campaign.stability import _pieces
 from ringsim.campaign.stability_groups import GROUPS, QUICK
