@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ring_runs import ideal_time, ring, run
+from ringsim.engine.build import build
 from ringsim.engine.joints import stop_torque
+from ringsim.engine.locks import Locks
 from ringsim.parts.joints import Stop
 from ringsim.simulation import run as outcome_of
 from ringsim.simulation import simulate
@@ -70,6 +72,52 @@ def test_reversed_forces_fold_an_open_ring() -> None:
     assert math.isnan(float(dataset["deployment_time"]))
     opening = dataset["opening_angle"].dropna("time")
     assert float(opening.isel(time=-1).mean()) == pytest.approx(40.0, abs=2.0)
+
+
+def locks(opening: float) -> tuple[Locks, np.ndarray]:
+    """The memory of a ring that starts at an opening angle, its stowed stop at 40 deg."""
+    built = build(ring(3, structure__opening_angle=opening, stop__stowed_angle=40.0))
+    angles = np.full((2, 3), math.radians(opening))
+    return Locks(built, angles), angles
+
+
+def test_joints_that_bounce_have_reached_the_stowed_stop() -> None:
+    memory, angles = locks(90.0)
+    folding = np.full((2, 3), -1.0)
+    for place in np.ndindex(2, 3):
+        assert not memory.stowed.all()
+        angles[:] = math.radians(42.0)  # those that came before have bounced
+        angles[place] = math.radians(39.9)
+        memory.note(angles)
+        assert memory.stowed[place]
+    assert memory.stowed.all()
+    # They rest near the stop, with contact steps, and wait for no first meeting.
+    contact = memory.contact(angles, folding)
+    assert contact.resting_rate == 1.0
+    assert contact.time_to_next == math.inf
+    # Far from it they are free again.
+    assert memory.contact(np.full((2, 3), math.radians(60.0)), folding).resting_rate == 0.0
+
+
+def test_the_first_joint_to_meet_the_stowed_stop_sets_the_step() -> None:
+    memory, angles = locks(90.0)
+    rates = np.zeros((2, 3))
+    rates[1, 2] = -2.0
+    contact = memory.contact(angles, rates)
+    assert contact.time_to_next == pytest.approx(math.radians(50.0) / 2.0)
+    assert contact.rate_of_next == 2.0
+    assert contact.resting_rate == 0.0
+
+
+def test_a_ring_that_starts_on_its_stowed_stop_has_not_folded() -> None:
+    memory, angles = locks(40.02)
+    memory.note(angles - 1e-3)
+    assert not memory.stowed.any()
+    # Pressed into the stop it needs contact steps all the same.
+    assert memory.contact(angles - 1e-3, np.full((2, 3), 0.5)).resting_rate == 0.5
+    for opened in (60.0, 39.9):
+        memory.note(np.full((2, 3), math.radians(opened)))
+    assert memory.stowed.all()
 
 
 def test_folding_takes_the_time_that_the_quadrature_gives() -> None:
