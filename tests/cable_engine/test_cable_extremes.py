@@ -11,17 +11,16 @@ import pytest
 from driven import outcome, truss
 from ringsim.variables import Outcome, Status
 
-TOLD = 0.1
-"""Energy error from which on a result counts as refused by its own balance."""
+BALANCE = 1e-3
+"""Energy error over a whole run at the scene's tolerance of 3e-4; 6e-5 to 5e-4 as measured."""
 
 
 def sound(found: Outcome) -> None:
     """Finished, or ended for a reason that is told; the times of winding are met."""
     assert found.reason
     values = found.values
-    assert np.isfinite(values["energy_error"])
     assert found.status in (Status.OK, Status.UNFINISHED)
-    assert values["energy_error"] < TOLD
+    assert values["energy_error"] < BALANCE
     if found.status == Status.OK:
         assert np.isfinite(values["deployment_time"])
 
@@ -62,7 +61,7 @@ def test_one_value_at_its_end(case: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 def test_pulleys_at_their_limit_stick_and_slip() -> None:
-    """Nineteen twentieths of the valid friction: the rope jerks, with 20 times the steps."""
+    """Nineteen twentieths of the valid friction: the rope jerks."""
     sound(wound_in(0.05, 20.0, both__friction__coefficient=0.0095))
 
 
