@@ -117,8 +117,8 @@ def _cell(found: xr.Dataset, rung: int, output: str) -> str:
 def _orders(found: xr.Dataset, outputs: Sequence[str]) -> list[str]:
     head = " | ".join(_SHORT.get(name, name) for name in outputs)
     lines = [
-        "Observed orders (slope of the error over the step, the root of the tolerance or the "
-        "length of an element, where it stands clear of the reference's own; a dash where it "
+        "Observed orders (slope of the error over the step, over one by the number of steps, or "
+        "over the length of an element, where it stands clear of the reference's own; a dash where it "
         "does not, or where the ladder hardly matters):",
         "",
         f"| ladder | theory | {head} |",

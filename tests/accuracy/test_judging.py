@@ -39,6 +39,7 @@ def made_up() -> xr.Dataset:
                 "deployment_time": TRUE_TIME * (1.0 + error),
                 "opening_angle": np.where(known, angle, np.nan)[None, None],
                 "asynchrony": np.where(known, times * (1.0 + error), np.nan),
+                "asynchrony_max": TRUE_TIME * (1.0 + error),
                 "peak_rod_stress": TRUE_STRESS * (1.0 - error),
                 "energy_error": error,
                 "cpu_time": 1.0 / np.sqrt(error),
