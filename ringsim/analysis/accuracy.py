@@ -37,7 +37,8 @@ GROUPS = {
 }
 """Outputs that are asked for together: the error is the largest of theirs."""
 NEEDED = (
-    *OUTPUTS, "asynchrony_max", "energy_error", "cpu_time", "newton_iterations", "steps", "status", "final_time",
+    *OUTPUTS, "asynchrony_max", "energy_error", "cpu_time", "newton_iterations", "steps", "status",
+    "final_time",
 )  # fmt: skip
 
 

@@ -118,8 +118,8 @@ def _orders(found: xr.Dataset, outputs: Sequence[str]) -> list[str]:
     head = " | ".join(_SHORT.get(name, name) for name in outputs)
     lines = [
         "Observed orders (slope of the error over the step, over one by the number of steps, or "
-        "over the length of an element, where it stands clear of the reference's own; a dash where it "
-        "does not, or where the ladder hardly matters):",
+        "over the length of an element, where it stands clear of the reference's own; a dash "
+        "where it does not, or where the ladder hardly matters):",
         "",
         f"| ladder | theory | {head} |",
         "|---|---|" + "---|" * len(outputs),
