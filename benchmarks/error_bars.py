@@ -1,26 +1,30 @@
 """Are the error bars of a run honest?  Random scenes against runs that are finer by far.
 
-Run: python benchmarks/error_bars.py [scenes] [processes]
+Run: python benchmarks/error_bars.py [scenes] [processes] [file]
 
 Each scene is drawn from a seed of its own: closed rings and open arcs, driven by forces or by
 cables, free or clamped, soft and stiff, with and without net, friction and damping.  The truth of
 a scene is a run with a sixteenth of its tolerance, twice the elements and a hundredth of
 Newton's tolerance.  Printed per output: how often the bar covers the error, and the ratios of bar
-to error.
+to error.  What every scene gave is kept in the file (runs/error-bars.json) as it comes; scenes that
+are there are not run again.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import multiprocessing
+import os
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
-from ringsim.variables import Outcome, Status
+from ringsim.variables import Status
 
 OUTPUTS = ("deployment_time", "opening_angle", "asynchrony_max", "peak_tension", "peak_rod_stress")
 
@@ -78,4 +82,77 @@ def finer(scene: Scene) -> Scene:
             "rods.elements": 2 * scene.rods.elements,
             "solver.step_limit": 200_000,
         }
+    )
+
+
+def compare(seed: int) -> dict[str, Any]:
+    """Value, error and bar of every output of one scene."""
+    scene = random_scene(seed)
+    barred = run(scene.with_values({"solver.error_bars": True}))
+    single = run(scene)
+    found: dict[str, Any] = {
+        "seed": seed,
+        "status": barred.status.word,
+        "reason": barred.reason,
+        "cost": float(barred.values["cpu_time"] / single.values["cpu_time"]),
+    }
+    if barred.status != Status.OK:
+        return found
+    truth = run(finer(scene))
+    found |= {"truth": truth.status.word, "outputs": {}}
+    if truth.status != Status.OK:
+        return found
+    one, fine = barred.values, truth.values
+    for name in OUTPUTS:
+        if f"{name}_error" not in one:
+            continue
+        if name == "opening_angle":
+            error = float(np.nanmax(np.abs(one[name] - fine[name])))
+            value = 180.0
+        else:
+            error, value = abs(float(one[name] - fine[name])), abs(float(fine[name]))
+        found["outputs"][name] = [value, error, float(one[f"{name}_error"])]
+    return found
+
+
+def summarise(rows: list[dict[str, Any]]) -> None:
+    good = [row["outputs"] for row in rows if row.get("outputs")]
+    others = [f"{row['seed']}: {row['status']}" for row in rows if not row.get("outputs")]
+    cost = np.median([row["cost"] for row in rows])
+    print(f"\n{len(good)} scenes of {len(rows)} ended well{': not ' if others else ''}", end="")
+    print(f"{', '.join(others)}; with bars a run costs {cost:.2f} times as much (median)\n")
+    print("| output | scenes | median error | covered | bar over error, median | within 10 |")
+    print("|---|---|---|---|---|---|")
+    for name in OUTPUTS:
+        table = np.array([row[name] for row in good if name in row])
+        value, error, bar = np.maximum(table.T, 1e-300)
+        ratio = bar / error
+        print(
+            f"| {name} | {len(table)} | {np.median(error / value):.1e} | {np.mean(ratio >= 1):.0%} |"
+            f" {np.median(ratio):.1f} | {np.mean((ratio < 10) & (ratio > 0.1)):.0%} |"
+        )
+    every = np.array([cell for row in good for cell in row.values()])
+    ratio = every[:, 2] / np.maximum(every[:, 1], 1e-300)
+    within = np.mean((ratio < 10) & (ratio > 0.1))
+    print(f"| all | {len(every)} | | {np.mean(ratio >= 1):.0%} | {np.median(ratio):.1f} | ", end="")
+    print(f"{within:.0%} |")
+
+
+def main(scenes: int, processes: int, file: Path) -> None:
+    rows = json.loads(file.read_text()) if file.exists() else []
+    missing = sorted(set(range(scenes)) - {row["seed"] for row in rows})
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with multiprocessing.Pool(processes, os.nice, (5,), maxtasksperchild=10) as pool:
+        for row in pool.imap_unordered(compare, missing):
+            rows.append(row)
+            file.write_text(json.dumps(rows))
+            print(row["seed"], row["status"], flush=True)
+    summarise(sorted(rows, key=lambda row: int(row["seed"])))
+
+
+if __name__ == "__main__":
+    main(
+        int(sys.argv[1]) if len(sys.argv) > 1 else 100,
+        int(sys.argv[2]) if len(sys.argv) > 2 else 2,
+        Path(sys.argv[3]) if len(sys.argv) > 3 else Path("runs/error-bars.json"),
     )
