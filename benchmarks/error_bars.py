@@ -128,7 +128,8 @@ def summarise(rows: list[dict[str, Any]]) -> None:
         value, error, bar = np.maximum(table.T, 1e-300)
         ratio = bar / error
         print(
-            f"| {name} | {len(table)} | {np.median(error / value):.1e} | {np.mean(ratio >= 1):.0%} |"
+            f"| {name} | {len(table)} | {np.median(error / value):.1e} | "
+            f"{np.mean(ratio >= 1):.0%} |"
             f" {np.median(ratio):.1f} | {np.mean((ratio < 10) & (ratio > 0.1)):.0%} |"
         )
     every = np.array([cell for row in good for cell in row.values()])
