@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ringsim.analysis.error_budget import budget_lines, error_budget
 from ringsim.campaign.folder import Folder, open_folder
 from ringsim.campaign.merging import merge
 from ringsim.campaign.watch import Progress, Stop, stopping_on_signals
@@ -249,6 +250,8 @@ def _conclude(campaign: Folder, choices: Choices, stop: Stop) -> int:
     over_budget = bool(stop.reason) and not stop.signalled
     if merged.path is not None:
         _tell(f"{merged.path}: {campaign.table.samples} samples, {failed} failed")
+        for line in _budget(campaign, merged.path):
+            _tell(f"  {line}")
     if over_budget:
         _tell(
             f"{stop.reason}; {left} samples are left: raise max_failed, or mend what fails and "
@@ -266,3 +269,14 @@ def _conclude(campaign: Folder, choices: Choices, stop: Stop) -> int:
 
 def _tell(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
+
+
+def _budget(campaign: Folder, path: Path) -> list[str]:
+    """Numerical against sampling error, where samples have error bars."""
+    listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
+    if not (listed or campaign.scene.solver.error_bars):
+        return []
+    import xarray as xr
+
+    with xr.open_dataset(path) as dataset:
+        return budget_lines(error_budget(dataset))

@@ -1,0 +1,160 @@
+"""Error bars: what they are made of, who has them, and what a campaign makes of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from ringsim.analysis.error_budget import budget_lines, error_budget
+from ringsim.campaign.cases import Cases, run_cases
+from ringsim.campaign.specification import load_campaign
+from ringsim.dataset import to_dataset
+from ringsim.refusal import InputError
+from ringsim.scene import Scene, load_scene
+from ringsim.simulation import run
+from ringsim.theory.error_bars import SAFETY, error_bars
+from ringsim.variables import Outcome, Status
+
+TIMES = np.linspace(0.0, 4.0, 41)
+
+
+def ring(**values: object) -> Scene:
+    plain = {
+        "structure.sections": 3,
+        "structure.aspect_ratio": 1.0,
+        "net": "none",
+        "loads.force": 0.03,
+        "solver.end_time": 5.0,
+    }
+    return load_scene("ring18").with_values(plain | values)
+
+
+def outcome(error: float, status: Status = Status.OK) -> Outcome:
+    """A run whose numbers are all too large by a relative error."""
+    rate = 50.0 * (1.0 + error)
+    locks = np.array([[2.0, 3.0]]) * (1.0 + error)
+    angles = np.where(locks[..., None] >= TIMES, rate * TIMES, np.nan)
+    values = {
+        "lock_time": locks,
+        "deployment_time": np.array(locks.max()),
+        "opening_angle": angles,
+        "asynchrony_max": np.array(5.0 * (1.0 + error)),
+        "peak_tension": np.array(10.0 * (1.0 + error)),
+        "final_time": np.array(4.0),
+    }
+    return Outcome(status, "", {"time": TIMES}, values)
+
+
+def test_a_method_of_second_order_is_covered_six_times() -> None:
+    """Twice the steps, four times the error: the runs differ by three errors of the finer."""
+    error = 1e-4
+    found = error_bars(outcome(error), outcome(4.0 * error))
+    assert found["deployment_time_error"] == pytest.approx(3.0 * SAFETY * error * 3.0)
+    assert found["asynchrony_max_error"] == pytest.approx(3.0 * SAFETY * error * 5.0, rel=0.5)
+    assert found["peak_tension_error"] == pytest.approx(3.0 * SAFETY * error * 10.0, rel=1e-3)
+    assert found["opening_angle_error"] == pytest.approx(3.0 * SAFETY * error * 150.0, rel=0.01)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_no_bars_without_two_good_runs(which: int) -> None:
+    pair = [outcome(1e-4), outcome(4e-4)]
+    pair[which] = outcome(1e-4, Status.UNFINISHED)
+    assert error_bars(*pair) == {}
+
+
+def test_bars_change_nothing_else() -> None:
+    scene = ring(**{"record.stress": True})
+    plain, barred = run(scene), run(scene.with_values({"solver.error_bars": True}))
+    bars = {name for name in barred.values if name not in plain.values}
+    assert bars == {
+        "deployment_time_error", "opening_angle_error", "asynchrony_max_error",
+        "peak_rod_stress_error",
+    }  # fmt: skip
+    for name in bars:
+        assert barred.values[name] > 0.0
+    for name, values in plain.values.items():
+        if name not in ("wall_time", "cpu_time"):
+            np.testing.assert_array_equal(values, barred.values[name])
+    assert barred.values["steps"] == plain.values["steps"]
+    dataset = to_dataset(barred, scene.with_values({"solver.error_bars": True}))
+    assert dataset.peak_rod_stress_error.attrs["units"] == "Pa"
+    assert "peak_tension_error" not in dataset
+    assert not bars & set(to_dataset(plain, scene).data_vars)
+
+
+def test_bars_cover_what_a_finer_run_finds() -> None:
+    scene = ring(**{"solver.error_bars": True})
+    barred = run(scene).values
+    finer = {"solver.tolerance": 5e-6, "rods.elements": 2, "solver.error_bars": False}
+    truth = run(scene.with_values(finer)).values
+    for name in ("deployment_time", "asynchrony_max"):
+        error = abs(float(barred[name] - truth[name]))
+        assert error < barred[f"{name}_error"] < 0.05 * truth[name]
+
+
+FILE = """
+name = "some"
+scene = "ring18"
+design = {{ kind = "random", samples = 10 }}
+error_bars_every = 4
+[set]
+"structure.sections" = 3
+[inputs]
+"loads.force" = {{ kind = "uniform", low = 0.02, high = 0.03 }}
+{more}
+"""
+
+
+def test_one_sample_in_four_has_bars(tmp_path) -> None:
+    file = tmp_path / "some.toml"
+    file.write_text(FILE.format(more=""))
+    table = load_campaign(file).draw()
+    asked = [bool(table.values_of(k)["solver.error_bars"]) for k in range(10)]
+    assert asked == [k % 4 == 0 for k in range(10)]
+    file.write_text(
+        FILE.format(more='"solver.error_bars" = { kind = "discrete", values = [true, false] }')
+    )
+    with pytest.raises(InputError, match="leave out one"):
+        load_campaign(file).draw()
+
+
+def test_budget_says_which_error_dominates() -> None:
+    rng = np.random.default_rng(3)
+    values = 10.0 + rng.normal(size=100)
+    bars = np.where(np.arange(100) % 10 == 0, 0.02, np.nan)
+    campaign = xr.Dataset(
+        {
+            "status": ("sample", np.zeros(100, dtype=int)),
+            "deployment_time": ("sample", values, {"units": "s"}),
+            "deployment_time_error": ("sample", bars, {"units": "s"}),
+            "asynchrony_max": ("sample", 5.0 + 1e-3 * values, {"units": "degree"}),
+            "asynchrony_max_error": ("sample", bars, {"units": "degree"}),
+            "energy_error": ("sample", values),
+        }
+    )
+    campaign.status[0] = 2
+    found = error_budget(campaign)
+    assert list(found.output.values) == ["deployment_time", "asynchrony_max"]
+    assert int(found.bars[0]) == 9
+    assert float(found.standard_error[0]) == pytest.approx(values[1:].std(ddof=1) / 99**0.5)
+    first, second = budget_lines(found)
+    assert "sampling error dominates" in first
+    assert "numerical error dominates" in second
+
+
+def test_cases_run_as_a_campaign_with_bars_and_steps_as_inputs(tmp_path, capfd) -> None:
+    cases = [
+        {"solver.step": step, "solver.tolerance": tolerance, "solver.error_bars": True}
+        for step, tolerance in ((0.2, 1e-3), (0.1, 3e-5))
+    ]
+    scene = ring(**{"solver.end_time": 4.0})
+    file = run_cases(tmp_path, Cases("steps", "two steps", scene, cases), workers=1)
+    with xr.open_dataset(file) as found:
+        assert (found.status == 0).all()
+        np.testing.assert_array_equal(found.solver_step, [0.2, 0.1])
+        errors = found.deployment_time_error.values
+    assert errors[1] < errors[0]
+    assert "dominates the mean" in capfd.readouterr().err
+    with pytest.raises(InputError, match="case 1"):
+        run_cases(tmp_path / "b", Cases("x", "", scene, [{"a": 1}, {"b": 2}]), workers=1)
