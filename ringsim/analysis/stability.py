@@ -8,7 +8,6 @@ promises is wrong.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -21,8 +20,9 @@ from ringsim.variables import VARIABLES, Status
 Array = NDArray[np.float64]
 
 OK, ENDED, WRONG = "ok", "ended", "wrong"
+OUT_OF_STEPS = "step limit"
 CAUSES = (
-    ("step limit", "solver.step_limit = "),
+    (OUT_OF_STEPS, "solver.step_limit = "),
     ("energy grew", "energy from nothing"),
     ("energy lost", "energy got lost"),
     ("blow-up", "blew up"),
@@ -65,10 +65,17 @@ _MEANING = {
 def cause_of(reason: str) -> str:
     """The word for a run's reason; empty if it names none of ``CAUSES``.
 
-    Of a run that started anew the last start counts.
+    Of a run that started anew the last start counts, unless it only ran out of the steps that it
+    made smaller: then what ended the first one is the cause.
     """
-    last = re.sub(r"\s*\((start|attempt) \d.*", "", reason, flags=re.DOTALL)
-    return next((word for word, phrase in CAUSES if phrase in last), "")
+    last, _, before = reason.partition(" (start ")
+    first = before.partition("start 1: ")[2]
+    found = _named(last)
+    return (_named(first) or found) if found == OUT_OF_STEPS else found
+
+
+def _named(reason: str) -> str:
+    return next((word for word, phrase in CAUSES if phrase in reason), "")
 
 
 def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr.Dataset:

@@ -20,6 +20,7 @@ from ringsim.analysis.stability_borders import borders
 def to_markdown(whole: xr.Dataset) -> str:
     """The map as a Markdown text."""
     lines = ["# Stability map", "", *_counts(whole), "", *_checks(whole), ""]
+    lines += ["![How each cell ended](stability.png)", ""]
     lines += ["## Borders", "", *_borders(whole), "", "## What lies beyond", "", *_causes(whole)]
     suspects = np.flatnonzero((whole["verdict"] == WRONG).values)
     if len(suspects):

@@ -103,7 +103,7 @@ _SPEED = Axis(
 )  # fmt: skip
 _STOP = Axis("stop stiffness", "N m/rad", ("stop.stiffness",), (0.1, 1.0, 10.0, 1e2, 1e4, 1e6))
 _TOLERANCE = Axis(
-    "tolerance of the step control", "1", ("solver.tolerance",), (1e-6, 1e-4, 1e-3, 1e-2, 0.1)
+    "tolerance of the step control", "1", ("solver.tolerance",), (1e-5, 1e-4, 1e-3, 1e-2, 0.1)
 )
 _ROPE = 0.2
 """Rope in metre that the reversing winch winds up before it turns back."""
@@ -120,22 +120,6 @@ GROUPS = (
     Group(
         "cable-speed", "cables: stiffness and winding speed", "truss2",
         _STIFFNESS, _SPEED, _WOUND,
-    ),
-    Group(
-        "chatter", "winch that reverses: slack-taut chatter", "truss2",
-        _STIFFNESS,
-        Axis("viscous friction of the V-joints", "N m s/rad", ("joints.vjoint.viscous",),
-             (0.0, 1e-3, 0.01, 0.1, 1.0)),
-        {
-            **_WOUND,
-            "solver.end_time": 4.0,
-            **_for_cables("winch.winding", {
-                "kind": "table",
-                "times": [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0],
-                "lengths": [0.0, _ROPE, 0.3 * _ROPE, 1.2 * _ROPE, 0.4 * _ROPE, 1.3 * _ROPE,
-                            0.5 * _ROPE, 2.5 * _ROPE],
-            }),
-        },
     ),
     Group(
         "fold-speed", "fold angle and winding speed", "truss2",
@@ -217,6 +201,22 @@ GROUPS = (
         Axis("sections", "1", ("structure.sections",), (1, 2, 3, 4, 6, 9, 12, 17), apart=True),
         Axis("winding speed", "m/s", _SPEED.paths, (0.1, 0.3, 1.0)),
         _WOUND,
+    ),
+    Group(
+        "chatter", "winch that reverses: slack-taut chatter", "truss2",
+        _STIFFNESS,
+        Axis("viscous friction of the V-joints", "N m s/rad", ("joints.vjoint.viscous",),
+             (0.0, 1e-3, 0.01, 0.1, 1.0)),
+        {
+            **_WOUND,
+            "solver.end_time": 2.5,
+            "solver.step_limit": 2000,
+            **_for_cables("winch.winding", {
+                "kind": "table",
+                "times": [0.0, 0.5, 1.0, 1.5, 2.0, 2.5],
+                "lengths": [0.0, _ROPE, 0.3 * _ROPE, 1.2 * _ROPE, 0.4 * _ROPE, 2.5 * _ROPE],
+            }),
+        },
     ),
 )  # fmt: skip
 """The map."""

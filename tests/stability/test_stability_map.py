@@ -88,6 +88,12 @@ def test_the_cause_is_that_of_the_last_start() -> None:
     assert cause_of(f"{NEWTON} (start 2 with solver.step = 1 s; start 1: not finite)") == "Newton"
 
 
+def test_a_new_start_that_runs_out_of_steps_is_ended_by_what_ended_the_first() -> None:
+    limit = "solver.step_limit = 800 steps took the run to 1 s only: raise solver.step_limit"
+    assert cause_of(limit) == "step limit"
+    assert cause_of(f"{limit} (start 2 with solver.step = 1 s; start 1: {NEWTON})") == "Newton"
+
+
 def test_the_final_angle_is_the_last_that_was_recorded() -> None:
     np.testing.assert_allclose(cells(GOOD)["final_angle"], 90.0)
 
