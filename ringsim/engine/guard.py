@@ -25,6 +25,8 @@ GROWTH, LOSS = 2.0, 5.0
 since X still grows: an error made early may be small beside all that follows."""
 BLOW_UP = 10.0
 """Kinetic and elastic energy over what start, loads and winches could give."""
+SLIGHT = 1e-3
+"""Share of the usual energy below which a whole run has done nothing worth judging."""
 GAP = 1e-4
 """Largest gap of a joint over the length of a bar."""
 OVERRUN = math.radians(30.0)
@@ -53,7 +55,7 @@ class Guard:
         energy_tolerance
             Largest |B| / X of a sound run.
         least_energy
-            X counts as this much at least, J.
+            X counts as this much at least during the run, J, and as ``SLIGHT`` of it at the end.
         bar
             Length in m against which gaps are measured.
         """
@@ -128,25 +130,26 @@ class Guard:
                 "drives it"
             )
         factor = GROWTH if balance > 0.0 else LOSS
-        if abs(balance) > factor * self._tolerance * self._exchanged:
-            return self._unbalanced(time, balance, f"{factor:g} times solver.energy_tolerance")
+        exchanged = self._exchanged(self._least)
+        if abs(balance) > factor * self._tolerance * exchanged:
+            bound = f"{factor:g} times solver.energy_tolerance"
+            return self._unbalanced(time, balance, exchanged, bound)
         return ""
 
     def verdict(self) -> str:
         """Why a run that ended by itself is not sound after all; empty if it is."""
         time, balance = self._worst
-        if abs(balance) <= self._tolerance * self._exchanged:
+        exchanged = self._exchanged(SLIGHT * self._least)
+        if abs(balance) <= self._tolerance * exchanged:
             return ""
-        return self._unbalanced(time, balance, "solver.energy_tolerance")
+        return self._unbalanced(time, balance, exchanged, "solver.energy_tolerance")
 
-    @property
-    def _exchanged(self) -> float:
+    def _exchanged(self, least: float) -> float:
         """X, J."""
         work = max(self._high[2], -self._low[2])
-        return float(max(self._least, work, *(self._high - self._low)[:2]))
+        return float(max(least, work, *(self._high - self._low)[:2]))
 
-    def _unbalanced(self, time: float, balance: float, bound: str) -> str:
-        exchanged = self._exchanged
+    def _unbalanced(self, time: float, balance: float, exchanged: float, bound: str) -> str:
         what = "came as energy from nothing" if balance > 0.0 else "is energy got lost in the steps"
         return (
             f"{abs(balance):.3g} J, {100.0 * abs(balance) / exchanged:.3g} % of the energy "

@@ -8,7 +8,7 @@ import pytest
 
 from ringsim.analysis.stability import cause_of
 from ringsim.engine.energy import Energies
-from ringsim.engine.guard import BLOW_UP, GAP, GROWTH, LOSS, OVERRUN, Guard
+from ringsim.engine.guard import BLOW_UP, GAP, GROWTH, LOSS, OVERRUN, SLIGHT, Guard
 
 TOLERANCE, LEAST, BAR = 0.02, 1e-3, 0.3
 
@@ -64,8 +64,14 @@ def test_an_early_imbalance_is_small_beside_all_that_follows() -> None:
 
 def test_next_to_no_energy_does_not_count() -> None:
     watching = guard()
-    assert watching.judge(1.0, after(0.0, 0.5 * TOLERANCE * LEAST), 0.0) == ""
+    assert watching.judge(1.0, after(0.0, 0.5 * TOLERANCE * SLIGHT * LEAST), 0.0) == ""
     assert watching.verdict() == ""
+
+
+def test_a_quiet_run_is_judged_by_its_own_energy_at_the_end() -> None:
+    watching = guard()
+    assert watching.judge(1.0, after(0.1 * LEAST, 0.01 * LEAST), 0.0) == ""
+    assert cause_of(watching.verdict()) == "energy grew"
 
 
 def test_more_energy_than_there_can_be_is_a_blow_up() -> None:
