@@ -183,8 +183,9 @@ def _orders(
 ) -> tuple[list[str], Array]:
     """Observed order of each ladder that has one: the slope of log error over log size.
 
-    Only errors that stand clear of the reference's own count, two of them make no order, and
-    neither do errors that come from elsewhere and hardly change along the ladder.
+    The three finest errors that stand clear of the reference's own count: coarser ones are not
+    small enough to show an order.  Errors that come from elsewhere and hardly change along the
+    ladder show none either.
     """
     names = list(dict.fromkeys(rung.ladder for rung in rungs if rung.size > 0.0))
     found = np.full((len(names), error.shape[1]), np.nan)
@@ -196,8 +197,9 @@ def _orders(
         for column in range(error.shape[1]):
             own = error[places, column]
             clear = np.isfinite(own) & (own > max(3.0 * floor[column], 1e-15))
-            if clear.sum() >= 3 and own[clear].max() > _MATTERS * own[clear].min():
-                found[row, column] = np.polyfit(sizes[clear], np.log(own[clear]), 1)[0]
+            last = np.flatnonzero(clear)[np.argsort(sizes[clear])][:3]
+            if len(last) == 3 and own[last].max() > _MATTERS * own[last].min():
+                found[row, column] = np.polyfit(sizes[last], np.log(own[last]), 1)[0]
     return names, found
 
 

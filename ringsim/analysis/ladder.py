@@ -23,8 +23,8 @@ PATHS = (
     "rods.elements",
 )
 """Scene paths that a ladder varies."""
-_TOLERANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
-_FINE = 5e-6
+_TOLERANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5)
+_FINE = 1e-5
 """Tolerance of the reference runs."""
 _MOVING_STEPS = (0.4, 0.2, 0.1)
 _CONSTANT_STEPS = (4.0, 2.0, 1.0, 0.5)

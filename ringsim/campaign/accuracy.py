@@ -34,6 +34,8 @@ def run_ladder(folder: Path, scene: Scene, workers: int) -> xr.Dataset:
     workers
         Solver processes.
 
+    A setting that fails is a failed rung: nothing starts anew with smaller steps here.
+
     Returns
     -------
     xr.Dataset
@@ -45,6 +47,7 @@ def run_ladder(folder: Path, scene: Scene, workers: int) -> xr.Dataset:
     InputError
         If the scene is refused, or a reference run does not end well.
     """
+    scene = scene.with_values({"solver.restarts": 0, "solver.error_bars": False})
     rungs = ladder(scene)
     truss = kind_of(scene.structure) == "planar-truss"
     parts: list[xr.Dataset] = []

@@ -27,6 +27,8 @@ _FALL, _RISE = 0.2, 1.5
 """Smallest and largest ratio of successive steps."""
 _FINEST = 1e-4
 """No step is repeated below this share of the largest step."""
+_PATIENCE = 300
+"""Steps of a ring without cables that are repeated at the tolerance 1e-4; impacts need fewer."""
 
 
 class EnergyControl:
@@ -40,8 +42,20 @@ class EnergyControl:
         Number of steps that were repeated.
     """
 
-    def __init__(self, solver: Solver, slight: float) -> None:
-        """``slight``: energy in J that does not matter; it counts as exchanged from the start."""
+    def __init__(self, solver: Solver, slight: float, *, tireless: bool) -> None:
+        """Start with nothing exchanged.
+
+        Parameters
+        ----------
+        slight
+            Energy in J that does not matter; it counts as exchanged from the start.
+        tireless
+            Whether any number of steps may be repeated.  A structure without ropes that vibrates
+            on and on, faster than anybody wants to resolve, would be followed forever; its energy
+            error tells instead.
+        """
+        more = math.sqrt(max(1e-4 / solver.tolerance, 1.0))
+        self._patience = math.inf if tireless else _PATIENCE * more
         self.limit, self.refused = math.inf, 0
         self._allowed = _SHARE * solver.tolerance
         self._least = _FINEST * solver.step
@@ -51,7 +65,9 @@ class EnergyControl:
     def shorter(self, step: float, before: Energies, after: Energies) -> float | None:
         """A smaller step in s to repeat this one with, or None if it is good enough."""
         ratio = self._ratio(before, after)
-        if not ratio > _REFUSED or step <= self._least:
+        # A step comes back as a difference of times: a little more than what was asked for.
+        least = step <= self._least * (1.0 + 1e-6)
+        if not ratio > _REFUSED or least or self.refused >= self._patience:
             return None
         self.refused += 1
         share = max(_FALL, _SAFETY * math.pow(ratio, -1.0 / 3.0))
@@ -61,7 +77,8 @@ class EnergyControl:
         """Learn from a step that was taken."""
         ratio = max(self._ratio(before, after), 1e-3)
         growth = min(max(_SAFETY * math.pow(ratio, -1.0 / 3.0), _FALL), _RISE)
-        self.limit = max(step * growth, self._least) if math.isfinite(ratio) else math.inf
+        judged = math.isfinite(ratio) and self.refused < self._patience
+        self.limit = max(step * growth, self._least) if judged else math.inf
         self._exchanged = self._exchange(before, after)
         self._work += after.work - before.work + after.driven
         if self._stored is None:

@@ -74,11 +74,12 @@ class Integration:
             usual_rate=usual_rate(scene),
         )
         self._control: EnergyControl | None = None
-        if built.cables is not None and scene.solver.step_control != "constant":
-            self._control = EnergyControl(scene.solver, slight_energy(built.cables))
-        self._guard = Guard(
-            scene.solver.energy_tolerance, usual_energy(scene), scene.structure.half_bar
-        )
+        usual = usual_energy(scene)
+        if scene.solver.step_control != "constant":
+            roped = built.cables is not None
+            slight = usual if built.cables is None else slight_energy(built.cables)
+            self._control = EnergyControl(scene.solver, slight, tireless=roped)
+        self._guard = Guard(scene.solver.energy_tolerance, usual, scene.structure.half_bar)
         self._fresh = True
         self._weighed: _Reading | None = None
         self._shorter: float | None = None

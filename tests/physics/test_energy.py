@@ -22,9 +22,13 @@ def test_energy_is_closed_before_the_first_contact(fine: Run) -> None:
 
 
 def test_energy_error_falls_with_the_tolerance(usual: Run, fine: Run) -> None:
-    """Second order: 12.5 times the tolerance, 12.5 times the error (8.0e-4 and 7.9e-5)."""
+    """12.5 times the tolerance, 7.1 times the error (3.6e-4 and 5.2e-5).
+
+    Steps that lack too much energy are repeated, which takes more from the larger error.
+    """
     errors = [np.abs(r.balance()[r.before_contact()]).max() for r in (usual, fine)]
-    assert 8.0 < errors[0] / errors[1] < 20.0
+    assert errors[0] < 5e-4
+    assert 5.0 < errors[0] / errors[1] < 20.0
 
 
 def test_energy_converges_over_the_impact(fine: Run) -> None:

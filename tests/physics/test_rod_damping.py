@@ -91,11 +91,14 @@ def test_a_spinning_element_is_not_braked() -> None:
 
 
 def test_what_the_rods_take_at_the_stop_is_accounted() -> None:
-    coarse, fine = (run(ring(3, rods__damping=1e-3, solver__tolerance=t)) for t in (1e-4, 1e-5))
-    lost = np.array(fine.history.energies)[:, 4].sum()
+    """With stops that take nothing all that is lost is lost in the rods."""
+    coarse, fine = (
+        run(ring(3, rods__damping=1e-3, stop__damping=0.0, solver__tolerance=t))
+        for t in (1e-4, 1e-5)
+    )
+    lost = np.array(fine.history.energies)[:, 3].sum()
     work = np.array(fine.history.energies)[-1, 2]
-    # At the stop nearly half of the kinetic energy ends in the rods.
-    assert 0.3 < lost / work < 0.6
-    errors = [np.abs(r.balance()).max() for r in (coarse, fine)]
-    assert errors[1] < 0.01
-    assert errors[1] < errors[0] / 3.0
+    # At the stop more than half of the kinetic energy ends in the rods.
+    assert 0.4 < lost / work < 0.7
+    assert np.abs(coarse.balance()).max() < 1e-3
+    assert np.abs(fine.balance()).max() < 2e-4

@@ -1,0 +1,49 @@
+"""Steps that are repeated because their energy does not balance."""
+
+import pytest
+
+from ringsim.engine.energy import Energies
+from ringsim.engine.energy_control import EnergyControl
+from ringsim.parts.solver import Solver
+
+SOLVER = Solver(step=0.2, tolerance=1e-4)
+LEAST = 2e-5
+BEFORE = Energies(kinetic=1.0, elastic=0.0, work=1.0, lost=0.0)
+
+
+def after(missing: float) -> Energies:
+    """A step in which so much energy is lost on the way, J."""
+    return Energies(kinetic=1.0 - missing, elastic=0.0, work=1.0, lost=0.0)
+
+
+def test_a_balanced_step_is_kept() -> None:
+    control = EnergyControl(SOLVER, 1e-3, tireless=True)
+    assert control.shorter(0.1, BEFORE, after(1e-6)) is None
+
+
+def test_the_repeated_step_is_what_third_order_asks_for() -> None:
+    control = EnergyControl(SOLVER, 1e-3, tireless=True)
+    allowed = 0.3 * SOLVER.tolerance
+    shorter = control.shorter(0.1, BEFORE, after(8.0 * allowed))
+    assert shorter == pytest.approx(0.1 * 0.8 / 2.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("tireless", [True, False])
+def test_repeating_ends_at_the_least_step(tireless: bool) -> None:
+    """Also if the step comes back with another last digit, as differences of times do."""
+    control = EnergyControl(SOLVER, 1e-3, tireless=tireless)
+    step, repeated = 0.1, 0
+    while (shorter := control.shorter(step, BEFORE, after(0.5))) is not None:
+        step, repeated = shorter * (1.0 + 1e-11), repeated + 1
+        assert repeated < 20
+    assert step == pytest.approx(LEAST)
+
+
+def test_patience_ends_without_ropes_alone() -> None:
+    for tireless in (True, False):
+        control = EnergyControl(SOLVER, 1e-3, tireless=tireless)
+        asked = [control.shorter(0.1, BEFORE, after(0.5)) is not None for _ in range(400)]
+        assert asked[:300] == [True] * 300
+        assert asked[-1] is tireless
+        control.accept(0.1, BEFORE, after(0.5))
+        assert (control.limit < 0.1) is tireless
