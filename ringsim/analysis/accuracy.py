@@ -31,6 +31,7 @@ OUTPUTS = {
     "peak_bending_strain": "peak bending strain",
 }
 """What people use of a result, as far as a scene has it."""
+_SCALAR_OF = {"asynchrony": "asynchrony_max"}
 GROUPS = {
     "motion": ("deployment_time", "opening_angle", "asynchrony"),
     "loads": ("peak_tension", "peak_rod_stress", "peak_bending_strain"),
@@ -79,8 +80,10 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     xr.Dataset
         ``error`` (rung, output): relative; ``order`` (graded, output): observed along a ladder of
         steps or elements, NaN where errors come near the reference's own; ``uncertainty``
-        (output): of the reference, relative; ``frontier`` (rung, output): whether no other setting
-        is both cheaper and better; ``cheapest`` (target, output): the rung, -1 if none will do;
+        (output): of the reference, relative; ``reference`` (output): its value, in the output's
+        unit, NaN for series (of the asynchrony the largest value); ``frontier`` (rung, output):
+        whether no other setting is both cheaper and better; ``cheapest`` (target, output): the
+        rung, -1 if none will do;
         ``cpu_time``, ``residual_evaluations``, ``steps``, ``status`` (rung); and for each truth
         its distance from the reference and from every rung.
 
@@ -94,9 +97,13 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         raise ValueError("a reference run did not end well")
     errors: dict[str, Array] = {}
     floors: dict[str, float] = {}
+    best: dict[str, float] = {}
     for name in OUTPUTS:
         if name in results and np.isfinite(results[name].isel(rung=slice(-3, None))).any():
             errors[name], floors[name] = _against_reference(results, name)
+            scalar = _SCALAR_OF.get(name, name)
+            if results[scalar].dims == ("rung",):
+                best[name] = float(_extrapolated(results[scalar]))
     full = np.array([rung.ladder != "fidelity" for rung in rungs])
     errors["energy"] = np.where(full, results.energy_error.to_numpy(), np.nan)
     floors["energy"] = 0.0
@@ -118,6 +125,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
             "error": (("rung", "output"), tried, _words("error relative to the reference", "1")),
             "order": (("graded", "output"), orders, _words("observed order", "1")),
             "uncertainty": ("output", floor, _words("uncertainty of the reference", "1")),
+            "reference": ("output", [best.get(name, np.nan) for name in outputs]),
             "frontier": (("rung", "output"), _frontier(cost, tried)),
             "cheapest": (("target", "output"), _cheapest(cost, tried)),
             "cpu_time": ("rung", cost, _words("processor time of the run", "s")),
@@ -142,10 +150,10 @@ def _words(long_name: str, units: str) -> Mapping[str, str]:
 
 def _against_reference(results: xr.Dataset, name: str) -> tuple[Array, float]:
     """Relative errors over the rungs, and the reference's own uncertainty."""
-    values, best = _before_the_end(results, name), None
+    values = _before_the_end(results, name)
     fine, halved, doubled = (values.isel(rung=k) for k in (-3, -2, -1))
     in_time, in_space = halved - fine, doubled - fine
-    best = fine + _RICHARDSON * (in_time + in_space)
+    best = _extrapolated(values)
     scale = _scale(results, name, best)
     inner = [dim for dim in values.dims if dim != "rung"]
     error = abs(values - best).max(inner).to_numpy() / scale
@@ -155,6 +163,12 @@ def _against_reference(results: xr.Dataset, name: str) -> tuple[Array, float]:
         largest, uncertain = _against_reference(results, "asynchrony_max")
         return np.maximum(error, largest), max(own, uncertain)
     return error, own
+
+
+def _extrapolated(values: xr.DataArray) -> xr.DataArray:
+    """Richardson's limit of the three reference runs, in time and in space."""
+    fine, halved, doubled = (values.isel(rung=k) for k in (-3, -2, -1))
+    return fine + _RICHARDSON * ((halved - fine) + (doubled - fine))
 
 
 def _before_the_end(results: xr.Dataset, name: str) -> xr.DataArray:

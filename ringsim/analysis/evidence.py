@@ -40,18 +40,30 @@ class Setting:
         Relative, by output.
     seconds
         Processor time of the run, s.
+    residuals
+        Residuals that Newton evaluated: the cost on any machine.
     """
 
     values: Mapping[str, Any]
     errors: Mapping[str, float]
     seconds: float
+    residuals: int
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """The settings on the frontier of one scene, cheapest first."""
+    """The settings on the frontier of one scene, cheapest first.
+
+    Attributes
+    ----------
+    scene
+        Its name.
+    references
+        Extrapolated values of its main numbers, SI units and degrees.
+    """
 
     scene: str
+    references: Mapping[str, float]
     settings: tuple[Setting, ...]
 
     def pick(self, accuracy: float) -> Setting:
@@ -91,8 +103,12 @@ def evidence_of(found: xr.Dataset) -> Evidence:
             if np.isfinite(found.error.values[rung, k])
         }
         seconds = float(f"{found.cpu_time.values[rung]:.3g}")
-        settings.append(Setting(_values(found, int(rung)), errors, seconds))
-    return Evidence(str(tomllib.loads(found.attrs["scene"])["name"]), tuple(settings))
+        residuals = int(found.residual_evaluations.values[rung])
+        settings.append(Setting(_values(found, int(rung)), errors, seconds, residuals))
+    known = zip(outputs, found.reference.values, strict=True)
+    references = {name: float(f"{value:.8g}") for name, value in known if np.isfinite(value)}
+    name = str(tomllib.loads(found.attrs["scene"])["name"])
+    return Evidence(name, references, tuple(settings))
 
 
 def _best(found: xr.Dataset, column: int) -> NDArray[np.bool_]:
@@ -118,8 +134,14 @@ def to_toml(evidence: Evidence) -> str:
     table = {
         "scene": evidence.scene,
         "judged_by": [JUDGED_BY, *GROUPS[JUDGED_BY]],
+        "references": dict(evidence.references),
         "settings": [
-            {"seconds": s.seconds, "values": dict(s.values), "errors": dict(s.errors)}
+            {
+                "seconds": s.seconds,
+                "residuals": s.residuals,
+                "values": dict(s.values),
+                "errors": dict(s.errors),
+            }
             for s in evidence.settings
         ],
     }
@@ -172,11 +194,12 @@ def _from_toml(text: str, name: str) -> Evidence:
     try:
         table = tomllib.loads(text)
         settings = tuple(
-            Setting(s["values"], s["errors"], float(s["seconds"])) for s in table["settings"]
+            Setting(s["values"], s["errors"], float(s["seconds"]), int(s["residuals"]))
+            for s in table["settings"]
         )
         if not settings or any(JUDGED_BY not in s.errors for s in settings):
             raise KeyError(JUDGED_BY)
-        return Evidence(str(table["scene"]), settings)
+        return Evidence(str(table["scene"]), table["references"], settings)
     except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"{name}: not the settings of an accuracy study ({error}): make it with "
