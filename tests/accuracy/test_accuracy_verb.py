@@ -1,0 +1,89 @@
+"""``ringsim accuracy`` and ``ringsim run --accuracy`` on the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from click.testing import CliRunner, Result
+
+from ringsim.analysis.evidence import evidence_for, read_evidence
+from ringsim.cli import cli
+from ringsim.scene import builtin_scenes, load_scene
+
+SMALL = [
+    "--set", "structure.sections=3", "--set", "structure.aspect_ratio=1.0", "--set", "net=none",
+    "--set", "loads.force=0.03", "--set", "solver.end_time=5.0",
+]  # fmt: skip
+
+
+def ringsim(*words: str) -> Result:
+    return CliRunner().invoke(cli, list(words))
+
+
+@pytest.mark.parametrize("name", builtin_scenes())
+def test_every_builtin_scene_has_its_evidence(name: str) -> None:
+    evidence = evidence_for(load_scene(name))
+    assert evidence.scene == name
+    for setting in evidence.settings:
+        load_scene(name).with_values(dict(setting.values))
+
+
+def test_settings_are_picked_and_told(tmp_path: Path) -> None:
+    out = tmp_path / "run.nc"
+    found = ringsim("run", "ring18", *SMALL, "--accuracy", "0.05", "--out", str(out))
+    assert found.exit_code == 0, found.output
+    assert "settings for 0.05: solver.step_control = motion" in found.output
+    assert "measured with ring18: deployment time" in found.output
+    picked = evidence_for(load_scene("ring18")).pick(0.05)
+    with xr.open_dataset(out) as dataset:
+        assert f"tolerance = {picked.values['solver.tolerance']}" in dataset.attrs["scene"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--accuracy", "1e-7"], "the best setting measured with ring18 gives"),
+        (["--accuracy", "0.01", "--fidelity", "ideal"], "leave out one"),
+        (["--accuracy", "0.05", "--set", "solver.tolerance=1e-3"], "--accuracy chooses it"),
+        (["--evidence", "none.toml"], "without --accuracy"),
+        (["--accuracy", "0.01", "--evidence", "none.toml"], "cannot be read"),
+        (["--accuracy", "7"], "--accuracy"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(words: list[str], told: str, tmp_path: Path) -> None:
+    found = ringsim("run", "ring18", *words, "--out", str(tmp_path / "x.nc"))
+    assert found.exit_code == 2
+    assert told in found.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_slope_vector_rods_need_their_own_evidence(tmp_path: Path) -> None:
+    scene = tmp_path / "ancf.toml"
+    scene.write_text(load_scene("ring18").with_values({"rods.kind": "ancf"}).to_toml())
+    found = ringsim("run", str(scene), "--accuracy", "0.01", "--out", str(tmp_path / "x.nc"))
+    assert found.exit_code == 2
+    assert "geometrically-exact" in found.output
+
+
+@pytest.mark.slow
+def test_a_study_from_end_to_end(tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    found = ringsim("accuracy", "ring18", *SMALL, "--out", str(folder), "--workers", "2")
+    assert found.exit_code == 0, found.output
+    assert {"accuracy.nc", "accuracy.md", "accuracy.png", "settings.toml"} <= {
+        file.name for file in folder.iterdir()
+    }
+    with xr.open_dataset(folder / "accuracy.nc") as study:
+        error = study.error.sel(output="deployment_time")
+        assert float(error.where(study.ladder == "as it stands").min()) < 2e-4
+        for output in ("deployment_time", "energy"):
+            assert 1.0 < float(study.order.sel(graded="tolerance", output=output)) < 3.0
+    own = read_evidence(folder / "settings.toml")
+    wanted = own.settings[-1].errors["motion"]
+    again = ringsim(
+        "run", "ring18", *SMALL, "--accuracy", str(2.0 * wanted),
+        "--evidence", str(folder / "settings.toml"), "--out", str(tmp_path / "run.nc"),
+    )  # fmt: skip
+    assert again.exit_code == 0, again.output
