@@ -6,7 +6,10 @@ import pytest
 
 from ringsim.analysis.stability import cause_of
 from ringsim.engine.build import build
+from ringsim.engine.energy import Energies
+from ringsim.engine.energy_control import EnergyControl
 from ringsim.engine.integrate import Integration
+from ringsim.parts.solver import Solver
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
 from ringsim.variables import Status
@@ -77,3 +80,18 @@ def test_an_error_of_our_own_inside_the_solver_is_not_called_a_failure_of_the_so
     integration._guard.stops = broken  # type: ignore[method-assign]
     with pytest.raises(RuntimeError, match="KeyError: 'surprise'"):
         integration.run()
+
+
+def test_the_smallest_step_is_not_repeated_forever() -> None:
+    """As the difference of two times it is longer than itself by round-off."""
+    solver, begin = Solver(step=3.0), 7.5e-4
+    control = EnergyControl(solver, 1e-12)
+    still, thrown = Energies(0.0, 0.0, 0.0, 0.0), Energies(1.0, 0.0, 0.0, 0.0)
+    step = 1.0
+    for repeats in range(100):
+        shorter = control.shorter((begin + step) - begin, still, thrown)
+        if shorter is None:
+            break
+        step = shorter
+    assert 3 < repeats < 20
+    assert step < 1e-3 * solver.step
