@@ -27,8 +27,6 @@ _FALL, _RISE = 0.2, 1.5
 """Smallest and largest ratio of successive steps."""
 _FINEST = 1e-4
 """No step is repeated below this share of the largest step."""
-_ROUND_OFF = 1.0 + 1e-6
-"""A step is the difference of two times: one that is smallest may come out larger."""
 _PATIENCE = 300
 """Steps of a ring without cables that are repeated at the tolerance 1e-4; impacts need fewer."""
 
@@ -68,7 +66,7 @@ class EnergyControl:
         """A smaller step in s to repeat this one with, or None if it is good enough."""
         ratio = self._ratio(before, after)
         # A step comes back as a difference of times: a little more than what was asked for.
-        least = step <= _ROUND_OFF * self._least * (1.0 + 1e-6)
+        least = step <= self._least * (1.0 + 1e-6)
         if not ratio > _REFUSED or least or self.refused >= self._patience:
             return None
         self.refused += 1

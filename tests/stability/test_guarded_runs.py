@@ -85,13 +85,10 @@ def test_an_error_of_our_own_inside_the_solver_is_not_called_a_failure_of_the_so
 def test_the_smallest_step_is_not_repeated_forever() -> None:
     """As the difference of two times it is longer than itself by round-off."""
     solver, begin = Solver(step=3.0), 7.5e-4
-    control = EnergyControl(solver, 1e-12)
+    control = EnergyControl(solver, 1e-12, tireless=True)
     still, thrown = Energies(0.0, 0.0, 0.0, 0.0), Energies(1.0, 0.0, 0.0, 0.0)
-    step = 1.0
-    for repeats in range(100):
-        shorter = control.shorter((begin + step) - begin, still, thrown)
-        if shorter is None:
-            break
-        step = shorter
+    step, repeats = solver.step, 0
+    while (shorter := control.shorter((begin + step) - begin, still, thrown)) and repeats < 100:
+        step, repeats = shorter, repeats + 1
     assert 3 < repeats < 20
     assert step < 1e-3 * solver.step
