@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,9 +17,9 @@ from ringsim.campaign.cases import Cases, run_cases
 from ringsim.campaign.stability_groups import Axis, Group
 from ringsim.scene import Scene, load_scene
 
-TIMEOUT = 120.0
+TIMEOUT = 600.0
 """Longest time of a cell, s."""
-_PATIENCE = 10.0
+_PATIENCE = 4.0
 """Times longer that a cell may take in its check."""
 
 
@@ -97,7 +98,9 @@ def run_check(
         begin = int(ends[number]) - len(piece.cells)
         own = [piece.cells[cell - begin] for cell in mine]
         starts = 1 + whole["restarts"].values[mine].astype(int)
-        again = _Piece(f"{piece.name}-check", piece.group, piece.scene, own)
+        # Another choice of cells is another campaign.
+        mark = hashlib.sha256(repr((own, starts.tolist())).encode()).hexdigest()[:6]
+        again = _Piece(f"{piece.name}-check-{mark}", piece.group, piece.scene, own)
         finer.append(_run(folder, again, workers, finer=starts.tolist()))
     return checked(whole, which, xr.concat(finer, dim="cell"))
 
