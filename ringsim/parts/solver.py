@@ -28,10 +28,10 @@ class Solver(Model):
     step: Second = 0.2
     """Largest step, or the step if it is constant."""
     step_control: Literal["motion", "constant"] = "motion"
-    tolerance: Annotated[float, Field(ge=_LEAST_TOLERANCE, le=0.1)] = 1e-4
+    tolerance: Annotated[float, Field(ge=_LEAST_TOLERANCE, le=0.1)] = 3e-4
     spectral_radius: Ratio = 0.8
     """High-frequency amplification per step: 1 keeps every vibration, lower damps it."""
-    newton_tolerance: Annotated[float, Field(ge=1e-12, le=1e-2)] = 1e-5
+    newton_tolerance: Annotated[float, Field(ge=1e-12, le=1e-2)] = 1e-3
     """Residual at which Newton stops, relative to the driving forces of the scene."""
 
     step_limit: Annotated[int, Field(ge=1, le=10_000_000)] = 20_000

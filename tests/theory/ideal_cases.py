@@ -16,6 +16,7 @@ def six(**values: Any) -> Scene:
     plain: dict[str, Any] = {
         "structure.sections": 6,
         "net.neutral_length": 0.24,
+        "solver.newton_tolerance": 1e-5,
         "cables.upper.winch.winding.speed": 0.04,
         "cables.lower.winch.winding.speed": 0.04,
     }
@@ -32,5 +33,10 @@ def six(**values: Any) -> Scene:
 def pulled(sections: int = 18, **values: Any) -> Scene:
     """The ring that forces open, without stress output."""
     chosen = {name.replace("__", "."): value for name, value in values.items()}
-    plain = {"structure.sections": sections, "record.stress": False}
+    plain = {
+        "structure.sections": sections,
+        "record.stress": False,
+        "solver.tolerance": 1e-4,
+        "solver.newton_tolerance": 1e-5,
+    }
     return load_scene("ring18").with_values(plain | chosen)
