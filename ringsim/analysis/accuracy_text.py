@@ -9,6 +9,7 @@ import xarray as xr
 
 from ringsim.analysis.accuracy import GROUPS, OUTPUTS
 from ringsim.analysis.ladder import PATHS
+from ringsim.variables import Status
 
 _SHORT = {
     "deployment_time": "deployment time",
@@ -95,6 +96,9 @@ def _errors(found: xr.Dataset, outputs: Sequence[str]) -> list[str]:
         name = f"{found.ladder.values[rung]}: {found.label.values[rung]}"
         if found.ladder.values[rung] == found.label.values[rung]:
             name = str(found.label.values[rung])
+        ended = Status(int(found.status.values[rung]))
+        if ended != Status.OK:
+            name += f" ({ended.word})"
         cells = [_cell(found, rung, output) for output in outputs]
         lines.append(
             f"| {name} | {found.steps.values[rung]:.0f} | "

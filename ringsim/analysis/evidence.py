@@ -95,7 +95,7 @@ def evidence_of(found: xr.Dataset) -> Evidence:
     outputs = [str(name) for name in found.output.values]
     column = outputs.index(JUDGED_BY)
     kept = np.flatnonzero(_best(found, column))
-    settings = []
+    settings: list[Setting] = []
     for rung in kept[np.argsort(found.cpu_time.values[kept])]:
         errors = {
             name: float(f"{found.error.values[rung, k]:.2e}")
@@ -104,7 +104,9 @@ def evidence_of(found: xr.Dataset) -> Evidence:
         }
         seconds = float(f"{found.cpu_time.values[rung]:.3g}")
         residuals = int(found.residual_evaluations.values[rung])
-        settings.append(Setting(_values(found, int(rung)), errors, seconds, residuals))
+        values = _values(found, int(rung))
+        if all(values != known.values for known in settings):  # ladders share settings
+            settings.append(Setting(values, errors, seconds, residuals))
     known = zip(outputs, found.reference.values, strict=True)
     references = {name: float(f"{value:.8g}") for name, value in known if np.isfinite(value)}
     name = str(tomllib.loads(found.attrs["scene"])["name"])
