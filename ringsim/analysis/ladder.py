@@ -27,7 +27,7 @@ _TOLERANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5)
 _FINE = 1e-5
 """Tolerance of the reference runs."""
 _MOVING_STEPS = (0.4, 0.2, 0.1)
-_CONSTANT_STEPS = (4.0, 2.0, 1.0, 0.5)
+_CONSTANT_STEPS = (4.0, 2.0, 1.0)
 """Constant steps over solver.step, for scenes whose step moves and for those whose does not."""
 
 
@@ -132,7 +132,7 @@ def _references(scene: Scene, base: Mapping[str, Any]) -> list[Rung]:
     if scene.solver.step_control == "motion":
         coarse, halved = {"solver.tolerance": _FINE}, {"solver.tolerance": _FINE / 4.0}
     else:
-        coarse, halved = {"solver.step": step / 8.0}, {"solver.step": step / 16.0}
+        coarse, halved = {"solver.step": step / 4.0}, {"solver.step": step / 8.0}
     more = {"rods.elements": 2 * elements}
     return [
         Rung("reference", "fine", 0.0, {**base, **fine, **coarse}),
