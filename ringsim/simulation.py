@@ -57,7 +57,7 @@ def run(scene: Scene) -> Outcome:
     if scene.solver.error_bars and outcome.status == Status.OK:
         longer = scene.solver.refined(restarts).coarsened()
         coarse = _attempt(scene.model_copy(update={"solver": longer}), begin)
-        outcome.values.update(error_bars(outcome, coarse))
+        outcome.values.update(error_bars(outcome, coarse, scene.rods.elements))
         for name in TIMINGS:
             outcome.values[name] = coarse.values.get(name, outcome.values[name])
     outcome.values["fidelity"] = np.array(int(Fidelity.FULL))

@@ -13,7 +13,7 @@ from ringsim.dataset import to_dataset
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
-from ringsim.theory.error_bars import SAFETY, error_bars
+from ringsim.theory.error_bars import OF_ONE_ELEMENT, SAFETY, error_bars
 from ringsim.variables import Outcome, Status
 
 TIMES = np.linspace(0.0, 4.0, 41)
@@ -46,21 +46,30 @@ def outcome(error: float, status: Status = Status.OK) -> Outcome:
     return Outcome(status, "", {"time": TIMES}, values)
 
 
-def test_a_method_of_second_order_is_covered_six_times() -> None:
+def test_a_method_of_second_order_is_covered_three_times_and_more() -> None:
     """Twice the steps, four times the error: the runs differ by three errors of the finer."""
     error = 1e-4
-    found = error_bars(outcome(error), outcome(4.0 * error))
-    assert found["deployment_time_error"] == pytest.approx(3.0 * SAFETY * error * 3.0)
-    assert found["asynchrony_max_error"] == pytest.approx(3.0 * SAFETY * error * 5.0, rel=0.5)
-    assert found["peak_tension_error"] == pytest.approx(3.0 * SAFETY * error * 10.0, rel=1e-3)
-    assert found["opening_angle_error"] == pytest.approx(3.0 * SAFETY * error * 150.0, rel=0.01)
+    found = error_bars(outcome(error), outcome(4.0 * error), elements=100)
+    values = {"deployment_time": 3.0, "opening_angle": 150.0, "peak_tension": 10.0}
+    for name, value in values.items():
+        expected = 3.0 * SAFETY[name] * error * value
+        assert found[f"{name}_error"] == pytest.approx(expected, rel=0.01)
+
+
+def test_few_elements_widen_what_they_bend() -> None:
+    same = outcome(0.0)
+    for elements in (1, 2):
+        found = error_bars(same, same, elements)
+        share = OF_ONE_ELEMENT["asynchrony_max"] / elements**2
+        assert found["asynchrony_max_error"] == pytest.approx(share * 5.0)
+        assert found["deployment_time_error"] == 0.0
 
 
 @pytest.mark.parametrize("which", [0, 1])
 def test_no_bars_without_two_good_runs(which: int) -> None:
     pair = [outcome(1e-4), outcome(4e-4)]
     pair[which] = outcome(1e-4, Status.UNFINISHED)
-    assert error_bars(*pair) == {}
+    assert error_bars(*pair, elements=1) == {}
 
 
 def test_bars_change_nothing_else() -> None:
