@@ -41,7 +41,8 @@ class Setting:
     seconds
         Processor time of the run, s.
     residuals
-        Residuals that Newton evaluated: the cost on any machine.
+        Residuals that Newton evaluated in accepted steps, and the steps: a cost that does not
+        depend on the machine's load, but leaves out factorisations.
     """
 
     values: Mapping[str, Any]
@@ -77,10 +78,10 @@ class Evidence:
         for setting in self.settings:
             if setting.errors[JUDGED_BY] <= accuracy:
                 return setting
-        best = min(setting.errors[JUDGED_BY] for setting in self.settings)
+        best = 1.1 * min(setting.errors[JUDGED_BY] for setting in self.settings)
         raise InputError(
             f"--accuracy {accuracy:g}: the best setting measured with {self.scene} gives "
-            f"{best:.1e}: ask for that, or set solver.tolerance yourself"
+            f"{best:.2g}: ask for that, or set solver.tolerance yourself"
         )
 
 
@@ -160,8 +161,8 @@ def read_evidence(path: Path) -> Evidence:
     """
     try:
         text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
     return _from_toml(text, str(path))
 
 
@@ -179,7 +180,13 @@ def evidence_for(scene: Scene) -> Evidence:
             "measured with geometrically-exact rods: use these, or give --evidence from "
             "ringsim accuracy on your scene"
         )
-    file = resources.files("ringsim") / "scenes" / "evidence" / f"{likest(scene)}.toml"
+    name = likest(scene)
+    file = resources.files("ringsim") / "scenes" / "evidence" / f"{name}.toml"
+    if not file.is_file():
+        raise InputError(
+            f"--accuracy: no settings for scenes like {name} come with ringsim: give --evidence "
+            "from ringsim accuracy on your scene"
+        )
     return _from_toml(file.read_text(encoding="utf-8"), file.name)
 
 
@@ -196,13 +203,18 @@ def _from_toml(text: str, name: str) -> Evidence:
     try:
         table = tomllib.loads(text)
         settings = tuple(
-            Setting(s["values"], s["errors"], float(s["seconds"]), int(s["residuals"]))
+            Setting(
+                dict(s["values"]),
+                {name: float(error) for name, error in s["errors"].items()},
+                float(s["seconds"]),
+                int(s["residuals"]),
+            )
             for s in table["settings"]
         )
         if not settings or any(JUDGED_BY not in s.errors for s in settings):
             raise KeyError(JUDGED_BY)
-        return Evidence(str(table["scene"]), table["references"], settings)
-    except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError) as error:
+        return Evidence(str(table["scene"]), dict(table["references"]), settings)
+    except (tomllib.TOMLDecodeError, AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"{name}: not the settings of an accuracy study ({error}): make it with "
             "ringsim accuracy"

@@ -123,8 +123,8 @@ def test_tables_name_settings_as_overrides(study: xr.Dataset) -> None:
     assert "| peak stress |" in text
     assert "closed form" in text
     assert "nan" not in text
-    rung = next(k for k, r in enumerate(RUNGS) if r.label == "0.0003")
-    assert in_words(study, rung) == "`--set solver.tolerance=0.0003`"
+    rung = next(k for k, r in enumerate(RUNGS) if r.label == "0.001")
+    assert in_words(study, rung) == "`--set solver.tolerance=0.001`"
     assert in_words(study, 0) == "as it stands"
 
 
@@ -143,9 +143,20 @@ def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tm
     )
     with pytest.raises(InputError, match="best setting"):
         evidence.pick(1e-8)
-    file.write_text("settings = 3")
-    with pytest.raises(InputError, match="not the settings"):
+    good = to_toml(evidence)
+    wrong = ("settings = 3", good.replace("motion = ", "motion = 'a' #"), good[:40])
+    for text in wrong:
+        file.write_text(text)
+        with pytest.raises(InputError, match="not the settings"):
+            read_evidence(file)
+    file.write_bytes(b"\xff\xfe")
+    with pytest.raises(InputError, match="cannot be read"):
         read_evidence(file)
+    best = min(setting.errors["motion"] for setting in evidence.settings)
+    with pytest.raises(InputError) as told:
+        evidence.pick(0.5 * best)
+    # What the refusal says to ask for is given.
+    evidence.pick(float(str(told.value).partition("gives ")[2].partition(":")[0]))
 
 
 @pytest.mark.parametrize("name", builtin_scenes())

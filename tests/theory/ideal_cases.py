@@ -16,6 +16,7 @@ def six(**values: Any) -> Scene:
     plain: dict[str, Any] = {
         "structure.sections": 6,
         "net.neutral_length": 0.24,
+        "solver.tolerance": 3e-4,
         "solver.newton_tolerance": 1e-5,
         "cables.upper.winch.winding.speed": 0.04,
         "cables.lower.winch.winding.speed": 0.04,
