@@ -129,6 +129,7 @@ _ALL = (
     Variable("constraint_violation", ("time",), "m", "largest gap in any joint"),
     Variable("constraint_error", (), "m", "largest gap in any joint at any step"),
     Variable("steps", (), "1", "time steps", "i4"),
+    Variable("repeated_steps", (), "1", "steps that were repeated with a smaller one", "i4"),
     Variable("newton_iterations", (), "1", "Newton iterations", "i4"),
     Variable("jacobians", (), "1", "Jacobian factorisations", "i4"),
     Variable("restarts", (), "1", "new starts with a smaller step after a run that failed", "i4"),

@@ -77,6 +77,7 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
     _add_cables(values, history, scene, grid, deployed)
     counts = {
         "steps": len(times) - 1,
+        "repeated_steps": history.halvings,
         "newton_iterations": history.newton_iterations,
         "jacobians": history.jacobians,
     }
