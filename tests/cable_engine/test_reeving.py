@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import exudyn as exu
-import exudyn.itemInterface as item  # noqa: N813
+import exudyn.itemInterface as item
 import numpy as np
 import pytest
 from numpy.typing import NDArray
