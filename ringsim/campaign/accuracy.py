@@ -52,12 +52,17 @@ def run_ladder(folder: Path, scene: Scene, workers: int) -> xr.Dataset:
     truss = kind_of(scene.structure) == "planar-truss"
     parts: list[xr.Dataset] = []
     order: list[int] = []
-    for name, stressed in (("stressed", True), ("unstressed", False)):
-        own = [k for k, rung in enumerate(rungs) if rung.stressed == stressed]
-        if own:
-            chosen = scene.with_values({"record.stress": stressed and not truss})
-            parts.append(_run(folder, name, chosen, [rungs[k] for k in own], workers))
-            order += own
+    # What gives a result its shape is the same within a campaign: stresses, a truss's elements.
+    shapes = [(rung.stressed, rung.values["rods.elements"] if truss else 0) for rung in rungs]
+    for stressed, elements in dict.fromkeys(shapes):
+        own = [k for k, shape in enumerate(shapes) if shape == (stressed, elements)]
+        given: dict[str, object] = {"record.stress": stressed and not truss}
+        name = "stressed" if stressed else "unstressed"
+        if truss:
+            name, given["rods.elements"] = f"elements-{elements}", elements
+        chosen = scene.with_values(given)
+        parts.append(_run(folder, name, chosen, [rungs[k] for k in own], workers, set(given)))
+        order += own
     results = xr.concat(parts, "rung").isel(rung=np.argsort(order))
     truths = _quadrature(scene)
     ideal = _ideal(folder, scene, workers)
@@ -74,14 +79,22 @@ def run_ladder(folder: Path, scene: Scene, workers: int) -> xr.Dataset:
         ) from error
 
 
-def _run(folder: Path, name: str, scene: Scene, rungs: Sequence[Rung], workers: int) -> xr.Dataset:
+def _run(
+    folder: Path,
+    name: str,
+    scene: Scene,
+    rungs: Sequence[Rung],
+    workers: int,
+    given: set[str],
+) -> xr.Dataset:
     """Run each setting once; rungs that share one share its result."""
     settings: list[dict[str, object]] = []
+    places: list[int] = []
     for rung in rungs:
-        wanted = {path: rung.values[path] for path in PATHS}
+        wanted = {path: rung.values[path] for path in PATHS if path not in given}
         if wanted not in settings:
             settings.append(wanted)
-    places = [settings.index({path: rung.values[path] for path in PATHS}) for rung in rungs]
+        places.append(settings.index(wanted))
     title = f"Settings of {scene.name} against each other ({name})"
     file = run_cases(folder, Cases(name, title, scene, settings, TIMEOUT), workers)
     return _needed(file).isel(rung=places)
