@@ -23,7 +23,7 @@ SAFETY = {
     "deployment_time": 1.0,
     "opening_angle": 2.0,
     "asynchrony_max": 1.0,
-    "peak_tension": 2.0,
+    "peak_tension": 0.5,
     "peak_rod_stress": 1.0,
 }
 """Bar over the difference of the two runs."""
