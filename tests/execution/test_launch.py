@@ -57,7 +57,8 @@ def test_nobody_passes_the_barrier_before_all_are_there(tmp_path):
         print(sign.exists())
         """
     )
-    assert done.stdout.split() == ["True", "True"], done.stderr
+    # Lines of two ranks may run into each other.
+    assert done.stdout.split() == ["True", "True"] or done.stdout.strip() == "TrueTrue", done.stderr
 
 
 @pytest.mark.parametrize(

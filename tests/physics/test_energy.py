@@ -32,11 +32,13 @@ def test_energy_error_falls_with_the_tolerance(usual: Run, fine: Run) -> None:
 
 
 def test_energy_converges_over_the_impact(fine: Run) -> None:
-    """Over the stop the steps are a twentieth of a bounce and shrink with the tolerance."""
+    """Steps that lack energy are repeated, over the stop as well (1.2e-4 and 8.8e-5).
+
+    Before, the same tolerances left 3.6e-3 and 1.3e-3.  What is left is the smallest step.
+    """
     finer = run(ring(3, solver__tolerance=2e-6))
     errors = [np.abs(r.balance()).max() for r in (fine, finer)]
-    assert errors[1] < errors[0] / 2.0
-    assert errors[1] < 2e-3
+    assert errors[1] < errors[0] < 2e-4
 
 
 def test_stops_and_rods_take_energy_and_never_give_any(fine: Run) -> None:
