@@ -16,6 +16,8 @@ from ringsim.scene import Scene
 from ringsim.variables import PLANES, RODS, Outcome
 
 Array = NDArray[np.float64]
+_POINTS = 8
+"""Points in each step at which the largest asynchrony is looked for."""
 
 
 def output_times(scene: Scene) -> Array:
@@ -48,6 +50,35 @@ def lock_times(times: Array, angles: Array, rates: Array) -> Array:
     return found
 
 
+def largest_spread(times: Array, angles: Array, rates: Array, until: float) -> float:
+    """Largest difference between the joints' angles up to a time, rad.
+
+    Looked for at ``_POINTS`` points in each step, on the cubics that fit angles and rates at its
+    ends, and at ``until`` itself: a few long steps step over the moment of the largest one.
+
+    Parameters
+    ----------
+    times, angles, rates
+        Shapes (n,), (n, joints) and the same; s, rad, rad/s.
+    until
+        s; infinite for the whole run.
+    """
+    largest = float(np.ptp(angles[0]))
+    begun = int(np.searchsorted(times[:-1], until))
+    span = np.diff(times[: begun + 1])[:, None]
+    part = np.minimum(until - times[:begun, None], span) / span
+    first, last = angles[:begun], angles[1 : begun + 1]
+    leaving, arriving = rates[:begun], rates[1 : begun + 1]
+    for point in range(1, _POINTS + 1):
+        s = point / _POINTS * part
+        value = s**2 * (3.0 - 2.0 * s) * (last - first)  # in place: no spline of the whole run
+        value += first
+        value += s * (1.0 - s) ** 2 * span * leaving
+        value -= s**2 * (1.0 - s) * span * arriving
+        largest = max(largest, float(np.ptp(value, axis=1).max(initial=0.0)))
+    return largest
+
+
 def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: float) -> Outcome:
     """Put a run on the output grid; what lies after its end is NaN."""
     sections = scene.structure.sections
@@ -63,11 +94,13 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
 
     opening = on_grid(grid, times, angles, rates)
     values["opening_angle"] = np.degrees(np.moveaxis(opening, 0, -1))
-    spread = np.degrees(np.ptp(angles.reshape(len(times), -1), axis=1))
     flat = values["opening_angle"].reshape(-1, len(grid))
     values["asynchrony"] = flat.max(axis=0) - flat.min(axis=0)
-    before = times <= deployed if math.isfinite(deployed) else np.ones(len(times), dtype=bool)
-    values["asynchrony_max"] = np.array(spread[before].max())
+    until = deployed if math.isfinite(deployed) else math.inf
+    joints = angles.reshape(len(times), -1), rates.reshape(len(times), -1)
+    largest = math.degrees(largest_spread(times, *joints, until))
+    on_time = values["asynchrony"][grid <= until]
+    values["asynchrony_max"] = np.array(np.fmax.reduce(on_time, initial=largest))
 
     add_energies(values, grid, times, history.energies, history.gaps)
     if history.stresses:
