@@ -41,8 +41,7 @@ class StressMeter:
             if whole != name:
                 middle = len(elements) // 2
                 elements = elements[:middle] if name.endswith("left") else elements[middle:]
-            length = model.assembly.system.GetObjectParameter(elements[0], "length")
-            ends = [(elements[0], -0.5 * length), (elements[-1], 0.5 * length)]
+            ends = [(elements[0], -0.5 * rod.length), (elements[-1], 0.5 * rod.length)]
             rows.append((ends, rod.tube))
         return rows
 
