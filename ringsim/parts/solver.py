@@ -10,7 +10,7 @@ from ringsim.units import Model, Ratio, Second, SecondOrZero
 
 _FINER = 0.25
 """Factor on the step from one start of a run to the next."""
-_LEAST_STEP, _LEAST_TOLERANCE = 1e-9, 1e-8
+_LEAST_STEP, _LEAST_TOLERANCE, _LARGEST_TOLERANCE = 1e-9, 1e-8, 0.1
 
 
 class Solver(Model):
@@ -28,7 +28,7 @@ class Solver(Model):
     step: Second = 0.2
     """Largest step, or the step if it is constant."""
     step_control: Literal["motion", "constant"] = "motion"
-    tolerance: Annotated[float, Field(ge=_LEAST_TOLERANCE, le=0.1)] = 3e-4
+    tolerance: Annotated[float, Field(ge=_LEAST_TOLERANCE, le=_LARGEST_TOLERANCE)] = 3e-4
     spectral_radius: Ratio = 0.8
     """High-frequency amplification per step: 1 keeps every vibration, lower damps it."""
     newton_tolerance: Annotated[float, Field(ge=1e-12, le=1e-2)] = 1e-3
@@ -72,11 +72,17 @@ class Solver(Model):
         )
 
     def coarsened(self) -> Solver:
-        """The settings of the second run of ``error_bars``: every step twice as long."""
-        tolerance = min(4.0 * self.tolerance, 0.1)
-        longer = self.step_control == "constant"
-        step = min(2.0 * self.step, self.end_time) if longer else self.step
-        return self.model_copy(update={"step": step, "tolerance": tolerance})
+        """The settings of the second run of ``error_bars``: every step twice as long.
+
+        The largest step doubles too, and the smallest with it, or a run at one of them would
+        differ too little from the first; only where a run is a single step there is no longer one.
+        """
+        return self.model_copy(
+            update={
+                "step": min(2.0 * self.step, self.end_time),
+                "tolerance": min(4.0 * self.tolerance, _LARGEST_TOLERANCE),
+            }
+        )
 
 
 class Record(Model):

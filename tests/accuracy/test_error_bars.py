@@ -10,6 +10,8 @@ from ringsim.analysis.error_budget import budget_lines, error_budget
 from ringsim.campaign.cases import Cases, run_cases
 from ringsim.campaign.specification import load_campaign
 from ringsim.dataset import to_dataset
+from ringsim.engine.stepping import StepControl, StopContact
+from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
@@ -54,6 +56,35 @@ def test_a_method_of_second_order_is_covered_three_times_and_more() -> None:
     for name, value in values.items():
         expected = 3.0 * SAFETY[name] * error * value
         assert found[f"{name}_error"] == pytest.approx(expected, rel=0.01)
+
+
+def steps_of(solver: Solver, rates: list[float], stops: StopContact) -> list[float]:
+    """Steps chosen while the mean rate goes through these values."""
+    control, time, steps = StepControl(solver, contact_step=2e-3, usual_rate=0.1), 0.0, []
+    for rate in rates:
+        time += control.step
+        steps.append(control.advance(time, rate, stops))
+    return steps
+
+
+FREE, MEETING = StopContact(np.inf, 0.0, 0.0), StopContact(1e-9, 30.0, 0.0)
+CALM, WILD = [1.0] * 40, [1.0, -1e9] * 20
+
+
+@pytest.mark.parametrize(
+    ("rates", "stops"), [(CALM, FREE), (WILD, FREE), (CALM, MEETING)], ids=["cap", "floor", "stop"]
+)
+@pytest.mark.parametrize("control", ["motion", "constant"])
+def test_the_second_run_doubles_every_step(rates, stops, control) -> None:
+    solver = Solver(step=0.1, step_control=control, tolerance=1e-3)
+    one, two = (steps_of(s, rates, stops) for s in (solver, solver.coarsened()))
+    np.testing.assert_allclose(two, 2.0 * np.array(one), rtol=1e-12)
+
+
+def test_a_second_run_stays_within_its_bounds() -> None:
+    solver = Solver(step=0.8, end_time=1.0, tolerance=0.05).coarsened()
+    assert (solver.step, solver.tolerance) == (1.0, 0.1)
+    assert Solver.model_validate(solver.model_dump()) == solver
 
 
 def test_few_elements_widen_what_they_bend() -> None:
