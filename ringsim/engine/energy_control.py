@@ -9,6 +9,10 @@ integrator swallows what it cannot resolve.  The imbalance of a step,
 is known from its two ends.  It falls with the third power of the step where the step resolves
 the motion, so that a refused step is repeated with h (allowed / imbalance)^(1/3), and the next
 one may be no larger than that.
+
+What is allowed goes with the tolerance where an impact or two are all that matters.  Ropes catch
+all the time: N ~ 1/h steps with an imbalance of h^3 each add up to h^2, which is to go with the
+tolerance, so that a step may lack tolerance^(3/2).
 """
 
 from __future__ import annotations
@@ -20,6 +24,8 @@ from ringsim.parts.solver import Solver
 
 _SHARE = 0.3
 """Imbalance allowed in a step over the tolerance times the energy exchanged so far."""
+_USUAL = 3e-4
+"""Tolerance at which that holds for ropes, too."""
 _REFUSED = 2.0
 """Imbalance over the allowed one from which on a step is repeated."""
 _SAFETY = 0.8
@@ -50,17 +56,27 @@ class EnergyControl:
         slight
             Energy in J that does not matter; it counts as exchanged from the start.
         tireless
-            Whether any number of steps may be repeated.  A structure without ropes that vibrates
-            on and on, faster than anybody wants to resolve, would be followed forever; its energy
-            error tells instead.
+            Whether any number of steps may be repeated, as ropes need it.  A structure without
+            ropes that vibrates on and on, faster than anybody wants to resolve, would be followed
+            forever; its energy error tells instead.
         """
         more = math.sqrt(max(1e-4 / solver.tolerance, 1.0))
         self._patience = math.inf if tireless else _PATIENCE * more
         self.limit, self.refused = math.inf, 0
-        self._allowed = _SHARE * solver.tolerance
+        often = math.sqrt(solver.tolerance / _USUAL) if tireless else 1.0
+        self._allowed = _SHARE * solver.tolerance * often
         self._least = _FINEST * solver.step
         self._exchanged, self._work = slight, 0.0
         self._stored: float | None = None
+
+    def note(self) -> str:
+        """What a run's reason must add about this; empty if every step was judged."""
+        if self.refused < self._patience:
+            return ""
+        return (
+            f"; {self.refused} steps were repeated for their energy, and no more after that: see "
+            "energy_error"
+        )
 
     def shorter(self, step: float, before: Energies, after: Energies) -> float | None:
         """A smaller step in s to repeat this one with, or None if it is good enough."""
