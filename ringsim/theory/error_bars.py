@@ -52,25 +52,34 @@ def error_bars(fine: Outcome, coarse: Outcome, elements: int) -> dict[str, Array
     """
     if fine.status != Status.OK or coarse.status != Status.OK:
         return {}
-    one, two = fine.values, coarse.values
-    apart = {"opening_angle": np.nanmax(np.abs(_until(fine, coarse)))}
-    if "lock_time" in one:
-        apart["deployment_time"] = np.abs(one["lock_time"] - two["lock_time"]).max()
+    return {
+        f"{name}_error": np.asarray(bar(name, apart, largest(fine, name), elements))
+        for name, apart in differences(fine, coarse).items()
+    }
+
+
+def differences(one: Outcome, other: Outcome) -> dict[str, float]:
+    """How far two runs of a scene are apart in their main numbers, as far as they have them.
+
+    Of times and angles it is the largest of all joints, of angles also of all output times.
+    """
+    first, second = one.values, other.values
+    angles = np.abs(first["opening_angle"] - second["opening_angle"])
+    apart = {"opening_angle": float(np.nanmax(angles))}
+    if "lock_time" in first:
+        apart["deployment_time"] = float(np.abs(first["lock_time"] - second["lock_time"]).max())
     for name in ("asynchrony_max", "peak_tension", "peak_rod_stress"):
-        if name in one:
-            apart[name] = np.abs(one[name] - two[name])
-    bars = {name: SAFETY[name] * difference for name, difference in apart.items()}
-    for name, share in OF_ONE_ELEMENT.items():
-        if name in bars:
-            bars[name] = bars[name] + share / elements**2 * one[name]
-    return {f"{name}_error": np.asarray(bar) for name, bar in bars.items()}
+        if name in first:
+            apart[name] = float(np.abs(first[name] - second[name]))
+    return apart
 
 
-def _until(fine: Outcome, coarse: Outcome) -> Array:
-    """Differences of all opening angles up to the end of the motion, deg."""
-    times = fine.coordinates["time"]
-    ends = [float(o.values.get("deployment_time", np.nan)) for o in (fine, coarse)]
-    last = [float(o.values["final_time"]) for o in (fine, coarse)]
-    until = times <= np.nanmin([*ends, *last])
-    angles = [o.values["opening_angle"][..., until] for o in (fine, coarse)]
-    return np.asarray(angles[0] - angles[1])
+def largest(outcome: Outcome, name: str) -> float:
+    """Value of a run's number, or the largest of its series; NaN where it has none."""
+    return float(np.fmax.reduce(outcome.values[name], axis=None))
+
+
+def bar(name: str, apart: float, value: float, elements: int) -> float:
+    """Error bar of one number from the difference of two runs, in its unit."""
+    of_elements = OF_ONE_ELEMENT[name] / elements**2 * value if name in OF_ONE_ELEMENT else 0.0
+    return SAFETY[name] * apart + of_elements
