@@ -1,17 +1,18 @@
 """What each part of a scene costs, and what changes without it.
 
-Run: python benchmarks/leave_out.py [scene ...]
+Run: python benchmarks/leave_out.py [scene ...] > docs/leave_out.md
 
-Parts are removed (or added, where the scene leaves them out) one by one.  For each variant:
-degrees of freedom and constraints, time to build, processor time and steps of the run, and how far
-the main results are from those of the scene as it stands, beside the error bars of that.  A part
-whose removal changes results by more than the bars is one that the scene needs.
+Parts are taken out of a scene one by one, and a few that it leaves out are put in.  A part whose
+removal changes a result by more than the scene's own error bar is one that the scene needs.
+Prints Markdown; how far it is goes to standard error.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 import time
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,30 +21,59 @@ from ringsim.choice import kind_of
 from ringsim.engine.build import build
 from ringsim.engine.planar_truss import build_truss
 from ringsim.refusal import InputError
-from ringsim.scene import Scene, builtin_scenes, load_scene
+from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
+from ringsim.theory.error_bars import differences, error_bars
+from ringsim.variables import Outcome, Status
 
-VARIANTS: dict[str, dict[str, Any]] = {
-    "no boom": {"boom": "none"},
-    "no net": {"net": "none"},
-    "no stops": {"stop": "none"},
-    "upper cable alone": {"cables.lower": "none"},
-    "cables without friction": {
-        "cables.upper.friction": {"kind": "none"},
-        "cables.lower.friction": {"kind": "none"},
-    },
-    "no rod damping": {"rods.damping": 0.0},
-    "with stress output": {"record.stress": True},
-    "two elements": {"rods.elements": 2},
-    "three elements": {"rods.elements": 3},
-    "ten times the output": {"record.interval": 0.01},
+BOTH = ("cables.upper", "cables.lower")
+REMOVED: dict[str, dict[str, Any]] = {
+    "boom": {"boom": "none"},
+    "net": {"net": "none"},
+    "loads": {"loads": "none"},
+    "upper cable": {"cables.upper": "none"},
+    "lower cable": {"cables.lower": "none"},
+    "friction of the pulleys": {f"{cable}.friction": {"kind": "none"} for cable in BOTH},
+    "stops": {"stop": "none"},
+    "latches of the stops": {"stop.latch": False},
+    "friction of the V-joints": {"joints.vjoint": "none"},
+    "friction of the hinges": {"joints.hinge": "none"},
+    "friction of the pivots": {"joints.pivot": "none"},
+    "damping of the rods": {"rods.damping": 0.0},
+    "damper of the spring": {"structure.spring.damping": 0.0},
+    "damper of the rest": {"structure.rest.damping": 0.0},
 }
-SHOWN = {
-    "deployment_time": ("deployment time", "s"),
-    "asynchrony_max": ("asynchrony", "deg"),
-    "peak_tension": ("peak tension", "N"),
-    "peak_bending_strain": ("peak strain", ""),
+"""What takes a part out; those that a scene does not have are passed over."""
+OUTPUTS = {
+    "deployment_time": "deployment time, s",
+    "opening_angle": "opening angles, deg",
+    "asynchrony_max": "asynchrony, deg",
+    "peak_tension": "peak tension, N",
+    "peak_rod_stress": "peak stress, Pa",
+    "peak_bending_strain": "peak strain",
 }
+INTRODUCTION = """# What a scene needs
+
+Made by `python benchmarks/leave_out.py`. Each built-in scene runs with its parts taken out one by
+one, and with more elements and output than it has. The claim: a scene contains nothing that it does
+not need. What it does not name is not built (coordinates, constraints and times say so), and what
+it names changes its results by more than its own error bars; what does not is said below each
+table.
+
+Changes are the largest over all joints and output times, in the unit of the column and, in
+brackets, in error bars of the scene. "needed" means that a result changes by more than its bar, or
+that the scene cannot do without the part. The strain has no error bar: the difference to the run
+with twice the step stands for it. Build times are the shortest of three; run times are processor
+times of one run each on a shared machine and vary by a quarter."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """The scene as it is compared with: with stress output where it can have it."""
+
+    scene: Scene
+    outcome: Outcome
+    bars: dict[str, float]
 
 
 def size_of(scene: Scene) -> tuple[int, int, float]:
@@ -58,49 +88,122 @@ def size_of(scene: Scene) -> tuple[int, int, float]:
     return data.ODE2Size(), data.AEsize(), min(seconds)
 
 
-def row(name: str, scene: Scene, standing: dict[str, Any]) -> dict[str, Any]:
+def apart(one: Outcome, other: Outcome) -> dict[str, float]:
+    """Changes of all outputs that both runs have."""
+    found = differences(one, other)
+    if "peak_bending_strain" in one.values:
+        values = (outcome.values["peak_bending_strain"] for outcome in (one, other))
+        found["peak_bending_strain"] = abs(float(np.subtract(*values)))
+    return found
+
+
+def standing_of(name: str) -> Standing:
+    """Run a scene, and once more with twice the step for its error bars."""
+    scene = load_scene(name)
+    if kind_of(scene.structure) != "planar-truss":
+        scene = scene.with_values({"record.stress": True})
+    outcome = run(scene)
+    coarse = run(scene.model_copy(update={"solver": scene.solver.coarsened()}))
+    bars = apart(outcome, coarse)
+    stated = error_bars(outcome, coarse, scene.rods.elements)
+    bars |= {name.removesuffix("_error"): float(bar) for name, bar in stated.items()}
+    return Standing(scene, outcome, {name: bars[name] for name in OUTPUTS if name in bars})
+
+
+def row(words: str, scene: Scene, found: Outcome, cells: list[str], verdict: str) -> str:
     coordinates, constraints, building = size_of(scene)
-    found = run(scene)
-    values = found.values
-    cells = []
-    for output in SHOWN:
-        if output not in standing:
+    seconds, steps = (found.values.get(name, math.nan) for name in ("cpu_time", "steps"))
+    numbers = f"{coordinates} | {constraints} | {1e3 * building:.0f} ms | {seconds:.2f} s | {steps}"
+    return f"| {words} | {numbers} | {' | '.join(cells)} | {verdict} |"
+
+
+def changes(standing: Standing, found: Outcome) -> tuple[list[str], bool]:
+    """Cells with the changes, and whether one of them is beyond its error bar."""
+    cells, beyond = [], False
+    there = apart(found, standing.outcome) if found.status == Status.OK else {}
+    for name, bar in standing.bars.items():
+        change = there.get(name, math.nan)
+        if not math.isfinite(change):
+            cells.append("")
             continue
-        change = values.get(output, np.array(np.nan)) - standing[output]
-        cells.append(f"{float(change):+.1e}" if np.isfinite(change) else "")
-    print(
-        f"| {name} | {coordinates} | {constraints} | {1e3 * building:.0f} ms | "
-        f"{float(values['cpu_time']):.2f} s | {int(values['steps'])} | {found.status.word} | "
-        + " | ".join(cells)
-        + " |",
-        flush=True,
-    )
-    return values
+        ratio = change / bar if change > 0.0 else 0.0
+        cells.append(f"{change:.1e} ({ratio:.2g})" if change > 0.0 else "0")
+        beyond = beyond or ratio > 1.0
+    return cells, beyond
+
+
+def variants(scene: Scene) -> list[tuple[str, dict[str, Any], bool]]:
+    """Words, values, and whether something is taken out, of all that differs from the scene."""
+    elements = scene.rods.elements
+    found = [(f"no {words}", values, True) for words, values in REMOVED.items()]
+    if elements > 1:
+        fewer = elements // 2
+        found.append((f"{fewer} elements instead of {elements}", {"rods.elements": fewer}, True))
+    more = elements + 1 if elements == 1 else 2 * elements
+    found.append((f"{more} elements instead of {elements}", {"rods.elements": more}, False))
+    return found
+
+
+def present(scene: Scene, values: dict[str, Any]) -> dict[str, Any]:
+    """The values of those parts that the scene has: none is created to be taken out."""
+    found = {}
+    for path, value in values.items():
+        table: Any = scene.to_table()
+        for name in path.split("."):
+            table = table.get(name) if isinstance(table, dict) else None
+        if table is not None and table != value and not (isinstance(table, dict) and not table):
+            found[path] = value
+    return found
 
 
 def show(name: str) -> None:
-    scene = load_scene(name)
-    barred = run(scene.with_values({"solver.error_bars": True})).values
-    there = [output for output in SHOWN if output in barred]
-    head = " | ".join(f"change of {SHOWN[o][0]} ({SHOWN[o][1] or '1'})" for o in there)
+    standing = standing_of(name)
+    scene, steps = standing.scene, int(standing.outcome.values["steps"])
     print(f"\n## {name}\n")
-    print(f"| variant | coordinates | constraints | build | run | steps | status | {head} |")
-    print("|---|---|---|---|---|---|---|" + "---|" * len(there))
-    bars = [f"bar {float(barred.get(f'{o}_error', np.nan)):.1e}" for o in there]
-    values = row("as it stands", scene, {})
-    print(f"| its error bars | | | | | | | {' | '.join(bars)} |")
-    for words, changes in VARIANTS.items():
-        try:
-            variant = scene.with_values(changes)
-        except InputError as error:
-            print(
-                f"| {words} | refused: {str(error).partition(': ')[2]} |" + " |" * (5 + len(there))
-            )
+    head = " | ".join(OUTPUTS[output] for output in standing.bars)
+    print(f"| | coordinates | constraints | build | run | steps | {head} | |")
+    print("|---|---|---|---|---|---|" + "---|" * (len(standing.bars) + 1))
+    values = [f"{np.fmax.reduce(standing.outcome.values[n], axis=None):.5g}" for n in standing.bars]
+    with_stress = "with stress output" if scene.record.stress else "as it stands"
+    print(row(with_stress, scene, standing.outcome, values, ""))
+    bars = " | ".join(f"{bar:.1e}" for bar in standing.bars.values())
+    print(f"| error bars | | | | | | {bars} | |")
+    if scene.record.stress:
+        plain = scene.with_values({"record.stress": False})
+        found = run(plain)
+        cells, beyond = changes(standing, found)
+        verdict = "changes results" if beyond else "output only, not in the scene"
+        print(row("without it, as the scene stands", plain, found, cells, verdict), flush=True)
+    parts, spare = 0, []
+    for words, wanted, taken in variants(scene):
+        given = present(scene, wanted)
+        if not given:
             continue
-        if variant.to_toml() != scene.to_toml():
-            row(words, variant, values)
+        print(f"{name}: {words}", file=sys.stderr, flush=True)
+        parts += taken
+        try:
+            variant = scene.with_values(given | {"solver.step_limit": 10 * steps})
+        except InputError as error:
+            reason = str(error).partition(": ")[2].partition(":")[0]
+            empty = " |" * (5 + len(standing.bars))
+            print(f"| {words} |{empty} needed: {reason} |", flush=True)
+            continue
+        found = run(variant)
+        cells, beyond = changes(standing, found)
+        if found.status != Status.OK:
+            beyond, verdict = True, f"needed: {found.status.word}" if taken else found.status.word
+        elif taken:
+            verdict = "needed" if beyond else "changes less than the error bars"
+        else:
+            verdict = "would change results" if beyond else "rightly left out"
+        if taken and not beyond:
+            spare.append(words.removeprefix("no "))
+        print(row(words, variant, found, cells, verdict), flush=True)
+    others = f"; not by what is measured here: {', '.join(spare)}" if spare else ""
+    print(f"\n{parts - len(spare)} of {parts} are needed{others}.", flush=True)
 
 
 if __name__ == "__main__":
-    for each in sys.argv[1:] or builtin_scenes():
+    print(INTRODUCTION)
+    for each in sys.argv[1:] or ("truss2", "ring18", "ring18-cable", "planar-truss"):
         show(each)
