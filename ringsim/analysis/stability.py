@@ -28,6 +28,7 @@ CAUSES = (
     ("blow-up", "blew up"),
     ("blow-up", "not finite"),
     ("stop passed", "past its stop"),
+    ("tension bends", "a tension bends by"),
     ("joint gap", "joints came apart"),
     ("Newton", "the solver gave up"),
     ("end time", "solver.end_time = "),

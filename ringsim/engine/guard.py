@@ -8,6 +8,15 @@ compare is the balance
 with the energy X exchanged so far, the largest of |work| and of the changes of kinetic and
 elastic energy.  Generalised-alpha takes energy out of what it does not resolve (B < 0) and puts
 in none, so that growth (B > 0) means more than loss.
+
+Constant steps too long for a rope that swings on its load swallow the swing, which holds too
+little energy for the balance to miss.  What is left of it shows: from one step to the next the
+tension bends by
+
+    |T(n-1) - 2 T(n) + T(n+1)| = 2 (1 - cos(w h)) |T - mean|,
+
+with the swing's angular frequency w: by two to four times the deviation from the mean where less
+than four steps make a period.  Such a run is judged at its end.
 """
 
 from __future__ import annotations
@@ -16,6 +25,7 @@ import math
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ringsim.engine.energy import Energies
 from ringsim.variables import Status
@@ -31,7 +41,14 @@ GAP = 1e-4
 """Largest gap of a joint over the length of a bar."""
 OVERRUN = math.radians(30.0)
 """Angle by which a V-joint may pass its stop: beyond it neither stop nor model mean anything."""
+BEND, PEAK_BEND = 0.05, 0.4
+"""Bend of a tension over the largest tension, its root mean square over the run and its value at
+the largest: what constant steps do not resolve changes that by 5 % at most (a swing of amplitude
+A that is not resolved bends by sqrt(2) A or more; a parabola rises by an eighth of its bend over
+the largest reading)."""
 _CURE = "reduce solver.step or solver.tolerance"
+
+Array = NDArray[np.float64]
 
 
 class Watched(Protocol):
@@ -40,6 +57,7 @@ class Watched(Protocol):
     times: list[float]
     energies: list[Energies]
     gaps: list[float]
+    tensions: list[Array]
     status: Status
     reason: str
 
@@ -47,7 +65,13 @@ class Watched(Protocol):
 class Guard:
     """Watches one run from its first reading on."""
 
-    def __init__(self, energy_tolerance: float, least_energy: float, bar: float) -> None:
+    def __init__(
+        self,
+        energy_tolerance: float,
+        least_energy: float,
+        bar: float,
+        least_bend: float = math.inf,
+    ) -> None:
         """Set the bounds.
 
         Parameters
@@ -58,8 +82,11 @@ class Guard:
             X counts as this much at least during the run, J, and as ``SLIGHT`` of it at the end.
         bar
             Length in m against which gaps are measured.
+        least_bend
+            Bend of a tension in N that does not matter; infinite where steps follow the motion.
         """
         self._tolerance, self._least, self._bar = energy_tolerance, least_energy, bar
+        self._least_bend = least_bend
         self._start: Energies | None = None
         self._lost = self._driven = 0.0
         self._low = self._high = np.zeros(3)
@@ -82,7 +109,7 @@ class Guard:
 
     def conclude(self, history: Watched) -> None:
         """Note in the history of a run that ended by itself if it is not sound after all."""
-        reason = self.verdict()
+        reason = self.verdict() or self._bent(history)
         if reason and history.status in (Status.OK, Status.UNFINISHED):
             history.status, history.reason = Status.DIVERGED, reason
 
@@ -143,6 +170,29 @@ class Guard:
         if abs(balance) <= self._tolerance * exchanged:
             return ""
         return self._unbalanced(time, balance, exchanged, "solver.energy_tolerance")
+
+    def _bent(self, history: Watched) -> str:
+        """Why constant steps have not resolved the tensions; empty if they have."""
+        if len(history.tensions) < 3 or math.isinf(self._least_bend):
+            return ""
+        tensions, steps = np.array(history.tensions), np.diff(history.times)[:, None]
+        bends = np.abs(np.diff(np.diff(tensions, axis=0) / steps, axis=0))
+        bends = (bends * np.minimum(steps[1:], steps[:-1])).max(axis=1)
+        largest, peak = float(tensions.max()), int(tensions.max(axis=1).argmax())
+        usual = math.sqrt(float(np.mean(bends**2)))
+        there = float(bends[peak - 1]) if 0 < peak < len(tensions) - 1 else 0.0
+        for bend, share, where in (
+            (usual, BEND, "in the root mean square"),
+            (there, PEAK_BEND, f"at {history.times[peak]:.6g} s, where it is largest"),
+        ):
+            if bend > max(share * largest, self._least_bend):
+                return (
+                    f"a tension bends by {bend:.3g} N within a step {where}, "
+                    f"{100.0 * bend / largest:.3g} % of its largest value and more than "
+                    f"{100.0 * share:g} %: the steps do not resolve how the rope swings: "
+                    "reduce solver.step"
+                )
+        return ""
 
     def _exchanged(self, least: float) -> float:
         """X, J."""

@@ -169,10 +169,12 @@ class Integration:
         """Have exudyn repeat a step that has converged to a state that lacks energy."""
         before, control = self.history.times[-1], self._control
         if time > before and self._weighed is None and control is not None:
-            self._weighed = self._measure(time)
-            if self._weighed is not None:
+            found = self._weighed = self._measure(time)
+            if found is not None:
                 self._shorter = control.shorter(
-                    time - before, self.history.energies[-1], self._weighed.energies
+                    time - before, self.history.energies[-1], found.energies
+                ) or self._steps.shorter_first(
+                    time - before, self._locks.contact(found.angles, found.rates)
                 )
         return [0.0 if self._shorter is None else _REFUSE, -1.0]
 

@@ -79,7 +79,8 @@ class TrussIntegration:
         time.adaptiveStepRecoverySteps = _RECOVERY
         self._reader = TrussReader(model)
         slight = _SLIGHT * self._push() * model.truss.beam_length
-        self._guard = Guard(solver.energy_tolerance, slight, model.truss.beam_length)
+        slack = max(cable.slack_width for cable in model.cable.chain.cables)
+        self._guard = Guard(solver.energy_tolerance, slight, model.truss.beam_length, slack)
         self.history = TrussHistory()
 
     def run(self) -> TrussHistory:

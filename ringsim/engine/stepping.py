@@ -20,6 +20,12 @@ _DEPTH = math.radians(0.05)
 """Angle by which a V-joint may pass its stop within one step, at the tolerance 1e-4."""
 _FIRST = 20.0
 """The first step is ``step`` over this."""
+_PART = 0.02
+"""Largest first step over the time to the first stop."""
+_RETRY = 0.2
+"""Ratio of the next attempt at the first step to one that was too long."""
+_BRIEFEST = 1e-4
+"""No first step is repeated below this share of ``step``."""
 
 
 class StopContact(NamedTuple):
@@ -84,6 +90,23 @@ class StepControl:
             wanted = min(wanted, max(0.5 * stops.time_to_next, meeting))
         self.step = min(wanted, GROWTH * self.step, self._solver.step)
         return self.step
+
+    def shorter_first(self, step: float, stops: StopContact) -> float | None:
+        """A smaller first step in s, or None if this one is good enough or not the first.
+
+        It is chosen without knowing the motion; a winch may take a ring that is nearly open to its
+        stops within it.
+
+        Parameters
+        ----------
+        step
+            What was tried, s.
+        stops
+            Where that has led.
+        """
+        if self._past or step <= _BRIEFEST * self._solver.step:
+            return None
+        return _RETRY * step if step > _PART * (step + stops.time_to_next) else None
 
     def _gentle(self, rate: float) -> float:
         """Step in which a V-joint at this rate goes no deeper than allowed into its stop."""

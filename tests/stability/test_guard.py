@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from ringsim.analysis.stability import cause_of
 from ringsim.engine.energy import Energies
-from ringsim.engine.guard import BLOW_UP, GAP, GROWTH, LOSS, OVERRUN, SLIGHT, Guard
+from ringsim.engine.guard import BLOW_UP, GAP, GROWTH, LOSS, OVERRUN, PEAK_BEND, SLIGHT, Guard
+from ringsim.engine.history import History
+from ringsim.variables import Status
 
 TOLERANCE, LEAST, BAR = 0.02, 1e-3, 0.3
 
@@ -106,3 +109,37 @@ def test_an_unknown_balance_stops_nothing() -> None:
     watching = guard()
     assert watching.judge(1.0, Energies(1.0, 0.0, 1.0, math.nan), 0.0) == ""
     assert watching.verdict() == ""
+
+
+def concluded(tensions, times, least_bend: float = 0.05) -> History:
+    """A run that went well, but for what its tensions say."""
+    seen = History(status=Status.OK)
+    seen.times, seen.tensions = list(times), [np.array([one]) for one in tensions]
+    Guard(TOLERANCE, LEAST, BAR, least_bend).conclude(seen)
+    return seen
+
+
+@pytest.mark.parametrize(("steps", "cause"), [(3, "tension bends"), (12, "")])
+def test_constant_steps_have_to_resolve_a_swing(steps, cause) -> None:
+    """A seventh of the mean, with a period of 1 s."""
+    times = np.arange(0.0, 10.0, 1.0 / steps)
+    found = concluded(10.0 + 1.5 * np.sin(2.0 * np.pi * times), times)
+    assert cause_of(found.reason) == cause
+    assert found.status is (Status.DIVERGED if cause else Status.OK)
+    unjudged = concluded(10.0 + 1.5 * np.sin(2.0 * np.pi * times), times, math.inf)
+    assert unjudged.status is Status.OK
+
+
+@pytest.mark.parametrize(("share", "cause"), [(1.1, "tension bends"), (0.9, "")])
+def test_constant_steps_have_to_resolve_the_largest_tension(share, cause) -> None:
+    tensions = np.full(1001, 10.0)
+    tensions[500] /= 1.0 - 0.5 * share * PEAK_BEND
+    found = concluded(tensions, 0.01 * np.arange(1001))
+    assert cause_of(found.reason) == cause
+    assert "at 5 s" in found.reason or not cause
+
+
+def test_a_ramp_in_uneven_steps_does_not_bend_and_a_slack_rope_does_not_matter() -> None:
+    ramp = np.array([0.0, 0.1, 0.2, 0.21, 0.22, 0.3, 0.4])
+    assert concluded(100.0 * ramp, ramp).status is Status.OK
+    assert concluded(0.01 * (-1.0) ** np.arange(9), np.arange(9.0)).status is Status.OK

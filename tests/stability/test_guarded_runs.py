@@ -68,6 +68,52 @@ def test_a_stop_that_is_far_too_soft_is_named() -> None:
     assert cause_of(outcome.reason) == "stop passed"
 
 
+def reel(**values) -> Scene:
+    """A planar truss reeled in from slack within a second, on a soft rope."""
+    winding = {"kind": "table", "times": [0.0, 0.5, 1.0], "lengths": [0.0, 0.03, 0.1]}
+    return load_scene("planar-truss").with_values(
+        {
+            "solver.end_time": 1.0,
+            "rods.elements": 3,
+            "cables.upper.axial_stiffness": 1e3,
+            "cables.upper.winch.winding": winding,
+        }
+        | values
+    )
+
+
+def test_a_rope_whose_swing_constant_steps_swallow_is_named_and_cured() -> None:
+    """Its energy balance to a tenth of a percent says nothing of it."""
+    coarse = run(reel(**{"solver.step": 0.05, "solver.restarts": 0}))
+    assert coarse.status is Status.DIVERGED
+    assert cause_of(coarse.reason) == "tension bends"
+    assert float(coarse.values["energy_error"]) < 0.01
+    cured, fine = run(reel(**{"solver.step": 0.05})), run(reel(**{"solver.step": 0.003}))
+    assert int(cured.values["restarts"]) == 1
+    peak = float(fine.values["peak_tension"])
+    assert cured.status is Status.OK
+    assert float(cured.values["peak_tension"]) == pytest.approx(peak, rel=0.05)  # what ok promises
+
+
+def test_a_ring_that_is_nearly_open_does_not_lock_within_its_first_step() -> None:
+    """The first step knows nothing of the motion; a winch may end that within it."""
+    nearly = load_scene("truss2").with_values(
+        {
+            "structure.opening_angle": 179.9,
+            "joints.vjoint.viscous": 0.2,
+            "cables.upper.winch.winding.speed": 3.0,
+            "cables.lower.winch.winding.speed": 3.0,
+            "cables.upper.slack_width": 0.05,
+            "cables.lower.slack_width": 0.05,
+        }
+    )
+    coarse, fine = (
+        run(nearly.model_copy(update={"solver": nearly.solver.refined(k)})) for k in (0, 1)
+    )
+    times = [float(outcome.values["deployment_time"]) for outcome in (coarse, fine)]
+    assert times[0] == pytest.approx(times[1], rel=0.01)  # what ok promises
+
+
 def test_an_error_of_our_own_inside_the_solver_is_not_called_a_failure_of_the_solver() -> None:
     integration = Integration(build(ring()))
     steps = integration.history.times
