@@ -23,6 +23,7 @@ from ringsim.engine.readings import JointGroup, Openings, State
 from ringsim.engine.scales import (
     contact_step,
     residual_tolerance,
+    rope_step,
     slight_energy,
     usual_energy,
     usual_rate,
@@ -69,9 +70,7 @@ class Integration:
         self._locks = Locks(built, self._openings.read(self._state)[0])
         self._settled_at = math.inf
         self._steps = StepControl(
-            scene.solver,
-            contact_step(built),
-            usual_rate=usual_rate(scene),
+            scene.solver, contact_step(built), usual_rate(scene), rope_step(built)
         )
         self._control: EnergyControl | None = None
         usual = usual_energy(scene)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ringsim.cable.section_path import path_slope
 from ringsim.engine.build import Built
 from ringsim.engine.cables import CableDrive
 from ringsim.scene import Scene
@@ -43,6 +44,29 @@ def contact_step(built: Built) -> float:
     half = rods.density * rods.bar.area * ring.half_bar**3 / 3.0
     inertia = 2.0 * half + ring.vjoint_mass * ring.half_bar**2
     return 2.0 * math.pi * math.sqrt(inertia / scene.stop.stiffness) / 20.0
+
+
+def rope_step(built: Built) -> float:
+    """Step that resolves how the ring, as stowed, swings on taut ropes: a fiftieth of the period.
+
+    A winch that starts at once throws the ring into that swing, often with the largest tension of
+    the run; the first V-joint moves before the others, so that it is faster than the ideal ring's.
+    Infinite without cables.
+    """
+    scene = built.ring.scene
+    if built.cables is None:
+        return math.inf
+    ring = scene.structure
+    inertia = 0.25 * float(IdealRing.of(scene).motion(ring.initial_phi).inertia)
+    cables, content = built.cables.chain.cables, np.abs(built.cables.ropes.content)
+    opening = math.pi - 2.0 * ring.initial_phi
+    stiffness = sum(
+        cable.axial_stiffness
+        / float(length)
+        * (ring.sections * float(path_slope(ring.half_bar, cable.block_offset, opening))) ** 2
+        for cable, length in zip(cables, content, strict=True)
+    )
+    return 2.0 * math.pi * math.sqrt(inertia / stiffness) / 50.0
 
 
 def residual_tolerance(built: Built) -> float:

@@ -19,7 +19,9 @@ _FILTERED = 1e-4
 _DEPTH = math.radians(0.05)
 """Angle by which a V-joint may pass its stop within one step, at the tolerance 1e-4."""
 _FIRST = 20.0
-"""The first step is ``step`` over this."""
+"""The first step is ``step`` over this at most."""
+_SHORTEST = 1e-7
+"""Shortest first step, s."""
 _PART = 0.02
 """Largest first step over the time to the first stop."""
 _RETRY = 0.2
@@ -58,7 +60,22 @@ class StepControl:
     stop with a small one, the smaller the faster it comes, and so it stays until it rests.
     """
 
-    def __init__(self, solver: Solver, contact_step: float, usual_rate: float) -> None:
+    def __init__(
+        self, solver: Solver, contact_step: float, usual_rate: float, first_step: float = math.inf
+    ) -> None:
+        """Start at rest.
+
+        Parameters
+        ----------
+        solver
+            The scene's settings.
+        contact_step
+            Step that resolves a V-joint's bounce at the tolerance 1e-4, s.
+        usual_rate
+            Mean opening rate to be expected of the run, rad/s.
+        first_step
+            Step that resolves how ropes swing as a winch starts, s.
+        """
         self._solver = solver
         self._contact = min(contact_step * math.sqrt(solver.tolerance / 1e-4), solver.step)
         self._least = solver.step / _FINEST
@@ -66,7 +83,9 @@ class StepControl:
         self._bend = 0.0
         self._past: deque[tuple[float, float]] = deque()
         self._stride = max(1.0, math.sqrt(_FILTERED / solver.tolerance))
-        self.step = solver.step if solver.step_control == "constant" else solver.step / _FIRST
+        self.step = solver.step
+        if solver.step_control != "constant":
+            self.step = max(min(solver.step / _FIRST, first_step), _SHORTEST)
 
     def advance(self, time: float, rate: float, stops: StopContact) -> float:
         """The next step in s.

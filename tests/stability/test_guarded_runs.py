@@ -114,6 +114,27 @@ def test_a_ring_that_is_nearly_open_does_not_lock_within_its_first_step() -> Non
     assert times[0] == pytest.approx(times[1], rel=0.01)  # what ok promises
 
 
+def test_the_jerk_of_a_winch_that_starts_at_once_does_not_depend_on_the_largest_step() -> None:
+    """It throws the ring into a swing on its ropes, with the largest tension of the run."""
+    jerk = load_scene("truss2").with_values(
+        {
+            "structure.opening_angle": 90.0,
+            "joints.vjoint.viscous": 0.2,
+            "cables.upper.winch.winding.speed": 0.15,
+            "cables.lower.winch.winding.speed": 0.15,
+            "solver.end_time": 0.1,
+        }
+    )
+    peaks = [
+        float(run(jerk.with_values(values)).values["peak_tension"])
+        for values in (
+            {"solver.step": 0.1, "solver.tolerance": 0.1},
+            {"solver.step": 0.01, "solver.tolerance": 1e-4},
+        )
+    ]
+    assert peaks[0] == pytest.approx(peaks[1], rel=0.02)  # 0.04 from a first step of 5 ms
+
+
 def test_an_error_of_our_own_inside_the_solver_is_not_called_a_failure_of_the_solver() -> None:
     integration = Integration(build(ring()))
     steps = integration.history.times
