@@ -109,6 +109,7 @@ class Integration:
             history.status = Status.SOLVER_FAILED  # exudyn may give up without raising
             history.reason = self._explain(RuntimeError("it stopped before the end"))
         self._guard.conclude(history)
+        history.reason += self._control.note() if self._control is not None else ""
         history.newton_iterations = int(solver.it.newtonStepsCount)
         history.jacobians = int(solver.it.newtonJacobiCount)
         return history

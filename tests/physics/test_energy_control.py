@@ -2,9 +2,12 @@
 
 import pytest
 
+from ringsim.engine import energy_control
 from ringsim.engine.energy import Energies
 from ringsim.engine.energy_control import EnergyControl
 from ringsim.parts.solver import Solver
+from ringsim.scene import load_scene
+from ringsim.simulation import run
 
 SOLVER = Solver(step=0.2, tolerance=1e-4)
 ALLOWED = {True: 0.3 * 1e-4 * (1.0 / 3.0) ** 0.5, False: 0.3 * 1e-4}
@@ -50,3 +53,13 @@ def test_patience_ends_without_ropes_alone() -> None:
         assert ("300 steps were repeated" in control.note()) is not tireless
         control.accept(0.1, BEFORE, after(0.5))
         assert (control.limit < 0.1) is tireless
+
+
+def test_a_run_tells_that_its_patience_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = load_scene("ring18").with_values(
+        {"structure.sections": 3, "structure.aspect_ratio": 1.0, "net": "none", "boom": "none",
+         "loads.force": 0.03}
+    )  # fmt: skip
+    assert "repeated" not in run(scene).reason
+    monkeypatch.setattr(energy_control, "_PATIENCE", 1)
+    assert "1 steps were repeated for their energy, and no more" in run(scene).reason
