@@ -74,7 +74,7 @@ class EnergyControl:
         if self.refused < self._patience:
             return ""
         return (
-            f"; {self.refused} steps were repeated for their energy, and no more after that: see "
+            f"; energy repeated a step {self.refused} times and was left alone after that: see "
             "energy_error"
         )
 

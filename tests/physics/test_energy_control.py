@@ -50,7 +50,7 @@ def test_patience_ends_without_ropes_alone() -> None:
         asked = [control.shorter(0.1, BEFORE, after(0.5)) is not None for _ in range(400)]
         assert asked[:300] == [True] * 300
         assert asked[-1] is tireless
-        assert ("300 steps were repeated" in control.note()) is not tireless
+        assert ("repeated a step 300 times" in control.note()) is not tireless
         control.accept(0.1, BEFORE, after(0.5))
         assert (control.limit < 0.1) is tireless
 
@@ -60,6 +60,6 @@ def test_a_run_tells_that_its_patience_ended(monkeypatch: pytest.MonkeyPatch) ->
         {"structure.sections": 3, "structure.aspect_ratio": 1.0, "net": "none", "boom": "none",
          "loads.force": 0.03}
     )  # fmt: skip
-    assert "repeated" not in run(scene).reason
+    assert "left alone" not in run(scene).reason
     monkeypatch.setattr(energy_control, "_PATIENCE", 1)
-    assert "1 steps were repeated for their energy, and no more" in run(scene).reason
+    assert "energy repeated a step 1 times and was left alone" in run(scene).reason
