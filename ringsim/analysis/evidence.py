@@ -1,7 +1,7 @@
 """Settings that were measured to be worth their cost, and picking one for a wanted accuracy.
 
-An accuracy study leaves the efficient frontier of the motion behind as a small table; those of
-the built-in scenes come with the package.
+An accuracy study leaves what is on one of its efficient frontiers behind as a small table; those
+of the built-in scenes come with the package.
 """
 
 from __future__ import annotations
@@ -18,14 +18,17 @@ import tomli_w
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.accuracy import GROUPS
-from ringsim.analysis.ladder import PATHS
+from ringsim.analysis.errors import GROUPS, OUTPUTS
+from ringsim.analysis.frontier import WORTH_A_CHANGE
+from ringsim.analysis.ladder import PATHS, STANDING
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError
-from ringsim.scene import Scene
+from ringsim.scene import Scene, scene_from_toml
 
 JUDGED_BY = "motion"
-"""The errors that a setting is picked by: deployment time, opening angle and asynchrony."""
+"""The errors that a setting is picked by, unless others are named: deployment time and angle."""
+CHOICES = (*GROUPS, *OUTPUTS, "energy")
+"""What a setting may be picked by."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +38,11 @@ class Setting:
     Attributes
     ----------
     values
-        By scene path; the largest step of a moving one is the scene's own affair.
+        By scene path.
     errors
-        Relative, by output.
+        What the setting is good for, relative, by output and group of outputs.
     seconds
-        Processor time of the run, s.
+        Processor time of a run, s.
     residuals
         Residuals that Newton evaluated in accepted steps, and the steps: a cost that does not
         depend on the machine's load, but leaves out factorisations.
@@ -53,82 +56,134 @@ class Setting:
 
 @dataclass(frozen=True)
 class Evidence:
-    """The settings on the frontier of one scene, cheapest first.
+    """The settings of one scene that are worth their cost, cheapest first.
+
+    That which the scene has goes before others that are hardly cheaper.
 
     Attributes
     ----------
     scene
         Its name.
+    kind
+        What it is, see :func:`kind_of_scene`.
+    step
+        Its largest step, s: that of another scene is scaled like it.
     references
         Extrapolated values of its main numbers, SI units and degrees.
     """
 
     scene: str
+    kind: Mapping[str, Any]
+    step: float
     references: Mapping[str, float]
     settings: tuple[Setting, ...]
 
-    def pick(self, accuracy: float) -> Setting:
-        """The cheapest setting whose motion is as accurate as that.
+    def pick(self, accuracy: float, of: str = JUDGED_BY) -> Setting:
+        """The cheapest setting that is good for such an error.
+
+        Parameters
+        ----------
+        accuracy
+            Relative error.
+        of
+            One of ``CHOICES``.
 
         Raises
         ------
         InputError
-            If none was measured to be.
+            If none is, or the scene has no such output.
         """
-        for setting in self.settings:
-            if setting.errors[JUDGED_BY] <= accuracy:
+        errors = [setting.errors.get(of, np.inf) for setting in self.settings]
+        if not np.isfinite(errors).any():
+            there = ", ".join(name for name in CHOICES if name in self.settings[0].errors)
+            raise InputError(f"--of {of}: {self.scene} has no such output: choose from {there}")
+        for setting, error in zip(self.settings, errors, strict=True):
+            if error <= accuracy:
                 return setting
-        best = 1.1 * min(setting.errors[JUDGED_BY] for setting in self.settings)
+        best = float(f"{1.006 * min(errors):.2e}")
         raise InputError(
-            f"--accuracy {accuracy:g}: the best setting measured with {self.scene} gives "
-            f"{best:.2g}: ask for that, or set solver.tolerance yourself"
+            f"--accuracy {accuracy:g}: the best setting measured with {self.scene} is good for "
+            f"{best:.3g} in {of.replace('_', ' ')}: ask for that, or set solver.tolerance yourself"
         )
+
+    def values_for(self, setting: Setting, scene: Scene) -> dict[str, Any]:
+        """A setting's values for a scene whose largest step may be another one."""
+        values = dict(setting.values)
+        step = values["solver.step"] / self.step * scene.solver.step
+        values["solver.step"] = float(f"{min(step, scene.solver.end_time):.6g}")
+        return values
+
+    def require_like(self, scene: Scene) -> None:
+        """Refuse evidence of another kind of scene.
+
+        Raises
+        ------
+        InputError
+            One line with what differs.
+        """
+        for name, value in kind_of_scene(scene).items():
+            if value != self.kind.get(name):
+                raise InputError(
+                    f"--accuracy: its settings were measured with {self.scene}, {name} = "
+                    f"{self.kind.get(name)}, and {scene.name} has {name} = {value}: give "
+                    "--evidence from ringsim accuracy on a scene of its kind"
+                )
+
+
+def kind_of_scene(scene: Scene) -> dict[str, Any]:
+    """What settings depend on most: structure, rods, drive, and how steps are chosen."""
+    return {
+        "structure": kind_of(scene.structure),
+        "rods": kind_of(scene.rods),
+        "cables": scene.cables is not None,
+        "step_control": scene.solver.step_control,
+    }
 
 
 def evidence_of(found: xr.Dataset) -> Evidence:
-    """The frontier of a study's motion (of its opening angle, if nothing locks).
+    """The settings of a study, each better in some output than every cheaper one.
 
     Parameters
     ----------
     found
         From :func:`ringsim.analysis.accuracy.judge`; its scene is the attribute ``scene``.
     """
+    scene = scene_from_toml(found.attrs["scene"], source="the study's scene")
     outputs = [str(name) for name in found.output.values]
-    column = outputs.index(JUDGED_BY)
-    kept = np.flatnonzero(_best(found, column))
     settings: list[Setting] = []
-    for rung in kept[np.argsort(found.cpu_time.values[kept])]:
-        errors = {
-            name: float(f"{found.error.values[rung, k]:.2e}")
-            for k, name in enumerate(outputs)
-            if np.isfinite(found.error.values[rung, k])
-        }
-        seconds = float(f"{found.cpu_time.values[rung]:.3g}")
-        residuals = int(found.residual_evaluations.values[rung])
-        values = _values(found, int(rung))
-        if all(values != known.values for known in settings):  # ladders share settings
-            settings.append(Setting(values, errors, seconds, residuals))
-    known = zip(outputs, found.reference.values, strict=True)
-    references = {name: float(f"{value:.8g}") for name, value in known if np.isfinite(value)}
-    name = str(tomllib.loads(found.attrs["scene"])["name"])
-    return Evidence(name, references, tuple(settings))
+    for rung in _by_cost(found):
+        bounds = dict(zip(outputs, found.bound.values[rung], strict=True))
+        errors = {name: _rounded_up(bound) for name, bound in bounds.items() if np.isfinite(bound)}
+        if all(any(errors[name] < known.errors[name] for name in errors) for known in settings):
+            seconds = float(f"{found.cost.values[rung]:.3g}")
+            residuals = int(found.residual_evaluations.values[rung])
+            settings.append(Setting(_values(found, int(rung)), errors, seconds, residuals))
+    references = {
+        name: float(f"{value:.8g}")
+        for name, value in zip(outputs, found.reference.values, strict=True)
+        if np.isfinite(value)
+    }
+    step = scene.solver.step
+    return Evidence(scene.name, kind_of_scene(scene), step, references, tuple(settings))
 
 
-def _best(found: xr.Dataset, column: int) -> NDArray[np.bool_]:
-    """The frontier among full runs of the scene's own rods."""
-    others = np.isin(found.ladder.values, ["fidelity", "formulation"])
-    error = np.where(others, np.inf, np.nan_to_num(found.error.values[:, column], nan=np.inf))
-    cost = found.cpu_time.values
-    beaten = [((cost < cost[k]) & (error <= error[k])).any() for k in range(len(error))]
-    return np.asarray(np.isfinite(error) & ~np.array(beaten))
+def _by_cost(found: xr.Dataset) -> NDArray[np.int64]:
+    """Good runs of the full model with the scene's own rods and step control, cheapest first."""
+    others = np.isin(found.ladder.values, ["fidelity", "formulation", "constant step"])
+    own = np.flatnonzero(~others & np.isfinite(found.bound.values).any(axis=1))
+    stands = found.ladder.values[own] == STANDING
+    cost = found.cost.values[own] * np.where(stands, WORTH_A_CHANGE, 1.0)
+    return np.asarray(own[np.argsort(cost, kind="stable")])
+
+
+def _rounded_up(error: float) -> float:
+    return float(f"{1.0049 * error:.2e}")
 
 
 def _values(found: xr.Dataset, rung: int) -> dict[str, Any]:
     values = {path: found[path.replace(".", "_")].values[rung] for path in PATHS}
     values = {path: getattr(value, "item", lambda v=value: v)() for path, value in values.items()}
-    del values["rods.kind"]
-    if values["solver.step_control"] == "motion":
-        del values["solver.step"]
+    del values["rods.kind"], values["solver.step_control"]
     return values
 
 
@@ -136,7 +191,8 @@ def to_toml(evidence: Evidence) -> str:
     """As a file."""
     table = {
         "scene": evidence.scene,
-        "judged_by": [JUDGED_BY, *GROUPS[JUDGED_BY]],
+        "kind": dict(evidence.kind),
+        "step": evidence.step,
         "references": dict(evidence.references),
         "settings": [
             {
@@ -172,14 +228,8 @@ def evidence_for(scene: Scene) -> Evidence:
     Raises
     ------
     InputError
-        If the scene has rods of another formulation.
+        If it knows nothing of such scenes.
     """
-    if kind_of(scene.rods) != "geometrically-exact":
-        raise InputError(
-            f'rods.kind = "{kind_of(scene.rods)}": the settings that come with ringsim were '
-            "measured with geometrically-exact rods: use these, or give --evidence from "
-            "ringsim accuracy on your scene"
-        )
     name = likest(scene)
     file = resources.files("ringsim") / "scenes" / "evidence" / f"{name}.toml"
     if not file.is_file():
@@ -211,9 +261,12 @@ def _from_toml(text: str, name: str) -> Evidence:
             )
             for s in table["settings"]
         )
-        if not settings or any(JUDGED_BY not in s.errors for s in settings):
-            raise KeyError(JUDGED_BY)
-        return Evidence(str(table["scene"]), dict(table["references"]), settings)
+        if not settings or any("solver.step" not in s.values for s in settings):
+            raise KeyError("settings")
+        step = float(table["step"])
+        return Evidence(
+            str(table["scene"]), dict(table["kind"]), step, dict(table["references"]), settings
+        )
     except (tomllib.TOMLDecodeError, AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"{name}: not the settings of an accuracy study ({error}): make it with "

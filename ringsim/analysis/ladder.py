@@ -1,13 +1,15 @@
 """The ladder of an accuracy study: which numerical settings of a scene are compared.
 
 Every rung changes what numbers say and nothing of what is simulated: step size, elements, rod
-formulation, dissipation of the integrator, Newton's tolerance, fidelity.
+formulation, dissipation of the integrator, Newton's tolerance, fidelity.  Ladders that are to
+show an order ("steps", "constant step", "elements", "formulation") solve each step so well that
+nothing but the knob they turn is left; the others are settings that somebody might choose.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from ringsim.choice import kind_of
@@ -23,12 +25,27 @@ PATHS = (
     "rods.elements",
 )
 """Scene paths that a ladder varies."""
-_TOLERANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5)
-_FINE = 1e-5
-"""Tolerance of the reference runs."""
-_MOVING_STEPS = (0.4, 0.2, 0.1)
-_CONSTANT_STEPS = (4.0, 2.0, 1.0)
-"""Constant steps over solver.step, for scenes whose step moves and for those whose does not."""
+STANDING = "as it stands"
+_IN_TIME = ("x 1/4", "x 1/8", "x 1/16")
+"""Labels of the three rungs of "steps" that the reference is made of."""
+_HALVINGS = {"x 2": -1, "x 1": 0, "x 1/2": 1, "x 1/4": 2, "x 1/8": 3, "x 1/16": 4}
+"""Rungs of "steps", by the factor on every step: the exponent of 1/2."""
+_FINE, _MIDDLE = 3, 2
+"""Halvings of the steps at which elements and rod formulations are compared."""
+_TIGHT = 1e-6
+"""Newton's tolerance, at most, of ladders that are to show an order."""
+_TOLERANCE = (1e-8, 0.1)
+_NEWTON = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+_RADII = (0.5, 0.8, 0.9, 0.95)
+_CONSTANT_STEPS = (0.1, 0.05, 0.025)
+"""Constant steps over solver.step, for scenes whose step moves."""
+_SETTINGS = (
+    (10.0, 1.0, 1), (10.0, 0.0, 1), (1.0 / 0.3, 1.0, 1), (1.0 / 0.3, 0.0, 1), (1.0 / 3.0, 1.0, 1),
+    (1.0 / 3.0, 0.0, 1), (0.1, 1.0, 1), (0.1, 0.1, 1), (1.0 / 30.0, 0.1, 1), (0.01, 0.1, 1),
+    (1.0, 1.0, 2), (1.0 / 3.0, 1.0, 2), (0.1, 0.1, 2), (1.0, 1.0, 4),
+)  # fmt: skip
+"""Settings to choose from: factors on solver.tolerance, on Newton's (0: as good as the ladders
+that are to show an order have it), and on the elements."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +55,12 @@ class Rung:
     Attributes
     ----------
     ladder
-        Which knob it turns: "as it stands", "tolerance", "constant step", "elements",
-        "formulation", "dissipation", "newton", "combined", or "reference".
+        Which knob it turns: "as it stands", "steps", "constant step", "elements",
+        "formulation", "dissipation", "newton", "setting", or "fidelity".
     label
         In words, unique in a ladder.
     size
-        What an order of convergence refers to: a step in s, the root of a tolerance, or
+        What an order of convergence refers to: a step in s or over that of the scene, or
         1 / elements; 0 where none does.
     values
         All of ``PATHS``.
@@ -52,7 +69,7 @@ class Rung:
     ladder: str
     label: str
     size: float
-    values: Mapping[str, Any] = field(default_factory=dict)
+    values: Mapping[str, Any]
 
     @property
     def stressed(self) -> bool:
@@ -61,55 +78,21 @@ class Rung:
 
 
 def ladder(scene: Scene) -> list[Rung]:
-    """All rungs for a scene, the references last; some ladders share a setting.
+    """All rungs for a scene; some ladders share a setting.
 
-    The references are a run with fine steps, the same with half the steps (``solver.tolerance``
-    over 4), and the same with twice the elements: what Richardson's extrapolation in time and
-    in space needs.
+    Among them are those that a reference is made of (see :func:`references`).
     """
     base = standing(scene)
-    moving = scene.solver.step_control == "motion"
-    found = [Rung("as it stands", "as it stands", 0.0, base)]
-
-    def add(name: str, label: str, size: float, **changes: Any) -> None:
-        values = base | {path.replace("__", "."): value for path, value in changes.items()}
-        found.append(Rung(name, label, size, values))
-
-    steps = _MOVING_STEPS if moving else _CONSTANT_STEPS
-    for share in steps:
-        step = float(f"{share * scene.solver.step:.6g}")
-        add(
-            "constant step",
-            f"{step:g} s",
-            step,
-            solver__step_control="constant",
-            solver__step=step,
-        )
-    if moving:
-        for tolerance in _TOLERANCES:
-            add("tolerance", f"{tolerance:g}", tolerance**0.5, solver__tolerance=tolerance)
-    one = scene.rods.elements
-    for elements in (one, 2 * one, 4 * one):
-        add("elements", f"{elements}", 1.0 / elements, rods__elements=elements)
-    if kind_of(scene.structure) == "pantograph-ring" and scene.cables is None:
-        other = "ancf" if kind_of(scene.rods) != "ancf" else "geometrically-exact"
-        for elements in (one, 2 * one):
-            label = f"{other}, {elements}"
-            add("formulation", label, 1.0 / elements, rods__kind=other, rods__elements=elements)
-    for radius in (0.5, 0.8, 0.9, 0.95):
-        add("dissipation", f"{radius:g}", 0.0, solver__spectral_radius=radius)
-    for tolerance in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
-        add("newton", f"{tolerance:g}", 0.0, solver__newton_tolerance=tolerance)
-    if moving:
-        for tolerance, newton in ((1e-3, 1e-3), (3e-4, 1e-3), (1e-4, 1e-3), (3e-5, 1e-4)):
-            add(
-                "combined",
-                f"{tolerance:g}, newton {newton:g}",
-                0.0,
-                solver__tolerance=tolerance,
-                solver__newton_tolerance=newton,
-            )
-    return found + _references(scene, base)
+    found = [Rung(STANDING, STANDING, 0.0, base)]
+    found += _steps(scene, base)
+    if _moves(scene):
+        found += _constant_steps(scene, base)
+    found += _elements(scene, base)
+    for radius in _RADII:
+        found.append(_rung(base, "dissipation", f"{radius:g}", solver__spectral_radius=radius))
+    for tolerance in _NEWTON:
+        found.append(_rung(base, "newton", f"{tolerance:g}", solver__newton_tolerance=tolerance))
+    return found + list(_settings(scene, base))
 
 
 def standing(scene: Scene) -> dict[str, Any]:
@@ -126,16 +109,107 @@ def standing(scene: Scene) -> dict[str, Any]:
     }
 
 
-def _references(scene: Scene, base: Mapping[str, Any]) -> list[Rung]:
-    elements, step = 2 * scene.rods.elements, scene.solver.step
-    fine = {"rods.elements": elements, "solver.newton_tolerance": 1e-7}
-    if scene.solver.step_control == "motion":
-        coarse, halved = {"solver.tolerance": _FINE}, {"solver.tolerance": _FINE / 4.0}
-    else:
-        coarse, halved = {"solver.step": step / 4.0}, {"solver.step": step / 8.0}
-    more = {"rods.elements": 2 * elements}
+def references(rungs: list[Rung]) -> tuple[list[int], list[int]]:
+    """Places of the three rungs with ever finer steps, and of the three with ever more elements.
+
+    Steps halve and elements double from one to the next.
+    """
+    in_time = [k for k, rung in enumerate(rungs) if rung.ladder == "steps"]
+    in_time = [k for k in in_time if rungs[k].label in _IN_TIME]
+    in_space = [k for k, rung in enumerate(rungs) if rung.ladder == "elements"]
+    return in_time, in_space
+
+
+def _moves(scene: Scene) -> bool:
+    return scene.solver.step_control == "motion"
+
+
+def _rung(
+    base: Mapping[str, Any], name: str, label: str, size: float = 0.0, **changes: Any
+) -> Rung:
+    values = {path.replace("__", "."): value for path, value in changes.items()}
+    return Rung(name, label, size, {**base, **values})
+
+
+def _halved(scene: Scene, times: int) -> dict[str, Any]:
+    """Every step halved so often, and each solved well; negative: doubled."""
+    solver = scene.solver
+    found: dict[str, Any] = {
+        "solver__step": _short(min(solver.step * 0.5**times, solver.end_time)),
+        "solver__newton_tolerance": min(solver.newton_tolerance, _TIGHT),
+    }
+    if _moves(scene):
+        found["solver__tolerance"] = _within(solver.tolerance * 0.25**times)
+    return found
+
+
+def _steps(scene: Scene, base: Mapping[str, Any]) -> list[Rung]:
     return [
-        Rung("reference", "fine", 0.0, {**base, **fine, **coarse}),
-        Rung("reference", "half the steps", 0.0, {**base, **fine, **halved}),
-        Rung("reference", "twice the elements", 0.0, {**base, **fine, **coarse, **more}),
+        _rung(base, "steps", label, 0.5**times, **_halved(scene, times))
+        for label, times in _HALVINGS.items()
     ]
+
+
+def _constant_steps(scene: Scene, base: Mapping[str, Any]) -> list[Rung]:
+    newton = min(scene.solver.newton_tolerance, _TIGHT)
+    return [
+        _rung(
+            base, "constant step", f"{step:g} s", step,
+            solver__step_control="constant", solver__step=step, solver__newton_tolerance=newton,
+        )
+        for step in (_short(share * scene.solver.step) for share in _CONSTANT_STEPS)
+    ]  # fmt: skip
+
+
+def _elements(scene: Scene, base: Mapping[str, Any]) -> list[Rung]:
+    """More elements with fine steps; the other rod formulation with all but as fine ones."""
+    one, own = scene.rods.elements, kind_of(scene.rods)
+    other = "ancf" if own != "ancf" else "geometrically-exact"
+    comparable = kind_of(scene.structure) == "pantograph-ring" and scene.cables is None
+    found = []
+    for name, kind, halvings in (("elements", own, _FINE), ("formulation", other, _MIDDLE)):
+        if kind != own and not comparable:
+            continue
+        for elements in (one, 2 * one, 4 * one):
+            label = f"{elements}" if kind == own else f"{kind}, {elements}"
+            changes = {"rods__kind": kind, "rods__elements": elements}
+            found.append(
+                _rung(base, name, label, 1.0 / elements, **_halved(scene, halvings), **changes)
+            )
+    return found
+
+
+def _settings(scene: Scene, base: Mapping[str, Any]) -> Iterator[Rung]:
+    """What somebody might choose: coarser or finer steps, Newton to match, more elements."""
+    solver = scene.solver
+    for coarser, newtons, more in _SETTINGS:
+        tight = min(solver.newton_tolerance, _TIGHT)
+        newton = float(f"{max(newtons * solver.newton_tolerance, tight):.6g}")
+        elements = more * scene.rods.elements
+        changes: dict[str, Any] = {"solver__newton_tolerance": newton, "rods__elements": elements}
+        if _moves(scene):
+            tolerance = _within(coarser * solver.tolerance)
+            if tolerance == solver.tolerance and coarser != 1.0:
+                continue  # the scene stands at the end of what is allowed
+            changes["solver__tolerance"] = tolerance
+            label = f"tolerance {tolerance:g}"
+        else:
+            step = min(coarser**0.5 * solver.step, solver.end_time)
+            step = solver.step if coarser == 1.0 else float(f"{step:.2g}")
+            changes["solver__step"] = step
+            label = f"step {step:g} s"
+        if newton != solver.newton_tolerance:
+            label += f", newton {newton:g}"
+        if more > 1:
+            label += f", {elements} elements"
+        yield _rung(base, "setting", label, 0.0, **changes)
+
+
+def _within(tolerance: float) -> float:
+    """A tolerance that a scene may have, in few digits."""
+    low, high = _TOLERANCE
+    return float(f"{min(max(tolerance, low), high):.6g}")
+
+
+def _short(step: float) -> float:
+    return float(f"{step:.6g}")

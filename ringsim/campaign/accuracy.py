@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from ringsim.analysis.accuracy import NEEDED, Truth, judge
-from ringsim.analysis.ladder import PATHS, Rung, ladder, standing
+from ringsim.analysis.ladder import PATHS, Rung, ladder, references, standing
 from ringsim.campaign.cases import Cases, run_cases
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError
@@ -17,13 +18,24 @@ from ringsim.scene import Scene
 from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 from ringsim.theory.ideal_ring import IdealRing
+from ringsim.variables import Status
 
 TIMEOUT = 1800.0
-"""Longest time of one rung, s."""
+"""Longest time of one rung, s, unless another is given."""
+_STEP_LIMIT = 1_000_000
+"""Steps of one rung: its time is limited instead."""
 
 
-def run_ladder(folder: Path, scene: Scene, workers: int) -> xr.Dataset:
+class ReferenceRunError(Exception):
+    """A scene has no reference to compare with: its message names setting, reason and cure."""
+
+
+def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float = TIMEOUT) -> xr.Dataset:
     """Errors and cost of all settings of a scene's ladder.
+
+    A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
+    cheapest run of the reference goes first, then the whole reference, then the rest, so that a
+    scene which cannot be studied costs little.
 
     Parameters
     ----------
@@ -33,8 +45,8 @@ def run_ladder(folder: Path, scene: Scene, workers: int) -> xr.Dataset:
         Any scene that ends well at fine settings.
     workers
         Solver processes.
-
-    A setting that fails is a failed rung: nothing starts anew with smaller steps here.
+    timeout
+        Longest time of one rung, s.
 
     Returns
     -------
@@ -45,59 +57,88 @@ def run_ladder(folder: Path, scene: Scene, workers: int) -> xr.Dataset:
     Raises
     ------
     InputError
-        If the scene is refused, or a reference run does not end well.
+        If the scene is refused.
+    ReferenceRunError
+        If a reference run does not end well.
     """
-    scene = scene.with_values({"solver.restarts": 0, "solver.error_bars": False})
+    scene = scene.with_values(
+        {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
+    )
+    study = _Study(folder, scene, workers, timeout)
     rungs = ladder(scene)
-    truss = kind_of(scene.structure) == "planar-truss"
-    parts: list[xr.Dataset] = []
-    order: list[int] = []
-    # What gives a result its shape is the same within a campaign: stresses, a truss's elements.
-    shapes = [(rung.stressed, rung.values["rods.elements"] if truss else 0) for rung in rungs]
-    for stressed, elements in dict.fromkeys(shapes):
-        own = [k for k, shape in enumerate(shapes) if shape == (stressed, elements)]
-        given: dict[str, object] = {"record.stress": stressed and not truss}
-        name = "stressed" if stressed else "unstressed"
-        if truss:
-            name, given["rods.elements"] = f"elements-{elements}", elements
-        chosen = scene.with_values(given)
-        parts.append(_run(folder, name, chosen, [rungs[k] for k in own], workers, set(given)))
-        order += own
-    results = xr.concat(parts, "rung").isel(rung=np.argsort(order))
+    in_time, in_space = references(rungs)
+    needed = [*in_time, *in_space]
+    for stage, places in (("first", in_time[:1]), ("reference", needed)):
+        own = [rungs[k] for k in places]
+        _require_ok(own, study.run(stage, own))
+    results = study.run("settings", rungs)
     truths = _quadrature(scene)
-    ideal = _ideal(folder, scene, workers)
+    ideal = _ideal(study)
     if ideal is not None:
         results = xr.concat([ideal, results], "rung")
         rungs = [Rung("fidelity", "ideal", 0.0, standing(scene)), *rungs]
         truths += _truths(ideal)
-    try:
-        return judge(results, rungs, truths)
-    except ValueError as error:
-        reasons = [str(r) for r in results.reason.to_numpy()[-3:] if r]
-        raise InputError(
-            f"{scene.name}: {error}: {'; '.join(reasons)}: choose a scene that ends well"
-        ) from error
+    return judge(results, rungs, truths)
 
 
-def _run(
-    folder: Path,
-    name: str,
-    scene: Scene,
-    rungs: Sequence[Rung],
-    workers: int,
-    given: set[str],
-) -> xr.Dataset:
-    """Run each setting once; rungs that share one share its result."""
-    settings: list[dict[str, object]] = []
-    places: list[int] = []
-    for rung in rungs:
-        wanted = {path: rung.values[path] for path in PATHS if path not in given}
-        if wanted not in settings:
-            settings.append(wanted)
-        places.append(settings.index(wanted))
-    title = f"Settings of {scene.name} against each other ({name})"
-    file = run_cases(folder, Cases(name, title, scene, settings, TIMEOUT), workers)
-    return _needed(file).isel(rung=places)
+@dataclass
+class _Study:
+    """Runs settings in stages, each setting once."""
+
+    folder: Path
+    scene: Scene
+    workers: int
+    timeout: float
+
+    def __post_init__(self) -> None:
+        self._truss = kind_of(self.scene.structure) == "planar-truss"
+        self._known: dict[tuple[object, ...], xr.Dataset] = {}
+
+    def run(self, stage: str, rungs: Sequence[Rung]) -> xr.Dataset:
+        """Results over the rungs, those that earlier stages ran among them."""
+        keys = [self._key(rung) for rung in rungs]
+        missing = {
+            key: rung for key, rung in zip(keys, rungs, strict=True) if key not in self._known
+        }
+        # What gives a result its shape is the same within a campaign.
+        shapes = {key: self._shape(rung) for key, rung in missing.items()}
+        for shape in dict.fromkeys(shapes.values()):
+            own = [key for key in missing if shapes[key] == shape]
+            found = self._campaign(stage, shape, [missing[key] for key in own])
+            self._known.update({key: found.isel(rung=[k]) for k, key in enumerate(own)})
+        return xr.concat([self._known[key] for key in keys], "rung")
+
+    @staticmethod
+    def _key(rung: Rung) -> tuple[object, ...]:
+        return tuple(rung.values[path] for path in PATHS)
+
+    def _shape(self, rung: Rung) -> tuple[bool, int]:
+        """Whether there are stresses; of a truss the number of elements, each with a strain."""
+        return rung.stressed, rung.values["rods.elements"] if self._truss else 0
+
+    def _campaign(self, stage: str, shape: tuple[bool, int], rungs: Sequence[Rung]) -> xr.Dataset:
+        stressed, elements = shape
+        given: dict[str, object] = {"record.stress": stressed and not self._truss}
+        name = stage if stressed else f"{stage}-unstressed"
+        if self._truss:
+            name, given["rods.elements"] = f"{stage}-elements-{elements}", elements
+        paths = [path for path in PATHS if path not in given]
+        settings = [{path: rung.values[path] for path in paths} for rung in rungs]
+        title = f"Settings of {self.scene.name} against each other ({name})"
+        cases = Cases(name, title, self.scene.with_values(given), settings, self.timeout)
+        return _needed(run_cases(self.folder, cases, self.workers))
+
+
+def _require_ok(rungs: Sequence[Rung], results: xr.Dataset) -> None:
+    for k, rung in enumerate(rungs):
+        ended = Status(int(results.status[k]))
+        if ended != Status.OK:
+            settings = ", ".join(f"{path} = {rung.values[path]}" for path in PATHS)
+            raise ReferenceRunError(
+                f"the reference run with {settings} ended as {ended.word}: "
+                f"{str(results.reason[k].item()) or 'no reason given'}: change the scene so that "
+                "it ends well with fine steps, or give it more time (--timeout)"
+            )
 
 
 def _needed(file: Path) -> xr.Dataset:
@@ -111,16 +152,19 @@ def _needed(file: Path) -> xr.Dataset:
     return kept
 
 
-def _ideal(folder: Path, scene: Scene, workers: int) -> xr.Dataset | None:
+def _ideal(study: _Study) -> xr.Dataset | None:
     """The ideal fidelity's answer as one rung; None if it cannot represent the scene."""
+    scene = study.scene
     plain = scene.with_values({"record.stress": False})
     try:
         refuse_if_not_ideal(plain)
     except InputError:
         return None
     case = {"solver.tolerance": scene.solver.tolerance}
-    title = f"{scene.name} with rigid rods"
-    return _needed(run_cases(folder, Cases("ideal", title, plain, [case], fidelity="ideal"), 1))
+    cases = Cases(
+        "ideal", f"{scene.name} with rigid rods", plain, [case], study.timeout, fidelity="ideal"
+    )
+    return _needed(run_cases(study.folder, cases, 1))
 
 
 def _quadrature(scene: Scene) -> list[Truth]:

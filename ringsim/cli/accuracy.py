@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import click
 
+from ringsim.cli import EXIT_FAILED
 from ringsim.overrides import parse_assignment
+from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 
 
@@ -23,11 +26,22 @@ from ringsim.scene import load_scene
 @click.option(
     "--workers", type=click.IntRange(1, 4096), help="Solver processes (default: all cores)."
 )
-def command(scene: str, settings: tuple[str, ...], out: Path | None, workers: int | None) -> None:
+@click.option(
+    "--timeout", type=click.FloatRange(0.0, min_open=True), default=1800.0, show_default=True,
+    help="Longest time of one setting, s.",
+)  # fmt: skip
+def command(
+    scene: str,
+    settings: tuple[str, ...],
+    out: Path | None,
+    workers: int | None,
+    timeout: float,
+) -> None:
     """Compare numerical settings of SCENE: error against run time, and which to choose.
 
     Writes accuracy.nc, accuracy.md, accuracy.png and settings.toml (for ``run --accuracy``); the
-    same command again goes on with an interrupted study.
+    same command again goes on with an interrupted study.  Exit codes: 0 done, 2 bad input, 3 a
+    run that the reference needs did not end well.
     """
     chosen = load_scene(scene)
     if settings:
@@ -36,18 +50,29 @@ def command(scene: str, settings: tuple[str, ...], out: Path | None, workers: in
 
     from ringsim.analysis.accuracy_text import tables
     from ringsim.analysis.evidence import evidence_of, to_toml
-    from ringsim.campaign.accuracy import run_ladder
+    from ringsim.campaign.accuracy import ReferenceRunError, run_ladder
     from ringsim.dataset import save
     from ringsim.plots.accuracy import draw_accuracy
 
-    found = run_ladder(folder, chosen, workers or len(os.sched_getaffinity(0)))
+    try:
+        found = run_ladder(folder, chosen, workers or len(os.sched_getaffinity(0)), timeout)
+    except ReferenceRunError as error:
+        click.echo(f"{chosen.name}: {error}", err=True)
+        sys.exit(EXIT_FAILED)
     found.attrs["title"] = f"Error against run time: {chosen.name}"
     found.attrs["scene"] = chosen.to_toml()
     save(found, folder / "accuracy.nc")
     text = tables(found, str(found.attrs["title"]))
-    (folder / "accuracy.md").write_text(text, encoding="utf-8")
-    (folder / "settings.toml").write_text(to_toml(evidence_of(found)), encoding="utf-8")
+    _write(folder / "accuracy.md", text)
+    _write(folder / "settings.toml", to_toml(evidence_of(found)))
     draw_accuracy(found, folder / "accuracy.png")
     click.echo(text)
     for name in ("accuracy.nc", "accuracy.md", "accuracy.png", "settings.toml"):
         click.echo(f"wrote {folder / name}")
+
+
+def _write(file: Path, text: str) -> None:
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written: {error.strerror}") from None

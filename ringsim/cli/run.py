@@ -36,8 +36,13 @@ EXIT_FAILED = 3
 @click.option(
     "--accuracy",
     type=click.FloatRange(1e-8, 1.0),
-    help="Relative error of deployment time, opening angle and asynchrony to aim at: picks the "
-    "cheapest settings measured to give it.",
+    help="Relative error of deployment time and opening angle to aim at: picks the cheapest "
+    "settings measured to give it.",
+)
+@click.option(
+    "--of",
+    metavar="OUTPUT",
+    help="Aim --accuracy at another output: loads, asynchrony, peak_tension, ...",
 )
 @click.option(
     "--evidence",
@@ -52,6 +57,7 @@ def command(
     out: Path | None,
     fidelity: str,
     accuracy: float | None,
+    of: str | None,
     evidence: Path | None,
     *,
     plot: bool,
@@ -60,9 +66,10 @@ def command(
     chosen = load_scene(scene)
     given = dict(parse_assignment(text) for text in settings)
     if accuracy is not None:
-        chosen = _with_accuracy(chosen, accuracy, evidence, given, fidelity)
-    elif evidence is not None:
-        raise InputError(f"--evidence {evidence}: says nothing without --accuracy; give both")
+        chosen = _with_accuracy(chosen, accuracy, of, evidence, given, fidelity)
+    for name, value in (("--of", of), ("--evidence", evidence)):
+        if value is not None and accuracy is None:
+            raise InputError(f"{name} {value}: says nothing without --accuracy; give both")
     if given:
         chosen = chosen.with_values(given)
     if fidelity == "ideal" and chosen.record.stress:
@@ -107,26 +114,37 @@ def command(
 
 
 def _with_accuracy(
-    scene: Scene, accuracy: float, file: Path | None, given: dict[str, Any], fidelity: str
+    scene: Scene,
+    accuracy: float,
+    of: str | None,
+    file: Path | None,
+    given: dict[str, Any],
+    fidelity: str,
 ) -> Scene:
     """The scene with the cheapest settings that were measured to be so accurate."""
-    from ringsim.analysis.evidence import evidence_for, read_evidence
+    from ringsim.analysis.evidence import CHOICES, JUDGED_BY, evidence_for, read_evidence
 
     if fidelity != "full":
         raise InputError(
             f"--accuracy {accuracy:g}: the ideal fidelity keeps its own tolerances: leave out one "
             "of --accuracy and --fidelity"
         )
-    known = read_evidence(file) if file is not None else evidence_for(scene)
-    picked = known.pick(accuracy)
+    output = of or JUDGED_BY
+    if output not in CHOICES:
+        raise InputError(f"--of {output}: must be one of {', '.join(CHOICES)}")
+    changed = scene.with_values(given) if given else scene
+    known = read_evidence(file) if file is not None else evidence_for(changed)
+    known.require_like(changed)
+    picked = known.pick(accuracy, output)
     clash = sorted(set(picked.values) & set(given))
     if clash:
         raise InputError(f"--set {clash[0]}: --accuracy chooses it: leave out one of the two")
-    words = ", ".join(f"{path} = {value}" for path, value in picked.values.items())
+    values = known.values_for(picked, changed)
+    words = ", ".join(f"{path} = {value}" for path, value in values.items())
     errors = ", ".join(f"{name.replace('_', ' ')} {e:.0e}" for name, e in picked.errors.items())
-    click.echo(f"settings for {accuracy:g}: {words or 'as the scene has them'}")
+    click.echo(f"settings for {accuracy:g}: {words}")
     click.echo(f"  measured with {known.scene}: {errors}")
-    return scene.with_values(dict(picked.values))
+    return scene.with_values(values)
 
 
 def _require_folder(target: Path) -> None:

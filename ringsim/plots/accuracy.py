@@ -14,14 +14,13 @@ from ringsim.plots import style
 
 _LOOKS = {
     "as it stands": (style.INK, "*"),
+    "steps": (style.BLUE, "o"),
     "constant step": (style.SKY, "s"),
-    "tolerance": (style.BLUE, "o"),
     "elements": (style.GREEN, "D"),
     "formulation": (style.ORANGE, "^"),
     "dissipation": (style.PURPLE, "v"),
     "newton": (style.VERMILLION, "P"),
-    "combined": (style.GREY, "X"),
-    "fidelity": (style.INK, "h"),
+    "setting": (style.GREY, "X"),
 }
 _TITLES = {
     "deployment_time": "Deployment time",
@@ -36,7 +35,10 @@ _TITLES = {
 
 @style.styled
 def accuracy(found: xr.Dataset) -> Figure:
-    """One panel an output: relative error over processor time, the frontier as a line.
+    """One panel an output: relative error over processor time.
+
+    The line is the frontier: what settings are good for, which is no less than the error of any
+    finer one.  What the ideal ring gives stands in words: it is too cheap for the axis.
 
     Parameters
     ----------
@@ -66,7 +68,7 @@ def accuracy(found: xr.Dataset) -> Figure:
 
 
 def _panel(axes: Axes, found: xr.Dataset) -> None:
-    cost, error = found.cpu_time.values, found.error.values
+    cost, error = found.cost.values, found.error.values
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -80,20 +82,30 @@ def _panel(axes: Axes, found: xr.Dataset) -> None:
                 cost[own], error[own], s=size, color=colour, marker=marker, label=name,
                 linewidths=0.0, alpha=0.9, zorder=4 if marker == "*" else 3,
             )  # fmt: skip
+    full = found.ladder.values != "fidelity"
     best = np.flatnonzero(found.frontier.values & (error > 0.0))
     best = best[np.argsort(cost[best])]
     axes.step(
-        cost[best], error[best], where="post", color=style.INK, linewidth=1.1,
-        label="efficient frontier", zorder=2,
+        cost[best], found.bound.values[best], where="post", color=style.INK, linewidth=1.1,
+        label="frontier: good for", zorder=2,
     )  # fmt: skip
     floor = float(found.uncertainty)
+    known = error[np.isfinite(error) & (error > 0.0) & full]
+    lowest, highest = known.min(initial=np.inf), known.max(initial=0.0)
     if floor > 0.0:
-        lowest = min(0.3 * floor, axes.get_ylim()[0])
-        axes.axhspan(lowest, floor, color=style.PALE, zorder=0.5)
-        axes.set_ylim(bottom=lowest)
-    known = error[np.isfinite(error) & (error > 0.0)]
-    if known.size:
-        axes.set_ylim(top=12.0 * known.max())
+        lowest = min(0.5 * floor, lowest)
+        highest = max(floor, highest)
+    if highest > 0.0:
+        axes.set_ylim(0.4 * lowest, 30.0 * highest)
+    axes.axhspan(
+        axes.get_ylim()[0], max(floor, axes.get_ylim()[0]), color=style.PALE, zorder=0.5,
+        linewidth=0.0, label="uncertainty of the reference",
+    )  # fmt: skip
+    for k in np.flatnonzero(~full & np.isfinite(error)):
+        axes.text(
+            0.97, 0.88, f"ideal ring: {error[k]:.1e} in {cost[k]:.2g} s", ha="right", va="top",
+            transform=axes.transAxes, fontsize="small", color=style.INK,
+        )  # fmt: skip
 
 
 def draw_accuracy(found: xr.Dataset, path: Path) -> Path:

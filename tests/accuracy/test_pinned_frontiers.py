@@ -1,51 +1,106 @@
-"""The settings that come with ringsim still give the errors that were measured, at their cost.
+"""What the settings that come with ringsim are: pinned, with their reasons, and measured again.
 
-Pinned: the frontier tables of two built-in scenes (ringsim/scenes/evidence).  They move for a
-reason only: another integrator, other elements, another step control.  Then make the reports
-again (benchmarks/accuracy_reports.py) and say why in DECISIONS.md.
+The picks of two built-in scenes' frontiers (ringsim/scenes/evidence) stand here in words of their
+own.  They move for a reason only: another integrator, other elements, another step control.  Then
+make the reports again (benchmarks/accuracy_reports.py), change the table here, and say why in
+DECISIONS.md.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import pytest
 
-from ringsim.analysis.evidence import Setting, evidence_for
+from ringsim.analysis.evidence import evidence_for
 from ringsim.scene import load_scene
 from ringsim.simulation import run
 
-SCENES = ("ring18", "ring18-cable")
-CASES = [
-    pytest.param(name, setting, id=f"{name}-{number}")
-    for name in SCENES
-    for number, setting in enumerate(evidence_for(load_scene(name)).settings)
-]
-MORE = 1.5
-"""Errors may grow by so much: the last digits of another library move impacts a little."""
-FLOOR = 3e-3
-"""Below this the peaks' errors are as uncertain as the references themselves."""
+
+class Pick(NamedTuple):
+    """The cheapest setting for an error: what differs from the scene as it stands, and why."""
+
+    scene: str
+    output: str
+    accuracy: float
+    changes: dict[str, float]
+    why: str
+
+
+TOLERANCE, NEWTON, STEP = "solver.tolerance", "solver.newton_tolerance", "solver.step"
+PICKS = (
+    Pick(
+        "ring18", "motion", 1e-2, {TOLERANCE: 1e-3},
+        "looser yet costs as much: steps across the stops fail and are repeated",
+    ),
+    Pick("ring18", "motion", 1e-3, {}, "the default was chosen by this"),
+    Pick(
+        "ring18", "motion", 1e-4, {STEP: 0.05, TOLERANCE: 1.875e-05, NEWTON: 1e-6},
+        "a quarter of every step, and Newton no longer as wrong as the steps are",
+    ),
+    Pick(
+        "ring18", "asynchrony", 1e-2, {TOLERANCE: 1e-4},
+        "the ring is nearly symmetric: a hundredth of 0.8 deg takes more than its motion does",
+    ),
+    Pick(
+        "ring18", "loads", 1e-2, {"rods.elements": 4},
+        "one element leaves 2.7 % out of the stress of the rods' own inertia at any step, two 1 %",
+    ),
+    Pick("ring18-cable", "motion", 1e-3, {}, "the scene's tolerance was chosen by this"),
+    Pick(
+        "ring18-cable", "motion", 1e-4, {TOLERANCE: 3e-4, NEWTON: 1e-4},
+        "the angle's error goes with the tolerance: 3.3e-4 as it stands",
+    ),
+    Pick("ring18-cable", "asynchrony", 1e-2, {}, "17 deg, that the cables cause: easy to follow"),
+    Pick("ring18-cable", "peak_tension", 1e-2, {}, "4.6e-3 as it stands"),
+    Pick(
+        "ring18-cable", "peak_tension", 1e-3, {STEP: 0.05, TOLERANCE: 7.5e-4, NEWTON: 1e-6},
+        "the peak comes with the jerk at the end: half of every step takes a fifth of its error",
+    ),
+)  # fmt: skip
+LUCK = 1.1
+"""Another machine's last digits move impacts, and errors with them."""
+
+
+def named(pick: Pick) -> str:
+    return f"{pick.scene}-{pick.output}-{pick.accuracy:g}"
+
+
+@pytest.mark.parametrize("pick", PICKS, ids=named)
+def test_the_frontier_is_where_it_was(pick: Pick) -> None:
+    scene = load_scene(pick.scene)
+    evidence = evidence_for(scene)
+    values = evidence.values_for(evidence.pick(pick.accuracy, pick.output), scene)
+    assert scene.with_values(values) == scene.with_values(pick.changes), pick.why
+
+
+@pytest.mark.parametrize("name", sorted({pick.scene for pick in PICKS}))
+def test_every_setting_is_on_a_frontier(name: str) -> None:
+    """Each is better in some output than every cheaper one, and covers all outputs."""
+    settings = evidence_for(load_scene(name)).settings
+    assert len({frozenset(setting.errors) for setting in settings}) == 1
+    for k, setting in enumerate(settings[1:], 1):
+        for cheaper in settings[:k]:
+            assert any(error < cheaper.errors[name] for name, error in setting.errors.items())
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "setting"), CASES)
-def test_a_setting_keeps_its_errors_and_its_cost(name: str, setting: Setting) -> None:
-    scene = load_scene(name)
-    references = evidence_for(scene).references
-    values = run(scene.with_values({**setting.values, "record.stress": True})).values
-    compared = {"deployment_time": 1e-5, "peak_tension": FLOOR, "peak_rod_stress": FLOOR}
-    for output, floor in compared.items():
-        if output in references:
-            error = abs(float(values[output]) / references[output] - 1.0)
-            assert error < MORE * setting.errors[output] + floor, output
-    largest = abs(float(values["asynchrony_max"]) / references["asynchrony"] - 1.0)
-    assert largest < MORE * setting.errors["asynchrony"] + FLOOR
+@pytest.mark.parametrize("pick", PICKS, ids=named)
+def test_a_setting_keeps_its_errors_and_its_cost(pick: Pick) -> None:
+    scene = load_scene(pick.scene)
+    evidence = evidence_for(scene)
+    setting = evidence.pick(pick.accuracy, pick.output)
+    values = run(scene.with_values({**pick.changes, "record.stress": True})).values
+    scalars = {
+        "deployment_time": "deployment_time",
+        "asynchrony": "asynchrony_max",
+        "peak_tension": "peak_tension",
+        "peak_rod_stress": "peak_rod_stress",
+    }
+    for output, scalar in scalars.items():
+        if output in evidence.references:
+            error = abs(float(values[scalar]) / evidence.references[output] - 1.0)
+            assert error < LUCK * setting.errors[output], output
+    assert float(values["energy_error"]) < LUCK * setting.errors["energy"]
     residuals = int(values["newton_iterations"] + values["steps"])
-    assert residuals < 1.25 * setting.residuals
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_frontiers_are_frontiers(name: str) -> None:
-    """Dearer settings are better; every one covers all outputs of its scene."""
-    settings = evidence_for(load_scene(name)).settings
-    errors = [setting.errors["motion"] for setting in settings]
-    assert errors == sorted(errors, reverse=True)
-    assert len({frozenset(setting.errors) for setting in settings}) == 1
+    assert residuals == pytest.approx(setting.residuals, rel=0.1)
