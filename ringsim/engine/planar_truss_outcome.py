@@ -18,8 +18,8 @@ def to_outcome(
 ) -> Outcome:
     """Put a run on the output grid; what lies after its end is NaN.
 
-    The strain is given in the middle of the upper beam's elements, where a linear element's
-    moment is exact for loads at its nodes.
+    The strain is given at the nodes of the upper beam, where a beam loaded at its nodes is bent
+    most.
     """
     grid, times = output_times(model.scene), np.array(history.times)
     tensions, strains = np.array(history.tensions), np.array(history.strains)
@@ -43,12 +43,11 @@ def to_outcome(
         "wall_time": np.array(wall_time),
         "cpu_time": np.array(cpu_time),
     }
-    places = model.upper.places
     coordinates = {
         "plane": np.array(model.truss.planes),
         "section": np.arange(1, model.truss.sections + 1),
         "time": grid,
         "span": np.arange(1, tensions.shape[1] + 1),
-        "station": 0.5 * (places[1:] + places[:-1]),
+        "station": model.upper.places,
     }
     return Outcome(history.status, history.reason, coordinates, values)

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 _KINETIC = exu.OutputVariableType.KineticEnergy
 _POTENTIAL = exu.OutputVariableType.PotentialEnergy
 _TORQUE = exu.OutputVariableType.TorqueLocal
+_FORCE = exu.OutputVariableType.ForceLocal
 _RECOVERY = 10
 """Steps after which a halved step may grow again."""
 _SLIGHT = 1e-3
@@ -45,7 +46,7 @@ class TrussHistory:
     cable_lengths
         From the lower joint to the upper outer joint, m.
     strains
-        Bending strain in the middle of each element of the upper beam.
+        Bending strain at each node of the upper beam.
     tensions, slack, wound
         Of each span (N), whether the cable is slack, and the rope wound (m).
     """
@@ -212,10 +213,20 @@ class TrussReader:
         return True
 
     def _strains(self) -> Array:
-        """Strain of the fibre on the side away from the strut, in the middle of each element."""
+        """Strain of the fibre on the side away from the strut, at the nodes of the beam.
+
+        exudyn gives the moment in the middle of an element; it follows the shear force to the ends,
+        dM_z/dx = -Q_y.  Where two elements meet their moments differ by what turns the node alone;
+        their mean counts.
+        """
         output, centre = self._model.assembly.system.GetObjectOutputBody, [0.0, 0.0, 0.0]
-        moments = [output(e, _TORQUE, centre)[2] for e in self._model.upper.elements]
-        return np.asarray(-self._per_moment * np.array(moments))
+        elements = self._model.upper.elements
+        moments = np.array([output(e, _TORQUE, centre)[2] for e in elements])
+        shear = np.array([output(e, _FORCE, centre)[1] for e in elements])
+        change = 0.5 * shear * np.diff(self._model.upper.places)
+        first, last = moments + change, moments - change
+        at_nodes = np.concatenate([first[:1], 0.5 * (first[1:] + last[:-1]), last[-1:]])
+        return np.asarray(-self._per_moment * at_nodes)
 
     def _energies(self, time: float, position: Array, velocity: Array) -> Energies:
         model, chain = self._model, self.chain
