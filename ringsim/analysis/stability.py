@@ -28,6 +28,7 @@ CAUSES = (
     ("blow-up", "blew up"),
     ("blow-up", "not finite"),
     ("stop passed", "past its stop"),
+    ("few steps", "the first V-joint locked within"),
     ("tension bends", "a tension bends by"),
     ("joint gap", "joints came apart"),
     ("Newton", "the solver gave up"),
@@ -41,6 +42,8 @@ CAUSES = (
 TIME_PROMISE, ANGLE_PROMISE, TENSION_PROMISE = 0.01, 0.5, 0.05
 """What an ok cell promises: relative error of the deployment time, error in degree of the mean
 angle where a run ended before, and error of the largest tension over itself."""
+MORE_STEPS = 1.5
+"""Steps of a finer run over those of the cell, at least; Newton may have cut both to the same."""
 ENERGY_PROMISE = Solver().energy_tolerance
 """Largest energy error of an ok cell."""
 
@@ -195,13 +198,13 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
     xr.Dataset
         The map with ``time_difference`` (relative), ``angle_difference`` (degree) and
         ``tension_difference`` (relative) of those cells, and ``check``: "" (not checked),
-        "holds", "differs", or "unproven" where the finer run did not end.
+        "holds", "differs", or "unproven" where the finer run did not end or was hardly finer.
     """
     found = cells.copy()
     for name in ("time_difference", "angle_difference", "tension_difference"):
         found[name] = ("cell", np.full(cells.sizes["cell"], np.nan))
     mine = cells.isel(cell=which)
-    ended = (finer["status"] == Status.OK).values
+    proves = (finer["status"] == Status.OK).values
     for name, variable in (("time", "deployment_time"), ("tension", "peak_tension")):
         there = finer[variable].values
         change = np.abs(mine[variable].values - there) / np.abs(there)
@@ -215,7 +218,8 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
     ):  # fmt: skip
         over |= found[f"{name}_difference"].values[which] > promise
     check = np.full(cells.sizes["cell"], "", dtype=object)
-    check[which] = np.where(~ended, "unproven", np.where(over, "differs", "holds"))
+    hardly = (finer["steps"].values < MORE_STEPS * mine["steps"].values) & ~over
+    check[which] = np.where(~proves | hardly, "unproven", np.where(over, "differs", "holds"))
     found["check"] = ("cell", check.astype(str))
     return judged(_described(found))
 

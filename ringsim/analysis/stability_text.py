@@ -55,7 +55,8 @@ def _checks(whole: xr.Dataset) -> list[str]:
         f"sixteenth of the tolerance: {held} held what ok promises ({100 * TIME_PROMISE:g} % of "
         f"the deployment time, {ANGLE_PROMISE:g} deg of the mean angle of runs that end before, "
         f"{100 * TENSION_PROMISE:g} % of the largest tension), {np.sum(check == 'differs')} did "
-        f"not, {np.sum(check == 'unproven')} stayed unproven because the finer run did not end.",
+        f"not, {np.sum(check == 'unproven')} stayed unproven because the finer run did not end or "
+        "was hardly finer.",
         "",
     ]
     for name, label, factor, unit in (

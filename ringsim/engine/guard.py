@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.engine.energy import Energies
+from ringsim.parts.solver import Solver
 from ringsim.variables import Status
 
 GROWTH, LOSS = 2.0, 5.0
@@ -46,6 +47,10 @@ BEND, PEAK_BEND = 0.05, 0.4
 the largest: what constant steps do not resolve changes that by 5 % at most (a swing of amplitude
 A that is not resolved bends by sqrt(2) A or more; a parabola rises by an eighth of its bend over
 the largest reading)."""
+STEPS = 50
+"""Constant steps until the first V-joint locks, at least.  The integrator starts from rest without
+an acceleration, which delays the motion by a third of the first step; steps that follow the motion
+start small."""
 _CURE = "reduce solver.step or solver.tolerance"
 
 Array = NDArray[np.float64]
@@ -67,7 +72,7 @@ class Guard:
 
     def __init__(
         self,
-        energy_tolerance: float,
+        solver: Solver,
         least_energy: float,
         bar: float,
         least_bend: float = math.inf,
@@ -76,8 +81,8 @@ class Guard:
 
         Parameters
         ----------
-        energy_tolerance
-            Largest |B| / X of a sound run.
+        solver
+            The scene's settings; ``energy_tolerance`` is the largest |B| / X of a sound run.
         least_energy
             X counts as this much at least during the run, J, and as ``SLIGHT`` of it at the end.
         bar
@@ -85,14 +90,16 @@ class Guard:
         least_bend
             Bend of a tension in N that does not matter; infinite where steps follow the motion.
         """
-        self._tolerance, self._least, self._bar = energy_tolerance, least_energy, bar
+        self._tolerance, self._least, self._bar = solver.energy_tolerance, least_energy, bar
+        self._least_steps = STEPS if solver.step_control == "constant" else 0
         self._least_bend = least_bend
         self._start: Energies | None = None
         self._lost = self._driven = 0.0
         self._low = self._high = np.zeros(3)
         self._worst = (0.0, 0.0)
+        self._until_lock = 0
 
-    def stops(self, history: Watched, overrun: float = 0.0) -> bool:
+    def stops(self, history: Watched, overrun: float = 0.0, opening: float = 0.0) -> bool:
         """Judge the last reading of a run; note in its history why it must stop there, if so.
 
         Parameters
@@ -101,7 +108,11 @@ class Guard:
             Of the run.
         overrun
             Largest angle by which a V-joint has passed its stops, rad.
+        opening
+            Largest opening angle of a V-joint, rad.
         """
+        if opening >= math.pi and not self._until_lock:
+            self._until_lock = len(history.times) - 1
         reason = self.judge(history.times[-1], history.energies[-1], history.gaps[-1], overrun)
         if reason:
             history.status, history.reason = Status.DIVERGED, reason
@@ -109,7 +120,7 @@ class Guard:
 
     def conclude(self, history: Watched) -> None:
         """Note in the history of a run that ended by itself if it is not sound after all."""
-        reason = self.verdict() or self._bent(history)
+        reason = self.verdict() or self._hasty(history) or self._bent(history)
         if reason and history.status in (Status.OK, Status.UNFINISHED):
             history.status, history.reason = Status.DIVERGED, reason
 
@@ -170,6 +181,16 @@ class Guard:
         if abs(balance) <= self._tolerance * exchanged:
             return ""
         return self._unbalanced(time, balance, exchanged, "solver.energy_tolerance")
+
+    def _hasty(self, history: Watched) -> str:
+        """Why constant steps have not resolved the motion; empty if they have."""
+        if not 0 < self._until_lock < self._least_steps:
+            return ""
+        return (
+            f"the first V-joint locked within {self._until_lock} steps, at "
+            f"{history.times[self._until_lock]:.3g} s, fewer than {STEPS} of constant length: "
+            'reduce solver.step, or let it follow the motion (solver.step_control = "motion")'
+        )
 
     def _bent(self, history: Watched) -> str:
         """Why constant steps have not resolved the tensions; empty if they have."""

@@ -78,7 +78,7 @@ class Integration:
             roped = built.cables is not None
             slight = usual if built.cables is None else slight_energy(built.cables)
             self._control = EnergyControl(scene.solver, slight, tireless=roped)
-        self._guard = Guard(scene.solver.energy_tolerance, usual, scene.structure.half_bar)
+        self._guard = Guard(scene.solver, usual, scene.structure.half_bar)
         self._fresh = True
         self._weighed: _Reading | None = None
         self._shorter: float | None = None
@@ -223,7 +223,7 @@ class Integration:
         history.gaps.append(max(float(group.gaps(self._state).max()) for group in self._gaps))
         if self._stress is not None:
             history.stresses.append(self._stress.read())
-        return not self._guard.stops(history, self._locks.overrun(angles))
+        return not self._guard.stops(history, self._locks.overrun(angles), float(angles.max()))
 
     def _read_cables(self, time: float) -> ChainState | None:
         cables = self._built.cables

@@ -81,7 +81,7 @@ class TrussIntegration:
         self._reader = TrussReader(model)
         slight = _SLIGHT * self._push() * model.truss.beam_length
         slack = max(cable.slack_width for cable in model.cable.chain.cables)
-        self._guard = Guard(solver.energy_tolerance, slight, model.truss.beam_length, slack)
+        self._guard = Guard(solver, slight, model.truss.beam_length, slack)
         self.history = TrussHistory()
 
     def run(self) -> TrussHistory:

@@ -23,6 +23,7 @@ _LOOKS: dict[str, tuple[str, str]] = {
     "energy grew": (style.VERMILLION, "G"),
     "blow-up": ("#7f0000", "B"),
     "stop passed": (style.PURPLE, "P"),
+    "few steps": ("#fddbc7", "F"),
     "tension bends": ("#f4a582", "W"),
     "joint gap": ("#9970ab", "J"),
     "Newton": (style.GREEN, "N"),

@@ -9,16 +9,28 @@ import pytest
 
 from ringsim.analysis.stability import cause_of
 from ringsim.engine.energy import Energies
-from ringsim.engine.guard import BLOW_UP, GAP, GROWTH, LOSS, OVERRUN, PEAK_BEND, SLIGHT, Guard
+from ringsim.engine.guard import (
+    BLOW_UP,
+    GAP,
+    GROWTH,
+    LOSS,
+    OVERRUN,
+    PEAK_BEND,
+    SLIGHT,
+    STEPS,
+    Guard,
+)
 from ringsim.engine.history import History
+from ringsim.parts.solver import Solver
 from ringsim.variables import Status
 
 TOLERANCE, LEAST, BAR = 0.02, 1e-3, 0.3
+SOLVER = Solver(energy_tolerance=TOLERANCE)
 
 
 def guard() -> Guard:
     """One that has seen a ring at rest."""
-    fresh = Guard(TOLERANCE, LEAST, BAR)
+    fresh = Guard(SOLVER, LEAST, BAR)
     assert fresh.judge(0.0, Energies(0.0, 0.0, 0.0, 0.0), 0.0) == ""
     return fresh
 
@@ -85,7 +97,7 @@ def test_more_energy_than_there_can_be_is_a_blow_up() -> None:
 
 
 def test_energy_of_the_start_is_available() -> None:
-    watching = Guard(TOLERANCE, LEAST, BAR)
+    watching = Guard(SOLVER, LEAST, BAR)
     assert watching.judge(0.0, Energies(0.0, 5.0, 0.0, 0.0), 0.0) == ""
     assert watching.judge(1.0, Energies(5.0, 0.0, 0.0, 0.0), 0.0) == ""
     assert watching.verdict() == ""
@@ -115,7 +127,7 @@ def concluded(tensions, times, least_bend: float = 0.05) -> History:
     """A run that went well, but for what its tensions say."""
     seen = History(status=Status.OK)
     seen.times, seen.tensions = list(times), [np.array([one]) for one in tensions]
-    Guard(TOLERANCE, LEAST, BAR, least_bend).conclude(seen)
+    Guard(SOLVER, LEAST, BAR, least_bend).conclude(seen)
     return seen
 
 
@@ -143,3 +155,24 @@ def test_a_ramp_in_uneven_steps_does_not_bend_and_a_slack_rope_does_not_matter()
     ramp = np.array([0.0, 0.1, 0.2, 0.21, 0.22, 0.3, 0.4])
     assert concluded(100.0 * ramp, ramp).status is Status.OK
     assert concluded(0.01 * (-1.0) ** np.arange(9), np.arange(9.0)).status is Status.OK
+
+
+@pytest.mark.parametrize(
+    ("control", "steps", "cause"),
+    [
+        ("constant", STEPS - 1, "few steps"),
+        ("constant", STEPS, ""),
+        ("constant", 10 * STEPS, ""),
+        ("motion", 5, ""),
+    ],
+)
+def test_a_few_constant_steps_do_not_resolve_a_motion(control, steps, cause) -> None:
+    watching, seen = Guard(Solver(step_control=control), LEAST, BAR), History(status=Status.OK)
+    for k in range(steps + 5):
+        seen.times.append(0.1 * k)
+        seen.energies.append(Energies(0.0, 0.0, 0.0, 0.0))
+        seen.gaps.append(0.0)
+        assert not watching.stops(seen, opening=math.pi * k / steps)
+    watching.conclude(seen)
+    assert cause_of(seen.reason) == cause
+    assert seen.status is (Status.DIVERGED if cause else Status.OK)

@@ -42,9 +42,9 @@ def test_a_sound_run_is_left_alone() -> None:
 
 
 def test_a_run_with_absurd_steps_stops_early_with_its_cause() -> None:
-    """Without guards it goes on to the stops and says that it went well."""
+    """With its energy unwatched it goes on to the stops."""
     unguarded = run(ring(**COARSE, energy_tolerance=1e6))
-    assert unguarded.status is Status.OK
+    assert cause_of(unguarded.reason) == "few steps"
     outcome = run(ring(**COARSE))
     assert outcome.status is Status.DIVERGED
     assert cause_of(outcome.reason) == "energy grew"
@@ -59,6 +59,14 @@ def test_too_coarse_steps_are_cured_by_a_new_start() -> None:
     assert 1 <= int(outcome.values["restarts"]) <= coarse.solver.restarts
     first = outcome.reason.partition("start 1: ")[2]
     assert cause_of(first) in ("energy lost", "energy grew")
+
+
+def test_constant_steps_that_newton_has_to_cut_are_too_few() -> None:
+    """A dozen that converge balance their energy, and are 2 % late."""
+    outcome = run(ring(step_control="constant", step=3.0).with_values({"loads.force": 10.0}))
+    assert outcome.status is Status.DIVERGED
+    assert cause_of(outcome.reason) == "few steps"
+    assert float(outcome.values["energy_error"]) < ring().solver.energy_tolerance
 
 
 def test_a_stop_that_is_far_too_soft_is_named() -> None:

@@ -45,7 +45,7 @@ def campaign(*reasons: str, **values: list[float]) -> xr.Dataset:
     angle[..., :2] = [60.0, 90.0]
     numbers = {
         "energy_error": [1e-4] * count, "restarts": [0] * count, "deployment_time": [3.0] * count,
-        "peak_tension": [10.0] * count, "cpu_time": [1.0] * count,
+        "peak_tension": [10.0] * count, "cpu_time": [1.0] * count, "steps": [1.0] * count,
     }  # fmt: skip
     found = {name: ("sample", np.array(v)) for name, v in (numbers | values).items()}
     found["status"] = ("sample", np.array([int(ENDS[r]) for r in reasons], dtype="i1"))
@@ -116,11 +116,13 @@ def test_the_choice_is_repeatable_and_of_ok_cells_alone() -> None:
         ({"deployment_time": [3.0 / (1.0 + 0.9 * TIME_PROMISE)]}, "holds", OK),
         ({"peak_tension": [10.0 / (1.0 + 1.1 * TENSION_PROMISE)]}, "differs", WRONG),
         ({"peak_tension": [np.nan]}, "holds", OK),
+        ({"steps": [1.4]}, "unproven", OK),
+        ({"steps": [1.4], "deployment_time": [4.0]}, "differs", WRONG),
     ],
 )
 def test_a_finer_run_proves_or_refutes_a_cell(changed, check, verdict) -> None:
     whole = judged(cells(NEWTON, GOOD))
-    found = checked(whole, np.array([1]), cells(GOOD, **changed))
+    found = checked(whole, np.array([1]), cells(GOOD, **({"steps": [1.6]} | changed)))
     assert found["check"].values.tolist() == ["", check]
     assert found["verdict"].values.tolist() == [ENDED, verdict]
 
