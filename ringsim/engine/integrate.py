@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ringsim.cable.section_path import path_slope
 from ringsim.cable.state import ChainState
 from ringsim.engine.build import Built
+from ringsim.engine.closing import close
 from ringsim.engine.energy import Energies, EnergyMeter
 from ringsim.engine.energy_control import EnergyControl
 from ringsim.engine.guard import Guard
@@ -110,8 +111,7 @@ class Integration:
             history.reason = self._explain(RuntimeError("it stopped before the end"))
         self._guard.conclude(history)
         history.reason += self._control.note() if self._control is not None else ""
-        history.newton_iterations = int(solver.it.newtonStepsCount)
-        history.jacobians = int(solver.it.newtonJacobiCount)
+        close(history, self._system, solver)
         return history
 
     def _path_slopes(self) -> Array:

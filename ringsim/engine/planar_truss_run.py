@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ringsim.cable.state import ChainState
 from ringsim.engine import quaternions
+from ringsim.engine.closing import close
 from ringsim.engine.energy import Energies
 from ringsim.engine.guard import Guard
 from ringsim.engine.planar_truss import TrussModel, rest_force
@@ -104,8 +105,7 @@ class TrussIntegration:
                 history.status = Status.OK
                 history.reason = f"the cable was wound until solver.end_time = {end:g} s"
         self._guard.conclude(history)
-        history.newton_iterations = int(solver.it.newtonStepsCount)
-        history.jacobians = int(solver.it.newtonJacobiCount)
+        close(history, self._system, solver)
         return history
 
     def _fail(self, detail: str) -> None:

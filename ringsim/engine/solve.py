@@ -32,7 +32,9 @@ class Solver(Protocol):
 
 def solve_ring(scene: Scene) -> Solved:
     """A pantograph ring, until all V-joints have locked."""
-    history = Integration(build(scene)).run()
+    built = build(scene)
+    history = Integration(built).run()
+    built.ring.assembly.container.Reset()
 
     def finish(*, wall_time: float, cpu_time: float) -> Outcome:
         return to_outcome(history, scene, wall_time=wall_time, cpu_time=cpu_time)
@@ -44,6 +46,7 @@ def solve_planar_truss(scene: Scene) -> Solved:
     """A planar truss, until the end time."""
     model = build_truss(scene)
     history = TrussIntegration(model).run()
+    model.assembly.container.Reset()
 
     def finish(*, wall_time: float, cpu_time: float) -> Outcome:
         return planar_truss_outcome.to_outcome(

@@ -3,8 +3,9 @@
 The integrator is of second order, so that doubling the steps multiplies an error by four and the
 two runs differ by three times the error of the finer one.  That holds on average; a single number
 (the largest of a trembling quantity, the time of one event) may agree by chance.  The bars
-therefore take about the whole difference, and of times and angles the largest of all joints.  What few elements leave out does not depend on the steps and is added: the rods' own
-inertia between two nodes, as a share that falls with the square of their number.
+therefore take about the whole difference, and of times and angles the largest of all joints.
+What few elements leave out does not depend on the steps and is added: the rods' own inertia
+between two nodes, as a share that falls with the square of their number.
 
 The factors are those that cover 9 errors of 10 over random scenes and are not much larger:
 benchmarks/error_bars.py, docs/accuracy.md.
