@@ -26,6 +26,8 @@ from ringsim.simulation import run
 from ringsim.theory.error_bars import differences, error_bars
 from ringsim.variables import Outcome, Status
 
+PATIENCE = 4
+"""Steps of a scene without one of its parts over those of the scene: then it counts as needed."""
 BOTH = ("cables.upper", "cables.lower")
 REMOVED: dict[str, dict[str, Any]] = {
     "boom": {"boom": "none"},
@@ -182,7 +184,8 @@ def show(name: str) -> None:
         print(f"{name}: {words}", file=sys.stderr, flush=True)
         parts += taken
         try:
-            variant = scene.with_values(given | {"solver.step_limit": 10 * steps})
+            patience = {"solver.step_limit": PATIENCE * steps, "solver.restarts": 0}
+            variant = scene.with_values(given | patience)
         except InputError as error:
             reason = str(error).partition(": ")[2].partition(":")[0]
             empty = " |" * (5 + len(standing.bars))

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.errors import OUTPUTS, Errors
-from ringsim.analysis.frontier import bounds, cheapest, frontier, in_favour, typical_cost
+from ringsim.analysis.frontier import bounds, cheapest, eligible, frontier, in_favour, typical_cost
 from ringsim.analysis.ladder import PATHS, Rung
 from ringsim.analysis.orders import observed_orders
 
@@ -69,7 +69,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         ladder, NaN where errors come near the reference's own; ``uncertainty`` (output): of the
         reference, relative; ``reference`` (output): its value, in the output's unit, NaN for
         series (of the asynchrony the largest value); ``frontier`` (rung, output): whether no
-        other setting of the full model is both cheaper and better; ``cheapest`` (target,
+        other setting of the scene's own model is both cheaper and better; ``cheapest`` (target,
         output): the rung among them, -1 if none will do; ``cost`` (rung): processor time without
         the machine's moods, s; ``cpu_time``, ``residual_evaluations``, ``jacobians``,
         ``steps``, ``status`` and the settings (rung); and for each truth its distance from the
@@ -87,10 +87,11 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     good = bounds(error, rungs, own)
     counts = {name: results[name].to_numpy().astype(float) for name in _COUNTS}
     residuals = counts.pop("newton_iterations") + counts["steps"]
-    cost = typical_cost(counts["cpu_time"], residuals, counts["jacobians"], rungs)
+    work = np.column_stack([residuals, counts["jacobians"], counts["steps"]])
+    cost = typical_cost(counts["cpu_time"], work, rungs)
     cost = np.where(errors.good, cost, counts["cpu_time"])
-    full = np.array([rung.ladder != "fidelity" for rung in rungs])
-    ranked = np.where(full[:, None], good, np.nan)
+    choice = eligible(rungs)
+    ranked = np.where(choice[:, None], good, np.nan)
     graded, orders = observed_orders(errors, rungs)
     found = xr.Dataset(
         {
@@ -115,8 +116,9 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
             ),
             "cost": ("rung", cost, _words("processor time, as fitted", "s")),
             "residual_evaluations": (
-                "rung", residuals, _words("residuals that Newton evaluated", "1"),
+                "rung", residuals, _words("residuals that Newton evaluated in accepted steps", "1"),
             ),
+            "eligible": ("rung", choice, _words("whether it may be recommended", "")),
             "status": ("rung", results.status.to_numpy(), _words("how the run ended", "")),
             "ladder": ("rung", [rung.ladder for rung in rungs], _words("what is varied", "")),
             "label": ("rung", [rung.label for rung in rungs], _words("the setting", "")),

@@ -102,8 +102,8 @@ def _errors(found: xr.Dataset, outputs: Sequence[str]) -> list[str]:
     head = " | ".join(_SHORT.get(name, name) for name in outputs)
     lines = [
         "Errors, bold where no other setting is both cheaper and good for less; runs that two "
-        "ladders share stand in the first. The cost is processor time, fitted to residuals and "
-        "Jacobians over all runs, so that the machine's moods cancel:",
+        "ladders share stand in the first. The cost is processor time, fitted to residuals, "
+        "Jacobians and steps over all runs, so that the machine's moods cancel:",
         "",
         f"| setting | steps | residuals | Jacobians | run | cost | {head} |",
         "|---|---|---|---|---|---|" + "---|" * len(outputs),

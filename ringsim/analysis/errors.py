@@ -65,7 +65,7 @@ class Errors:
         self.uncertainty: dict[str, float] = {}
         self.best: dict[str, float] = {}
         for name in OUTPUTS:
-            if name in results and np.isfinite(self.until_the_end(name)[self.places]).any():
+            if name in results and self._known(name):
                 self._judge(name)
         full = np.array([rung.ladder != "fidelity" for rung in rungs])
         self.of["energy"] = np.where(full & self.good, results.energy_error, np.nan)
@@ -75,6 +75,12 @@ class Errors:
             if present:
                 self.of[group] = np.max([self.of[m] for m in present], axis=0)
                 self.uncertainty[group] = max(self.uncertainty[m] for m in present)
+
+    def _known(self, name: str) -> bool:
+        """Whether all references have an output."""
+        values = self.until_the_end(name).isel(rung=self.places).notnull()
+        inner = [dim for dim in values.dims if dim != "rung"]
+        return bool(values.any(inner).all())
 
     def until_the_end(self, name: str) -> xr.DataArray:
         """A variable, series only up to the earliest deployment time of the references."""

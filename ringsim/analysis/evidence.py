@@ -66,15 +66,12 @@ class Evidence:
         Its name.
     kind
         What it is, see :func:`kind_of_scene`.
-    step
-        Its largest step, s: that of another scene is scaled like it.
     references
         Extrapolated values of its main numbers, SI units and degrees.
     """
 
     scene: str
     kind: Mapping[str, Any]
-    step: float
     references: Mapping[str, float]
     settings: tuple[Setting, ...]
 
@@ -107,10 +104,10 @@ class Evidence:
         )
 
     def values_for(self, setting: Setting, scene: Scene) -> dict[str, Any]:
-        """A setting's values for a scene whose largest step may be another one."""
+        """A setting's values for a scene: no fewer elements than it has, no step beyond its end."""
         values = dict(setting.values)
-        step = values["solver.step"] / self.step * scene.solver.step
-        values["solver.step"] = float(f"{min(step, scene.solver.end_time):.6g}")
+        values["solver.step"] = min(values["solver.step"], scene.solver.end_time)
+        values["rods.elements"] = max(values["rods.elements"], scene.rods.elements)
         return values
 
     def require_like(self, scene: Scene) -> None:
@@ -163,14 +160,12 @@ def evidence_of(found: xr.Dataset) -> Evidence:
         for name, value in zip(outputs, found.reference.values, strict=True)
         if np.isfinite(value)
     }
-    step = scene.solver.step
-    return Evidence(scene.name, kind_of_scene(scene), step, references, tuple(settings))
+    return Evidence(scene.name, kind_of_scene(scene), references, tuple(settings))
 
 
 def _by_cost(found: xr.Dataset) -> NDArray[np.int64]:
     """Good runs of the full model with the scene's own rods and step control, cheapest first."""
-    others = np.isin(found.ladder.values, ["fidelity", "formulation", "constant step"])
-    own = np.flatnonzero(~others & np.isfinite(found.bound.values).any(axis=1))
+    own = np.flatnonzero(found.eligible.values & np.isfinite(found.bound.values).any(axis=1))
     stands = found.ladder.values[own] == STANDING
     cost = found.cost.values[own] * np.where(stands, WORTH_A_CHANGE, 1.0)
     return np.asarray(own[np.argsort(cost, kind="stable")])
@@ -192,7 +187,6 @@ def to_toml(evidence: Evidence) -> str:
     table = {
         "scene": evidence.scene,
         "kind": dict(evidence.kind),
-        "step": evidence.step,
         "references": dict(evidence.references),
         "settings": [
             {
@@ -263,10 +257,8 @@ def _from_toml(text: str, name: str) -> Evidence:
         )
         if not settings or any("solver.step" not in s.values for s in settings):
             raise KeyError("settings")
-        step = float(table["step"])
-        return Evidence(
-            str(table["scene"]), dict(table["kind"]), step, dict(table["references"]), settings
-        )
+        name_of = str(table["scene"])
+        return Evidence(name_of, dict(table["kind"]), dict(table["references"]), settings)
     except (tomllib.TOMLDecodeError, AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"{name}: not the settings of an accuracy study ({error}): make it with "

@@ -57,19 +57,25 @@ def _refines(fine: Rung, coarse: Rung) -> bool:
     return bool(moved) or a["rods.elements"] > b["rods.elements"]
 
 
-def typical_cost(
-    seconds: Array, residuals: Array, jacobians: Array, rungs: Sequence[Rung]
-) -> Array:
+def typical_cost(seconds: Array, work: Array, rungs: Sequence[Rung]) -> Array:
     """Processor time of each setting without the machine's moods, shape (rung,), s.
 
-    Every residual and every Jacobian costs the same within a ladder, but for a factor for the
-    rods' formulation and elements: fitted to what was measured.  A fidelity costs what it did.
+    Every piece of work costs the same within a ladder, but for a factor for the rods' formulation
+    and elements: fitted to what was measured.  A fidelity costs what it did.
+
+    Parameters
+    ----------
+    seconds
+        As measured, shape (rung,).
+    work
+        Counts of what takes time, shape (rung, kinds).
+    rungs
+        The settings.
     """
     cost = np.array(seconds, dtype=float)
     sizes = [_size(rung) for rung in rungs]
     standing = max(set(sizes), key=sizes.count)
     own = np.array([size == standing for size in sizes]) & np.isfinite(seconds)
-    work = np.column_stack([residuals, jacobians]).astype(float)
     scale = 1.0 / np.maximum(seconds[own], 1e-9)  # relative errors count
     shares, _ = nnls(work[own] * scale[:, None], np.ones(own.sum()))
     plain = work @ shares
@@ -100,6 +106,12 @@ def frontier(cost: Array, error: Array) -> NDArray[np.bool_]:
             better = no_worse & ((cost < cost[row]) | (own < own[row]))
             best[row, column] = not better.any()
     return best
+
+
+def eligible(rungs: Sequence[Rung]) -> NDArray[np.bool_]:
+    """What may be recommended: the full model with the scene's own rods and step control."""
+    others = ("fidelity", "formulation", "constant step")
+    return np.array([rung.ladder not in others for rung in rungs])
 
 
 def in_favour(cost: Array, rungs: Sequence[Rung]) -> Array:

@@ -14,6 +14,8 @@ from ringsim.analysis.reference import limit, order
 Array = NDArray[np.float64]
 _CLEAR = 1.5
 """An error over the limit's uncertainty from which on it counts."""
+_ABOUT = 0.2
+"""Share by which an error may rise towards finer steps and still count as falling."""
 _MATTERS = 2.0
 """Ratio of the errors along a ladder from which on it shows an order."""
 
@@ -62,10 +64,15 @@ def _order_of_changes(errors: Errors, places: Array, sizes: Array, name: str) ->
 def _slope(sizes: Array, error: Array, floor: float) -> float:
     """Slope of log error over log size among all that stand clear of the limit's uncertainty.
 
-    All of them, because two may agree by chance.  Errors that come from elsewhere and hardly
-    change along the ladder show no order.
+    All of them, because two may agree by chance.  Errors that rise somewhere towards finer steps,
+    or hardly change, show no order.
     """
     clear = np.isfinite(error) & (error > max(_CLEAR * floor, 1e-300))
-    if clear.sum() < 3 or error[clear].max() < _MATTERS * error[clear].min():
+    finer = error[clear][np.argsort(-sizes[clear])]
+    if (
+        len(finer) < 3
+        or finer[0] < _MATTERS * finer[-1]
+        or (np.diff(finer) > _ABOUT * finer[:-1]).any()
+    ):
         return np.nan
     return float(np.polyfit(sizes[clear], np.log(error[clear]), 1)[0])

@@ -2,7 +2,8 @@
 
 Three levels tell whether halving pays as it should.  Changes that shrink by r from one level to
 the next (4 at second order) leave d / (r - 1) of the last change d to go, Richardson (1911);
-those that do not shrink say nothing of where they lead, and nothing is extrapolated.
+those that do not shrink, or go back and forth, say nothing of where they lead, and nothing is
+extrapolated.
 """
 
 from __future__ import annotations
@@ -38,9 +39,11 @@ def limit(values: xr.DataArray) -> Limit:
         return Limit(fine, 0.0)
     if now * _SHRINKING > before:
         return Limit(fine, max(before, now))
+    least = before / _SECOND_ORDER / (_SECOND_ORDER - 1.0)
+    if float((first * last).sum()) < 0.0:  # back and forth: the limit lies between the two last
+        return Limit(fine, max(now, least))
     ratio = min(before / max(now, 1e-300), _SECOND_ORDER)
     step = last / (ratio - 1.0)
-    least = before / _SECOND_ORDER / (_SECOND_ORDER - 1.0)
     return Limit(fine + step, max(now / (ratio - 1.0), least))
 
 

@@ -66,6 +66,8 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float = TIMEOU
     )
     study = _Study(folder, scene, workers, timeout)
     rungs = ladder(scene)
+    for rung in rungs:
+        scene.with_values(dict(rung.values))  # refused before anything has run
     in_time, in_space = references(rungs)
     needed = [*in_time, *in_space]
     for stage, places in (("first", in_time[:1]), ("reference", needed)):
@@ -137,7 +139,7 @@ def _require_ok(rungs: Sequence[Rung], results: xr.Dataset) -> None:
             raise ReferenceRunError(
                 f"the reference run with {settings} ended as {ended.word}: "
                 f"{str(results.reason[k].item()) or 'no reason given'}: change the scene so that "
-                "it ends well with fine steps, or give it more time (--timeout)"
+                "it ends well with fine steps, or give it more time (--timeout) in a new folder"
             )
 
 

@@ -141,9 +141,9 @@ def _with_accuracy(
         raise InputError(f"--set {clash[0]}: --accuracy chooses it: leave out one of the two")
     values = known.values_for(picked, changed)
     words = ", ".join(f"{path} = {value}" for path, value in values.items())
-    errors = ", ".join(f"{name.replace('_', ' ')} {e:.0e}" for name, e in picked.errors.items())
+    errors = ", ".join(f"{name.replace('_', ' ')} {e:.2g}" for name, e in picked.errors.items())
     click.echo(f"settings for {accuracy:g}: {words}")
-    click.echo(f"  measured with {known.scene}: {errors}")
+    click.echo(f"  measured with {known.scene} to be good for: {errors}")
     return scene.with_values(values)
 
 

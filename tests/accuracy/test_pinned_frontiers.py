@@ -54,8 +54,8 @@ PICKS = (
     Pick("ring18-cable", "asynchrony", 1e-2, {}, "17 deg, that the cables cause: easy to follow"),
     Pick("ring18-cable", "peak_tension", 1e-2, {}, "4.6e-3 as it stands"),
     Pick(
-        "ring18-cable", "peak_tension", 1e-3, {STEP: 0.05, TOLERANCE: 7.5e-4, NEWTON: 1e-6},
-        "the peak comes with the jerk at the end: half of every step takes a fifth of its error",
+        "ring18-cable", "peak_tension", 1e-3, {TOLERANCE: 3e-4, NEWTON: 1e-4},
+        "half of every step leaves 9.8e-4, and the reference is uncertain by 3e-5",
     ),
 )  # fmt: skip
 LUCK = 1.1

@@ -34,6 +34,15 @@ def test_changes_that_do_not_shrink_extrapolate_nothing(values: tuple[float, ...
     assert found.uncertainty == 1.0
 
 
+@pytest.mark.parametrize("values", [(1.0, -0.5, 0.25), (1.0, 0.0, 0.5), (1.0, -0.3, 0.09)])
+def test_changes_that_go_back_and_forth_are_not_extrapolated(values: tuple[float, ...]) -> None:
+    a, b, c = values
+    aitken = c - (c - b) ** 2 / (c - 2.0 * b + a)
+    found = limit(levels(*values))
+    assert float(found.value) == c
+    assert abs(aitken - c) <= found.uncertainty
+
+
 def test_equal_levels_are_certain() -> None:
     assert limit(levels(2.0, 2.0, 2.0)) == (2.0, 0.0)
 

@@ -111,7 +111,8 @@ def test_a_late_motor_and_one_that_stops() -> None:
     angles = late.values["opening_angle"]
     # A slack rope of 0.1 N below the smoothing pulls nothing.
     assert angles[..., before] == pytest.approx(60.0, abs=1e-6)
-    assert late.values["wound_length"][:, before].max() == 0.0
+    # The step across the start is interpolated.
+    assert late.values["wound_length"][:, before].max() < 1e-7
     assert angles[..., -1].min() > 65.0
     stopped = outcome(scene(both__winch__stop_time=2.0, joints__vjoint__viscous=0.5, **loose))
     assert stopped.status == Status.UNFINISHED
