@@ -13,6 +13,7 @@ from exudyn.advancedUtilities import CreateSymbolicUserFunction
 from numpy.typing import NDArray
 
 from ringsim.engine import quaternions
+from ringsim.engine.rod_dampers import RodDampers
 
 Array = NDArray[np.float64]
 exu.config.printToConsole = False
@@ -52,7 +53,7 @@ class Assembly:
     rigid_nodes
         Nodes with Euler parameters.
     dampers
-        Dampers of the rods with their damping matrices, shape (6, 6).
+        Dampers of the rods.
 
     """
 
@@ -61,7 +62,7 @@ class Assembly:
     starts: dict[int, Array] = field(default_factory=dict)
     bodies: list[Any] = field(default_factory=list)
     rigid_nodes: list[Any] = field(default_factory=list)
-    dampers: list[tuple[Any, Array]] = field(default_factory=list)
+    dampers: RodDampers = field(default_factory=RodDampers)
     _laws: dict[Any, Any] = field(default_factory=dict)
     _ground: Any = None
 

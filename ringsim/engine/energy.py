@@ -15,7 +15,7 @@ from ringsim.engine.joints import friction_torque, stop_torque
 from ringsim.engine.net import HubNet, net_forces
 from ringsim.engine.pantograph_ring import RingModel
 from ringsim.engine.readings import JointGroup, State
-from ringsim.engine.work import StepWork, rod_damping
+from ringsim.engine.work import StepWork
 from ringsim.parts.joints import JointFriction
 
 Array = NDArray[np.float64]
@@ -85,7 +85,7 @@ class EnergyMeter:
         kinetic = sum(self._output(body, _KINETIC) for body in self._model.assembly.bodies)
         elastic = float(sum(self._output(element, _POTENTIAL) for element in self._elements))
         lifted = (state.position - state.reference)[self._lifts]
-        damped = [self._rods_damping(), self._stop_damping(angles, rates, latched)]
+        damped = [self._stop_damping(angles, rates, latched)]
         for law, group, sections in self._friction:
             rate = group.rate(state)
             damped.append((friction_torque(law, group.sections, sections, rate), rate))
@@ -105,20 +105,20 @@ class EnergyMeter:
             float(kinetic),
             elastic,
             float(np.sum(self._forces * lifted)),
-            passed.lost,
+            passed.lost + self._lost_in_rods(time),
             passed.driven,
         )
 
     def keep(self) -> None:
         """Count from the last reading on."""
         self._since.keep()
+        self._model.assembly.dampers.keep()
 
-    def _rods_damping(self) -> Damping:
-        if self._model.scene.rods.damping == 0.0:
-            return _NOTHING
-        if not self._model.formulation.has_strains:
-            return np.full(1, math.nan), np.zeros(1)
-        return rod_damping(self._model.assembly)
+    def _lost_in_rods(self, time: float) -> float:
+        model = self._model
+        if model.scene.rods.damping > 0.0 and not model.formulation.has_strains:
+            return math.nan
+        return model.assembly.dampers.lost(model.assembly.system, time)
 
     def _friction_groups(self) -> list[tuple[JointFriction, JointGroup, int]]:
         laws = self._model.scene.joints

@@ -22,7 +22,7 @@ from ringsim.engine.guard import Guard
 from ringsim.engine.planar_truss import TrussModel, rest_force
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.settings import raise_own, solver_settings
-from ringsim.engine.work import StepWork, rod_damping
+from ringsim.engine.work import StepWork
 from ringsim.variables import Status
 
 Array = NDArray[np.float64]
@@ -245,12 +245,13 @@ class TrussReader:
         elastic += 0.5 * spring.stiffness * (strut - spring.free_length) ** 2
         elastic += 0.5 * rest.stiffness * max(room - distance, 0.0) ** 2
         elastic += float(chain.elastic_energy.sum())
-        in_beams, beam_rates = rod_damping(model.assembly)
-        forces = np.concatenate([[spring.damping * closing, held - push], in_beams])
-        rates = np.concatenate([[closing, rate], beam_rates])
-        passed = self._since.since(time, forces, rates, chain)
+        dampers = model.assembly.dampers
+        in_beams = dampers.lost(model.assembly.system, time)
+        forces = np.array([spring.damping * closing, held - push])
+        passed = self._since.since(time, forces, np.array([closing, rate]), chain)
         self._since.keep()
-        return Energies(kinetic, elastic, 0.0, passed.lost, passed.driven)
+        dampers.keep()
+        return Energies(kinetic, elastic, 0.0, passed.lost + in_beams, passed.driven)
 
     def _gap(self, position: Array) -> float:
         """Largest distance of points that a joint holds together, m."""

@@ -26,6 +26,7 @@ class Predictor:
 
     def __init__(self, assembly: Assembly, solver: Any) -> None:
         self._system, self._solver = assembly.system, solver
+        self._dampers = assembly.dampers
         self._turns = np.array([assembly.coordinates_of(n)[3:7] for n in assembly.rigid_nodes])
         data = self._system.systemData
         reference = np.array(data.GetODE2Coordinates(exu.ConfigurationType.Reference))
@@ -34,7 +35,11 @@ class Predictor:
         self._last: tuple[float, Array] | None = None
 
     def apply(self, system: Any, time: float, newton: int, discontinuous: int) -> None:
-        """Called by exudyn before every residual; acts once per step, before the first."""
+        """Called by exudyn before every residual; acts once per step, before the first.
+
+        The rods' dampers come first: they read the state that the step starts from.
+        """
+        self._dampers.prepare(system, time, newton, discontinuous)
         if newton != 0 or discontinuous != 0 or time == self._time:
             return
         self._time = time

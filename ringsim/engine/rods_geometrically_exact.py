@@ -30,7 +30,7 @@ class GeometricallyExact:
 
         exudyn's element takes no damping and says nothing of it.  Its strains are constant, so
         damping C eps_dot is a damper C / L between its ends' frames moved to its middle, where
-        they coincide: a rigid motion of the element then costs nothing.
+        they coincide (``ringsim.engine.rod_dampers``).
         """
         damping = np.array(section.dampingMatrix) / length
         if damping.any():
@@ -39,19 +39,17 @@ class GeometricallyExact:
                 assembly.body_marker(assembly.add_body(node, 0.0, np.zeros((3, 3))), arm)
                 for node, arm in zip(nodes, (middle, -middle), strict=True)
             ]
-            damper = assembly.system.AddObject(
-                item.ObjectConnectorRigidBodySpringDamper(
-                    markerNumbers=markers, stiffness=np.zeros((6, 6)), damping=damping
-                )
-            )
-            assembly.dampers.append((damper, damping))
-        return assembly.system.AddObject(
+            number = assembly.dampers.add(assembly.system, markers, damping)
+        element = assembly.system.AddObject(
             item.ObjectBeamGeometricallyExact(
                 nodeNumbers=nodes,
                 length=length,
                 sectionData=section,
             )
         )
+        if damping.any():
+            assembly.dampers.numbers[int(element)] = number
+        return element
 
     def add_mass(self, assembly: Assembly, node: Any, mass: float) -> None:
         """A body without inertia of its own: the beam lends the node its rotary inertia."""

@@ -21,17 +21,19 @@ _MIDDLE = [0.0, 0.0, 0.0]
 class StressMeter:
     """Stress |N| / A + |M| r / I of every rod half: the larger of its two ends.
 
-    exudyn gives the moment in the middle of an element; along it the moment follows the shear
-    force, dM_z/dx = -Q_y and dM_y/dx = Q_z.
+    exudyn gives the elastic moment in the middle of an element, the rods' dampers add what damping
+    carries there; along it the moment follows the shear force, dM_z/dx = -Q_y and dM_y/dx = Q_z.
     """
 
     def __init__(self, model: RingModel) -> None:
-        self._output = model.assembly.system.GetObjectOutputBody
+        self._system, self._dampers = model.assembly.system, model.assembly.dampers
+        self._output = self._system.GetObjectOutputBody
         self._places = [self._rows(model, name) for name in RODS]
 
     def read(self) -> Array:
         """Stresses at the current state, shape (8, sections), Pa."""
-        return np.array([[self._worst(*half) for half in row] for row in self._places])
+        damping = self._dampers.latest
+        return np.array([[self._worst(*half, damping) for half in row] for row in self._places])
 
     def _rows(self, model: RingModel, name: str) -> list[Any]:
         whole = name if name.startswith("bar") else name.rsplit("_", 1)[0]
@@ -45,11 +47,14 @@ class StressMeter:
             rows.append((ends, rod.tube))
         return rows
 
-    def _worst(self, ends: Any, tube: Any) -> float:
+    def _worst(self, ends: Any, tube: Any, damping: Array) -> float:
         worst = 0.0
         for element, x in ends:
             force = self._output(element, _FORCE, _MIDDLE)
             torque = self._output(element, _TORQUE, _MIDDLE)
+            number = self._dampers.numbers.get(int(element))
+            if number is not None:
+                force, torque = force + damping[number, :3], torque + damping[number, 3:]
             moment = math.hypot(torque[1] + force[2] * x, torque[2] - force[1] * x)
             bending = moment * 0.5 * tube.outer_diameter
             worst = max(worst, abs(force[0]) / tube.area + bending / tube.second_moment)

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.state import ChainState
 from ringsim.cable.work import ChainWork, work_between
-from ringsim.engine.assembly import Assembly
 
 Array = NDArray[np.float64]
-_VELOCITY = exu.OutputVariableType.VelocityLocal
-_ANGULAR_VELOCITY = exu.OutputVariableType.AngularVelocityLocal
 _Instant = tuple[float, Array, Array, ChainState | None]
 
 
@@ -57,13 +51,3 @@ class StepWork:
         """Count from the instant of the last call on."""
         self._before = self._last
 
-
-def rod_damping(assembly: Assembly) -> tuple[Array, Array]:
-    """Forces and rates of the rods' dampers, shape (6 dampers,) each."""
-    read: Any = assembly.system.GetObjectOutput
-    forces, rates = [np.zeros(0)], [np.zeros(0)]
-    for damper, matrix in assembly.dampers:
-        rate = np.concatenate([read(damper, _VELOCITY), read(damper, _ANGULAR_VELOCITY)])
-        forces.append(matrix @ rate)
-        rates.append(rate)
-    return np.concatenate(forces), np.concatenate(rates)

@@ -12,7 +12,9 @@ LENGTH, MASS, INERTIA, RELAXATION = 0.3, 1.0, 1e-2, 1e-3
 STIFFNESS = np.diag([1e4, 4e3, 4e3, 10.0, 20.0, 20.0])
 
 
-def swing(relaxation: float, spin: float, stretch: float, bend: float) -> tuple[Array, Array]:
+def swing(
+    relaxation: float, spin: float, stretch: float, bend: float, steps: int = 2000
+) -> tuple[Array, Array]:
     """One nearly massless element between two bodies, set off spinning, stretching, bending.
 
     Returns times, s, and stretch, bending angle and spin over them.
@@ -42,7 +44,7 @@ def swing(relaxation: float, spin: float, stretch: float, bend: float) -> tuple[
     settings.solution.file.write = False
     settings.timeIntegration.verboseMode = 0
     settings.timeIntegration.endTime = 0.2
-    settings.timeIntegration.numberOfSteps = 2000
+    settings.timeIntegration.numberOfSteps = steps
     settings.timeIntegration.generalizedAlpha.spectralRadius = 0.99
     settings.timeIntegration.newton.relativeTolerance = 1e-6
     settings.timeIntegration.newton.absoluteTolerance = 1e-7
@@ -50,6 +52,7 @@ def swing(relaxation: float, spin: float, stretch: float, bend: float) -> tuple[
     rows: list[list[float]] = []
 
     def note(system: exu.MainSystem, time: float) -> bool:
+        assembly.dampers.lost(system, time)
         places = [np.array(system.GetNodeOutput(n, kind.Position)) for n in nodes]
         turns = [np.array(system.GetNodeOutput(n, kind.AngularVelocityLocal)) for n in nodes]
         reach = float(np.linalg.norm(places[1] - places[0]))
@@ -57,6 +60,8 @@ def swing(relaxation: float, spin: float, stretch: float, bend: float) -> tuple[
         return True
 
     assembly.system.SetPostStepUserFunction(note)
+    assembly.system.SetPreNewtonResidualUserFunction(assembly.dampers.prepare)
+    assembly.dampers.lost(assembly.system, 0.0)
     assembly.system.SolveDynamic(settings)
     table = np.array(rows)
     return table[:, 0], table[:, 1:]
