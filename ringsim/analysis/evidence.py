@@ -22,6 +22,7 @@ from ringsim.analysis.errors import GROUPS, OUTPUTS
 from ringsim.analysis.frontier import WORTH_A_CHANGE
 from ringsim.analysis.ladder import PATHS, STANDING
 from ringsim.choice import kind_of
+from ringsim.parts.solver import NO_DEVIATIONS
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_toml
 
@@ -179,6 +180,8 @@ def _values(found: xr.Dataset, rung: int) -> dict[str, Any]:
     values = {path: found[path.replace(".", "_")].values[rung] for path in PATHS}
     values = {path: getattr(value, "item", lambda v=value: v)() for path, value in values.items()}
     del values["rods.kind"], values["solver.step_control"]
+    if values["solver.deviation_tolerance"] >= NO_DEVIATIONS:
+        del values["solver.deviation_tolerance"]  # not followed by this scene, perhaps by others
     return values
 
 

@@ -20,7 +20,12 @@ WORTH_A_CHANGE = 0.9
 """Cost of another setting over that of the scene's own from which on it is worth a change: less
 is within what the fit of the cost, and the luck of single steps, are good for."""
 _SAME = ("solver.step_control", "rods.kind")
-_SMALLER = ("solver.step", "solver.tolerance", "solver.newton_tolerance")
+_SMALLER = (
+    "solver.step",
+    "solver.tolerance",
+    "solver.deviation_tolerance",
+    "solver.newton_tolerance",
+)
 
 
 def bounds(error: Array, rungs: Sequence[Rung], uncertainty: Array) -> Array:

@@ -19,6 +19,7 @@ PATHS = (
     "solver.step_control",
     "solver.step",
     "solver.tolerance",
+    "solver.deviation_tolerance",
     "solver.spectral_radius",
     "solver.newton_tolerance",
     "rods.kind",
@@ -102,6 +103,7 @@ def standing(scene: Scene) -> dict[str, Any]:
         "solver.step_control": solver.step_control,
         "solver.step": solver.step,
         "solver.tolerance": solver.tolerance,
+        "solver.deviation_tolerance": solver.deviation_tolerance,
         "solver.spectral_radius": solver.spectral_radius,
         "solver.newton_tolerance": solver.newton_tolerance,
         "rods.kind": kind_of(scene.rods),
@@ -140,6 +142,8 @@ def _halved(scene: Scene, times: int) -> dict[str, Any]:
     }
     if _moves(scene):
         found["solver__tolerance"] = _within(solver.tolerance * 0.25**times)
+        deviations = solver.deviations_scaled(0.25**times)
+        found["solver__deviation_tolerance"] = _short(deviations)
     return found
 
 
@@ -192,6 +196,8 @@ def _settings(scene: Scene, base: Mapping[str, Any]) -> Iterator[Rung]:
             if tolerance == solver.tolerance and coarser != 1.0:
                 continue  # the scene stands at the end of what is allowed
             changes["solver__tolerance"] = tolerance
+            deviations = solver.deviations_scaled(coarser)
+            changes["solver__deviation_tolerance"] = _short(deviations)
             label = f"tolerance {tolerance:g}"
         else:
             step = min(coarser**0.5 * solver.step, solver.end_time)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import exudyn as exu
 import numpy as np
@@ -13,8 +13,8 @@ from ringsim.cable.section_path import path_slope
 from ringsim.cable.state import ChainState
 from ringsim.engine.build import Built
 from ringsim.engine.closing import close
+from ringsim.engine.deviation_steps import deviation_steps
 from ringsim.engine.energy import Energies, EnergyMeter
-from ringsim.engine.energy_control import EnergyControl
 from ringsim.engine.guard import Guard
 from ringsim.engine.history import History
 from ringsim.engine.locks import Locks
@@ -25,11 +25,11 @@ from ringsim.engine.scales import (
     contact_step,
     residual_tolerance,
     rope_step,
-    slight_energy,
     usual_energy,
     usual_rate,
 )
 from ringsim.engine.settings import raise_own, solver_settings
+from ringsim.engine.step_judge import Reading, StepJudge
 from ringsim.engine.stepping import StepControl
 from ringsim.engine.stress import StressMeter
 from ringsim.variables import Status
@@ -37,16 +37,6 @@ from ringsim.variables import Status
 Array = NDArray[np.float64]
 _REFUSE = 10.0
 """Error that makes exudyn repeat a step; its tolerance is 1."""
-
-
-class _Reading(NamedTuple):
-    """The state at the end of a step: time (s), angles (rad), rates (rad/s), energies, cables."""
-
-    time: float
-    angles: Array
-    rates: Array
-    energies: Energies
-    chain: ChainState | None
 
 
 class Integration:
@@ -73,15 +63,15 @@ class Integration:
         self._steps = StepControl(
             scene.solver, contact_step(built), usual_rate(scene), rope_step(built)
         )
-        self._control: EnergyControl | None = None
-        usual = usual_energy(scene)
-        if scene.solver.step_control != "constant":
-            roped = built.cables is not None
-            slight = usual if built.cables is None else slight_energy(built.cables)
-            self._control = EnergyControl(scene.solver, slight, tireless=roped)
-        self._guard = Guard(scene.solver, usual, scene.structure.half_bar)
+        constant = scene.solver.step_control == "constant"
+        self._judge = None if constant else StepJudge(built)
+        self._deviations = deviation_steps(scene)
+        bend = math.inf
+        if constant and built.cables is not None:
+            bend = max(cable.slack_width for cable in built.cables.chain.cables)
+        self._guard = Guard(scene.solver, usual_energy(scene), scene.structure.half_bar, bend)
         self._fresh = True
-        self._weighed: _Reading | None = None
+        self._weighed: Reading | None = None
         self._shorter: float | None = None
         self._chain: ChainState | None = None
         self.history = History()
@@ -92,7 +82,7 @@ class Integration:
         solver.SetUserFunctionUpdateCurrentTime(self._system, self._update_time)
         self._system.SetPostStepUserFunction(self._after_step)
         self._system.SetPreNewtonResidualUserFunction(Predictor(ring.assembly, solver).apply)
-        if self._control is not None:
+        if self._judge is not None:
             self._settings.timeIntegration.discontinuous.ignoreMaxIterations = False
             self._system.SetPostNewtonUserFunction(self._weigh)
         self._read(0.0)
@@ -110,7 +100,7 @@ class Integration:
             history.status = Status.SOLVER_FAILED  # exudyn may give up without raising
             history.reason = self._explain(RuntimeError("it stopped before the end"))
         self._guard.conclude(history)
-        history.reason += self._control.note() if self._control is not None else ""
+        history.reason += self._judge.note() if self._judge is not None else ""
         close(history, self._system, solver)
         return history
 
@@ -132,8 +122,9 @@ class Integration:
         """Set the step: the one chosen after the last step, or the reduced one of a retry."""
         if self._fresh:
             now = self.history.times[-1]
-            if self._control is not None:
-                self._steps.step = min(self._steps.step, self._control.limit)
+            if self._judge is not None:
+                self._judge.locked = math.isfinite(self._settled_at)
+                self._steps.step = min(self._steps.step, self._judge.limit)
             ends = (self._scene.solver.end_time, self._built.faults.next_time, self._settled_at)
             left = min(ends) - now
             step = min(self._steps.step, left)
@@ -163,29 +154,29 @@ class Integration:
         if time >= self._settled_at or self._finished(time) or self._exhausted(time):
             return False
         self._steps.advance(time, float(np.mean(rates)), self._locks.contact(angles, rates))
+        if self._deviations is not None and not self._locks.deployed.any():
+            self._steps.step = min(self._steps.step, self._deviations.limit(time, angles, rates))
         return True
 
     def _weigh(self, system: Any, time: float) -> list[float]:
         """Have exudyn repeat a step that has converged to a state that lacks energy."""
-        before, control = self.history.times[-1], self._control
-        if time > before and self._weighed is None and control is not None:
+        before, judge = self.history.times[-1], self._judge
+        if time > before and self._weighed is None and judge is not None:
             found = self._weighed = self._measure(time)
             if found is not None:
-                self._shorter = control.shorter(
-                    time - before, self.history.energies[-1], found.energies
-                ) or self._steps.shorter_first(
+                self._shorter = judge.shorter(self.history, found) or self._steps.shorter_first(
                     time - before, self._locks.contact(found.angles, found.rates)
                 )
         return [0.0 if self._shorter is None else _REFUSE, -1.0]
 
-    def _measure(self, time: float) -> _Reading | None:
+    def _measure(self, time: float) -> Reading | None:
         """The current state; None if it is not finite."""
         self._state.refresh()
         if not self._state.finite():
             return None
         angles, rates = self._openings.read(self._state)
         chain = self._read_cables(time)
-        return _Reading(time, angles, rates, self._energies(time, angles, rates, chain), chain)
+        return Reading(time, angles, rates, self._energies(time, angles, rates, chain), chain)
 
     def _energies(
         self, time: float, angles: Array, rates: Array, chain: ChainState | None
@@ -202,8 +193,8 @@ class Integration:
             )
             return False
         _, angles, rates, energies, chain = found
-        if self._control is not None and history.times:
-            self._control.accept(time - history.times[-1], history.energies[-1], energies)
+        if self._judge is not None and history.times:
+            self._judge.accept(history, found)
         if self._built.faults.strike(time, angles, chain):
             chain = self._read_cables(time)
             after = self._energies(time, angles, rates, chain)

@@ -21,6 +21,7 @@ from ringsim.engine.energy import Energies
 from ringsim.engine.guard import Guard
 from ringsim.engine.planar_truss import TrussModel, rest_force
 from ringsim.engine.predictor import Predictor
+from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.engine.settings import raise_own, solver_settings
 from ringsim.engine.work import StepWork
 from ringsim.variables import Status
@@ -142,6 +143,8 @@ class TrussIntegration:
         model, rods = self._model, self._model.scene.rods
         element = float(np.diff(model.upper.places).min())
         stiffest = float(np.max(rods.young_modulus)) * rods.bar.area / element
+        if rods.damping > 0.0:
+            stiffest *= STIFFENING
         size = self._system.systemData.ODE2Size()
         round_off = 4.0 * float(np.finfo(float).eps) * stiffest * math.sqrt(size)
         return max(model.scene.solver.newton_tolerance * self._push(), round_off)

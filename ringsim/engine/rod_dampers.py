@@ -10,10 +10,13 @@ the backward difference of second order (BDF2; of first order in a run's first s
 positions alone, so that a rod that turns without being strained is not damped, whatever the step.
 The integrator's own velocities would not do: they follow the positions to second order in the step
 only, and of a turning rod that error points along its axis, where C is largest.  With steps of a
-tenth of a second it was a force as large as the one that drives the ring.
+twentieth of a second it was a force as large as those that drive a ring.
 
 exudyn evaluates the force itself: it is a spring of stiffness a0 C whose unstretched length is
--(a1 e1 + a2 e0) / a0, both set before each attempt at a step.
+-(a1 e1 + a2 e0) / a0, both set before each attempt at a step.  In steps below tau / 2 such a spring
+would be several times as stiff as the rod, and round-off of the positions would keep Newton from
+converging.  There the velocities are good (their error is that of a step of tau / 2 at most) and
+the force is C de/dt with them.
 """
 
 from __future__ import annotations
@@ -28,6 +31,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 _SHIFT = exu.OutputVariableType.DisplacementLocal
 _TURN = exu.OutputVariableType.Rotation
+_VELOCITY = exu.OutputVariableType.VelocityLocal
+_SPIN = exu.OutputVariableType.AngularVelocityLocal
+_SHORT = 0.5
+"""Steps below this share of tau take velocities: the spring is 1.5 / 0.5 times as stiff as the rod
+there, which ``STIFFENING`` allows for."""
+STIFFENING = 1.0 + 1.5 / _SHORT
+"""Largest stiffness of a rod with its damper over that of the rod alone; 3/2 is a0 h of BDF2."""
 
 
 class RodDampers:
@@ -47,14 +57,24 @@ class RodDampers:
         self.latest = np.zeros((0, 6))
         self._dampers: list[Any] = []
         self._rows: list[Array] = []
+        self._short = 0.0
         self._past: list[tuple[float, Array]] = []
         self._prepared = (-1.0, -1.0)
-        self._stiffness, self._offsets = np.zeros((0, 6, 6)), np.zeros((0, 6))
+        self._lead = 0.0
+        self._offsets = np.zeros((0, 6))
+        self._by_velocity = False
         self._read: tuple[float, Array] | None = None
         self._kept: tuple[Array, Array] | None = None
 
-    def add(self, system: Any, markers: list[Any], damping: Array) -> int:
-        """A damper between two markers that coincide; ``damping`` C has the shape (6, 6).
+    def add(self, system: Any, markers: list[Any], damping: Array, relaxation: float) -> int:
+        """A damper between two markers that coincide.
+
+        Parameters
+        ----------
+        damping
+            C, shape (6, 6), N s/m and N m s.
+        relaxation
+            The rod's Kelvin-Voigt time tau, s.
 
         Returns
         -------
@@ -65,6 +85,7 @@ class RodDampers:
             system.AddObject(item.ObjectConnectorRigidBodySpringDamper(markerNumbers=markers))
         )
         self._rows.append(damping)
+        self._short = max(self._short, _SHORT * relaxation)
         return len(self._dampers) - 1
 
     def prepare(self, system: Any, time: float, newton: int, discontinuous: int) -> None:
@@ -80,13 +101,16 @@ class RodDampers:
             if self._read is None or self._read[0] != start:
                 raise RuntimeError(f"the rods' dampers were not read at {start:.9g} s")
             self._past = [*self._past[-1:], self._read]
-        lead, self._offsets = _difference(time, self._past)
-        self._stiffness = lead * np.array(self._rows)
-        for damper, stiffness, offset in zip(
-            self._dampers, self._stiffness, self._offsets, strict=True
-        ):
-            system.SetObjectParameter(damper, "stiffness", stiffness)
-            system.SetObjectParameter(damper, "offset", offset)
+        if time - start >= self._short:
+            self._by_velocity = False
+            self._lead, self._offsets = _difference(time, self._past)
+            self._set(system, "stiffness", self._lead * np.array(self._rows))
+            self._set(system, "offset", self._offsets)
+            self._set(system, "damping", np.zeros((len(self._rows), 6, 6)))
+        elif not self._by_velocity:
+            self._by_velocity = True
+            self._set(system, "stiffness", np.zeros((len(self._rows), 6, 6)))
+            self._set(system, "damping", np.array(self._rows))
 
     def lost(self, system: Any, time: float) -> float:
         """Energy taken since the reading that was kept last, J: mean force times change of strain.
@@ -98,11 +122,15 @@ class RodDampers:
         """
         if not self._dampers:
             return 0.0
-        strains = self._strains(system)
+        strains = self._outputs(system, _SHIFT, _TURN)
         self._read = time, strains
-        self.latest = np.zeros_like(strains)
-        if len(self._stiffness):
-            self.latest = np.einsum("nij,nj->ni", self._stiffness, strains - self._offsets)
+        if self._by_velocity:
+            rates = self._outputs(system, _VELOCITY, _SPIN)
+        elif self._past:
+            rates = self._lead * (strains - self._offsets)
+        else:
+            rates = np.zeros_like(strains)
+        self.latest = np.einsum("nij,nj->ni", np.array(self._rows), rates)
         if self._kept is None:
             return 0.0
         before, force = self._kept
@@ -113,13 +141,17 @@ class RodDampers:
         if self._read is not None:
             self._kept = self._read[1], self.latest
 
-    def _strains(self, system: Any) -> Array:
+    def _set(self, system: Any, name: str, values: Array) -> None:
+        for damper, value in zip(self._dampers, values, strict=True):
+            system.SetObjectParameter(damper, name, value)
+
+    def _outputs(self, system: Any, shift: Any, turn: Any) -> Array:
         output = system.GetObjectOutput
-        return np.array([[*output(d, _SHIFT), *output(d, _TURN)] for d in self._dampers])
+        return np.array([[*output(d, shift), *output(d, turn)] for d in self._dampers])
 
 
 def _difference(time: float, past: list[tuple[float, Array]]) -> tuple[float, Array]:
-    """A0 (1/s) and the strain at which a0 e2 + a1 e1 + a2 e0 vanishes, shape (dampers, 6)."""
+    """Of a0 e2 + a1 e1 + a2 e0: a0 in 1/s, and the e2 at which it vanishes, shape (dampers, 6)."""
     now, last = past[-1]
     h = time - now
     if len(past) == 1:

@@ -39,7 +39,8 @@ class GeometricallyExact:
                 assembly.body_marker(assembly.add_body(node, 0.0, np.zeros((3, 3))), arm)
                 for node, arm in zip(nodes, (middle, -middle), strict=True)
             ]
-            number = assembly.dampers.add(assembly.system, markers, damping)
+            tau = float(section.dampingMatrix[0][0] / section.stiffnessMatrix[0][0])
+            number = assembly.dampers.add(assembly.system, markers, damping, tau)
         element = assembly.system.AddObject(
             item.ObjectBeamGeometricallyExact(
                 nodeNumbers=nodes,

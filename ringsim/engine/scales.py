@@ -9,6 +9,7 @@ import numpy as np
 from ringsim.cable.section_path import path_slope
 from ringsim.engine.build import Built
 from ringsim.engine.cables import CableDrive
+from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.scene import Scene
 from ringsim.theory.ideal_ring import IdealRing
 
@@ -86,6 +87,8 @@ def residual_tolerance(built: Built) -> float:
             (scene.rods.bar, scene.structure.half_bar),
         )
     )
+    if scene.rods.damping > 0.0:
+        stiffest *= STIFFENING
     size = built.ring.assembly.system.systemData.ODE2Size()
     round_off = 4.0 * np.finfo(float).eps * float(stiffest) * math.sqrt(size)
     return max(scene.solver.newton_tolerance * drive, round_off)

@@ -33,7 +33,9 @@ class StressMeter:
     def read(self) -> Array:
         """Stresses at the current state, shape (8, sections), Pa."""
         damping = self._dampers.latest
-        return np.array([[self._worst(*half, damping) for half in row] for row in self._places])
+        return np.array(
+            [[self._worst(ends, tube, damping) for ends, tube in row] for row in self._places]
+        )
 
     def _rows(self, model: RingModel, name: str) -> list[Any]:
         whole = name if name.startswith("bar") else name.rsplit("_", 1)[0]

@@ -50,4 +50,3 @@ class StepWork:
     def keep(self) -> None:
         """Count from the instant of the last call on."""
         self._before = self._last
-

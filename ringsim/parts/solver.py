@@ -10,7 +10,10 @@ from ringsim.units import Model, Ratio, Second, SecondOrZero
 
 _FINER = 0.25
 """Factor on the step from one start of a run to the next."""
+NO_DEVIATIONS = 1e6
+"""``deviation_tolerance`` from which on the deviations choose no steps."""
 _LEAST_STEP, _LEAST_TOLERANCE, _LARGEST_TOLERANCE = 1e-9, 1e-8, 0.1
+_LEAST_DEVIATION = 1e-6
 
 
 class Solver(Model):
@@ -31,8 +34,12 @@ class Solver(Model):
     tolerance: Annotated[float, Field(ge=_LEAST_TOLERANCE, le=_LARGEST_TOLERANCE)] = 3e-4
     spectral_radius: Ratio = 0.8
     """High-frequency amplification per step: 1 keeps every vibration, lower damps it."""
-    newton_tolerance: Annotated[float, Field(ge=1e-12, le=1e-2)] = 1e-3
+    newton_tolerance: Annotated[float, Field(ge=1e-12, le=1e-2)] = 1e-4
     """Residual at which Newton stops, relative to the driving forces of the scene."""
+    deviation_tolerance: Annotated[float, Field(ge=_LEAST_DEVIATION, le=NO_DEVIATIONS)] = 0.02
+    """Error of the joints' deviations from their mean angle, over the largest so far, to which
+    steps resolve the ring's own vibrations where ``record.stress`` asks for them; 1e6: not
+    followed."""
 
     step_limit: Annotated[int, Field(ge=1, le=10_000_000)] = 20_000
     """A run that has not ended after so many steps is given up."""
@@ -68,6 +75,7 @@ class Solver(Model):
             update={
                 "step": max(self.step * _FINER**times, _LEAST_STEP),
                 "tolerance": max(self.tolerance * _FINER ** (2 * times), _LEAST_TOLERANCE),
+                "deviation_tolerance": self.deviations_scaled(_FINER ** (2 * times)),
             }
         )
 
@@ -81,8 +89,15 @@ class Solver(Model):
             update={
                 "step": min(2.0 * self.step, self.end_time),
                 "tolerance": min(4.0 * self.tolerance, _LARGEST_TOLERANCE),
+                "deviation_tolerance": self.deviations_scaled(4.0),
             }
         )
+
+    def deviations_scaled(self, factor: float) -> float:
+        """``deviation_tolerance`` times a factor, within its bounds; not followed stays so."""
+        if self.deviation_tolerance >= NO_DEVIATIONS:
+            return NO_DEVIATIONS
+        return max(self.deviation_tolerance * factor, _LEAST_DEVIATION)
 
 
 class Record(Model):
