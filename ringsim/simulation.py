@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ringsim.engine.solve import SOLVERS
+from ringsim.parts.solver import Solver
 from ringsim.scene import Scene
-from ringsim.theory.error_bars import error_bars
+from ringsim.theory.error_bars import OF_FINER, error_bars
 from ringsim.theory.ideal_fidelity import run_ideal, run_ideal_many
 from ringsim.variables import TIMINGS, Fidelity, Outcome, Status
 
@@ -55,14 +56,30 @@ def run(scene: Scene) -> Outcome:
             how += f" and solver.tolerance = {finer.tolerance:.2g}"
         outcome = replace(outcome, reason=f"{outcome.reason} ({how}; start 1: {first})")
     if scene.solver.error_bars and outcome.status == Status.OK:
-        longer = scene.solver.refined(restarts).coarsened()
-        coarse = _attempt(scene.model_copy(update={"solver": longer}), begin)
-        outcome.values.update(error_bars(outcome, coarse, scene.rods.elements))
-        for name in TIMINGS:
-            outcome.values[name] = coarse.values.get(name, outcome.values[name])
+        outcome = _with_bars(outcome, scene, scene.solver.refined(restarts), begin)
     outcome.values["fidelity"] = np.array(int(Fidelity.FULL))
     outcome.values["restarts"] = np.array(restarts)
     return outcome
+
+
+def _with_bars(
+    outcome: Outcome, scene: Scene, solver: Solver, begin: tuple[float, float]
+) -> Outcome:
+    """The outcome of a run at these settings with its error bars, or why it has none."""
+    reasons = []
+    for words, other, scale in (
+        ("twice as long", solver.coarsened(), 1.0),
+        ("half as long", solver.halved(), OF_FINER),
+    ):
+        found = _attempt(scene.model_copy(update={"solver": other}), begin)
+        for name in TIMINGS:
+            outcome.values[name] = found.values.get(name, outcome.values[name])
+        bars = error_bars(outcome, found, scene.rods.elements, scale)
+        if bars:
+            outcome.values.update(bars)
+            return outcome
+        reasons.append(f"with steps {words} it ended as {found.status.word}: {found.reason}")
+    return replace(outcome, reason=f"{outcome.reason}; no error bars, since {'; '.join(reasons)}")
 
 
 def _attempt(scene: Scene, begin: tuple[float, float]) -> Outcome:

@@ -126,6 +126,12 @@ _ALL = (
             ("peak_rod_stress", "Pa", "largest stress", "error bars of stress"),
         )
     ),
+    Variable(
+        "asynchrony_error",
+        ("time",),
+        "degree",
+        "what the asynchrony may be wrong by at any time up to then",
+    ),
     Variable("constraint_violation", ("time",), "m", "largest gap in any joint"),
     Variable("constraint_error", (), "m", "largest gap in any joint at any step"),
     Variable("steps", (), "1", "time steps", "i4"),

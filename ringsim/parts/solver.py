@@ -93,6 +93,16 @@ class Solver(Model):
             }
         )
 
+    def halved(self) -> Solver:
+        """Every step half as long."""
+        return self.model_copy(
+            update={
+                "step": max(0.5 * self.step, _LEAST_STEP),
+                "tolerance": max(0.25 * self.tolerance, _LEAST_TOLERANCE),
+                "deviation_tolerance": self.deviations_scaled(0.25),
+            }
+        )
+
     def deviations_scaled(self, factor: float) -> float:
         """``deviation_tolerance`` times a factor, within its bounds; not followed stays so."""
         if self.deviation_tolerance >= NO_DEVIATIONS:
