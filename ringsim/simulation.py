@@ -19,7 +19,7 @@ from ringsim.parts.solver import Solver
 from ringsim.scene import Scene
 from ringsim.theory.error_bars import OF_FINER, error_bars
 from ringsim.theory.ideal_fidelity import run_ideal, run_ideal_many
-from ringsim.variables import TIMINGS, Fidelity, Outcome, Status
+from ringsim.variables import COUNTS, TIMINGS, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,17 +40,21 @@ def run(scene: Scene) -> Outcome:
     -------
     Outcome
         Arrays on the scene's output grid, of the last start; ``restarts`` says how many there
-        were, and its times count all of them.  A solve that fails or does not reach its goal has
-        a status other than OK and the reason; it never raises.  With ``solver.error_bars`` it
-        holds the error bars of its main numbers, and the times of both runs.
+        were, ``step_used`` and ``tolerance_used`` with which settings the last one ran.  Times and
+        the counts ``total_steps``, ... are those of all starts.  A solve that fails or does not
+        reach its goal has a status other than OK and the reason; it never raises.  With
+        ``solver.error_bars`` it holds the error bars of its main numbers, and the times (not the
+        counts) of both runs.
     """
     begin = (time.perf_counter(), time.process_time())
     outcome, first, restarts = _attempt(scene, begin), "", 0
+    counts = [_counts(outcome)]
     while restarts < scene.solver.restarts and _curable(outcome, scene):
         restarts += 1
         first = first or outcome.reason
         finer = scene.solver.refined(restarts)
         outcome = _attempt(scene.model_copy(update={"solver": finer}), begin)
+        counts.append(_counts(outcome))
         how = f"start {restarts + 1} with solver.step = {finer.step:.3g} s"
         if finer.step_control != "constant":
             how += f" and solver.tolerance = {finer.tolerance:.2g}"
@@ -59,6 +63,12 @@ def run(scene: Scene) -> Outcome:
         outcome = _with_bars(outcome, scene, scene.solver.refined(restarts), begin)
     outcome.values["fidelity"] = np.array(int(Fidelity.FULL))
     outcome.values["restarts"] = np.array(restarts)
+    used = scene.solver.refined(restarts)
+    outcome.values["step_used"] = np.array(used.step)
+    follows = used.step_control == "motion"
+    outcome.values["tolerance_used"] = np.array(used.tolerance if follows else np.nan)
+    for name in COUNTS:
+        outcome.values[f"total_{name}"] = np.array(sum(each[name] for each in counts))
     return outcome
 
 
@@ -80,6 +90,11 @@ def _with_bars(
             return outcome
         reasons.append(f"with steps {words} it ended as {found.status.word}: {found.reason}")
     return replace(outcome, reason=f"{outcome.reason}; no error bars, since {'; '.join(reasons)}")
+
+
+def _counts(outcome: Outcome) -> dict[str, int]:
+    """What one start of a run took; 0 where it ended too early to tell."""
+    return {name: int(outcome.values.get(name, np.array(0))) for name in COUNTS}
 
 
 def _attempt(scene: Scene, begin: tuple[float, float]) -> Outcome:

@@ -134,11 +134,16 @@ _ALL = (
     ),
     Variable("constraint_violation", ("time",), "m", "largest gap in any joint"),
     Variable("constraint_error", (), "m", "largest gap in any joint at any step"),
-    Variable("steps", (), "1", "time steps", "i4"),
+    Variable("steps", (), "1", "time steps of the start that counts", "i4"),
     Variable("repeated_steps", (), "1", "steps that were repeated with a smaller one", "i4"),
-    Variable("newton_iterations", (), "1", "Newton iterations", "i4"),
-    Variable("jacobians", (), "1", "Jacobian factorisations", "i4"),
+    Variable("newton_iterations", (), "1", "Newton iterations of the start that counts", "i4"),
+    Variable("jacobians", (), "1", "Jacobian factorisations of the start that counts", "i4"),
     Variable("restarts", (), "1", "new starts with a smaller step after a run that failed", "i4"),
+    Variable("total_steps", (), "1", "time steps of all starts of the run", "i4"),
+    Variable("total_newton_iterations", (), "1", "Newton iterations of all starts", "i4"),
+    Variable("total_jacobians", (), "1", "Jacobian factorisations of all starts", "i4"),
+    Variable("step_used", (), "s", "largest step allowed, solver.step, of the start that counts"),
+    Variable("tolerance_used", (), "1", "solver.tolerance of the start that counts"),
     Variable("final_time", (), "s", "time at which the run ended"),
     Variable("fidelity", (), "1", "model: 0 full multibody, 1 ideal ring of rigid rods", "i4"),
     Variable("status", (), "1", "how the run ended", "i1"),
@@ -146,6 +151,9 @@ _ALL = (
     Variable("cpu_time", (), "s", "processor time of the run"),
 )
 VARIABLES = {variable.name: variable for variable in _ALL}
+
+COUNTS = ("steps", "newton_iterations", "jacobians")
+"""What a start of a run takes; "total_" before the name counts all starts."""
 
 TIMINGS = ("wall_time", "cpu_time")
 """The only variables that differ between repetitions of one run."""

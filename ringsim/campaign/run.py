@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ringsim.analysis.error_budget import budget_lines, error_budget
+from ringsim.analysis.restarts import restart_lines
 from ringsim.campaign.folder import Folder, open_folder
 from ringsim.campaign.merging import merge
 from ringsim.campaign.watch import Progress, Stop, stopping_on_signals
@@ -250,7 +251,7 @@ def _conclude(campaign: Folder, choices: Choices, stop: Stop) -> int:
     over_budget = bool(stop.reason) and not stop.signalled
     if merged.path is not None:
         _tell(f"{merged.path}: {campaign.table.samples} samples, {failed} failed")
-        for line in _budget(campaign, merged.path):
+        for line in _notes(campaign, merged.path):
             _tell(f"  {line}")
     if over_budget:
         _tell(
@@ -271,12 +272,13 @@ def _tell(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-def _budget(campaign: Folder, path: Path) -> list[str]:
-    """Numerical against sampling error, where samples have error bars."""
-    listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
-    if not (listed or campaign.scene.solver.error_bars):
-        return []
+def _notes(campaign: Folder, path: Path) -> list[str]:
+    """Samples that started anew, and numerical against sampling error where there are bars."""
     import xarray as xr
 
+    listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
     with xr.open_dataset(path) as dataset:
-        return budget_lines(error_budget(dataset))
+        lines = restart_lines(dataset)
+        if listed or campaign.scene.solver.error_bars:
+            lines += budget_lines(error_budget(dataset))
+    return lines

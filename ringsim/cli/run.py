@@ -12,6 +12,7 @@ import numpy as np
 
 from ringsim.choice import kind_of
 from ringsim.overrides import parse_assignment
+from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 
@@ -96,8 +97,14 @@ def command(
         ("energy error", "energy_error", "", "10.1e"),
         ("constraint error", "constraint_error", "m", "10.1e"),
         ("steps", "steps", "", "10d"),
+        ("steps of all starts", "total_steps", "", "10d"),
         ("wall time", "wall_time", "s", "10.2f"),
     ]
+    anew = restarted(values, chosen.solver)
+    if anew:
+        click.echo(f"  {anew}")
+    else:
+        rows = [row for row in rows if row[1] != "total_steps"]
     for label, name, unit, style in rows:
         if name in values and np.isfinite(values[name].item()):
             click.echo(f"  {label:20s}{format(values[name].item(), style)} {unit}".rstrip())
@@ -111,6 +118,21 @@ def command(
             click.echo(f"wrote {picture}")
     if outcome.status >= Status.SOLVER_FAILED:
         sys.exit(EXIT_FAILED)
+
+
+def restarted(values: dict[str, Any], asked: Solver) -> str:
+    """With which settings a run that started anew was computed; empty if it did not."""
+    times = int(values.get("restarts", 0))
+    if not times:
+        return ""
+    used = f"solver.step = {values['step_used'].item():.3g} s instead of {asked.step:.3g} s"
+    if np.isfinite(values["tolerance_used"]):
+        tolerance = values["tolerance_used"].item()
+        used += f", solver.tolerance = {tolerance:.2g} instead of {asked.tolerance:.2g}"
+    return (
+        f"started anew {times} times: computed with {used} (solver.restarts = 0 to see the "
+        "first start fail instead)"
+    ).replace("1 times", "once")
 
 
 def _with_accuracy(

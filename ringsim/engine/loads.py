@@ -13,7 +13,11 @@ Array = NDArray[np.float64]
 
 
 def add_loads(model: RingModel) -> Array:
-    """Apply the scene's forces; returns them along z, shape (2, sections), N."""
+    """Apply the scene's forces; returns them along z, shape (2, sections), N.
+
+    The direction is that of the space in which the ring was built, not of the ring: exudyn's
+    force vectors are those of the global frame unless ``bodyFixed`` is set.
+    """
     loads = model.scene.loads
     sections = model.geometry.sections
     force = spread(0.0 if loads is None else loads.force, sections)

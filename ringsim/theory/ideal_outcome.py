@@ -14,7 +14,7 @@ from ringsim.scene import Scene
 from ringsim.theory import radau
 from ringsim.theory.batched_chain import ChainBatch
 from ringsim.theory.ideal_course import Course, Piece
-from ringsim.variables import PLANES, Fidelity, Outcome, Status
+from ringsim.variables import COUNTS, PLANES, Fidelity, Outcome, Status
 
 Array = NDArray[np.float64]
 _INSIDE = np.concatenate([[0.0], radau.NODES])
@@ -67,7 +67,10 @@ def to_outcome(course: Course, scene: Scene, *, wall_time: float, cpu_time: floa
         "restarts": 0,
         "fidelity": int(Fidelity.IDEAL),
     }
+    counts |= {f"total_{name}": counts[name] for name in COUNTS}
     values.update({name: np.array(number) for name, number in counts.items()})
+    values["step_used"] = np.array(np.nan)
+    values["tolerance_used"] = np.array(scene.solver.tolerance)
     values["final_time"] = np.array(end)
     values["wall_time"], values["cpu_time"] = np.array(wall_time), np.array(cpu_time)
     return Outcome(Status(course.status), course.reason, coordinates, values)

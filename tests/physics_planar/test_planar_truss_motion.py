@@ -7,7 +7,7 @@ import pytest
 
 from ringsim.scene import load_scene
 from ringsim.simulation import run
-from ringsim.theory.planar_truss import bending_strain, tension
+from ringsim.theory.planar_truss import bending_strain, statics
 from ringsim.variables import Status
 from truss_runs import DEPLOYED, STOWED
 
@@ -26,39 +26,52 @@ def test_it_is_reeled_in_and_out(truss_run):
 
 def test_tension_is_quasi_static_in_mid_travel(truss_run):
     times = truss_run.free(0.2, 0.8)
-    closed = tension(truss_run.scene.structure, truss_run.length[times])
-    # Inertia at 0.12 m/s, the damper and the beam's deflection (1 mm of the spring's 100 mm)
-    # give up to 0.5 % each: 0.1 N of 17 N.
-    np.testing.assert_allclose(truss_run.tension[times], closed, rtol=0.0, atol=0.15)
+    closed = statics(truss_run.scene, truss_run.length[times]).tension
+    off = truss_run.tension[times] - closed
+    # The truss swings on its cable where the table of the winding has corners, by 0.06 N at most;
+    # what is left on average is 2.5e-3 of the 4.7 N.
+    assert np.abs(off).max() < 0.08
+    assert np.sqrt(np.mean(off**2)) < 0.015
 
 
 def test_tension_is_quasi_static_near_both_ends(truss_run):
     times = truss_run.free(0.1005, 0.9)
-    closed = tension(truss_run.scene.structure, truss_run.length[times])
+    closed = statics(truss_run.scene, truss_run.length[times]).tension
     # Vibration of the truss on its cable: after the start, and after leaving the rest.
-    np.testing.assert_allclose(truss_run.tension[times], closed, rtol=0.0, atol=0.45)
-    assert np.sqrt(np.mean((truss_run.tension[times] - closed) ** 2)) < 0.1
+    np.testing.assert_allclose(truss_run.tension[times], closed, rtol=0.0, atol=0.3)
+    assert np.sqrt(np.mean((truss_run.tension[times] - closed) ** 2)) < 0.06
 
 
 def test_strain_along_the_beam_is_quasi_static(truss_run):
     times = truss_run.free(0.1005, 0.9)
     closed = bending_strain(truss_run.scene, truss_run.length[times], truss_run.station)
-    # 0.5 % of the largest: deflection shifts the head by 1 mm against a lever of 87 mm and 540.
-    atol = 0.006 * closed.max()
+    # The vibration after leaving the rest; the chord's shortening (3e-5 m) moves the head by less.
+    atol = 0.003 * closed.max()
     np.testing.assert_allclose(truss_run.strain[:, times], closed, rtol=0.0, atol=atol)
+
+
+def test_the_gauge_at_the_centre_shows_the_published_strain(truss_run):
+    """Paper 001: measured at the centre of the upper beam, up to 4e-4, largest near 500 mm."""
+    beam = truss_run.scene.structure.beam_length
+    centre = int(np.argmin(np.abs(truss_run.station - 0.5 * beam)))
+    gauge = truss_run.strain[centre]
+    assert truss_run.station[centre] == pytest.approx(0.5 * beam, abs=1e-12)
+    assert gauge.max() == pytest.approx(4e-4, rel=0.01)
+    assert gauge.max() == truss_run.strain.max()
+    assert truss_run.length[gauge.argmax()] == pytest.approx(0.5, abs=0.025)
 
 
 def test_tension_rises_sharply_at_the_end_of_contraction(truss_run):
     length, pull = truss_run.length, truss_run.tension
     before = np.flatnonzero(length < STOWED + 1e-3)[0]
     held = (truss_run.time > 12.5) & (truss_run.time < 13.5)
-    assert pull[before] < 6.0
-    assert 1.8 * KILOGRAM_FORCE < pull[held].min() <= pull.max() < 2.2 * KILOGRAM_FORCE
+    assert pull[before] < 1.6
+    assert 1.95 * KILOGRAM_FORCE < pull[held].min() <= pull.max() < 2.05 * KILOGRAM_FORCE
     assert float(truss_run.outcome.values["peak_tension"]) == pytest.approx(pull.max(), rel=0.01)
-    # 14 N more in less than 0.15 mm; the mechanism would need the whole travel for as much.
+    # Four times what the whole travel changes it by, in less than 0.05 mm.
     contact = length < STOWED - 2e-5
-    assert np.ptp(length[contact]) < 1.5e-4
-    assert np.ptp(pull[contact]) > 10.0
+    assert np.ptp(length[contact]) < 5e-5
+    assert np.ptp(pull[contact]) > 12.0
 
 
 def test_winding_at_the_rest_only_stretches_the_cable(truss_run):
@@ -78,8 +91,8 @@ def test_strain_is_largest_in_mid_travel_and_small_at_both_ends(truss_run):
     worst = truss_run.strain.max(axis=0)
     at = truss_run.length[worst.argmax()]
     assert 0.4 < at < 0.6
-    assert 1e-4 < worst.max() < 5e-4
-    assert float(truss_run.outcome.values["peak_bending_strain"]) < 5e-4
+    peak = float(truss_run.outcome.values["peak_bending_strain"])
+    assert peak == pytest.approx(worst.max(), rel=1e-3)  # every step is on the output grid
     stowed, deployed = truss_run.length < STOWED + 1e-4, truss_run.time > 24.5
     assert worst[stowed].max() < 0.15 * worst.max()
     assert worst[deployed].max() < 0.2 * worst.max()
@@ -100,16 +113,16 @@ def test_strain_vanishes_at_both_ends_of_the_beam(truss_run):
 def test_opening_angle_follows_the_cable(truss_run):
     angle = np.radians(truss_run.outcome.values["opening_angle"][0, 0])
     ideal = truss_run.scene.structure.geometry().angle(truss_run.length)
-    # The strut pulls the upper beam longer by 150 N q / (E A) = 4e-5 m; over dc/dg = 0.25 m/rad
-    # at the rest that is 2e-4 rad.
-    np.testing.assert_allclose(angle, ideal, rtol=0.0, atol=3e-4)
+    # The strut pulls the upper beam longer by 107 N q / (E A) = 1.8e-5 m; over dc/dg = 0.25 m/rad
+    # at the rest that is 7e-5 rad.
+    np.testing.assert_allclose(angle, ideal, rtol=0.0, atol=1.2e-4)
 
 
 def test_energy_closes(truss_run):
     values = truss_run.outcome.values
     assert float(values["energy_error"]) < 1e-3
     assert float(values["constraint_error"]) < 1e-9  # Newton's tolerance over the joints' rates
-    assert float(np.ptp(values["work"])) > 5.0  # the spring's energy, so that 1e-3 says something
+    assert float(np.ptp(values["work"])) > 2.5  # the spring's energy, so that 1e-3 says something
 
 
 def test_nothing_is_lost_over_a_cycle_but_to_dampers(truss_run):
@@ -119,9 +132,9 @@ def test_nothing_is_lost_over_a_cycle_but_to_dampers(truss_run):
     grid = np.linspace(0.2, 0.8, 25)
     first = np.interp(-grid, -truss_run.length[inwards], truss_run.tension[inwards])
     second = np.interp(grid, truss_run.length[outwards], truss_run.tension[outwards])
-    # Twice the damper's share (0.15 N of the spring's 100 at 0.03 m/s of the strut, times 0.2),
+    # Twice the damper's share (0.07 N of the spring's 60 at 0.014 m/s of the strut, times 0.1),
     # and what is left of vibration.
-    np.testing.assert_allclose(first, second, atol=0.15)
+    np.testing.assert_allclose(first, second, atol=0.07)
 
 
 def test_half_the_step_changes_nothing_that_is_claimed():
@@ -129,10 +142,10 @@ def test_half_the_step_changes_nothing_that_is_claimed():
     coarse = run(load_scene("planar-truss").with_values(short))
     fine = run(load_scene("planar-truss").with_values(short | {"solver.step": 0.01}))
     late = coarse.coordinates["time"] > 1.0
-    for name, atol in (("cable_length", 5e-5), ("cable_tension", 0.4), ("bending_strain", 2e-6)):
+    for name, atol in (("cable_length", 5e-5), ("cable_tension", 0.3), ("bending_strain", 2e-6)):
         one, other = coarse.values[name][..., late], fine.values[name][..., late]
         # The vibration of the start has the period of a few steps, so its phase depends on the
-        # step: 0.3 N on a cable of 8 N/mm are 4e-5 m.
+        # step: 0.2 N on a cable of 8 N/mm are 3e-5 m.
         np.testing.assert_allclose(one, other, rtol=0.0, atol=atol, err_msg=name)
 
 

@@ -89,6 +89,8 @@ OUT_OF_RANGE = [
 IMPOSSIBLE = [
     _scene("bars longer than diagonals", "structure.half_bar = 0.5",
            "half_bar = 0.5 m", "below half_diagonal = 0.4275 m"),
+    _scene("hinge assembly as long as a bar", "structure.hinge_offset = 0.2889",
+           "structure.hinge_offset = 0.2889 m", "below half_bar = 0.2889 m", "shorten it"),
     _scene("closed with two", "structure.sections = 2", "sections = 2", "at least 3", "closed = false"),
     _scene("arc longer than its polygon", "structure = { sections = 18, closed = false }",
            "sections = 18", "below polygon_sections = 18"),

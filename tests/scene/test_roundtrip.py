@@ -29,6 +29,7 @@ def scene_tables(draw: st.DrawFn) -> dict[str, Any]:
     closed = draw(st.booleans())
     sections = draw(st.integers(3, 20) if closed else st.integers(1, 20))
     half_diagonal = draw(st.floats(0.1, 10.0))
+    half_bar = half_diagonal * draw(st.floats(0.3, 0.99))
 
     def each(low: float, high: float, count: int = sections) -> Any:
         value = st.floats(low, high)
@@ -60,8 +61,8 @@ def scene_tables(draw: st.DrawFn) -> dict[str, Any]:
             "polygon_sections": draw(st.integers(21, 60)),
             "aspect_ratio": draw(st.floats(0.3, 1.0)),
             "half_diagonal": half_diagonal,
-            "half_bar": half_diagonal * draw(st.floats(0.3, 0.99)),
-            "hinge_offset": draw(st.floats(0.0, 0.1)),
+            "half_bar": half_bar,
+            "hinge_offset": half_bar * draw(st.floats(0.0, 0.99)),
             "opening_angle": opening,
         },
         "rods": {

@@ -77,13 +77,19 @@ def test_a_stop_that_is_far_too_soft_is_named() -> None:
 
 
 def reel(**values) -> Scene:
-    """A planar truss reeled in from slack within a second, on a soft rope."""
+    """A planar truss with a strong spring, reeled in within a second on a soft rope."""
     winding = {"kind": "table", "times": [0.0, 0.5, 1.0], "lengths": [0.0, 0.03, 0.1]}
     return load_scene("planar-truss").with_values(
         {
             "solver.end_time": 1.0,
             "rods.elements": 3,
+            "structure.strut_foot": 0.12,
+            "structure.strut_head": 0.54,
+            "structure.strut_tube_length": 0.4,
+            "structure.spring.stiffness": 1200.0,
+            "structure.spring.free_length": 0.55,
             "cables.upper.axial_stiffness": 1e3,
+            "cables.upper.initial_slack": -0.00035,
             "cables.upper.winch.winding": winding,
         }
         | values

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
+from click.testing import CliRunner
 
 from ringsim import simulation
+from ringsim.analysis.restarts import restart_lines
+from ringsim.campaign import accuracy
+from ringsim.cli import cli
 from ringsim.dataset import to_dataset
 from ringsim.execution.serial import Serial
 from ringsim.execution.solve import solve
@@ -13,7 +18,7 @@ from ringsim.execution.work import Limits, Retry, Task, Work
 from ringsim.parts.solver import Solver
 from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.scene import load_scene
-from ringsim.variables import Outcome, Status
+from ringsim.variables import COUNTS, Outcome, Status
 
 SCENE = load_scene("truss2")
 
@@ -117,3 +122,69 @@ def test_a_replayed_attempt_runs_as_the_campaign_ran_it(endings) -> None:
     prepared = endings(Status.DIVERGED)
     solve(simulation.run, SCENE, Task(0, {}, 0.5, restarts=False))
     assert [solver.step for solver in prepared.solvers] == [0.5 * SCENE.solver.step]
+
+
+def test_the_counts_of_all_starts_are_kept_beside_those_of_the_last(endings) -> None:
+    endings(Status.DIVERGED, Status.DIVERGED, Status.OK, steps=7)
+    found = to_dataset(simulation.run(SCENE), SCENE)
+    assert int(found["steps"]) == 7
+    assert int(found["total_steps"]) == 21
+    assert float(found["step_used"]) == SCENE.solver.step / 16
+    assert float(found["tolerance_used"]) == SCENE.solver.tolerance / 256
+
+
+def test_a_real_run_that_starts_anew_took_more_than_its_last_start() -> None:
+    """The same coarse run without restarts took the difference, step for step."""
+    coarse = load_scene("ring18").with_values(
+        {"structure.sections": 4, "boom": "none", "solver.step_control": "constant"}
+        | {"solver.step": 0.02, "loads.force": 1.0, "solver.restarts": 1}
+    )
+    whole = simulation.run(coarse)
+    first = simulation.run(coarse.with_values({"solver.restarts": 0}))
+    assert int(whole.values["restarts"]) == 1
+    assert float(whole.values["step_used"]) == 0.005
+    assert np.isnan(whole.values["tolerance_used"])
+    assert float(first.values["step_used"]) == 0.02
+    for name in COUNTS:
+        assert int(first.values[f"total_{name}"]) == int(first.values[name]) > 0
+        both = int(whole.values[name]) + int(first.values[name])
+        assert int(whole.values[f"total_{name}"]) == both
+
+
+def test_the_summary_of_a_run_says_that_it_started_anew(endings, tmp_path) -> None:
+    endings(Status.DIVERGED, Status.DIVERGED, Status.OK)
+    arguments = ["run", "truss2", "--out", str(tmp_path / "run.nc")]
+    lines = CliRunner().invoke(cli, arguments).output.splitlines()
+    (told,) = [line for line in lines if "started anew" in line]
+    assert "started anew 2 times" in told
+    assert "solver.step = 0.00625 s instead of 0.1 s" in told
+    assert "solver.tolerance = 1.2e-06 instead of 0.0003" in told
+    assert any(line.split() == ["steps", "of", "all", "starts", "30"] for line in lines)
+    endings(Status.OK)
+    plain = CliRunner().invoke(cli, arguments).output
+    assert "anew" not in plain
+    assert "all starts" not in plain
+
+
+def test_a_campaign_says_how_many_samples_started_anew() -> None:
+    counts = {"restarts": [0, 2, 1, -1], "steps": [10, 40, 20, -1], "total_steps": [10, 70, 40, -1]}
+    whole = xr.Dataset({name: ("sample", np.array(n)) for name, n in counts.items()})
+    (line,) = restart_lines(whole)
+    assert line.startswith("2 of 4 samples started anew")
+    assert "42% of all 120 steps" in line  # (30 + 20) of 120
+    assert restart_lines(whole.isel(sample=[0, 3])) == []
+
+
+def test_a_rung_of_an_accuracy_study_never_starts_anew(monkeypatch, tmp_path) -> None:
+    asked = []
+
+    def refuse(folder, cases, workers):
+        asked.append(cases)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(accuracy, "run_cases", refuse)
+    with pytest.raises(KeyboardInterrupt):
+        accuracy.run_ladder(tmp_path, SCENE.with_values({"solver.restarts": 5}), workers=1)
+    (cases,) = asked
+    assert cases.scene.solver.restarts == 0
+    assert not any("solver.restarts" in case for case in cases.cases)

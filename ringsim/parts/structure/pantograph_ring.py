@@ -47,7 +47,7 @@ class PantographRing(Structure):
         if self.hinge_offset >= self.half_bar:
             raise ValueError(
                 f"hinge_offset = {self.hinge_offset} m must be below half_bar = {self.half_bar} m: "
-                "a hinge assembly is smaller than a section"
+                "shorten it, a hinge assembly is smaller than a section"
             )
         if self.closed and self.sections < 3:
             raise ValueError(

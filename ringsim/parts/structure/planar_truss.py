@@ -18,8 +18,8 @@ RING_PARTS = ("stop", "boom", "net", "loads")
 class DeployingSpring(Model):
     """Compression spring inside the telescopic strut, with its damping."""
 
-    stiffness: SpringRate = 1200.0
-    free_length: Metre = 0.55
+    stiffness: SpringRate = 2030.0
+    free_length: Metre = 0.316
     """Length of the strut at which the spring is without force."""
     damping: DampingRate = 5.0
 
@@ -55,14 +55,19 @@ class PlanarTruss(Structure):
        outer joint is 34 mm off the axis: half the axis' tube (15 mm), half the synchronising
        beam (7.5 mm) and a buffer.  There the contraction ends on a rest, so winding further
        only stretches the cable.
-    2. Tension T = F q p c / (b H s) for the spring's force F.  A two-tube strut at most doubles
-       its length; p = 0.12 m and q = 0.54 m need 0.42 .. 0.54 m.
-    3. The strut pushes the upper beam between its joint and the cable, so it bends most at the
-       head: M = T H sin(g) (b - q) / c.  It vanishes at either end of the beam; in time it is
-       small when folded (sin g) and when deployed (spring nearly relaxed) and largest in
-       between, at c = 0.47 m.  With T of 17 N there, b - q = 87 mm gives a strain of 4e-4.
-    4. 1200 N/m and 0.55 m give 17 N (1.73 kgf) at 0.49 m, 5.3 N at 0.1 m and 2.9 N at 0.9 m;
-       the rest of the published 2 kgf is the rise at the end of contraction.
+    2. The gauge sits at the centre of the upper beam.  For a head q up to there the strain of
+       the gauge follows from the tension alone, M = T H sin(g) b / (2 c): 4e-4 is 4.7 N (0.48
+       kgf).  A head beyond it asks for more tension and strains the beam more elsewhere: 13.6 N
+       and 6.6e-4 at q = 0.45 m, 57 N (above the published 2 kgf) and 14e-4 at 0.54 m; one before
+       it, 0.2 m, has 5.4e-4 at the head.  So q = b / 2: the gauge sits where the beam bends most.
+    3. In time the strain is small when folded (sin g) and when deployed (spring nearly relaxed).
+       It is largest at 0.40 m of cable with the strut's foot at the lower joint, 0.46 m with
+       p = 0.08 m, 0.48 m with p = 0.05 m, 0.50 m with 0.03 m, but then the spring needs 180 N for
+       5 N of tension.  p = 0.05 m takes 106 N and stays near the published 500 mm.
+    4. 2030 N/m and 0.316 m give 4e-4; 0.12 of that is left at 0.1 m and 0.14 at 0.9 m.  Zero
+       would need a truss folded flat there, and here a spring without force, so a slack cable:
+       0.8 N are left to it.  The tension is 1.4 N where the rest is met; the published 2 kgf is
+       the rise at the end of contraction.
     """
 
     planes: ClassVar[tuple[str, ...]] = ("upper",)
@@ -78,11 +83,11 @@ class PlanarTruss(Structure):
     beam_length: Metre = 0.627
     axis_length: Metre = 0.72
     """Distance of the two joints on the fixed axis."""
-    strut_foot: Metre = 0.12
+    strut_foot: Metre = 0.05
     """Distance of the strut's joint on the fixed axis from the upper joint."""
-    strut_head: Metre = 0.54
+    strut_head: Metre = 0.3135
     """Distance of the strut's joint on the upper beam from the upper joint."""
-    strut_tube_length: Metre = 0.4
+    strut_tube_length: Metre = 0.23
     """Length of the strut's outer tube, and of its inner one."""
     cable_length: Metre = 0.9
     """Initial distance from the lower joint to the upper outer joint: 0.9 m deployed."""
