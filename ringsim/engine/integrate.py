@@ -126,8 +126,7 @@ class Integration:
                 self._judge.locked = math.isfinite(self._settled_at)
                 self._steps.step = min(self._steps.step, self._judge.limit)
             ends = (self._scene.solver.end_time, self._built.faults.next_time, self._settled_at)
-            left = min(ends) - now
-            step = min(self._steps.step, left)
+            step = self._steps.towards(min(ends) - now)
             solver.it.currentStepSize = step
             self._fresh = False
             if self._built.cables is not None and self._chain is not None:

@@ -110,6 +110,16 @@ class StepControl:
         self.step = min(wanted, GROWTH * self.step, self._solver.step)
         return self.step
 
+    def towards(self, left: float) -> float:
+        """The next step in s if only so much time is left to an event.
+
+        A step that follows the motion shares the rest with the one after it: behind a long step a
+        tiny one would read velocities that are still the long one's.
+        """
+        if self._solver.step_control == "constant" or left <= self.step or left >= 2.0 * self.step:
+            return min(self.step, left)
+        return 0.5 * left
+
     def shorter_first(self, step: float, stops: StopContact) -> float | None:
         """A smaller first step in s, or None if this one is good enough or not the first.
 

@@ -173,3 +173,19 @@ def test_the_smallest_step_is_not_repeated_forever() -> None:
         step, repeats = shorter, repeats + 1
     assert 3 < repeats < 20
     assert step < 1e-3 * solver.step
+
+
+@pytest.mark.parametrize("step", [0.2, 0.05])
+def test_constant_steps_that_miss_a_ropes_swing_are_not_ok(step: float) -> None:
+    """The truss is thrown within 40 ms: such steps have its largest tension wrong by 7 to 13 %."""
+    short = {"solver.end_time": 1.0, "solver.step_control": "constant", "solver.restarts": 0}
+    outcome = run(load_scene("truss2").with_values(short | {"solver.step": step}))
+    assert outcome.status is Status.DIVERGED
+    assert "reduce solver.step" in outcome.reason
+
+
+def test_constant_steps_that_resolve_it_are() -> None:
+    short = {"solver.end_time": 1.0, "solver.step_control": "constant", "solver.step": 0.0025}
+    outcome = run(load_scene("truss2").with_values(short))
+    assert outcome.status is Status.UNFINISHED  # not "diverged": its reason is the end time
+    assert int(outcome.values["restarts"]) == 0
