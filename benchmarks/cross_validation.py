@@ -33,14 +33,18 @@ def report(case: str, assignments: list[str]) -> None:
     print(f"{case} {' '.join(assignments) or 'at default settings'}: {run.attrs['reason']}")
     print("\n| mean angle, deg | time | deviations | MBDyn's largest deviation, deg |")
     print("|---|---|---|---|")
-    rows = ANGLES[[bool(found.ours.covers(a) and found.theirs.covers(a)) for a in ANGLES]]
-    largest = np.abs(found.deviations(rows)[1]).max(axis=1)
+    rows = found.nearest(ANGLES)
+    largest = np.abs(found.theirs.deviations[rows]).max(axis=1)
     for row in zip(
-        rows, found.time_errors(rows), found.deviation_errors(rows), largest, strict=True
+        found.theirs.mean[rows],
+        found.time_errors(rows),
+        found.deviation_errors(rows),
+        largest,
+        strict=True,
     ):
-        print("| {:.0f} | {:+.1e} | {:.1e} | {:.2e} |".format(*row))
+        print("| {:.1f} | {:+.1e} | {:.1e} | {:.2e} |".format(*row))
     for low, high in WINDOWS:
-        worst = found.deviation_errors(found.window(low, high)).max(initial=0.0)
+        worst = found.deviation_errors(found.rows(low, high)).max(initial=0.0)
         print(f"worst error of deviations {low:.0f}..{high:.0f} deg: {worst:.1e}")
     print(f"largest asynchrony up to 175 deg: {found.asynchrony_error():+.1e}")
     ours, theirs = found.stresses()
