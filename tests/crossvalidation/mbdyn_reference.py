@@ -182,20 +182,19 @@ class Comparison:
         ours, theirs = (np.ptp(deviations, axis=1).max() for deviations in both)
         return float(ours / theirs - 1.0)
 
-    def stresses(self, low: float = 75.0, high: float = 135.0) -> tuple[Array, Array]:
-        """Stresses in a window of mean angles (deg), ours and MBDyn's, shape (rows, rods), Pa."""
-        rows = self.rows(low, high)
+    def stresses(self, rows: Rows) -> tuple[Array, Array]:
+        """Stresses of ``rods_of``, ours and MBDyn's, shape (rows, rods), Pa."""
         times = self.ours.time_at(self.theirs.mean[rows])
         ours = [np.interp(times, self.ours.times, stress) for stress in self.ours.stresses.T]
         return np.array(ours).T, self.theirs.stresses[rows]
 
-    def worst_stress_error(self, low: float = 75.0, high: float = 135.0) -> float:
-        """Largest error of any stress of ``rods_of`` over the largest at the same angle."""
-        ours, theirs = self.stresses(low, high)
-        return float((np.abs(ours - theirs).max(axis=1) / theirs.max(axis=1)).max())
+    def stress_errors(self, rows: Rows) -> Array:
+        """Worst error of any of these stresses over the largest, at each row."""
+        ours, theirs = self.stresses(rows)
+        return np.asarray(np.abs(ours - theirs).max(axis=1) / theirs.max(axis=1))
 
-    def mean_bar_stress_error(self, low: float = 75.0, high: float = 135.0) -> float:
-        """Relative error of the bars' largest stress, averaged over bars and angles."""
-        ours, theirs = self.stresses(low, high)
+    def mean_bar_stress_error(self, rows: Rows) -> float:
+        """Relative error of the bars' largest stresses, averaged over bars and rows."""
+        ours, theirs = self.stresses(rows)
         bars = [column for column, rod in enumerate(RODS) if rod.startswith("bar")]
         return float(ours[:, bars].mean() / theirs[:, bars].mean() - 1.0)
