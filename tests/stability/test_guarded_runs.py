@@ -63,7 +63,7 @@ def test_too_coarse_steps_are_cured_by_a_new_start() -> None:
 
 def test_constant_steps_that_newton_has_to_cut_are_too_few() -> None:
     """A dozen that converge balance their energy, and are 2 % late."""
-    outcome = run(ring(step_control="constant", step=3.0).with_values({"loads.force": 10.0}))
+    outcome = run(ring(step_control="constant", step=3.0).with_values({"loads.force": 5.0}))
     assert outcome.status is Status.DIVERGED
     assert cause_of(outcome.reason) == "few steps"
     assert float(outcome.values["energy_error"]) < ring().solver.energy_tolerance
