@@ -13,7 +13,6 @@ from ringsim.analysis.accuracy import NEEDED, Truth, judge
 from ringsim.analysis.ladder import PATHS, Rung, ladder, references, standing
 from ringsim.campaign.cases import Cases, run_cases
 from ringsim.choice import kind_of
-from ringsim.parts.solver import NO_DEVIATIONS
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.energy_quadrature import opening_time
@@ -62,15 +61,9 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float = TIMEOU
     ReferenceRunError
         If a reference run does not end well.
     """
-    given: dict[str, object] = {
-        "solver.restarts": 0,
-        "solver.error_bars": False,
-        "solver.step_limit": _STEP_LIMIT,
-    }
-    if not scene.record.stress:
-        # The study looks at stresses of every scene; they must not change this scene's steps.
-        given["solver.deviation_tolerance"] = NO_DEVIATIONS
-    scene = scene.with_values(given)
+    scene = scene.with_values(
+        {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
+    )
     study = _Study(folder, scene, workers, timeout)
     rungs = ladder(scene)
     for rung in rungs:

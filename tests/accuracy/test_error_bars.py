@@ -109,10 +109,10 @@ def test_bars_change_nothing_else() -> None:
     bars = {name for name in barred.values if name not in plain.values}
     assert bars == {
         "deployment_time_error", "opening_angle_error", "asynchrony_max_error",
-        "peak_rod_stress_error",
+        "peak_rod_stress_error", "asynchrony_error",
     }  # fmt: skip
     for name in bars:
-        assert barred.values[name] > 0.0
+        assert np.nanmin(barred.values[name]) > 0.0
     for name, values in plain.values.items():
         if name not in ("wall_time", "cpu_time"):
             np.testing.assert_array_equal(values, barred.values[name])

@@ -93,7 +93,7 @@ def test_a_run_with_too_many_steps_is_not_repeated_with_more(endings) -> None:
 
 
 def test_a_refined_solver_stays_within_its_bounds() -> None:
-    least = Solver(step=1e-9, tolerance=1e-8)
+    least = Solver(step=1e-9, tolerance=1e-8, deviation_tolerance=1e-6)
     assert least.refined(5) == least
     assert Solver().refined(0) == Solver()
 
