@@ -11,6 +11,9 @@ from ringsim.geometry.ring import RingGeometry
 from ringsim.parts.structure.family import Structure
 from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
 
+LEAST_HINGE_OFFSET = 1e-6
+"""Metre; directions of the rope between two pulleys are then good to 1e-10 in doubles."""
+
 
 class PantographRing(Structure):
     """Sections of two crossing diagonals and two folding bars between hinge assemblies.
@@ -88,15 +91,28 @@ class PantographRing(Structure):
                 f"boom.length = {scene.boom.length} m must be at least {highest:.4g} m, the "
                 "height of the stowed ring: the sliding joint would leave the boom"
             )
+        self._check_pulleys(scene)
         if scene.stop is not None and scene.stop.stowed_angle >= self.opening_angle:
             raise ValueError(
                 f"stop.stowed_angle = {scene.stop.stowed_angle} deg must be below "
                 f"structure.opening_angle = {self.opening_angle} deg"
             )
 
+    def _check_pulleys(self, scene: Any) -> None:
+        """The cables' spans between neighbouring sections have a length and a direction."""
+        if scene.cables is None or self.sections == 1:
+            return
+        if self.hinge_offset < LEAST_HINGE_OFFSET:
+            raise ValueError(
+                f"structure.hinge_offset = {self.hinge_offset} m must be at least "
+                f"{LEAST_HINGE_OFFSET:g} m with cables: the rope runs between the hinge pulleys of "
+                "neighbouring sections, which would coincide (set it to "
+                f"{LEAST_HINGE_OFFSET:g} for pulleys on one axis, or leave the cables out)"
+            )
+
     @property
     def pulleys(self) -> int:
-        """Pulleys of each cable: two hinges and a V-joint a section, less the cable's end."""
+        """Pulleys of a cable with one winch: two hinges and a V-joint a section, less its end."""
         return 3 * self.sections - 1
 
     @property
