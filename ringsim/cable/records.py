@@ -86,7 +86,8 @@ class Cable(Model):
     """Where the winch is: at section 1, at the last section, or one at either end."""
     winch: Winch
     far_winch: Winch | None = None
-    """With end = "both", the winch at the last section; left out, it is like the first."""
+    """With end = "both", the winch at the last section, as far from its pulley as the first one
+    from its own; left out, it is like the first."""
     axial_stiffness: AxialStiffness = 1e5
     """Young's modulus times cross-section (EA)."""
     damping_time: SecondOrZero = 0.0

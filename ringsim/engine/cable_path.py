@@ -220,19 +220,22 @@ def ring_path(model: RingModel, cables: Cables) -> CablePath:
     """The paths of a ring's cables, each from its first winch."""
     paths = []
     for plane, cable in cables.present():
-        way = _from_last if cable.end == "last" else _pulleys
-        paths.append(way(model, plane, cables.winch_distance, cable.block_offset))
+        path = _pulleys(model, plane, cable.block_offset)
+        if cable.end == "last":
+            path = path[::-1]
+        path = [_winch(path[0], plane, cables.winch_distance), *path]
+        if cable.end == "both":
+            path.append(_winch(path[-1], plane, cables.winch_distance))
+        paths.append(path)
     return CablePath(paths)
 
 
-def _pulleys(model: RingModel, plane: int, distance: float, offset: float) -> list[Stop]:
-    """Points from the winch at section 1."""
+def _pulleys(model: RingModel, plane: int, offset: float) -> list[Stop]:
+    """Points from the first hinge pulley of section 1 to the second one of the last section."""
     fold = model.fold
     sense = 1.0 if plane == 0 else -1.0
-    inward = np.array([0.0, 0.0, -sense])
     nodes = [node for _, node in model.hinges[plane]]
-    first = fold.left[plane, 0] - fold.corners[plane, 0]
-    path: list[Stop] = [FixedStop(nodes[0], first + distance * inward)]
+    path: list[Stop] = []
     for section in range(model.geometry.sections):
         following = (section + 1) % len(nodes)
         left = fold.left[plane, section] - fold.corners[plane, section]
@@ -244,10 +247,8 @@ def _pulleys(model: RingModel, plane: int, distance: float, offset: float) -> li
     return path
 
 
-def _from_last(model: RingModel, plane: int, distance: float, offset: float) -> list[Stop]:
-    """The same path with its winch at the last section."""
-    path = _pulleys(model, plane, distance, offset)[1:][::-1]
-    last = path[0]
-    assert isinstance(last, FixedStop)
+def _winch(nearest: Stop, plane: int, distance: float) -> FixedStop:
+    """The winch of the hinge pulley at an end of the path, a distance (m) inwards from it."""
+    assert isinstance(nearest, FixedStop)
     inward = np.array([0.0, 0.0, -1.0 if plane == 0 else 1.0])
-    return [FixedStop(last.node, last.arm + distance * inward), *path]
+    return FixedStop(nearest.node, nearest.arm + distance * inward)
