@@ -17,6 +17,7 @@ import numpy as np
 from ringsim.engine.solve import SOLVERS
 from ringsim.scene import Scene
 from ringsim.theory.error_bars import error_bars
+from ringsim.theory.faded_friction import with_remark
 from ringsim.theory.ideal_fidelity import run_ideal, run_ideal_many
 from ringsim.variables import TIMINGS, Fidelity, Outcome, Status
 
@@ -62,7 +63,7 @@ def run(scene: Scene) -> Outcome:
             outcome.values[name] = coarse.values.get(name, outcome.values[name])
     outcome.values["fidelity"] = np.array(int(Fidelity.FULL))
     outcome.values["restarts"] = np.array(restarts)
-    return outcome
+    return with_remark(outcome, scene)
 
 
 def _attempt(scene: Scene, begin: tuple[float, float]) -> Outcome:

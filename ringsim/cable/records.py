@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from ringsim.cable import regularisation
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.friction.family import PulleyFriction
 from ringsim.cable.friction.frictionless import Frictionless
@@ -94,8 +95,9 @@ class Cable(Model):
     """Kelvin-Voigt time t_d: stress = E (strain + t_d * strain rate)."""
     pulley_radius: Metre = 0.01
     friction: AnyFriction = Frictionless()
-    slip_speed: PositiveSpeed = 2e-4
-    """Rope speed over a pulley at which 76 % of its friction acts (regularisation)."""
+    slip_speed: PositiveSpeed | None = None
+    """Rope speed over a pulley at which 76 % of its friction acts (regularisation).  Left out, it
+    follows the winding: see ``ringsim.cable.regularisation``."""
     slack_width: Annotated[Tension, Field(ge=1e-6)] = 0.05
     """Width of the passage from slack to taut; at the natural length 0.69 of it pulls."""
     initial_slack: SignedMetre = 0.0
@@ -118,6 +120,13 @@ class Cable(Model):
                 f'far_winch needs end = "both", but end = "{self.end}" (leave one of them out)'
             )
         return self
+
+    def slip_speed_over(self, pulleys: int) -> float:
+        """The slip speed of the scene, or the one that follows the winding, m/s."""
+        if self.slip_speed is not None:
+            return self.slip_speed
+        winding = sum(winch.winding.usual_speed() for winch in self.winches)
+        return regularisation.slip_speed(winding, pulleys)
 
     @property
     def winches(self) -> tuple[Winch, ...]:

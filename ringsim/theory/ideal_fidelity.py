@@ -18,6 +18,7 @@ from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.persection import spread
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.theory.faded_friction import with_remark
 from ringsim.theory.ideal_batch import Batch, equal_cables
 from ringsim.theory.ideal_outcome import to_outcome
 from ringsim.theory.ideal_ring import IdealRing
@@ -148,7 +149,7 @@ def _run_alike(scenes: list[Scene]) -> list[Outcome]:
         outcome = to_outcome(course, scene, wall_time=0.0, cpu_time=0.0)
         outcome.values["wall_time"] = np.array(common_wall + time.perf_counter() - wall)
         outcome.values["cpu_time"] = np.array(common_cpu + time.process_time() - cpu)
-        outcomes.append(outcome)
+        outcomes.append(with_remark(outcome, scene))
     return outcomes
 
 
