@@ -59,6 +59,9 @@ class SectionSeries:
         self.tension = dataset["cable_tension"].sel(plane=plane).transpose("span", "time").values
         self._half, self._offset = ring.half_bar, cable.block_offset
         self._fold = 0.5 * (np.pi - self.opening)
+        directions = ring.geometry().directions
+        following = np.einsum("ki,ki->k", directions[:-1], directions[1:])[order]
+        self._half_turns = np.sqrt(0.5 * (1.0 + following))[:, None]
 
     @property
     def sections(self) -> int:
@@ -93,7 +96,7 @@ class SectionSeries:
     @property
     def decays(self) -> Array:
         """Tension behind a section over the tension before it; NaN while the rope is slack."""
-        after = np.concatenate([self.arriving[1:], self.behind[-1:]])
+        after = np.concatenate([self.arriving[1:], self.tension[-1:]])
         taut = self.arriving > self.cable.slack_width
         return np.asarray(np.where(taut, after / np.where(taut, self.arriving, 1.0), np.nan))
 
@@ -102,17 +105,22 @@ class SectionSeries:
         """Force on the first hinge pulley, N.
 
         The rope comes up the boom at the first section, and from the section before, square to
-        the boom, at all others.
+        the boom and by half the turn of the plan aside, at all others.  Paper 000, eqs 28 and 29,
+        with T1 + T2 sin gamma in the first.
         """
-        along = self.entry * self._half * np.cos(self._fold) / self.lengths
-        inward = self.entry * (self._half * np.sin(self._fold) + self._offset) / self.lengths
-        inward[0] += self.arriving[0]
-        along[1:] -= self.arriving[1:]
-        return np.asarray(np.hypot(along, inward))
+        level = self._half * np.cos(self._fold) / self.lengths
+        fall = (self._half * np.sin(self._fold) + self._offset) / self.lengths
+        # Cosine of the angle between the pulls; half the plan's turn lies at either hinge pulley.
+        cosine = np.concatenate([fall[:1], -level[1:] * self._half_turns])
+        square = self.entry**2 + self.arriving**2 + 2.0 * self.entry * self.arriving * cosine
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
     @property
     def block_forces(self) -> Array:
-        """Force on the V pulley along its bisector, N."""
+        """Force on the V pulley along its bisector, N: (T2 + T3) sin gamma.
+
+        Paper 000, eq. 30, prints the difference of both; the pulls add up (``docs/cables.md``).
+        """
         drop = self._half * np.sin(self._fold) + self._offset
         return np.asarray((self.entry + self.behind) * drop / self.lengths)
 
