@@ -16,7 +16,7 @@ from ringsim.simulation import simulate
 Array = NDArray[np.float64]
 PAGE = Path(__file__).parents[2] / "docs" / "cables.md"
 HALF, OFFSET, RATIO, PLAN = 0.2889, 0.105, 0.04, np.radians(21.53959)
-"""Of truss2: bar half and block offset (m), f / R, and the turn of the plan between its sections."""
+"""Of truss2: bar half and block offset (m), f / R, and the turn of the plan between sections."""
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +105,6 @@ def test_figs_9_and_10_forces_on_the_second_section(
     for found, stated in ((first, hinge), (second, block)):
         digits = len(stated.split(".")[1])
         assert found == pytest.approx(float(stated), abs=0.6 * 10.0**-digits)
-    # The plan's turn is written with six digits.  The figure leaves out the part of the V pulley's force along the bars.
+    # The plan's turn is written with seven digits; the part along the bars is left out.
     assert series.hinge_forces[1, k] == pytest.approx(first, rel=1e-6)
     assert series.block_forces[1, k] == pytest.approx(second, rel=0.01)
