@@ -91,11 +91,6 @@ class Scene(Model):
                     "one value for all, or a list of that length"
                 )
         _check_faults(self)
-        if self.cables is not None and kind_of(self.rods) != "geometrically-exact":
-            raise ValueError(
-                f'cables need rods.kind = "geometrically-exact", not "{kind_of(self.rods)}": the '
-                "blocks of the V pulleys stand on nodes with an orientation"
-            )
         self.structure.check(self)
         if self.record.stress and isinstance(self.rods, AncfRods):
             raise ValueError(
