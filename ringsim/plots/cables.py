@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ringsim.cable.records import Cable
-from ringsim.cable.section_path import span_length
 from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.plots import style, wording
 from ringsim.scene import scene_from_toml
@@ -32,8 +31,7 @@ class SectionSeries:
     """A cable's quantities by section over time, shape (section, time), from a recorded run.
 
     Tensions are recorded; span lengths and angles are recomputed from the opening angles on the
-    ideal geometry of one section (see ``ringsim.cable.section_path``), where the spans on either
-    side of the V pulley are equally long.
+    ideal geometry of one section (see ``ringsim.cable.bracket``).
 
     Parameters
     ----------
@@ -57,8 +55,14 @@ class SectionSeries:
             dataset["opening_angle"].sel(plane=plane).transpose("section", "time").values[order]
         )
         self.tension = dataset["cable_tension"].sel(plane=plane).transpose("span", "time").values
-        self._half, self._offset = ring.half_bar, cable.block_offset
+        self._half = ring.half_bar
         self._fold = 0.5 * (np.pi - self.opening)
+        aside, inward = cable.bracket.place(self._fold, cable.block_offset)
+        self._drop = self._half * np.sin(self._fold) + inward
+        spans = cable.bracket.spans(self._half, cable.block_offset, self.opening)
+        backwards = cable.end == "last"
+        self._before, self._behind = spans[::-1] if backwards else spans
+        self._aside = -aside if backwards else aside
         directions = ring.geometry().directions
         following = np.einsum("ki,ki->k", directions[:-1], directions[1:])[order]
         self._half_turns = np.sqrt(0.5 * (1.0 + following))[:, None]
@@ -71,7 +75,7 @@ class SectionSeries:
     @property
     def lengths(self) -> Array:
         """Length of the span before the V pulley, m."""
-        return span_length(self._half, self._offset, self.opening)
+        return self._before
 
     @property
     def entry(self) -> Array:
@@ -108,8 +112,8 @@ class SectionSeries:
         the boom and by half the turn of the plan aside, at all others.  Paper 000, eqs 28 and 29,
         with T1 + T2 sin gamma in the first.
         """
-        level = self._half * np.cos(self._fold) / self.lengths
-        fall = (self._half * np.sin(self._fold) + self._offset) / self.lengths
+        level = (self._half * np.cos(self._fold) + self._aside) / self.lengths
+        fall = self._drop / self.lengths
         # Cosine of the angle between the pulls; half the plan's turn lies at either hinge pulley.
         cosine = np.concatenate([fall[:1], -level[1:] * self._half_turns])
         square = self.entry**2 + self.arriving**2 + 2.0 * self.entry * self.arriving * cosine
@@ -121,8 +125,7 @@ class SectionSeries:
 
         Paper 000, eq. 30, prints the difference of both; the pulls add up (``docs/cables.md``).
         """
-        drop = self._half * np.sin(self._fold) + self._offset
-        return np.asarray((self.entry + self.behind) * drop / self.lengths)
+        return np.asarray(self._drop * (self.entry / self._before + self.behind / self._behind))
 
 
 _VALUES: dict[str, Callable[[SectionSeries], Array]] = {

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ringsim.cable.bracket.bisector import BisectorBracket
 from ringsim.choice import kind_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.persection import spread
@@ -53,6 +54,12 @@ def refuse_if_not_ideal(scene: Scene) -> None:
             raise InputError(
                 f'faults[{number}].kind = "{fault.kind}": with rigid rods one stuck V-joint stops '
                 f"the whole ring, so the ideal fidelity has no answer {cure}"
+            )
+    for _, cable in [] if scene.cables is None else scene.cables.present():
+        if not isinstance(cable.bracket, BisectorBracket):
+            raise InputError(
+                f'cables: bracket.kind = "{kind_of(cable.bracket)}": the ideal fidelity knows '
+                'pulleys on the bisector alone (choose "bisector", or use the full fidelity)'
             )
     if scene.record.stress:
         raise InputError(

@@ -76,8 +76,9 @@ def path_points(
     """Points of a path, shape (points, 3), m: winch, pulleys, far end."""
     inward = np.array([0.0, 0.0, -1.0 if plane == 0 else 1.0])
     left, right = fold.left[plane], fold.right[plane]
-    drop = geometry.half_bar * np.sin(phi) + cable.block_offset
-    blocks = 0.5 * (left + right) + drop * inward
+    aside, inwards = cable.bracket.place(phi, cable.block_offset)
+    drop = geometry.half_bar * np.sin(phi) + inwards
+    blocks = 0.5 * (left + right) + drop * inward + aside * geometry.directions
     path = np.stack([left, blocks, right], axis=1).reshape(-1, 3)
     if cable.end == "last":
         path = path[::-1]
@@ -92,7 +93,9 @@ def path_point_rates(
     """Derivatives of ``path_points`` after phi, m/rad; ``rate`` is the fold's."""
     inward = np.array([0.0, 0.0, -1.0 if plane == 0 else 1.0])
     left, right = rate.left[plane], rate.right[plane]
-    blocks = 0.5 * (left + right) + geometry.half_bar * np.cos(phi) * inward
+    aside, inwards = cable.bracket.rate(phi, cable.block_offset)
+    drop = geometry.half_bar * np.cos(phi) + inwards
+    blocks = 0.5 * (left + right) + drop * inward + aside * geometry.directions
     path = np.stack([left, blocks, right], axis=1).reshape(-1, 3)
     if cable.end == "last":
         path = path[::-1]

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from ringsim.choice import kind_of
 from ringsim.geometry.ring import RingGeometry
 from ringsim.parts.structure.family import Structure
 from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
@@ -99,8 +100,18 @@ class PantographRing(Structure):
             )
 
     def _check_pulleys(self, scene: Any) -> None:
-        """The cables' spans between neighbouring sections have a length and a direction."""
-        if scene.cables is None or self.sections == 1:
+        """V pulleys that open the bars, and spans that have a length and a direction."""
+        present = [] if scene.cables is None else scene.cables.present()
+        for plane, cable in present:
+            reason = cable.bracket.refusal(self.opening_angle)
+            if reason is not None:
+                raise ValueError(f"cables.{self.planes[plane]}.{reason}")
+            if kind_of(cable.bracket) == "bar-half" and kind_of(scene.rods) == "ancf":
+                raise ValueError(
+                    f'cables.{self.planes[plane]}.bracket.kind = "bar-half" needs rods.kind = '
+                    '"geometrically-exact", not "ancf": choose one of both'
+                )
+        if not present or self.sections == 1:
             return
         if self.hinge_offset < LEAST_HINGE_OFFSET:
             raise ValueError(
