@@ -54,7 +54,8 @@ class SectionSeries:
         self.opening = np.radians(
             dataset["opening_angle"].sel(plane=plane).transpose("section", "time").values[order]
         )
-        self.tension = dataset["cable_tension"].sel(plane=plane).transpose("span", "time").values
+        tension = dataset["cable_tension"].sel(plane=plane).transpose("span", "time").values
+        self.tension = tension[: scene.pulleys_of(cable) + 1]
         self._half = ring.half_bar
         self._fold = 0.5 * (np.pi - self.opening)
         aside, inward = cable.bracket.place(self._fold, cable.block_offset)
