@@ -12,6 +12,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from ringsim.cable.cables import Cables, pulleys_of
 from ringsim.cable.faults.family import CableFault
+from ringsim.cable.records import Cable
 from ringsim.choice import kind_of, load_package, one_of
 from ringsim.overrides import section_of, set_path
 from ringsim.parts.boom.family import Boom
@@ -79,7 +80,10 @@ class Scene(Model):
         for path, value in _lists(self):
             structure = self.structure
             wanted = _length_of(
-                path, structure.sections, structure.pulleys, closed=structure.closed
+                path,
+                structure.sections,
+                self._pulleys_at(path),
+                closed=structure.closed,
             )
             if wanted is not None and len(value) != wanted:
                 raise ValueError(
@@ -87,11 +91,6 @@ class Scene(Model):
                     "one value for all, or a list of that length"
                 )
         _check_faults(self)
-        if self.cables is not None and kind_of(self.rods) != "geometrically-exact":
-            raise ValueError(
-                f'cables need rods.kind = "geometrically-exact", not "{kind_of(self.rods)}": the '
-                "blocks of the V pulleys stand on nodes with an orientation"
-            )
         self.structure.check(self)
         if self.record.stress and isinstance(self.rods, AncfRods):
             raise ValueError(
@@ -110,6 +109,21 @@ class Scene(Model):
                 "solver.end_time: the result would not fit in memory"
             )
         return self
+
+    def pulleys_of(self, cable: Cable) -> int:
+        """Pulleys of one of the scene's cables: a second winch takes one more."""
+        return self.structure.pulleys + len(cable.winches) - 1
+
+    @property
+    def spans(self) -> int:
+        """Spans of the cable that has most of them; 0 without cables."""
+        present = [] if self.cables is None else self.cables.present()
+        return max((self.pulleys_of(cable) + 1 for _, cable in present), default=0)
+
+    def _pulleys_at(self, path: str) -> int:
+        """Pulleys of the cable that a dotted path leads to."""
+        cable = getattr(self.cables, path.split(".")[1], None) if "." in path else None
+        return self.pulleys_of(cable) if isinstance(cable, Cable) else self.structure.pulleys
 
     def with_values(self, values: dict[str, Any]) -> Scene:
         """A copy with the fields at dotted paths replaced in their order, validated again.
@@ -153,10 +167,11 @@ def _length_of(path: str, sections: int, pulleys: int, *, closed: bool) -> int |
 def _check_faults(scene: Scene) -> None:
     """Every fault names a place that the scene has."""
     cables = [] if scene.cables is None else scene.cables.present()
-    sections = scene.structure.sections
-    pulleys = scene.structure.pulleys
-    places = {"section": sections, "cable": len(cables), "pulley": pulleys, "span": pulleys + 1}
+    places = {"section": scene.structure.sections, "cable": len(cables)}
     for number, fault in enumerate(scene.faults, 1):
+        if isinstance(fault, CableFault) and fault.cable <= len(cables):
+            pulleys = scene.pulleys_of(cables[fault.cable - 1][1])
+            places |= {"pulley": pulleys, "span": pulleys + 1}
         for name, most in places.items():
             given = getattr(fault, name, 1)
             if isinstance(fault, CableFault) and not cables:
@@ -178,7 +193,12 @@ def _length_in(table: dict[str, Any], path: str) -> int:
         return 1
     sections = structure["sections"]
     closed = structure.get("closed") is not False
-    return _length_of(path, sections, pulleys_of(sections), closed=closed) or 1
+    own: Any = table
+    for step in path.split(".")[:2]:
+        own = own.get(step) if isinstance(own, dict) else None
+    both = isinstance(own, dict) and own.get("end") == "both"
+    pulleys = pulleys_of(sections, winches=2 if both else 1)
+    return _length_of(path, sections, pulleys, closed=closed) or 1
 
 
 def _lists(record: Model, prefix: str = "") -> list[tuple[str, tuple[float, ...]]]:

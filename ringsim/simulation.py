@@ -18,6 +18,7 @@ from ringsim.engine.solve import SOLVERS
 from ringsim.parts.solver import Solver
 from ringsim.scene import Scene
 from ringsim.theory.error_bars import OF_FINER, error_bars
+from ringsim.theory.faded_friction import with_remark
 from ringsim.theory.ideal_fidelity import run_ideal, run_ideal_many
 from ringsim.variables import COUNTS, TIMINGS, Fidelity, Outcome, Status
 
@@ -69,7 +70,7 @@ def run(scene: Scene) -> Outcome:
     outcome.values["tolerance_used"] = np.array(used.tolerance if follows else np.nan)
     for name in COUNTS:
         outcome.values[f"total_{name}"] = np.array(sum(each[name] for each in counts))
-    return outcome
+    return with_remark(outcome, scene)
 
 
 def _with_bars(

@@ -86,7 +86,8 @@ class Chain:
                     f"are {pulleys} pulleys: give one value for all, or one for each"
                 )
         pulleys_per_cable = [points - 2 for points in points_per_cable]
-        self._slip_speed = np.repeat([c.slip_speed for c in cables], pulleys_per_cable)
+        slip = [c.slip_speed_over(n) for c, n in zip(cables, pulleys_per_cable, strict=True)]
+        self._slip_speed = np.repeat(slip, pulleys_per_cable)
         self._ropes: Ropes | None = None
         self._material = self._per_rope(np.arange(len(cables)))
 

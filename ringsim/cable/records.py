@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
+from ringsim.cable import regularisation
+from ringsim.cable.bracket.bisector import BisectorBracket
+from ringsim.cable.bracket.family import Bracket
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.friction.family import PulleyFriction
 from ringsim.cable.friction.frictionless import Frictionless
@@ -22,14 +27,18 @@ from ringsim.units import (
     Tension,
 )
 
-for _package in ("friction", "winding", "faults"):
+Array = NDArray[np.float64]
+
+for _package in ("bracket", "friction", "winding", "faults"):
     load_package(f"ringsim.cable.{_package}")
 
 if TYPE_CHECKING:
+    AnyBracket = Bracket
     AnyFriction = PulleyFriction
     AnyWinding = Winding
     AnyFault = CableFault
 else:
+    AnyBracket = one_of(Bracket)
     AnyFriction = one_of(PulleyFriction)
     AnyWinding = one_of(Winding)
     AnyFault = one_of(CableFault)
@@ -86,26 +95,31 @@ class Cable(Model):
     """Where the winch is: at section 1, at the last section, or one at either end."""
     winch: Winch
     far_winch: Winch | None = None
-    """With end = "both", the winch at the last section; left out, it is like the first."""
+    """With end = "both", the winch at the last section, as far from its pulley as the first one
+    from its own; left out, it is like the first."""
     axial_stiffness: AxialStiffness = 1e5
     """Young's modulus times cross-section (EA)."""
     damping_time: SecondOrZero = 0.0
     """Kelvin-Voigt time t_d: stress = E (strain + t_d * strain rate)."""
     pulley_radius: Metre = 0.01
     friction: AnyFriction = Frictionless()
-    slip_speed: PositiveSpeed = 2e-4
-    """Rope speed over a pulley at which 76 % of its friction acts (regularisation)."""
+    slip_speed: PositiveSpeed | None = None
+    """Rope speed over a pulley at which 76 % of its friction acts (regularisation).  Left out, it
+    follows the winding: see ``ringsim.cable.regularisation``."""
     slack_width: Annotated[Tension, Field(ge=1e-6)] = 0.05
     """Width of the passage from slack to taut; at the natural length 0.69 of it pulls."""
     initial_slack: SignedMetre = 0.0
     """Natural length minus path length at the start; negative: the cable is pre-stretched."""
     block_offset: MetreOrZero = 0.105
-    """Distance of the V pulleys from the V-joint's axis, on the bisector and away from the bars.
+    """Distance of the V pulleys from the V-joint's axis; the bracket says in which direction.
 
     Without it the V pulley would sit on the axis, its spans would keep their lengths and the
     cable would do no work.  Source: h in paper 000, fig. 3; the value is inferred from its
     deployment time.
     """
+
+    bracket: AnyBracket = BisectorBracket()
+    """What holds the V pulleys: a block on the bisector, or an element fixed to a bar half."""
 
     @model_validator(mode="after")
     def _usable(self) -> Cable:
@@ -117,6 +131,17 @@ class Cable(Model):
                 f'far_winch needs end = "both", but end = "{self.end}" (leave one of them out)'
             )
         return self
+
+    def slip_speed_over(self, pulleys: int) -> float:
+        """The slip speed of the scene, or the one that follows the winding, m/s."""
+        if self.slip_speed is not None:
+            return self.slip_speed
+        winding = sum(winch.winding.usual_speed() for winch in self.winches)
+        return regularisation.slip_speed(winding, pulleys)
+
+    def path_slope(self, half_bar: float, opening: ArrayLike) -> Array:
+        """Derivative of one section's path after its opening angle (rad), m/rad."""
+        return self.bracket.path_slope(half_bar, self.block_offset, opening)
 
     @property
     def winches(self) -> tuple[Winch, ...]:

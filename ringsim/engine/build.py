@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.engine.boom import add_boom
-from ringsim.engine.cable_path import ring_path
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.faults import Faults
 from ringsim.engine.joints import add_friction, add_stops
 from ringsim.engine.loads import add_loads
 from ringsim.engine.net import HubNet, add_net
 from ringsim.engine.pantograph_ring import RingModel, build_ring
+from ringsim.engine.ring_path import ring_path
 from ringsim.engine.rods import Formulation
 from ringsim.engine.rods_ancf import Ancf
 from ringsim.engine.rods_geometrically_exact import GeometricallyExact

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.tangent import RopeTangent, mean_tangent, rope_tangent
-from ringsim.engine.cable_path import WIDTH, CablePath, Placed
-from ringsim.engine.rotations import cross, skew
+from ringsim.engine.cable_path import CablePath, Placed
 
 Array = NDArray[np.float64]
 _PER_SPAN = 4
@@ -42,7 +41,7 @@ class JacobianPattern:
 
     def __init__(self, path: CablePath, ropes: Ropes, auxiliary: int) -> None:
         self._path = path
-        self._size = len(path.nodes) * WIDTH
+        self._size = path.size
         self._spans = ropes.spans
         legs: list[tuple[int, int, float]] = []
         for span in range(ropes.spans):
@@ -53,31 +52,30 @@ class JacobianPattern:
         self._leg = np.array([leg[1] for leg in legs])
         self._sign = np.array([leg[2] for leg in legs])
         nodes = path.leg_node[self._leg]
-        own = nodes[:, None] * WIDTH + np.arange(WIDTH)
+        own, width = path.spots[nodes], path.width
         differences = self._difference(self._span)
         tension = self._tension(self._span)
-        self._first, self._second = path.turning_pairs()
-        turn = path.leg_node * WIDTH + 3
-        turn_rows = turn[self._first][:, None] + np.arange(4)
-        turn_columns = turn[self._second][:, None] + np.arange(4)
-        single = turn[:, None] + np.arange(4)
+        first, second = path.turning_pairs
+        turn = path.spots[path.leg_node, 3:]
         every = np.arange(self._size, self._size + auxiliary)
-        turned = np.ones((len(self._leg), WIDTH, 3), dtype=bool)
+        turned = np.ones((len(self._leg), width, 3), dtype=bool)
         turned[:, :3] = path.leg_carries[self._leg, None, None] > 0.0
+        turned &= own[:, :, None] >= 0
         shifted = turned.copy()
         shifted[:, :3] &= np.eye(3, dtype=bool)
         places = [
             _pairs(differences, own),
             _pairs(own, tension[:, None]),
             _pairs(own, differences),
-            _pairs(turn_rows, turn_columns),
-            _pairs(single, single),
+            _pairs(turn[first], turn[second]),
+            _pairs(turn, turn),
         ]
         rows, columns = (np.concatenate([place[k] for place in places]) for k in (0, 1))
         filled = [shifted.transpose(0, 2, 1), turned[:, :, :1], turned]
         mask = np.concatenate([part.ravel() for part in filled])
         # Explicit zeros would fill the factors of the system's matrix.
-        self._kept = np.concatenate([np.flatnonzero(mask), np.arange(len(mask), len(rows))])
+        mask = np.concatenate([mask, (rows[len(mask) :] >= 0) & (columns[len(mask) :] >= 0)])
+        self._kept = np.flatnonzero(mask)
         self._unknowns = auxiliary
         self._known = auxiliary + len(self._kept)
         self._entries = np.ones((self._known, 3))
@@ -133,7 +131,7 @@ class JacobianPattern:
             -maps,
             turned @ state.directions[self._span, :, None],
             turned @ directions[self._span],
-            *self._turning(state, placed),
+            *(-block for block in self._path.turning(placed, state.point_forces)),
         ]
         values = np.concatenate([block.ravel() for block in blocks])
         entries = self._with_room(self._known + sum(len(part) for part in parts))
@@ -213,27 +211,10 @@ class JacobianPattern:
         by_velocity = tangent.by_velocity[:, self._span[own] - spans.start]
         values = -by_q * np.einsum("slj,ljk->slk", by_velocity, swings)
         tension = self._tension(np.arange(spans.start, spans.stop))
-        columns = self._path.leg_node[self._leg[own], None] * WIDTH + np.arange(WIDTH)
+        columns = self._path.spots[self._path.leg_node[self._leg[own]]]
         places = np.broadcast_arrays(tension[:, None, None], columns, values)
-        return np.stack([place.ravel() for place in places], axis=1)
-
-    def _turning(self, state: ChainState, placed: Placed) -> list[Array]:
-        """Change of the moments arm x F at fixed F with the turns of the nodes."""
-        path = self._path
-        forces = state.point_forces[path.leg_point]
-        arms = placed.arms[path.leg_point]
-        along = np.einsum("li,li->l", arms, forces)
-        kernel = arms[:, :, None] * forces[:, None, :]
-        kernel[:, range(3), range(3)] -= along[:, None]
-        shares = path.leg_share
-        gyrations = shares[:, None, None] * placed.gyrations[path.leg_node]
-        carried = gyrations.transpose(0, 2, 1) @ kernel
-        pairs = carried[self._first] @ gyrations[self._second]
-        moments = shares[:, None] * cross(arms, forces)
-        own = np.zeros((len(moments), 4, 4))
-        own[:, 0, 1:], own[:, 1:, 0] = -2.0 * moments, 2.0 * moments
-        own[:, 1:, 1:] = 2.0 * skew(moments)
-        return [-pairs, -own]
+        found = np.stack([place.ravel() for place in places], axis=1)
+        return found[found[:, 1] >= 0.0]
 
 
 def _entries(rows: NDArray[np.int64], columns: NDArray[np.int64], values: Array) -> Array:

@@ -21,9 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.cable.cables import Cables
 from ringsim.engine.assembly import Assembly
-from ringsim.engine.pantograph_ring import RingModel
 from ringsim.engine.rotations import cross, first_axes, gyration, rotated, skew, spin
 from ringsim.scene import Scene
 
@@ -107,7 +105,13 @@ class CablePath:
     leg_point, leg_node, leg_share
         Every dependence of a point on a node, in the order of the nodes: the point, the node's
         place in ``nodes``, and the share of the node's turn that turns the point's arm.
+    spots
+        Place of each node's coordinates among those of all nodes behind one another, shape
+        (nodes, width); -1 where a node has fewer.
     """
+
+    width = WIDTH
+    """Most coordinates of a node."""
 
     def __init__(self, paths: Sequence[Sequence[Stop]]) -> None:
         self._register: dict[int, int] = {}
@@ -138,34 +142,56 @@ class CablePath:
         halves = np.full(len(block), 0.5)
         self.leg_share = np.concatenate([ones, halves, halves])
         self.leg_carries = np.concatenate([ones, np.ones(len(block)), np.zeros(len(block))])
-        order = np.argsort(self.leg_node, kind="stable")
+        self._order = order = np.argsort(self.leg_node, kind="stable")
         self.leg_point, self.leg_node = self.leg_point[order], self.leg_node[order]
         self.leg_share, self.leg_carries = self.leg_share[order], self.leg_carries[order]
         self._first_leg = np.searchsorted(self.leg_node, np.arange(len(self.nodes)))
         self._carrier = np.empty(count, dtype=np.int64)
         self._carrier[self._hinge_point] = self._hinge_node
         self._carrier[self._block_point] = self._left
+        self._held = np.arange(self.width) < self._widths()[:, None]
+        self.spots = np.where(self._held, np.cumsum(self._held).reshape(self._held.shape) - 1, -1)
+
+    def _widths(self) -> Indices:
+        """Coordinates of each node."""
+        return np.full(len(self.nodes), WIDTH)
+
+    @property
+    def size(self) -> int:
+        """Coordinates of all nodes."""
+        return int(self._held.sum())
+
+    def by_node(self, values: Array) -> Array:
+        """Values of all coordinates, (size,), as (nodes, width); 0 where a node has fewer."""
+        if self._held.all():
+            return values.reshape(self._held.shape)
+        found = np.zeros(self._held.shape, dtype=values.dtype)
+        found[self._held] = values
+        return found
+
+    def in_a_row(self, values: Array) -> Array:
+        """Values by node, (nodes, width), as (size,)."""
+        return values[self._held]
 
     def place(self, coordinates: Array, rates: Array) -> Placed:
-        """Points and velocities from the nodes' coordinates and rates, shape (nodes, 7)."""
-        turns = coordinates[:, 3:]
-        spins = spin(turns, rates[:, 3:])
-        arms = np.empty((self.count, 3))
+        """Points and velocities from the nodes' coordinates and rates, shape (nodes, width)."""
+        turns = coordinates[:, 3:7]
+        spins = spin(turns, rates[:, 3:7])
+        arms, turning = np.empty((2, self.count, 3))
         arms[self._hinge_point] = rotated(turns[self._hinge_node], self._hinge_arm)
+        turning[self._hinge_point] = spins[self._hinge_node]
         x, y = first_axes(turns[self._halves])
         count = len(self._left)
         bisector = y[:count] + y[count:] + self._sense * (x[count:] - x[:count])
         size = np.sqrt(np.einsum("ij,ij->i", bisector, bisector))
         arms[self._block_point] = (-self._sense * self._offset / size[:, None]) * bisector
-        turning = np.empty((self.count, 3))
-        turning[self._hinge_point] = spins[self._hinge_node]
         turning[self._block_point] = 0.5 * (spins[self._left] + spins[self._right])
         points = coordinates[self._carrier, :3] + arms
         velocities = rates[self._carrier, :3] + cross(turning, arms)
-        return Placed(points, velocities, arms, turns, rates[:, 3:], turning)
+        return Placed(points, velocities, arms, turns, rates[:, 3:7], turning)
 
     def generalised(self, placed: Placed, forces: Array) -> Array:
-        """Generalised forces on the nodes' coordinates, shape (nodes, 7), of point forces."""
+        """Generalised forces on the nodes' coordinates, (nodes, width), of point forces."""
         pull = forces[self.leg_point]
         moments = self.leg_share[:, None] * cross(placed.arms[self.leg_point], pull)
         by_leg = np.empty((len(pull), WIDTH))
@@ -177,7 +203,7 @@ class CablePath:
         return np.asarray(np.add.reduceat(by_leg, self._first_leg, axis=0))
 
     def leg_maps(self, placed: Placed) -> Array:
-        """Derivative of each leg's point after its node's coordinates, shape (legs, 3, 7)."""
+        """Derivative of each leg's point after its node's coordinates, (legs, 3, width)."""
         maps = np.zeros((len(self.leg_point), 3, WIDTH))
         maps[:, range(3), range(3)] = self.leg_carries[:, None]
         arms = self.leg_share[:, None] * placed.arms[self.leg_point]
@@ -188,7 +214,7 @@ class CablePath:
         """Derivative of each leg's velocity after its node's coordinates at fixed rates.
 
         With w = G(q) q_dot = -G(q_dot) q, w turns and carries the arm: dv = dw x arm + w x darm.
-        Shape (legs, 3, 7), 1/s.
+        Shape (legs, 3, width), 1/s.
         """
         swings = np.zeros((len(self.leg_point), 3, WIDTH))
         arms = skew(self.leg_share[:, None] * placed.arms[self.leg_point])
@@ -197,6 +223,34 @@ class CablePath:
         swings[:, :, 3:] = arms @ gyration(placed.turn_rates[self.leg_node]) - carried
         return swings
 
+    def turning(self, placed: Placed, forces: Array) -> tuple[Array, Array]:
+        """Change of the generalised forces of constant point forces with the nodes' turns.
+
+        Parameters
+        ----------
+        forces
+            On all points, N, shape (points, 3).
+
+        Returns
+        -------
+        tuple of Array
+            Derivatives of the moments arm x F by the pairs of ``turning_pairs``, and of what
+            moments do on each leg's own node, shape (pairs or legs, width - 3, width - 3).
+        """
+        pull, arms = forces[self.leg_point], placed.arms[self.leg_point]
+        along = np.einsum("li,li->l", arms, pull)
+        kernel = arms[:, :, None] * pull[:, None, :]
+        kernel[:, range(3), range(3)] -= along[:, None]
+        gyrations = self.leg_share[:, None, None] * placed.gyrations[self.leg_node]
+        carried = gyrations.transpose(0, 2, 1) @ kernel
+        first, second = self.turning_pairs
+        moments = self.leg_share[:, None] * cross(arms, pull)
+        own = np.zeros((len(moments), 4, 4))
+        own[:, 0, 1:], own[:, 1:, 0] = -2.0 * moments, 2.0 * moments
+        own[:, 1:, 1:] = 2.0 * skew(moments)
+        return carried[first] @ gyrations[second], own
+
+    @cached_property
     def turning_pairs(self) -> tuple[Indices, Indices]:
         """Pairs of legs of the same point: how a moment on one node turns with another."""
         first, second = [], []
@@ -214,40 +268,3 @@ class CablePath:
             self._register[key] = len(self.nodes)
             self.nodes.append(node)
         return self._register[key]
-
-
-def ring_path(model: RingModel, cables: Cables) -> CablePath:
-    """The paths of a ring's cables, each from its first winch."""
-    paths = []
-    for plane, cable in cables.present():
-        way = _from_last if cable.end == "last" else _pulleys
-        paths.append(way(model, plane, cables.winch_distance, cable.block_offset))
-    return CablePath(paths)
-
-
-def _pulleys(model: RingModel, plane: int, distance: float, offset: float) -> list[Stop]:
-    """Points from the winch at section 1."""
-    fold = model.fold
-    sense = 1.0 if plane == 0 else -1.0
-    inward = np.array([0.0, 0.0, -sense])
-    nodes = [node for _, node in model.hinges[plane]]
-    first = fold.left[plane, 0] - fold.corners[plane, 0]
-    path: list[Stop] = [FixedStop(nodes[0], first + distance * inward)]
-    for section in range(model.geometry.sections):
-        following = (section + 1) % len(nodes)
-        left = fold.left[plane, section] - fold.corners[plane, section]
-        right = fold.right[plane, section] - fold.corners[plane, following]
-        vjoint = model.vjoints[plane][section]
-        path.append(FixedStop(nodes[section], left))
-        path.append(BlockStop(vjoint.gap[0], vjoint.gap[1], sense, offset))
-        path.append(FixedStop(nodes[following], right))
-    return path
-
-
-def _from_last(model: RingModel, plane: int, distance: float, offset: float) -> list[Stop]:
-    """The same path with its winch at the last section."""
-    path = _pulleys(model, plane, distance, offset)[1:][::-1]
-    last = path[0]
-    assert isinstance(last, FixedStop)
-    inward = np.array([0.0, 0.0, -1.0 if plane == 0 else 1.0])
-    return [FixedStop(last.node, last.arm + distance * inward), *path]

@@ -18,13 +18,13 @@ from ringsim.cable.chain import Chain
 from ringsim.cable.state import ChainState
 from ringsim.cable.winches import Winches
 from ringsim.engine.cable_jacobian import JacobianPattern, auxiliary_unknowns
-from ringsim.engine.cable_path import WIDTH, CablePath, Carrier, Placed
+from ringsim.engine.cable_path import CablePath, Carrier, Placed
 
 Array = NDArray[np.float64]
 
 
 class _Answered(NamedTuple):
-    """The state of the nodes last asked for (shape (nodes, 7), s), and what it gave."""
+    """The state of the nodes last asked for (shape (nodes, width), s), and what it gave."""
 
     time: float
     place: Array
@@ -58,7 +58,7 @@ class CableDrive:
         start = self.path.place(self._reference, np.zeros_like(self._reference))
         self.ropes = self.chain.start(start.points)
         self.winches = Winches(self.chain.cables)
-        self._size = len(self.path.nodes) * WIDTH
+        self._size = self.path.size
         self._answered: _Answered | None = None
         most_ropes = len(present) + len(model.scene.faults)
         self.auxiliary = auxiliary_unknowns(self.ropes.spans, most_ropes)
@@ -68,7 +68,7 @@ class CableDrive:
         self._add_object()
 
     def evaluate(self, coordinates: Array, rates: Array, time: float) -> tuple[ChainState, Placed]:
-        """The chain from the nodes' total coordinates and rates, shape (nodes, 7)."""
+        """The chain from the nodes' total coordinates and rates, (nodes, width)."""
         placed = self.path.place(coordinates, rates)
         wound, wound_rate = self.winches.at(time, self.ropes, *self._paths(placed))
         state = self.chain.state(self.ropes, placed.points, placed.velocities, wound, wound_rate)
@@ -105,18 +105,20 @@ class CableDrive:
 
     def current(self, position: Array, velocity: Array, time: float) -> ChainState:
         """The chain at a state of the whole system (total coordinates)."""
-        place = self._columns
-        return self.evaluate(position[place], velocity[place], time)[0]
+        place, rates = (self.path.by_node(x[self._columns]) for x in (position, velocity))
+        return self.evaluate(place, rates, time)[0]
 
     def locate(self) -> None:
         """Look up where the nodes' coordinates stand in the system vector; after assembly."""
         assembly = self._model.assembly
-        self._columns = np.array([assembly.coordinates_of(node) for node in self.path.nodes])
+        self._columns = np.concatenate([assembly.coordinates_of(n) for n in self.path.nodes])
 
     def _gather_reference(self) -> Array:
         system = self._model.assembly.system
-        return np.array(
-            [system.GetNodeParameter(node, "referenceCoordinates") for node in self.path.nodes]
+        return self.path.by_node(
+            np.concatenate(
+                [system.GetNodeParameter(node, "referenceCoordinates") for node in self.path.nodes]
+            )
         )
 
     def _add_object(self) -> None:
@@ -143,9 +145,8 @@ class CableDrive:
         )
 
     def _split(self, q: Any, q_t: Any) -> tuple[Array, Array]:
-        shape = (len(self.path.nodes), WIDTH)
-        place = np.asarray(q[: self._size]).reshape(shape) + self._reference
-        return place, np.asarray(q_t[: self._size]).reshape(shape)
+        place, rates = (self.path.by_node(np.asarray(x[: self._size])) for x in (q, q_t))
+        return place + self._reference, rates
 
     def _answer(self, q: Any, q_t: Any, time: float) -> tuple[ChainState, Placed]:
         """The chain at a state of the object; Newton asks twice for force and Jacobian."""
@@ -167,7 +168,9 @@ class CableDrive:
         try:
             with np.errstate(all="ignore"):
                 state, placed = self._answer(q, q_t, t)
-                force[: self._size] = self.path.generalised(placed, state.point_forces).ravel()
+                force[: self._size] = self.path.in_a_row(
+                    self.path.generalised(placed, state.point_forces)
+                )
         except ValueError as error:
             # A stray Newton iterate, or no rope left: no number makes Newton take a smaller step.
             self.refusal = str(error)

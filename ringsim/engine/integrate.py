@@ -9,7 +9,6 @@ import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.cable.section_path import path_slope
 from ringsim.cable.state import ChainState
 from ringsim.engine.build import Built
 from ringsim.engine.closing import close
@@ -113,7 +112,7 @@ class Integration:
         angles = self.history.angles[-1]
         return np.array(
             [
-                float(np.sum(path_slope(ring.half_bar, cable.block_offset, angles[plane])))
+                float(np.sum(cable.path_slope(ring.half_bar, angles[plane])))
                 for plane, cable in cables.present()
             ]
         )

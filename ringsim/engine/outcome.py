@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from ringsim.cable.cables import pulleys_of
 from ringsim.engine.energy import Energies
 from ringsim.engine.history import History
 from ringsim.scene import Scene
@@ -158,7 +157,7 @@ def add_energies(
 def _add_cables(
     values: dict[str, Array], history: History, scene: Scene, grid: Array, deployed: float
 ) -> None:
-    """Tensions by plane and span; a plane without a cable is NaN.
+    """Tensions by plane and span; NaN where a plane has no cable, or the other one more spans.
 
     The peak counts up to the deployment time (s; NaN for the whole run): winches that go on
     pulling at a locked ring raise the tension for as long as one cares to simulate.
@@ -168,13 +167,14 @@ def _add_cables(
     times = np.array(history.times)
     tensions = np.array(history.tensions)
     slack = np.array(history.slack)
-    spans = pulleys_of(scene.structure.sections) + 1
-    by_plane = np.full((2, spans, len(grid)), np.nan)
+    by_plane = np.full((2, scene.spans, len(grid)), np.nan)
     loose = np.full(2, np.nan)
     wound = np.full((2, len(grid)), np.nan)
-    for number, (plane, _) in enumerate(scene.cables.present()):
-        own = tensions[:, number * spans : (number + 1) * spans]
-        by_plane[plane] = on_grid(grid, times, own).T
+    begin = 0
+    for number, (plane, cable) in enumerate(scene.cables.present()):
+        end = begin + scene.pulleys_of(cable) + 1
+        by_plane[plane, : end - begin] = on_grid(grid, times, tensions[:, begin:end]).T
+        begin = end
         ends = slack[:, number]
         loose[plane] = float(np.sum(0.5 * np.diff(times) * (ends[1:] + ends[:-1])))
         wound[plane] = on_grid(grid, times, np.array(history.wound)[:, number])

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from ringsim.cable.section_path import path_slope
 from ringsim.engine.build import Built
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.rod_dampers import STIFFENING
@@ -64,7 +63,7 @@ def rope_step(built: Built) -> float:
     stiffness = sum(
         cable.axial_stiffness
         / float(length)
-        * (ring.sections * float(path_slope(ring.half_bar, cable.block_offset, opening))) ** 2
+        * (ring.sections * float(cable.path_slope(ring.half_bar, opening))) ** 2
         for cable, length in zip(cables, content, strict=True)
     )
     return 2.0 * math.pi * math.sqrt(inertia / stiffness) / 50.0

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ringsim.cable.records import Cable
-from ringsim.cable.section_path import span_length
 from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.plots import style, wording
 from ringsim.scene import scene_from_toml
@@ -32,8 +31,7 @@ class SectionSeries:
     """A cable's quantities by section over time, shape (section, time), from a recorded run.
 
     Tensions are recorded; span lengths and angles are recomputed from the opening angles on the
-    ideal geometry of one section (see ``ringsim.cable.section_path``), where the spans on either
-    side of the V pulley are equally long.
+    ideal geometry of one section (see ``ringsim.cable.bracket``).
 
     Parameters
     ----------
@@ -56,9 +54,19 @@ class SectionSeries:
         self.opening = np.radians(
             dataset["opening_angle"].sel(plane=plane).transpose("section", "time").values[order]
         )
-        self.tension = dataset["cable_tension"].sel(plane=plane).transpose("span", "time").values
-        self._half, self._offset = ring.half_bar, cable.block_offset
+        tension = dataset["cable_tension"].sel(plane=plane).transpose("span", "time").values
+        self.tension = tension[: scene.pulleys_of(cable) + 1]
+        self._half = ring.half_bar
         self._fold = 0.5 * (np.pi - self.opening)
+        aside, inward = cable.bracket.place(self._fold, cable.block_offset)
+        self._drop = self._half * np.sin(self._fold) + inward
+        spans = cable.bracket.spans(self._half, cable.block_offset, self.opening)
+        backwards = cable.end == "last"
+        self._before, self._behind = spans[::-1] if backwards else spans
+        self._aside = -aside if backwards else aside
+        directions = ring.geometry().directions
+        following = np.einsum("ki,ki->k", directions[:-1], directions[1:])[order]
+        self._half_turns = np.sqrt(0.5 * (1.0 + following))[:, None]
 
     @property
     def sections(self) -> int:
@@ -68,7 +76,7 @@ class SectionSeries:
     @property
     def lengths(self) -> Array:
         """Length of the span before the V pulley, m."""
-        return span_length(self._half, self._offset, self.opening)
+        return self._before
 
     @property
     def entry(self) -> Array:
@@ -93,7 +101,7 @@ class SectionSeries:
     @property
     def decays(self) -> Array:
         """Tension behind a section over the tension before it; NaN while the rope is slack."""
-        after = np.concatenate([self.arriving[1:], self.behind[-1:]])
+        after = np.concatenate([self.arriving[1:], self.tension[-1:]])
         taut = self.arriving > self.cable.slack_width
         return np.asarray(np.where(taut, after / np.where(taut, self.arriving, 1.0), np.nan))
 
@@ -102,19 +110,23 @@ class SectionSeries:
         """Force on the first hinge pulley, N.
 
         The rope comes up the boom at the first section, and from the section before, square to
-        the boom, at all others.
+        the boom and by half the turn of the plan aside, at all others.  Paper 000, eqs 28 and 29,
+        with T1 + T2 sin gamma in the first.
         """
-        along = self.entry * self._half * np.cos(self._fold) / self.lengths
-        inward = self.entry * (self._half * np.sin(self._fold) + self._offset) / self.lengths
-        inward[0] += self.arriving[0]
-        along[1:] -= self.arriving[1:]
-        return np.asarray(np.hypot(along, inward))
+        level = (self._half * np.cos(self._fold) + self._aside) / self.lengths
+        fall = self._drop / self.lengths
+        # Cosine of the angle between the pulls; half the plan's turn lies at either hinge pulley.
+        cosine = np.concatenate([fall[:1], -level[1:] * self._half_turns])
+        square = self.entry**2 + self.arriving**2 + 2.0 * self.entry * self.arriving * cosine
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
     @property
     def block_forces(self) -> Array:
-        """Force on the V pulley along its bisector, N."""
-        drop = self._half * np.sin(self._fold) + self._offset
-        return np.asarray((self.entry + self.behind) * drop / self.lengths)
+        """Force on the V pulley along its bisector, N: (T2 + T3) sin gamma.
+
+        Paper 000, eq. 30, prints the difference of both; the pulls add up (``docs/cables.md``).
+        """
+        return np.asarray(self._drop * (self.entry / self._before + self.behind / self._behind))
 
 
 _VALUES: dict[str, Callable[[SectionSeries], Array]] = {

@@ -44,7 +44,8 @@ class Column:
         Scene path that the values are written to.
     dim
         Second dimension of ``values``, or empty: what there is a value for, "section", "corner"
-        or "pulley", or "place_k" for lists of any other length k.
+        "pulley" or "pulley_of_two_winches" (one more), or "place_k" for lists of any other
+        length k.
     units
         SI unit of the field.
     origin
@@ -162,6 +163,8 @@ def _column(
     dim = ""
     if values.ndim == 2:
         dim = place_of(path, closed=scene.structure.closed) or f"place_{values.shape[1]}"
+        if dim == "pulley" and values.shape[1] != scene.structure.pulleys:
+            dim = "pulley_of_two_winches"
     name = path.replace(".", "_").replace("[", "_").removesuffix("]")
     words = "listed in a file" if origin is None else origin.model_dump_json(exclude_none=True)
     found = field_at(scene, path)
@@ -180,7 +183,11 @@ def _seeds(seed: int, samples: int) -> NDArray[np.int64]:
 
 
 def _check_extremes(base: Scene, table: Table) -> None:
-    """Build the scenes that hold the least and the greatest value of every input."""
+    """Build the scenes that hold the least and the greatest value of every input.
+
+    Every word among the inputs is in one of them, so that all numbers of spans are seen.
+    """
+    spans: set[int] = set()
     suspects: set[int] = {0}
     for column in table.columns:
         flat = column.values.reshape(table.samples, -1)
@@ -190,9 +197,15 @@ def _check_extremes(base: Scene, table: Table) -> None:
             suspects |= {int(k) for k in np.unique(flat[:, 0], return_index=True)[1]}
     for sample in sorted(suspects):
         try:
-            base.with_values(table.values_of(sample))
+            spans.add(base.with_values(table.values_of(sample)).spans)
         except InputError as error:
             raise InputError(f"sample {sample}: {error}; change or truncate the inputs") from None
+    if len(spans) > 1:
+        raise InputError(
+            f"inputs: cables of {min(spans)} and of {max(spans)} spans would not fit into one "
+            'result, and end = "both" has a span more: draw only from "first" and "last", or '
+            "run a campaign for each"
+        )
 
 
 def with_error_bars(table: Table, every: int) -> Table:

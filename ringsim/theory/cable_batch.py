@@ -69,6 +69,10 @@ def stack(
     def column(name: str) -> Array:
         return np.array([[getattr(c, name) for c in own] for own in cables], float)[:, None]
 
+    slip = [
+        [c.slip_speed_over(s.cosines.shape[1]) for c, s in zip(own, paths, strict=True)]
+        for own, paths in zip(cables, shapes, strict=True)
+    ]
     coefficients = []
     for k in range(len(cables[0])):
         laws = [own[k].friction for own in cables]
@@ -87,7 +91,7 @@ def stack(
         damping_time=column("damping_time"),
         slack_width=column("slack_width"),
         radius=column("pulley_radius"),
-        slip_speed=column("slip_speed"),
+        slip_speed=np.array(slip)[:, None],
         content=np.zeros((len(cables), 1, 0)),
         alive=np.zeros((len(cables), 1, 0)),
         coefficients=tuple(coefficients),

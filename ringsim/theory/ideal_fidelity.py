@@ -13,11 +13,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ringsim.cable.bracket.bisector import BisectorBracket
 from ringsim.choice import kind_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.persection import spread
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.theory.faded_friction import with_remark
 from ringsim.theory.ideal_batch import Batch, equal_cables
 from ringsim.theory.ideal_outcome import to_outcome
 from ringsim.theory.ideal_ring import IdealRing
@@ -52,6 +54,12 @@ def refuse_if_not_ideal(scene: Scene) -> None:
             raise InputError(
                 f'faults[{number}].kind = "{fault.kind}": with rigid rods one stuck V-joint stops '
                 f"the whole ring, so the ideal fidelity has no answer {cure}"
+            )
+    for _, cable in [] if scene.cables is None else scene.cables.present():
+        if not isinstance(cable.bracket, BisectorBracket):
+            raise InputError(
+                f'cables: bracket.kind = "{kind_of(cable.bracket)}": the ideal fidelity knows '
+                'pulleys on the bisector alone (choose "bisector", or use the full fidelity)'
             )
     if scene.record.stress:
         raise InputError(
@@ -148,7 +156,7 @@ def _run_alike(scenes: list[Scene]) -> list[Outcome]:
         outcome = to_outcome(course, scene, wall_time=0.0, cpu_time=0.0)
         outcome.values["wall_time"] = np.array(common_wall + time.perf_counter() - wall)
         outcome.values["cpu_time"] = np.array(common_cpu + time.process_time() - cpu)
-        outcomes.append(outcome)
+        outcomes.append(with_remark(outcome, scene))
     return outcomes
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from ringsim.cable.cables import pulleys_of
 from ringsim.scene import Scene
 from ringsim.theory import radau
 from ringsim.theory.batched_chain import ChainBatch
@@ -56,8 +55,8 @@ def to_outcome(course: Course, scene: Scene, *, wall_time: float, cpu_time: floa
     values["asynchrony_max"] = np.array(0.0)
     _add_energies(values, course, where, (phi, rate, latched), on_grid)
     if scene.cables is not None:
-        coordinates["span"] = np.arange(1, pulleys_of(sections) + 2)
-        _add_cables(values, course, where, sections, on_grid)
+        _add_cables(values, course, where, on_grid)
+        coordinates["span"] = np.arange(1, values["cable_tension"].shape[1] + 1)
     values["constraint_violation"] = on_grid(np.zeros(len(where)))
     values["constraint_error"] = np.array(0.0)
     counts = {
@@ -176,12 +175,11 @@ def _add_energies(
     values["energy_error"] = np.array(wrong / exchanged)
 
 
-def _add_cables(
-    values: dict[str, Array], course: Course, where: Array, sections: int, on_grid: Any
-) -> None:
-    """Tensions by plane and span; a plane without a cable is NaN."""
-    spans = pulleys_of(sections) + 1
-    tensions = np.full((2, spans, len(where)), np.nan)
+def _add_cables(values: dict[str, Array], course: Course, where: Array, on_grid: Any) -> None:
+    """Tensions by plane and span; NaN where a plane has no cable, or the other one more spans."""
+    whole = course.pieces[0].equation.ropes
+    edge = np.zeros(1, dtype=int) if whole is None else whole.cable_starts
+    tensions = np.full((2, np.diff(edge).max(initial=0), len(where)), np.nan)
     wound = np.full((2, len(where)), np.nan)
     loose = np.full(2, np.nan)
     peak, peak_time = -math.inf, math.nan
@@ -202,8 +200,9 @@ def _add_cables(
         for number, planes in enumerate(piece.equation.planes):
             slack = _time_below_zero(times, stretch[..., number])
             for plane in planes:
-                at_spans = found[..., number * spans : (number + 1) * spans]
-                tensions[plane][:, own] = _through_stages(piece, at_spans)(where[own]).T
+                at_spans = found[..., edge[number] : edge[number + 1]]
+                held = _through_stages(piece, at_spans)(where[own]).T
+                tensions[plane, : len(held), own] = held.T
                 ends = piece.wound[:, :, number].sum(axis=-1)
                 wound[plane, own] = _through_stages(piece, ends)(where[own])
                 loose[plane] = np.nan_to_num(loose[plane]) + slack

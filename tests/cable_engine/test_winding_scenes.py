@@ -97,9 +97,10 @@ def test_winches_at_both_ends_pull_evenly() -> None:
     found = outcome(scene(boom="none", both__end="both", solver__end_time=2.0))
     angle = found.values["opening_angle"][:, :, -1]
     assert angle[:, 0] == pytest.approx(angle[:, 1], abs=1e-3)
-    # The first winch stands one pulley before the first hinge, the other on the last.
-    tension = found.values["cable_tension"][0, 1:, -1]
-    assert tension == pytest.approx(tension[::-1], rel=1e-3)
+    # Mirror symmetric but for the rods' initial swing, which Newton leaves at 1e-5 of the forces.
+    tension = found.values["cable_tension"][0, :, -1]
+    assert len(tension) == 7
+    assert tension == pytest.approx(tension[::-1], rel=1e-5)
     assert found.values["wound_length"][:, -1] == pytest.approx(2 * (2.0 - 0.25) * 0.05, rel=1e-6)
 
 

@@ -112,6 +112,10 @@ IMPOSSIBLE = [
     _scene("friction list", "joints.pivot.viscous = [0.1]", "joints.pivot.viscous has 1", "needs 18"),
     _scene("starts beyond its stop", "stop.stowed_angle = 50.0",
            "stop.stowed_angle = 50.0 deg", "below structure.opening_angle"),
+    _scene("hinge pulleys that coincide",
+           f"{RODS}\nstructure.hinge_offset = 0.0\n[cables.upper]\n"
+           'winch.winding = { kind = "constant", speed = 0.01 }',
+           "structure.hinge_offset = 0.0 m", "at least 1e-06 m", "leave the cables out"),
     _scene("step longer than the run", "solver = { step = 2.0, end_time = 1.0 }",
            "solver.step = 2.0 s", "end_time = 1.0 s"),
     _scene("result beyond memory", "record.interval = 1e-8", "record.interval = 1e-08 s", "at least"),

@@ -14,6 +14,10 @@ class ConstantWinding(PrescribedWinding):
     kind: Literal["constant"] = "constant"
     speed: Speed
 
+    def usual_speed(self) -> float:
+        """The speed, in m/s."""
+        return abs(self.speed)
+
     def wound(self, time: float) -> float:
         """Rope taken up, in metre."""
         return self.speed * time

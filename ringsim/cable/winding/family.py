@@ -56,6 +56,14 @@ class Winding(Model):
     feedback: ClassVar[bool]
     """Whether the law needs readings of the rope."""
 
+    def usual_speed(self) -> float:
+        """Speed at which the law winds, or pays out, for most of its time, m/s; 0 if it rests.
+
+        As far as the law can know it beforehand: the friction of the pulleys is regularised
+        below it, see ``ringsim.cable.regularisation``.
+        """
+        raise NotImplementedError
+
 
 class PrescribedWinding(Winding):
     """A law that is known beforehand."""

@@ -22,6 +22,10 @@ class RampWinding(PrescribedWinding):
     duration: Second
     shape: Literal["cubic", "quintic"] = "quintic"
 
+    def usual_speed(self) -> float:
+        """The speed after the ramp, in m/s."""
+        return abs(self.speed)
+
     def wound(self, time: float) -> float:
         """Rope taken up, in metre."""
         phase = min(max(time / self.duration, 0.0), 1.0)

@@ -24,6 +24,10 @@ class StallWinding(FeedbackWinding):
     backdrivable: bool = False
     """Whether rope can be pulled off the winch; if not, it holds."""
 
+    def usual_speed(self) -> float:
+        """The speed below the stall, in m/s."""
+        return self.speed
+
     def command(self, tension: float, reading: WinchReading) -> float:
         """Speed of the motor at a tension (N), in m/s."""
         del reading

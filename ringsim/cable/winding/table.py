@@ -67,6 +67,16 @@ class TableWinding(PrescribedWinding):
         twist = (slope[:-1] + slope[1:] - 2.0 * secant) / step**2
         return time, np.stack([length[:-1], slope[:-1], bend, twist], axis=-1)
 
+    def usual_speed(self) -> float:
+        """Median over time of the mean speeds between the table's times at which it moves, m/s."""
+        step, speed = np.diff(self.times), np.abs(np.diff(self.lengths) / np.diff(self.times))
+        order = np.argsort(speed)
+        order = order[speed[order] > 0.0]
+        elapsed = np.cumsum(step[order])
+        if not len(order):
+            return 0.0
+        return float(speed[order[np.searchsorted(elapsed, 0.5 * elapsed[-1])]])
+
     def wound(self, time: float) -> float:
         """Rope taken up, in metre."""
         times, cubics = self._cubics

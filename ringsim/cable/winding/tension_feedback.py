@@ -34,6 +34,10 @@ class TensionFeedbackWinding(FeedbackWinding):
     opening_rate: AngularRate | None = None
     """Wanted rate of the opening angle; left out, the winch follows the structure."""
 
+    def usual_speed(self) -> float:
+        """The speed, in m/s, at which it takes up a slack rope while nothing else moves."""
+        return min(self.gain * self.target, self.max_speed)
+
     def command(self, tension: float, reading: WinchReading) -> float:
         """Speed wanted at a tension (N), in m/s."""
         if self.opening_rate is None:

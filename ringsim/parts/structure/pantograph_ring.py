@@ -7,9 +7,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from ringsim.choice import kind_of
 from ringsim.geometry.ring import RingGeometry
 from ringsim.parts.structure.family import Structure
 from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
+
+LEAST_HINGE_OFFSET = 1e-6
+"""Metre; directions of the rope between two pulleys are then good to 1e-10 in doubles."""
 
 
 class PantographRing(Structure):
@@ -88,15 +92,38 @@ class PantographRing(Structure):
                 f"boom.length = {scene.boom.length} m must be at least {highest:.4g} m, the "
                 "height of the stowed ring: the sliding joint would leave the boom"
             )
+        self._check_pulleys(scene)
         if scene.stop is not None and scene.stop.stowed_angle >= self.opening_angle:
             raise ValueError(
                 f"stop.stowed_angle = {scene.stop.stowed_angle} deg must be below "
                 f"structure.opening_angle = {self.opening_angle} deg"
             )
 
+    def _check_pulleys(self, scene: Any) -> None:
+        """V pulleys that open the bars, and spans that have a length and a direction."""
+        present = [] if scene.cables is None else scene.cables.present()
+        for plane, cable in present:
+            reason = cable.bracket.refusal(self.opening_angle)
+            if reason is not None:
+                raise ValueError(f"cables.{self.planes[plane]}.{reason}")
+            if kind_of(cable.bracket) == "bar-half" and kind_of(scene.rods) == "ancf":
+                raise ValueError(
+                    f'cables.{self.planes[plane]}.bracket.kind = "bar-half" needs rods.kind = '
+                    '"geometrically-exact", not "ancf": choose one of both'
+                )
+        if not present or self.sections == 1:
+            return
+        if self.hinge_offset < LEAST_HINGE_OFFSET:
+            raise ValueError(
+                f"structure.hinge_offset = {self.hinge_offset} m must be at least "
+                f"{LEAST_HINGE_OFFSET:g} m with cables: the rope runs between the hinge pulleys of "
+                "neighbouring sections, which would coincide (set it to "
+                f"{LEAST_HINGE_OFFSET:g} for pulleys on one axis, or leave the cables out)"
+            )
+
     @property
     def pulleys(self) -> int:
-        """Pulleys of each cable: two hinges and a V-joint a section, less the cable's end."""
+        """Pulleys of a cable with one winch: two hinges and a V-joint a section, less its end."""
         return 3 * self.sections - 1
 
     @property

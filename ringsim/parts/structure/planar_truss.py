@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import model_validator
 
+from ringsim.choice import kind_of
 from ringsim.geometry.planar_truss import TrussGeometry
 from ringsim.parts.structure.family import Structure
 from ringsim.parts.tube import Tube
@@ -149,6 +150,11 @@ class PlanarTruss(Structure):
             raise ValueError(
                 f'cables.upper.end = "{scene.cables.upper.end}" must be "first": the winch '
                 "stands on the fixed axis"
+            )
+        if kind_of(scene.rods) != "geometrically-exact":
+            raise ValueError(
+                f'rods.kind = "{kind_of(scene.rods)}" must be "geometrically-exact": the cable '
+                "of a planar truss runs to a node with an orientation"
             )
         if scene.solver.step_control != "constant":
             raise ValueError('solver.step_control = "motion" must be "constant" for a planar truss')

@@ -1,0 +1,1 @@
+"""Kinds of brackets that hold the V pulleys, one file each."""

@@ -1,0 +1,62 @@
+"""A bracket that is a part of one bar half."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field
+
+from ringsim.cable.bracket.family import Array, Bracket
+from ringsim.units import Unit
+
+
+class BarHalfBracket(Bracket):
+    r"""The pulley at the end of an element of length H that is fixed to one bar half.
+
+    From the bar to the element are theta + 90 deg, turned across the other half, so that with the
+    opening angle delta
+
+        b = H sin((2 theta - delta) / 2),   a = +-H cos((2 theta - delta) / 2)
+
+    (+ on the first half).  b is h of paper 000, eq. 21; "sin^-1" there is no arc sine, and theta
+    is the angle from the bar's normal.  The paper leaves out a and has both spans alike; a pulley
+    that is fixed to a half stands aside.  The span to that half's own hinge pulley then keeps its
+    length, and the other has
+
+        L^2 = l^2 + H^2 + 2 l H sin(theta - delta),
+
+    which falls all the way from the stowed angle on for 90 deg <= theta <= 90 deg + delta: outside
+    the rope would fold the bars somewhere.
+    """
+
+    kind: Literal["bar-half"] = "bar-half"
+    angle: Annotated[float, Field(ge=90.0, le=270.0), Unit("deg")]
+    """Theta."""
+    half: Literal["first", "second"] = "first"
+    """The half towards the section's first or second corner, seen from the boom."""
+
+    def refusal(self, opening_angle: float) -> str | None:
+        """See ``Bracket``."""
+        most = 90.0 + opening_angle
+        if self.angle <= most:
+            return None
+        return (
+            f"bracket.angle = {self.angle} deg must be at most {most:g} deg, 90 deg above "
+            "structure.opening_angle: the cable would fold the bars at first"
+        )
+
+    def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
+        """A and b with theta - delta / 2 = theta - 90 deg + phi."""
+        turn = np.radians(self.angle - 90.0) + np.asarray(phi, dtype=float)
+        return self._sign * distance * np.cos(turn), distance * np.sin(turn)
+
+    def rate(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
+        """Derivatives of the same."""
+        turn = np.radians(self.angle - 90.0) + np.asarray(phi, dtype=float)
+        return -self._sign * distance * np.sin(turn), distance * np.cos(turn)
+
+    @property
+    def _sign(self) -> float:
+        return 1.0 if self.half == "first" else -1.0

@@ -1,0 +1,29 @@
+"""A bracket that a gear keeps on the bisector of the bar halves."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ringsim.cable.bracket.family import Array, Bracket
+
+
+class BisectorBracket(Bracket):
+    """The pulley at a constant distance h from the joint, away from the bars on their bisector.
+
+    Both spans are alike at every angle.  Source: paper 000, eq. 20 and fig. 3 with constant h.
+    """
+
+    kind: Literal["bisector"] = "bisector"
+
+    def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
+        """A = 0, b = h."""
+        size = np.shape(phi)
+        return np.zeros(size), np.full(size, distance)
+
+    def rate(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
+        """Both are constant."""
+        del distance
+        return np.zeros(np.shape(phi)), np.zeros(np.shape(phi))

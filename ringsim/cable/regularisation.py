@@ -1,0 +1,69 @@
+r"""How fast rope must run for the friction of its pulleys to act, and what slower rope costs.
+
+Friction turns round with the rope; p_j = tanh(s_j / s_slip) of the full decay makes that smooth
+(``ringsim.cable.chain``).  Its share of the rope's speed decides what is left out.  On a ring of
+N sections that open evenly the 2 N spans beside the V pulleys give the rope free, so a pulley
+with m of them beyond it sees
+
+    s = m v,   v = winding speed / (2 N) = 1.5 winding speed / (spans of the cable),
+
+falling to v at the V pulley next to the fixed end; with two winches m counts from where the rope
+rests between them.  Such pulleys alone lose friction, so the tension there is too high by
+
+    exp(sum over pulleys of \|ln eta\| (1 - tanh(m v / s_slip))) - 1,
+
+which hardly depends on N.  With s_slip = 0.5 winding speed / spans the slowest pulley has
+tanh(3) = 0.995 of its friction: 0.03 % at f / R = 0.04, below 1 % up to f / R = 0.9.  Rope that
+is wound fast keeps the slip speed of 2e-4 m/s, below that share.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LARGEST_SLIP_SPEED = 2e-4
+"""Metre per second; the slip speed of rope that is wound fast, or not at all."""
+SHARE = 0.5
+"""Slip speed over the winding speed per span."""
+TOLERATED = 0.01
+"""Relative error of the far end's tension that a run does not mention."""
+_MOVES = 1e-3
+"""Share of the largest winding speed above which a winch counts as turning."""
+
+
+def slip_speed(winding: float, pulleys: int) -> float:
+    """The slip speed (m/s) that suits a winding speed (m/s, of all winches of a cable)."""
+    if winding <= 0.0:
+        return LARGEST_SLIP_SPEED
+    return min(LARGEST_SLIP_SPEED, SHARE * winding / (pulleys + 1))
+
+
+def excess(slip: float, winding: float, pulleys: int, decay: float) -> float:
+    """How much too high the tension is where rope runs slowest, relative.
+
+    Parameters
+    ----------
+    slip, winding
+        Slip speed and winding speed, m/s.
+    pulleys
+        Number of pulleys of the cable.
+    decay
+        Largest -ln(eta) of its pulleys.
+    """
+    spans = np.arange(1, max(2 * (pulleys + 1) // 3, 2))
+    alike = 2.0 - spans % 2  # one V pulley, then the two hinge pulleys of neighbouring sections
+    faded = 1.0 - np.tanh(spans * 1.5 * winding / (pulleys + 1) / slip)
+    return math.expm1(decay * float(alike @ faded))
+
+
+def usual_winding(times: Array, wound: Array) -> float:
+    """Median speed (m/s) of winches while they turn, from rope wound (m) at times (s)."""
+    known = np.isfinite(wound)
+    speed = np.abs(np.diff(wound[known])) / np.diff(times[known])
+    moving = speed[speed > _MOVES * speed.max(initial=0.0)]
+    return float(np.median(moving)) if len(moving) else 0.0

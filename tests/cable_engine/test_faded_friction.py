@@ -1,0 +1,50 @@
+"""A run whose slip speed is too fast for its rope says so, in both fidelities."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from driven import outcome, truss
+from ringsim.scene import Scene
+from ringsim.simulation import run_ideal
+from ringsim.variables import Status
+
+SLOW = 5e-4
+STALLED = {"kind": "stall", "speed": 0.05, "max_tension": 0.03}
+
+
+def slowly(**values: Any) -> Scene:
+    """The truss, half open, for a short while."""
+    fields: dict[str, Any] = {
+        "structure__opening_angle": 120.0,
+        "solver__end_time": 2.0,
+        "boom": "none",
+        "both__winch__winding": {"kind": "constant", "speed": SLOW},
+    }
+    return truss(**(fields | values))
+
+
+@pytest.mark.parametrize("fidelity", [outcome, run_ideal], ids=["full", "ideal"])
+def test_too_fast_a_slip_speed_is_named_with_its_cure(fidelity: Any) -> None:
+    found = fidelity(slowly(cables__upper__slip_speed=2e-4))
+    assert found.status == Status.UNFINISHED
+    # 0.5 x 5e-4 m/s over 6 spans; the lower cable follows its winch.
+    assert "cables.upper.slip_speed = 0.0002 m/s is too fast" in found.reason
+    assert "at most 4.2e-05 m/s" in found.reason
+    assert "cables.lower" not in found.reason
+
+
+def test_silence_where_friction_acts_or_where_there_is_none() -> None:
+    for values in (
+        {},
+        {"both__slip_speed": 4.2e-5},
+        {"both__slip_speed": 2e-4, "both__friction": {"kind": "none"}},
+    ):
+        assert "slip_speed" not in run_ideal(slowly(**values)).reason
+
+
+def test_a_motor_that_stalls_into_a_crawl_is_judged_by_what_it_wound() -> None:
+    found = outcome(slowly(both__winch__winding=STALLED, joints__vjoint__viscous=0.5))
+    assert "too fast for rope wound at" in found.reason
