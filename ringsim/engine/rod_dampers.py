@@ -21,7 +21,7 @@ the force is C de/dt with them.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import exudyn as exu
 import exudyn.itemInterface as item
@@ -38,6 +38,16 @@ _SHORT = 0.5
 there, which ``STIFFENING`` allows for."""
 STIFFENING = 1.0 + 1.5 / _SHORT
 """Largest stiffness of a rod with its damper over that of the rod alone; 3/2 is a0 h of BDF2."""
+
+
+class _Reading(NamedTuple):
+    """Time (s), strains, their rates and the forces of all dampers, shape (dampers, 6)."""
+
+    time: float
+    strains: Array
+    rates: Array
+    forces: Array
+    by_velocity: bool
 
 
 class RodDampers:
@@ -63,8 +73,8 @@ class RodDampers:
         self._lead = 0.0
         self._offsets = np.zeros((0, 6))
         self._by_velocity = False
-        self._read: tuple[float, Array] | None = None
-        self._kept: tuple[Array, Array] | None = None
+        self._found: _Reading | None = None
+        self._kept: _Reading | None = None
 
     def add(self, system: Any, markers: list[Any], damping: Array, relaxation: float) -> int:
         """A damper between two markers that coincide.
@@ -98,9 +108,9 @@ class RodDampers:
         self._prepared = start, time
         if not self._past or start > self._past[-1][0]:
             # By now exudyn has moved the current state on: only a reading knows the start's.
-            if self._read is None or self._read[0] != start:
+            if self._found is None or self._found.time != start:
                 raise RuntimeError(f"the rods' dampers were not read at {start:.9g} s")
-            self._past = [*self._past[-1:], self._read]
+            self._past = [*self._past[-1:], (start, self._found.strains)]
         if time - start >= self._short:
             self._by_velocity = False
             self._lead, self._offsets = _difference(time, self._past)
@@ -123,23 +133,26 @@ class RodDampers:
         if not self._dampers:
             return 0.0
         strains = self._outputs(system, _SHIFT, _TURN)
-        self._read = time, strains
         if self._by_velocity:
             rates = self._outputs(system, _VELOCITY, _SPIN)
         elif self._past:
             rates = self._lead * (strains - self._offsets)
         else:
             rates = np.zeros_like(strains)
+        before = self._kept
         self.latest = np.einsum("nij,nj->ni", np.array(self._rows), rates)
-        if self._kept is None:
+        self._found = _Reading(time, strains, rates, self.latest, self._by_velocity)
+        if before is None:
             return 0.0
-        before, force = self._kept
-        return 0.5 * float(np.sum((force + self.latest) * (strains - before)))
+        moved = strains - before.strains
+        if before.by_velocity and self._by_velocity:
+            # The rates that the forces are made of balance an impact twice as well.
+            moved = 0.5 * (time - before.time) * (before.rates + rates)
+        return 0.5 * float(np.sum((before.forces + self.latest) * moved))
 
     def keep(self) -> None:
         """Count what is lost from the last reading on."""
-        if self._read is not None:
-            self._kept = self._read[1], self.latest
+        self._kept = self._found
 
     def _set(self, system: Any, name: str, values: Array) -> None:
         for damper, value in zip(self._dampers, values, strict=True):
