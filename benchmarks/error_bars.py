@@ -79,7 +79,14 @@ def random_scene(seed: int) -> Scene:
     if cables:
         base = load_scene("ring18-cable" if closed else "truss2")
         speed = log_uniform(rng, 0.015, 0.2)
-        winch = {"kind": "ramp", "speed": speed, "duration": float(rng.uniform(0.3, 2.0))}
+        winch: dict[str, Any] = {
+            "kind": "ramp",
+            "speed": speed,
+            "duration": float(rng.uniform(0.3, 2.0)),
+        }
+        if rng.random() < 0.15:
+            target = log_uniform(rng, 0.3, 3.0)
+            winch = {"kind": "tension-feedback", "target": target, "max_speed": 3.0 * speed}
         end, kind = str(rng.choice(["first", "first", "both"])), str(rng.choice(FRICTIONS))
         for plane in ("upper", "lower"):
             coefficient = float(rng.uniform(0.0, 0.08 if kind == "capstan" else 8e-4))

@@ -83,8 +83,9 @@ def _with_bars(
         ("half as long", solver.halved(), OF_FINER),
     ):
         found = _attempt(scene.model_copy(update={"solver": other}), begin)
-        for name in TIMINGS:
-            outcome.values[name] = found.values.get(name, outcome.values[name])
+        outcome.values.update(
+            {name: found.values[name] for name in TIMINGS if name in found.values}
+        )
         bars = error_bars(outcome, found, scene.rods.elements, scale)
         if bars:
             outcome.values.update(bars)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from ringsim import simulation
 from ringsim.analysis.error_budget import budget_lines, error_budget
 from ringsim.campaign.cases import Cases, run_cases
 from ringsim.campaign.specification import load_campaign
@@ -121,6 +122,55 @@ def test_bars_change_nothing_else() -> None:
     assert dataset.peak_rod_stress_error.attrs["units"] == "Pa"
     assert "peak_tension_error" not in dataset
     assert not bars & set(to_dataset(plain, scene).data_vars)
+
+
+@pytest.fixture
+def attempts(monkeypatch):
+    """Have runs end as given, one after another; the settings that they were given are noted."""
+
+    def prepare(*endings: Outcome) -> list[Solver]:
+        left, seen = list(endings), []
+
+        def attempt(scene: Scene, begin: tuple[float, float]) -> Outcome:
+            seen.append(scene.solver)
+            return left.pop(0)
+
+        monkeypatch.setattr(simulation, "_attempt", attempt)
+        return seen
+
+    return prepare
+
+
+def test_shorter_steps_give_the_bars_where_longer_ones_fail(attempts) -> None:
+    """Half the steps, a quarter of the error: the runs differ by three quarters of it."""
+    error, failed = 4e-4, Outcome(Status.DIVERGED, "lost")
+    seen = attempts(outcome(error), failed, outcome(0.25 * error))
+    scene = ring(**{"solver.error_bars": True, "rods.elements": 100})
+    found = run(scene)
+    assert seen[1] == scene.solver.coarsened()
+    assert seen[2] == scene.solver.halved()
+    expected = 3.0 * SAFETY["peak_tension"] * error * 10.0
+    assert found.values["peak_tension_error"] == pytest.approx(expected, rel=0.01)
+    assert "no error bars" not in found.reason
+
+
+def test_a_run_without_bars_says_why(attempts) -> None:
+    failed = Outcome(Status.DIVERGED, "the motion blew up")
+    attempts(outcome(1e-4), failed, failed)
+    found = run(ring(**{"solver.error_bars": True}))
+    assert found.status is Status.OK
+    assert "no error bars, since with steps twice as long it ended as diverged" in found.reason
+    assert not any(name.endswith("_error") for name in found.values)
+
+
+def test_the_bar_of_the_asynchrony_is_that_of_all_that_came_before() -> None:
+    fine, coarse = outcome(0.0), outcome(0.0)
+    fine.values["asynchrony"] = np.where(TIMES <= 3.0, TIMES, np.nan)
+    coarse.values["asynchrony"] = fine.values["asynchrony"] + np.where(TIMES[10] == TIMES, 0.5, 0.1)
+    found = error_bars(fine, coarse, elements=10**6)["asynchrony_error"]
+    np.testing.assert_allclose(found[:10], 0.1 * SAFETY["asynchrony"], rtol=1e-9)
+    np.testing.assert_allclose(found[10:31], 0.5 * SAFETY["asynchrony"], rtol=1e-9)
+    assert np.isnan(found[31:]).all()
 
 
 def test_bars_cover_what_a_finer_run_finds() -> None:
