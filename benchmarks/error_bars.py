@@ -161,7 +161,7 @@ def outputs_of(fine: Outcome, coarse: Outcome, truth: Outcome) -> dict[str, list
     values = {name: largest(fine, name) for name in apart}
     found = {n: [values[n], errors[n], apart[n]] for n in apart if n != "asynchrony"}
     error = np.abs(fine.values["asynchrony"] - truth.values["asynchrony"])
-    bars = bar("asynchrony", apart["asynchrony"], values["asynchrony"], 1)
+    bars = bar("asynchrony", apart["asynchrony"], values["asynchrony"], 1, 0.0)
     there = np.isfinite(error) & (apart["asynchrony"] > 0.0)
     worst = int(np.argmax(np.where(there, error / np.maximum(bars, 1e-300), 0.0)))
     series = (values["asynchrony"], error, apart["asynchrony"])
@@ -187,7 +187,7 @@ def columns(rows: list[dict[str, Any]], name: str) -> np.ndarray:
 
 def ratios(name: str, table: np.ndarray) -> np.ndarray:
     """Bar over error of an output."""
-    bars = [float(bar(name, apart, value, int(n))) for value, _, apart, n, _ in table.T]
+    bars = [float(bar(name, apart, value, int(n), tol)) for value, _, apart, n, tol in table.T]
     return np.maximum(bars, 1e-300) / np.maximum(table[1], 1e-300)
 
 

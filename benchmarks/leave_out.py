@@ -107,8 +107,10 @@ def standing_of(name: str) -> Standing:
     outcome = run(scene)
     coarse = run(scene.model_copy(update={"solver": scene.solver.coarsened()}))
     bars = apart(outcome, coarse)
-    stated = error_bars(outcome, coarse, scene.rods.elements)
-    bars |= {name.removesuffix("_error"): float(bar) for name, bar in stated.items()}
+    stated = error_bars(outcome, coarse, scene.rods.elements, scene.solver.tolerance)
+    bars |= {
+        name.removesuffix("_error"): float(bar) for name, bar in stated.items() if bar.ndim == 0
+    }
     return Standing(scene, outcome, {name: bars[name] for name in OUTPUTS if name in bars})
 
 

@@ -86,7 +86,7 @@ def _with_bars(
         outcome.values.update(
             {name: found.values[name] for name in TIMINGS if name in found.values}
         )
-        bars = error_bars(outcome, found, scene.rods.elements, scale)
+        bars = error_bars(outcome, found, scene.rods.elements, solver.tolerance, scale)
         if bars:
             outcome.values.update(bars)
             return outcome

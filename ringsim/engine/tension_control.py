@@ -20,13 +20,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.parts.solver import Solver
+from ringsim.parts.solver import TENSION_BEND, Solver
 
 Array = NDArray[np.float64]
-_SHARE = 15.0
-"""Allowed bend over the largest tension so far, over the tolerance.  At 3e-3, the tolerance of
-``ring18-cable``, that is 0.045, and the peaks found are good to 2.5 % (rings of 4 and 5 sections
-that lock slowly) or better, for at most a third more steps."""
 _REFUSED = 2.0
 """Bend over the allowed one from which on a step is repeated."""
 _SAFETY = 0.8
@@ -56,7 +52,7 @@ class TensionControl:
             Tension in N that counts as reached from the start, so that ropes may become taut.
         """
         self.limit = math.inf
-        self._allowed = _SHARE * solver.tolerance
+        self._allowed = TENSION_BEND * solver.tolerance
         self._least = _FINEST * solver.step
         self._largest = slight
         self._past: tuple[float, Array] | None = None
