@@ -17,13 +17,13 @@ import numpy as np
 from ringsim.engine.solve import SOLVERS
 from ringsim.scene import Scene
 from ringsim.theory.error_bars import error_bars
-from ringsim.theory.ideal_fidelity import run_ideal, run_ideal_many
+from ringsim.theory.ideal_fidelity import run_ideal
 from ringsim.variables import TIMINGS, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIDELITIES", "run", "run_ideal", "run_ideal_many", "simulate"]
+__all__ = ["FIDELITIES", "run", "run_ideal", "simulate"]
 
 
 def run(scene: Scene) -> Outcome:

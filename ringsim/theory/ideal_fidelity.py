@@ -9,7 +9,6 @@ does.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,14 +17,11 @@ from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.persection import spread
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.theory.ideal_batch import Batch, equal_cables
+from ringsim.theory.ideal_course import Integration
 from ringsim.theory.ideal_outcome import to_outcome
 from ringsim.theory.ideal_ring import IdealRing
-from ringsim.theory.ideal_steps import Integration
 from ringsim.variables import Outcome
 
-MOST_AT_ONCE = 64
-"""Samples that are integrated together; more would only take memory."""
 _LIGHT_HUB = 1e-3
 """Largest mass of the net's hub over the ring's."""
 _CENTRED = 0.05
@@ -91,81 +87,18 @@ def run_ideal(scene: Scene) -> Outcome:
     Returns
     -------
     Outcome
-        The variables of the full model where they exist; all sections open alike.
+        The variables of the full model where they exist; all sections open alike.  It always ends
+        with a status.
 
     Raises
     ------
     InputError
         If the ideal ring cannot represent the scene.
     """
-    return run_ideal_many([scene])[0]
-
-
-def run_ideal_many(scenes: Sequence[Scene]) -> list[Outcome]:
-    """Integrate many scenes, those with the same structure of the problem together.
-
-    Together go scenes with the same number of sections, cables at the same ends with the same
-    kinds of friction, and faults of the same kinds at the same places in the same order; any
-    number in them may differ.  Each sample keeps its own steps, so its numbers do not depend on
-    its company but for round-off (feedback laws: nothing at all).
-
-    Parameters
-    ----------
-    scenes
-        In any order.
-
-    Returns
-    -------
-    list of Outcome
-        In the order of ``scenes``.  ``wall_time`` and ``cpu_time`` of a sample are its share of
-        its batch's.
-
-    Raises
-    ------
-    InputError
-        If the ideal ring cannot represent one of the scenes.
-    """
-    groups: dict[str, list[int]] = {}
-    for number, scene in enumerate(scenes):
-        refuse_if_not_ideal(scene)
-        groups.setdefault(_likeness(scene), []).append(number)
-    found: dict[int, Outcome] = {}
-    for members in groups.values():
-        for first in range(0, len(members), MOST_AT_ONCE):
-            own = members[first : first + MOST_AT_ONCE]
-            found.update(zip(own, _run_alike([scenes[k] for k in own]), strict=True))
-    return [found[number] for number in range(len(scenes))]
-
-
-def _run_alike(scenes: list[Scene]) -> list[Outcome]:
+    refuse_if_not_ideal(scene)
     wall, cpu = time.perf_counter(), time.process_time()
-    courses = Integration(Batch(scenes)).run()
-    common_wall = (time.perf_counter() - wall) / len(scenes)
-    common_cpu = (time.process_time() - cpu) / len(scenes)
-    outcomes = []
-    for course, scene in zip(courses, scenes, strict=True):
-        wall, cpu = time.perf_counter(), time.process_time()
-        outcome = to_outcome(course, scene, wall_time=0.0, cpu_time=0.0)
-        outcome.values["wall_time"] = np.array(common_wall + time.perf_counter() - wall)
-        outcome.values["cpu_time"] = np.array(common_cpu + time.process_time() - cpu)
-        outcomes.append(outcome)
-    return outcomes
-
-
-def _likeness(scene: Scene) -> str:
-    """What two scenes must have in common to be integrated together."""
-    structure, cables = scene.structure, scene.cables
-    present = [] if cables is None else cables.present()
-    faults = [
-        (kind_of(f), sorted(f.model_dump(exclude={"time", "kind"}).items()))
-        for f in sorted(scene.faults, key=lambda f: f.time)
-    ]
-    return repr(
-        (
-            structure.sections,
-            structure.closed,
-            [(plane, cable.end, kind_of(cable.friction)) for plane, cable in present],
-            equal_cables(scene),
-            faults,
-        )
-    )
+    with np.errstate(all="ignore"):
+        outcome = to_outcome(Integration(scene).run(), scene, wall_time=0.0, cpu_time=0.0)
+    outcome.values["wall_time"] = np.array(time.perf_counter() - wall)
+    outcome.values["cpu_time"] = np.array(time.process_time() - cpu)
+    return outcome

@@ -1,0 +1,225 @@
+"""The cables of an ideal ring: ringsim.cable's chain on points that follow its coordinates.
+
+Only the spans beside a V pulley change their lengths, with phi alone: hinge pulleys sit on the
+pins about which the end assemblies swing, and a winch keeps its distance from its first pulley.
+The generalised force on phi is - sum T_i dL_i/dphi.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.cable.cables import pulleys_of
+from ringsim.cable.chain import Chain
+from ringsim.cable.faults.family import CableFault
+from ringsim.cable.records import Cable, Winch
+from ringsim.cable.section_path import path_slope
+from ringsim.cable.state import ChainState
+from ringsim.cable.winches import Winches
+from ringsim.cable.winding.family import WinchState
+from ringsim.scene import Scene
+from ringsim.theory.ideal_mechanism import Mechanism, Pose
+from ringsim.theory.ideal_points import UP
+
+Array = NDArray[np.float64]
+
+_SETTLED, _MOST_ANSWERS = 1e-12, 30
+"""Change of the winches' speeds (m/s) at which the search for them ends, and its length."""
+
+
+class Pull(NamedTuple):
+    """The cables at one instant.
+
+    Attributes
+    ----------
+    chain
+        See ringsim.cable.
+    force
+        Generalised force on phi, N m.
+    speeds
+        Of the winches with feedback, m/s.
+    loss, power, elastic
+        Power lost (W), power put in by the winches less the energy wound up with the rope (W),
+        elastic energy (J).
+    """
+
+    chain: ChainState
+    force: float
+    speeds: Array
+    loss: float
+    power: float
+    elastic: float
+
+
+class _Place(NamedTuple):
+    """A winch: its cable (from 0), the end of it (0 first, 1 far), and what it is."""
+
+    cable: int
+    end: int
+    winch: Winch
+
+
+class IdealCables:
+    """The cables of a scene on its ideal ring.
+
+    Attributes
+    ----------
+    planes
+        Planes of each cable: two where both planes have cables that pull alike all the time.
+    ropes
+        Which spans form one rope; ``strike`` changes them.
+    answering
+        The winches with feedback: their rope is a state of the motion.
+    """
+
+    def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
+        assert scene.cables is not None
+        self._mechanism, present = mechanism, scene.cables.present()
+        alike = scene.structure.closed and len(present) == 2 and not scene.faults
+        if alike and present[0][1] == present[1][1]:
+            present, self.planes = present[:1], [(0, 1)]
+        else:
+            self.planes = [(plane,) for plane, _ in present]
+        self._copies = np.array([float(len(planes)) for planes in self.planes])
+        self._cables = [cable for _, cable in present]
+        self._winch_distance = scene.cables.winch_distance
+        paths = [self._path(plane, cable) for plane, cable in present]
+        per_cable = [len(path) for path in paths]
+        self._paths = np.concatenate(paths)
+        self._starts = np.cumsum([0, *per_cable[:-1]])
+        self._chain = Chain(self._cables, per_cable)
+        start = mechanism.pose(_initial(scene, mechanism), np.zeros(mechanism.freedom))
+        self.ropes = self._chain.start(self._points(start))
+        self._spans = pulleys_of(scene.structure.sections) + 1
+        self._winches = Winches(self._cables)
+        self._places = [
+            _Place(number, end, winch)
+            for number, cable in enumerate(self._cables)
+            for end, winch in enumerate(cable.winches)
+        ]
+        self.answering = [place for place in self._places if place.winch.feedback]
+
+    @property
+    def breaks(self) -> list[float]:
+        """Times at which a winch is switched on or off, s."""
+        times = {t for p in self._places for t in (p.winch.start_time, p.winch.stop_time)}
+        return sorted(time for time in times if time is not None and time > 0.0)
+
+    @property
+    def nudges(self) -> tuple[float, float]:
+        """Increments of a length (m) and a rate (1/s) over which tensions are as good as linear.
+
+        A slack rope becomes taut within slack_width / EA of strain; friction turns within the
+        slip speed.
+        """
+        soft = min(cable.slack_width / cable.axial_stiffness for cable in self._cables)
+        slip = min(cable.slip_speed for cable in self._cables)
+        return min(max(1e-2 * soft, 1e-9), 1e-6), 1e-2 * slip
+
+    def pull(self, time: float, pose: Pose, stored: Array) -> Pull:
+        """Evaluate the cables.
+
+        Parameters
+        ----------
+        time
+            For the winches' laws, s.
+        stored
+            Rope wound by each winch with feedback, m.
+
+        Raises
+        ------
+        ValueError
+            If a span has no length, or a winch has wound up its whole rope.
+        """
+        points, slopes = self._points(pose), self._paths @ pose.basis[1]
+        state = self._wind(time, pose, points, slopes * pose.rate[0], stored)
+        ropes = self.ropes
+        longer = np.einsum("ij,ij->i", state.directions, slopes[ropes.far] - slopes[ropes.near])
+        copies, cable = self._copies, ropes.cable
+        on_rope, on_pulley = copies[cable], copies[cable][ropes.of_pulley]
+        return Pull(
+            state,
+            -float((on_rope[ropes.of_span] * state.tensions) @ longer),
+            np.array([state.wound_rate[p.cable, p.end] for p in self.answering]),
+            float(on_pulley @ state.friction_loss + on_rope @ state.damping_loss),
+            float(copies @ state.winch_power.sum(axis=1) - on_rope @ state.drum_power),
+            float(on_rope @ state.elastic_energy),
+        )
+
+    def strike(self, fault: CableFault, state: ChainState) -> None:
+        """Let a fault change the ropes."""
+        self.ropes = fault.strike(self.ropes, state)
+
+    def tensions(self, state: ChainState) -> Array:
+        """Tensions by cable and span, N, shape (cables, spans)."""
+        return state.tensions.reshape(len(self.planes), self._spans)
+
+    def stretches(self, state: ChainState) -> Array:
+        """Path less natural length of the rope at each cable's first winch, m; -1 if it is cut."""
+        first = self.ropes.first
+        alive = self.ropes.alive[first]
+        return np.where(alive, (state.paths - state.natural)[first], -1.0)
+
+    def _wind(
+        self, time: float, pose: Pose, points: Array, velocities: Array, stored: Array
+    ) -> ChainState:
+        """The chain with its winches' ropes and speeds."""
+        wound, speed = np.zeros((2, len(self._cables), 2))
+        for number, end, winch in self._places:
+            if not winch.feedback:
+                law = winch.at(time, WinchState())
+                wound[number, end], speed[number, end] = law.wound, law.speed
+        if not self.answering:
+            return self._chain.state(self.ropes, points, velocities, wound, speed)
+        for place, length in zip(self.answering, stored, strict=True):
+            wound[place.cable, place.end] = length
+        ring, opening = self._mechanism.geometry, math.pi - 2.0 * float(pose.place[0])
+        slopes = np.array(
+            [
+                ring.sections * float(path_slope(ring.half_bar, cable.block_offset, opening))
+                for cable in self._cables
+            ]
+        )
+        for _ in range(_MOST_ANSWERS):
+            state = self._chain.state(self.ropes, points, velocities, wound, speed)
+            self._winches.advance(time, state, slopes)
+            _, found = self._winches.at(time, self.ropes, state.paths, state.path_rates)
+            if np.abs(found - speed).max() < _SETTLED:
+                break
+            speed = found
+        return state
+
+    def _points(self, pose: Pose) -> Array:
+        points = self._paths @ pose.basis[0]
+        ends = self._mechanism.ends
+        if ends is None:
+            return points
+        for start, cable, planes in zip(self._starts, self._cables, self.planes, strict=True):
+            swing = planes[0] + (2 if cable.end == "last" else 0)
+            arm, angle = points[start] - points[start + 1], float(pose.place[1 + swing])
+            along = np.cross(UP, ends.normals[swing])
+            points[start] = points[start + 1] + arm[2] * (
+                math.cos(angle) * UP - math.sin(angle) * along
+            )
+        return points
+
+    def _path(self, plane: int, cable: Cable) -> Array:
+        """Coefficients of a path's points: winch, pulleys, far end; shape (points, 3, 4)."""
+        geometry, points = self._mechanism.geometry, self._mechanism.points
+        inward = np.array([0.0, 0.0, -1.0 if plane == 0 else 1.0])
+        left, right = points.left[plane], points.right[plane]
+        drop = np.array([cable.block_offset, 0.0, geometry.half_bar, 0.0])
+        blocks = 0.5 * (left + right) + np.outer(inward, drop)
+        path = np.stack([left, blocks, right], axis=1).reshape(-1, 3, 4)
+        if cable.end == "last":
+            path = path[::-1]
+        winch = path[0] + np.outer(self._winch_distance * inward, np.eye(4)[0])
+        return np.concatenate([winch[None], path])
+
+
+def _initial(scene: Scene, mechanism: Mechanism) -> Array:
+    return np.append(scene.structure.initial_phi, np.zeros(mechanism.freedom - 1))
