@@ -91,6 +91,7 @@ class IdealCables:
         per_cable = [len(path) for path in paths]
         self._paths = np.concatenate(paths)
         self._starts = np.cumsum([0, *per_cable[:-1]])
+        self._hung = self._swinging()
         self._chain = Chain(self._cables, per_cable)
         start = mechanism.pose(_initial(scene, mechanism), np.zeros(mechanism.freedom))
         self.ropes = self._chain.start(self._points(start))
@@ -139,15 +140,15 @@ class IdealCables:
         state = self._wind(time, pose, points, slopes * pose.rate[0], stored)
         ropes = self.ropes
         longer = np.einsum("ij,ij->i", state.directions, slopes[ropes.far] - slopes[ropes.near])
-        copies, cable = self._copies, ropes.cable
+        copies, cable, density = self._copies, ropes.cable, state.energy_density
         on_rope, on_pulley = copies[cable], copies[cable][ropes.of_pulley]
         return Pull(
             state,
             -float((on_rope[ropes.of_span] * state.tensions) @ longer),
             np.array([state.wound_rate[p.cable, p.end] for p in self.answering]),
             float(on_pulley @ state.friction_loss + on_rope @ state.damping_loss),
-            float(copies @ state.winch_power.sum(axis=1) - on_rope @ state.drum_power),
-            float(on_rope @ state.elastic_energy),
+            float(copies @ state.winch_power.sum(axis=1) - on_rope @ (density * state.wound_rates)),
+            float(on_rope @ (density * state.natural)),
         )
 
     def strike(self, fault: CableFault, state: ChainState) -> None:
@@ -195,17 +196,21 @@ class IdealCables:
 
     def _points(self, pose: Pose) -> Array:
         points = self._paths @ pose.basis[0]
-        ends = self._mechanism.ends
-        if ends is None:
+        if self._mechanism.ends is None:
             return points
-        for start, cable, planes in zip(self._starts, self._cables, self.planes, strict=True):
-            swing = planes[0] + (2 if cable.end == "last" else 0)
-            arm, angle = points[start] - points[start + 1], float(pose.place[1 + swing])
-            along = np.cross(UP, ends.normals[swing])
-            points[start] = points[start + 1] + arm[2] * (
-                math.cos(angle) * UP - math.sin(angle) * along
-            )
+        for start, swing, along in self._hung:
+            arm, angle = points[start, 2] - points[start + 1, 2], float(pose.place[1 + swing])
+            turned = math.cos(angle) * UP - math.sin(angle) * along
+            points[start] = points[start + 1] + arm * turned
         return points
+
+    def _swinging(self) -> list[tuple[int, int, Array]]:
+        """Each winch on an end assembly: its point, the swing that it shares, its section's way."""
+        ways, found = self._mechanism.geometry.directions, []
+        for start, cable, planes in zip(self._starts, self._cables, self.planes, strict=True):
+            last = cable.end == "last"
+            found.append((int(start), planes[0] + 2 * last, ways[-1 if last else 0]))
+        return found
 
     def _path(self, plane: int, cable: Cable) -> Array:
         """Coefficients of a path's points: winch, pulleys, far end; shape (points, 3, 4)."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from ringsim.variables import Status
 
 Array = NDArray[np.float64]
 
-RELATIVE = 1e-8
+RELATIVE = 3e-7
 """Local error of a step, relative to every part of the state."""
 AT_STOP = 1e-10
 """Angle in rad within which a stop counts as met."""
@@ -190,7 +191,7 @@ class Integration:
             crossed = crossed[(crossed > 0) | (abs(curve(places[0]) - level) > AT_STOP)]
             if len(crossed):
                 begin, finish = places[crossed[0]], places[crossed[0] + 1]
-                found.append((float(brentq(lambda t: curve(t) - level, begin, finish)), level))
+                found.append((float(brentq(partial(_above, curve, level), begin, finish)), level))
         return min(found, default=None)
 
     def _reach(self, time: float, level: float) -> None:
@@ -228,6 +229,10 @@ class Integration:
     def _fail(self, cause: str) -> None:
         self.course.status = Status.SOLVER_FAILED
         self.course.reason = f"the ideal ring's solver gave up at {self._time:.6g} s: {cause}"
+
+
+def _above(curve: BPoly, level: float, time: float) -> float:
+    return float(curve(time)) - level
 
 
 def quintic(times: Array, values: Array, bends: Array) -> BPoly:

@@ -14,12 +14,12 @@ import numpy as np
 
 from ringsim.choice import kind_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
-from ringsim.parts.persection import spread
+from ringsim.parts.net import Net
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.ideal_course import Integration
 from ringsim.theory.ideal_outcome import to_outcome
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.ideal_net import FreeHub
 from ringsim.variables import Outcome
 
 _LIGHT_HUB = 1e-3
@@ -55,25 +55,20 @@ def refuse_if_not_ideal(scene: Scene) -> None:
             "false, or use the full fidelity)"
         )
     if scene.net is not None:
-        _refuse_net(scene)
+        _refuse_net(scene, scene.net)
 
 
-def _refuse_net(scene: Scene) -> None:
-    ring, net = IdealRing.of(scene), scene.net
-    if net is None:
-        return
-    plan = ring.geometry.plan
-    arms = plan - plan.mean(axis=0)
-    arms = arms / np.linalg.norm(arms, axis=1)[:, None]
-    stiffness = spread(net.stiffness, len(plan))
-    aside = float(np.linalg.norm(stiffness @ arms))
-    if aside > _CENTRED * float(stiffness.sum()):
+def _refuse_net(scene: Scene, net: Net) -> None:
+    corners = scene.structure.geometry().fold(scene.structure.initial_phi).corners[0]
+    aside = FreeHub(net, len(corners)).imbalance(corners)
+    if net.damping > 0.0 and aside > _CENTRED:
         raise InputError(
-            f"net.stiffness: its pulls on the hub are out of balance by "
-            f"{100.0 * aside / stiffness.sum():.0f} % of their sum, and the ideal fidelity keeps "
-            "the hub in the middle (use one stiffness and a closed ring, or the full fidelity)"
+            f"net.damping = {net.damping:g} N s/m: the net's pulls on its hub are out of balance "
+            f"by {100.0 * aside:.0f} % of their sum, and the ideal fidelity finds the hub from the "
+            "springs alone (set it to 0, use one net.stiffness and a closed ring, or use the full "
+            "fidelity)"
         )
-    total = 2.0 * len(plan) * scene.structure.corner_mass
+    total = 2.0 * len(corners) * scene.structure.corner_mass
     if net.hub_mass > _LIGHT_HUB * total:
         raise InputError(
             f"net.hub_mass = {net.hub_mass:g} kg must be at most {_LIGHT_HUB * total:.2g} kg in "

@@ -23,7 +23,7 @@ from ringsim.parts.joints import JointFriction, Stop
 from ringsim.parts.persection import spread
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import SENSE, Mechanism, Pose
-from ringsim.theory.ideal_net import HubNet
+from ringsim.theory.ideal_net import FreeHub
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ class Forces:
         loads = 0.0 if scene.loads is None else scene.loads.force
         self.load = float(spread(loads, sections).sum())
         corners = mechanism.points.corners.shape[1]
-        self._net = None if scene.net is None else HubNet(scene.net, corners)
+        self._net = None if scene.net is None else FreeHub(scene.net, corners)
         self._joints = _joints(scene, sections)
         laws = [law for law, *_ in _families(scene)]
         self.slowest = min((law.rate for law in laws if np.any(law.coulomb)), default=math.inf)

@@ -35,6 +35,7 @@ SENSE = np.array([-1.0, 1.0, 1.0, -1.0])
 """How the rods on the end assemblies (left upper, left lower, right upper, right lower) turn
 while phi grows: about the section's normal or against it."""
 _RIGID = 6
+_NONE = np.zeros((0, 3))
 
 
 def skew(r: Array) -> Array:
@@ -54,8 +55,13 @@ class _Ends:
     swing: NDArray[np.intp]
     pins: Array
     normals: Array
-    arms: Array
     masses: Array
+    beside: Array
+    """Part of each arm along the pin's axis, which does not turn."""
+    arms: Array
+    """The rest at psi = 0."""
+    ahead: Array
+    """The rest a quarter turn on."""
 
 
 class Pose(NamedTuple):
@@ -71,8 +77,13 @@ class Pose(NamedTuple):
         Derivatives of p after the free coordinates, shape (len(p), freedom).
     bias
         p'' less slopes times the free accelerations, rad/s^2.
-    arms
-        From the pins to the point masses of the end assemblies, shape (masses, 3), m.
+    arms, across
+        From the pins to the point masses of the end assemblies, and the derivatives of that after
+        their swings, shape (masses, 3), m.
+    jacobian
+        Derivatives of these masses' places after (V, W, p'), shape (masses, 3, 6 + len(p)).
+    held
+        On a fixed base: derivatives of (V, W) after p', and what is left of their rates.
     """
 
     basis: Array
@@ -80,7 +91,10 @@ class Pose(NamedTuple):
     rate: Array
     slopes: Array
     bias: Array
-    arms: Array
+    arms: Array = _NONE
+    across: Array = _NONE
+    jacobian: Array = _NONE
+    held: tuple[Array, Array] = (_NONE, _NONE)
 
 
 class Mechanism:
@@ -102,6 +116,7 @@ class Mechanism:
         self.points: Points = points_of(self.geometry)
         self.fixed = boom is not None and boom.base == "fixed"
         self._boom = boom is not None
+        self._along = self.geometry.directions[0]
         tubes = [(rods.density * t.area, rods.density * t.second_moment)
                  for t in (rods.diagonal, rods.bar)]  # fmt: skip
         masses, places = point_masses(self.geometry, self.points, *tubes, ring.vjoint_mass)
@@ -120,6 +135,7 @@ class Mechanism:
             masses = np.concatenate([masses, np.full(len(inner), ring.corner_mass)])
             places = np.concatenate([places, inner])
             self.ends = self._hang(ring.corner_mass, hung, arms)
+            self._end_spin = self._end_spins()
         self.freedom = 1 if ring.closed else 4 if self._boom else 5
         self._mass = float(masses.sum())
         self._first = np.einsum("i,iap->ap", masses, places)
@@ -133,25 +149,46 @@ class Mechanism:
         normals = geometry.normals[[0, 0, -1, -1]]
         out = geometry.hinge_offset * np.stack([-first, -first, last, last])
         swing = np.concatenate([np.arange(4), np.zeros(len(hung), dtype=np.intp)])
+        pins, normals = pins[swing], normals[swing]
+        whole = np.concatenate([out, out[0] + arms])
+        beside = normals * np.einsum("ij,ij->i", normals, whole)[:, None]
         return _Ends(
-            swing, pins[swing], normals[swing],
-            np.concatenate([out, out[0] + arms]), np.concatenate([np.full(4, mass), hung]),
+            swing, pins, normals, np.concatenate([np.full(4, mass), hung]),
+            beside, whole - beside, np.cross(normals, whole),
         )  # fmt: skip
 
     def pose(self, free: Array, rates: Array) -> Pose:
         """Where everything is at free coordinates (rad) and their rates (rad/s)."""
+        found = self._pose(free, rates)
+        return found._replace(held=self._held(found)) if self.fixed else found
+
+    def _pose(self, free: Array, rates: Array) -> Pose:
         s = basis(self.geometry, float(free[0]))
         if self.ends is None:
-            return Pose(s, free, rates, np.ones((1, 1)), np.zeros(1), np.zeros((0, 3)))
+            return Pose(s, free, rates, np.ones((1, 1)), np.zeros(1))
         if self._boom:
             place, rate, slopes, bias = self._on_the_boom(s, free, rates)
         else:
             place, rate, slopes, bias = free, rates, np.eye(5), np.zeros(5)
-        n, arms = self.ends.normals, self.ends.arms
-        angle = place[1 + self.ends.swing][:, None]
-        beside = n * np.einsum("ij,ij->i", n, arms)[:, None]
-        turned = beside + np.cos(angle) * (arms - beside) + np.sin(angle) * np.cross(n, arms)
-        return Pose(s, place, rate, slopes, bias, turned)
+        return self._reach(Pose(s, place, rate, slopes, bias))
+
+    def _reach(self, pose: Pose) -> Pose:
+        """The same with arms, their slopes and the Jacobian of the end assemblies."""
+        ends = self.ends
+        assert ends is not None
+        angle = pose.place[1 + ends.swing][:, None]
+        c, s = np.cos(angle), np.sin(angle)
+        arms, across = ends.beside + c * ends.arms + s * ends.ahead, c * ends.ahead - s * ends.arms
+        x, y, z = (ends.pins @ pose.basis[0] + arms).T
+        count = len(arms)
+        jacobian = np.zeros((count, 3, _RIGID + 5))
+        jacobian[:, [0, 1, 2], [0, 1, 2]] = 1.0
+        jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
+        jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
+        jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
+        jacobian[:, :, 6] = ends.pins @ pose.basis[1]
+        jacobian[np.arange(count), :, 7 + ends.swing] = across
+        return pose._replace(arms=arms, across=across, jacobian=jacobian)
 
     def _on_the_boom(
         self, s: Array, free: Array, rates: Array
@@ -187,7 +224,7 @@ class Mechanism:
             for corner, end in ((0, 0), (-1, 2)):
                 places[corner] = self.ends.pins[end] @ pose.basis[0] + pose.arms[end]
                 slopes[corner, :, 0] = self.ends.pins[end] @ pose.basis[1]
-                slopes[corner, :, 1 + end] = np.cross(self.ends.normals[end], pose.arms[end])
+                slopes[corner, :, 1 + end] = pose.across[end]
         return places, slopes
 
     def vertical(self, pose: Pose) -> Array:
@@ -195,7 +232,7 @@ class Mechanism:
         if self.ends is None or not self.fixed:
             return UP
         angle = pose.place[1]
-        return np.asarray(math.cos(angle) * UP - math.sin(angle) * self.geometry.directions[0])
+        return np.asarray(math.cos(angle) * UP - math.sin(angle) * self._along)
 
     def mass(self, pose: Pose) -> Array:
         """Mass matrix of (V, W, p), shape (6 + len(p), 6 + len(p))."""
@@ -212,10 +249,8 @@ class Mechanism:
         matrix[3:6, :3] = matrix[:3, 3:6].T
         matrix[6, :6] = matrix[:6, 6]
         if self.ends is not None:
-            jacobian, _ = self._end_jacobian(pose)
-            matrix += np.einsum("i,iaj,iak->jk", self.ends.masses, jacobian, jacobian)
-            turn = self._end_turns()
-            matrix += self._hinge_spin * np.einsum("iaj,iak->jk", turn, turn)
+            flat = pose.jacobian.reshape(-1, size)
+            matrix += (flat.T * np.repeat(self.ends.masses, 3)) @ flat + self._end_spin
         return matrix
 
     def inertial(self, pose: Pose, spin: Array) -> Array:
@@ -233,16 +268,15 @@ class Mechanism:
         found[3:6] = _axial(about)
         found[6] = np.trace(along)
         if self.ends is not None:
-            jacobian, places = self._end_jacobian(pose)
             swinging = pose.rate[1 + self.ends.swing][:, None]
-            across = np.cross(self.ends.normals, pose.arms)
-            velocity = rate * (self.ends.pins @ pose.basis[1]) + swinging * across
+            velocity = rate * pose.jacobian[:, :, 6] + swinging * pose.across
             bias = rate**2 * (self.ends.pins @ pose.basis[2])
-            bias += swinging**2 * np.cross(self.ends.normals, across)
+            bias += swinging**2 * (self.ends.beside - pose.arms)
+            places = self.ends.pins @ pose.basis[0] + pose.arms
             bias += places @ whirl.T + 2.0 * velocity @ turn.T
-            found += np.einsum("i,iaj,ia->j", self.ends.masses, jacobian, bias)
-            turning = np.cross(spin, self.ends.normals[:4]) * pose.rate[1:, None]
-            found[3:6] += self._hinge_spin * turning.sum(axis=0)
+            flat = pose.jacobian.reshape(-1, len(found))
+            found += (self.ends.masses[:, None] * bias).ravel() @ flat
+            found[3:6] += self._hinge_spin * turn @ (pose.rate[1:] @ self.ends.normals[:4])
         return found
 
     def rigid_rates(self, pose: Pose, matrix: Array, spin: Array | None = None) -> Array:
@@ -252,7 +286,7 @@ class Mechanism:
         rotation ``spin`` (rad/s) or, if None, without angular momentum too.
         """
         if self.fixed:
-            return np.asarray(self._held(pose)[0] @ pose.rate)
+            return np.asarray(pose.held[0] @ pose.rate)
         if spin is None:
             return np.linalg.solve(matrix[:6, :6], -matrix[:6, 6:] @ pose.rate)
         momentum = matrix[:3, 3:6] @ spin + matrix[:3, 6:] @ pose.rate
@@ -275,12 +309,15 @@ class Mechanism:
             Generalised forces on p, N m.
         """
         load = np.concatenate([np.zeros(3), torque, forces]) - self.inertial(pose, spin)
+        if self.ends is None and not self.fixed:
+            found = np.linalg.solve(matrix, load)
+            return found[6:], found[3:6]
         load -= matrix[:, 6:] @ pose.bias
         free = len(pose.slopes[0])
         reach = np.zeros((len(matrix), free if self.fixed else _RIGID + free))
         reach[6:, -free:] = pose.slopes
         if self.fixed:
-            held, bias = self._held(pose)
+            held, bias = pose.held
             reach[:6] = held @ pose.slopes
             load -= matrix[:, :6] @ (held @ pose.bias + bias)
         else:
@@ -289,7 +326,7 @@ class Mechanism:
         return found[-free:], found[3:6] if not self.fixed else np.zeros(3)
 
     def _held(self, pose: Pose) -> tuple[Array, Array]:
-        """Derivatives of (V, W) after p' on a fixed base, and the rest of their rates."""
+        """What holds the first upper assembly, see ``Pose``."""
         slopes, bias = np.zeros((6, len(pose.place))), np.zeros(6)
         rate = pose.rate[0]
         if self.ends is None:
@@ -297,41 +334,27 @@ class Mechanism:
             slopes[:3, 0] = -corner @ pose.basis[1]
             bias[:3] = -(rate**2) * (corner @ pose.basis[2])
             return slopes, bias
-        pin, normal, arm = self.ends.pins[0], self.ends.normals[0], pose.arms[0]
-        place = pin @ pose.basis[0] + arm
-        across = np.cross(normal, arm)
-        slopes[3:, 1] = -normal
+        pin, across, swing = self.ends.pins[0], pose.across[0], pose.rate[1]
+        place, velocity = pin @ pose.basis[0] + pose.arms[0], rate * (pin @ pose.basis[1])
+        turn = skew(self.ends.normals[0])
+        slopes[3:, 1] = -self.ends.normals[0]
         slopes[:3, 0] = -pin @ pose.basis[1]
-        slopes[:3, 1] = np.cross(normal, place) - across
-        swing = pose.rate[1]
-        spin, velocity = -swing * normal, rate * (pin @ pose.basis[1]) + swing * across
-        bias[:3] = -(rate**2) * (pin @ pose.basis[2]) - swing**2 * np.cross(normal, across)
-        bias[:3] -= np.cross(spin, np.cross(spin, place)) + 2.0 * np.cross(spin, velocity)
+        slopes[:3, 1] = turn @ place - across
+        bias[:3] = -(rate**2) * (pin @ pose.basis[2]) + 2.0 * swing * (turn @ velocity)
+        bias[:3] += swing**2 * (turn @ (across - turn @ place))
         return slopes, bias
 
     def _seconds(self, s: Array) -> Array:
         """Sums of m (P s_i) (P s_j)^T, shape (i, j, 3, 3)."""
         return np.einsum("ip,apbq,jq->ijab", s, self._second, s)
 
-    def _end_jacobian(self, pose: Pose) -> tuple[Array, Array]:
-        """J of the end assemblies' masses, shape (masses, 3, 6 + p), and their places."""
-        assert self.ends is not None
-        places = self.ends.pins @ pose.basis[0] + pose.arms
-        count = len(places)
-        jacobian = np.zeros((count, 3, _RIGID + 5))
-        jacobian[:, :, :3] = np.eye(3)
-        jacobian[:, :, 3:6] = np.cross(np.eye(3)[None], places[:, None]).transpose(0, 2, 1)
-        jacobian[:, :, 6] = self.ends.pins @ pose.basis[1]
-        jacobian[np.arange(count), :, 7 + self.ends.swing] = np.cross(self.ends.normals, pose.arms)
-        return jacobian, places
-
-    def _end_turns(self) -> Array:
-        """Rates of turn of the end assemblies after (V, W, p'), shape (4, 3, 11)."""
+    def _end_spins(self) -> Array:
+        """What the end assemblies' own rotation adds to the mass matrix, shape (11, 11)."""
         assert self.ends is not None
         turns = np.zeros((4, 3, _RIGID + 5))
         turns[:, :, 3:6] = np.eye(3)
         turns[np.arange(4), :, 7 + np.arange(4)] = self.ends.normals[:4]
-        return turns
+        return np.asarray(self._hinge_spin * np.einsum("iaj,iak->jk", turns, turns))
 
 
 def _boom_masses(scene: Scene) -> tuple[Array, Array]:

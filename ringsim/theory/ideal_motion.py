@@ -19,7 +19,7 @@ from ringsim.parts.faults.family import Fault
 from ringsim.scene import Scene
 from ringsim.theory.ideal_cables import IdealCables, Pull
 from ringsim.theory.ideal_forces import Acting, Forces
-from ringsim.theory.ideal_mechanism import Mechanism
+from ringsim.theory.ideal_mechanism import Mechanism, skew
 from ringsim.theory.ideal_points import UP
 
 Array = NDArray[np.float64]
@@ -136,7 +136,7 @@ class IdealMotion:
         found[self._place] = state[self._rate]
         found[self._rate] = now.acceleration
         if self._tilts:
-            found[self._up] = -np.cross(now.spin, state[self._up])
+            found[self._up] = -skew(now.spin) @ state[self._up]
             found[self._spin] = now.spin_rate
         found[-2:] = now.acting.loss, 0.0
         if now.pull is not None:

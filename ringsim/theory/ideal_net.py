@@ -22,7 +22,7 @@ _ONSET = 1e-4
 """Stretch in m over which the damping of a string comes in."""
 _MOST = 60
 _BALANCED = 1e-14
-"""Movement of the hub over the net's size at which the search for it ends."""
+"""Pull on the hub over the largest string's, or its movement over the net's size, that is none."""
 
 
 class NetForces(NamedTuple):
@@ -33,14 +33,14 @@ class NetForces(NamedTuple):
     loss: float
 
 
-class HubNet:
+class FreeHub:
     """Springs from so many corners to a free hub."""
 
     def __init__(self, net: Net, corners: int) -> None:
         self._net, self._stiffness = net, spread(net.stiffness, corners)
 
-    def stretches(self, corners: Array) -> tuple[Array, Array, Array]:
-        """Stretch (m) and direction of each string, and the matrices A_i (N/m).
+    def hub(self, corners: Array) -> Array:
+        """Where the hub lies, shape (3,), m: in the middle while all strings are slack.
 
         Parameters
         ----------
@@ -50,22 +50,23 @@ class HubNet:
         hub = corners.mean(axis=0)
         size = float(np.ptp(corners))
         for _ in range(_MOST):
-            stretch, units, matrices = self._strings(corners - hub)
-            pull = units.T @ (self._stiffness * stretch)
-            whole = matrices.sum(axis=0)
-            step = np.linalg.lstsq(whole, pull, rcond=1e-9)[0]
+            stretch, units, spring = self._strings(corners - hub)
+            pull = spring @ units
+            if np.abs(pull).max() <= _BALANCED * np.abs(spring).max():
+                break
+            step = np.linalg.lstsq(self._rates(stretch, units).sum(axis=0), pull, rcond=1e-9)[0]
             longest = float(np.abs(step).max())
             if longest > 0.1 * size:
                 step *= 0.1 * size / longest
+            hub = hub + step
             if longest < _BALANCED * size:
                 break
-            hub = hub + step
-        return stretch, units, matrices
+        return np.asarray(hub)
 
     def energy(self, corners: Array) -> float:
         """Energy stored in the springs, J."""
-        stretch, _, _ = self.stretches(corners)
-        return 0.5 * float(self._stiffness @ stretch**2)
+        stretch, _, spring = self._strings(corners - self.hub(corners))
+        return 0.5 * float(spring @ stretch)
 
     def forces(self, corners: Array, slopes: Array, rates: Array) -> NetForces:
         """Generalised forces on some coordinates.
@@ -78,12 +79,12 @@ class HubNet:
         rates
             Of the coordinates, rad/s.
         """
-        stretch, units, matrices = self.stretches(corners)
-        spring = self._stiffness * stretch
+        stretch, units, spring = self._strings(corners - self.hub(corners))
         energy = 0.5 * float(spring @ stretch)
         longer = np.einsum("ia,iaj->ij", units, slopes)
         if self._net.damping == 0.0:
             return NetForces(-spring @ longer, energy, 0.0)
+        matrices = self._rates(stretch, units)
         carried = np.einsum("iab,ibj->aj", matrices, slopes)
         hub = np.linalg.lstsq(matrices.sum(axis=0), carried, rcond=1e-9)[0]
         longer -= units @ hub
@@ -104,8 +105,13 @@ class HubNet:
         stretch = lengths - self._net.neutral_length
         if not self._net.two_sided:
             stretch = np.maximum(stretch, 0.0)
-        acting = self._stiffness * ((stretch > 0.0) | self._net.two_sided)
         units = arms / np.maximum(lengths, 1e-300)[:, None]
+        return np.asarray(stretch), units, self._stiffness * stretch
+
+    def _rates(self, stretch: Array, units: Array) -> Array:
+        """The matrices A_i, shape (corners, 3, 3), N/m."""
+        acting = self._stiffness * ((stretch > 0.0) | self._net.two_sided)
         along = units[:, :, None] * units[:, None, :]
-        across = (self._stiffness * stretch / np.maximum(lengths, 1e-300))[:, None, None]
-        return stretch, units, acting[:, None, None] * along + across * (np.eye(3) - along)
+        lengths = np.maximum(stretch + self._net.neutral_length, 1e-300)
+        across = (self._stiffness * stretch / lengths)[:, None, None]
+        return np.asarray(acting[:, None, None] * along + across * (np.eye(3) - along))

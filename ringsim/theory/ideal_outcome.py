@@ -16,7 +16,7 @@ from ringsim.theory.ideal_motion import Instant
 from ringsim.variables import PLANES, Fidelity, Outcome
 
 Array = NDArray[np.float64]
-_BETWEEN = (0.25, 0.5, 0.75)
+_BETWEEN = (0.5,)
 """Where in a step the largest tension is looked for, besides its ends."""
 
 
