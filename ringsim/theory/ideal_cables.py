@@ -79,11 +79,10 @@ class IdealCables:
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
         assert scene.cables is not None
         self._mechanism, present = mechanism, scene.cables.present()
+        self.planes: list[tuple[int, ...]] = [(plane,) for plane, _ in present]
         alike = scene.structure.closed and len(present) == 2 and not scene.faults
         if alike and present[0][1] == present[1][1]:
             present, self.planes = present[:1], [(0, 1)]
-        else:
-            self.planes = [(plane,) for plane, _ in present]
         self._copies = np.array([float(len(planes)) for planes in self.planes])
         self._cables = [cable for _, cable in present]
         self._winch_distance = scene.cables.winch_distance
@@ -195,7 +194,7 @@ class IdealCables:
         return state
 
     def _points(self, pose: Pose) -> Array:
-        points = self._paths @ pose.basis[0]
+        points: Array = self._paths @ pose.basis[0]
         if self._mechanism.ends is None:
             return points
         for start, swing, along in self._hung:

@@ -1,8 +1,8 @@
-"""The ideal fidelity: a scene answered by its one coordinate, in a fraction of a second.
+"""The ideal fidelity: a scene answered by its ring of rigid rods.
 
-With rigid rods the ring has one degree of freedom.  What that cannot represent is refused; what
-it can is integrated to tolerances far below those of the full model
-(``ringsim.theory.ideal_steps``), so that the difference of the two is what the rods' elasticity
+A closed ring of rigid rods has one coordinate, an open arc up to five.  What they cannot represent
+is refused; what they can is integrated to tolerances far below those of the full model
+(``ringsim.theory.ideal_course``), so that the difference of the two is what the rods' elasticity
 does.
 """
 
@@ -18,8 +18,8 @@ from ringsim.parts.net import Net
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.ideal_course import Integration
-from ringsim.theory.ideal_outcome import to_outcome
 from ringsim.theory.ideal_net import FreeHub
+from ringsim.theory.ideal_outcome import to_outcome
 from ringsim.variables import Outcome
 
 _LIGHT_HUB = 1e-3
@@ -29,7 +29,7 @@ _CENTRED = 0.05
 
 
 def refuse_if_not_ideal(scene: Scene) -> None:
-    """Refuse what one coordinate cannot represent.
+    """Refuse what rigid rods cannot represent.
 
     Raises
     ------
@@ -40,8 +40,8 @@ def refuse_if_not_ideal(scene: Scene) -> None:
     kind = kind_of(scene.structure)
     if kind != "pantograph-ring":
         raise InputError(
-            f'structure.kind = "{kind}": the ideal fidelity knows the pantograph ring alone, whose '
-            "rigid rods leave one coordinate (use the full fidelity)"
+            f'structure.kind = "{kind}": the ideal fidelity knows the pantograph ring alone '
+            "(use the full fidelity)"
         )
     for number, fault in enumerate(scene.faults, 1):
         if isinstance(fault, StuckVJoint):

@@ -1,7 +1,7 @@
 """Forces on the ideal ring but for its cables: V-joint loads, net, joint friction, stops.
 
 Per unit rate of (phi, psi_1 .. psi_4), theta the diagonals' angle and e = +-1 the sense in which
-the rods of an end assembly turn (ringsim.theory.ideal_mechanism), N sections have
+the rods of an end assembly turn (ringsim.theory.ideal_ends), N sections have
 
     V-joints (2 N)              2 phi'
     pivots (N)                  2 theta'
@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from ringsim.parts.joints import JointFriction, Stop
 from ringsim.parts.persection import spread
 from ringsim.scene import Scene
-from ringsim.theory.ideal_mechanism import SENSE, Mechanism, Pose
+from ringsim.theory.ideal_ends import SENSE
+from ringsim.theory.ideal_mechanism import Mechanism, Pose
 from ringsim.theory.ideal_net import FreeHub
 
 Array = NDArray[np.float64]
