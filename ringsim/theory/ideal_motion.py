@@ -167,8 +167,13 @@ class IdealMotion:
         return found
 
     def tolerances(self, relative: float) -> Array:
-        """Absolute tolerance of every part of the state, for a relative one."""
+        """Absolute tolerance of every part of the state, for a relative one.
+
+        Coarser for the swings: an end assembly is light, and friction on its pins is stiff.
+        """
+        n = self.mechanism.freedom
         found = np.full(self.size, 0.01 * relative)
+        found[1:n], found[n + 1 : 2 * n] = 0.3 * relative, 3.0 * relative
         found[-2:] = 1e-3 * relative
         return found
 
