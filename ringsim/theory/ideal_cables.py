@@ -8,6 +8,7 @@ The generalised force on phi is - sum T_i dL_i/dphi.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,16 +20,12 @@ from ringsim.cable.faults.family import CableFault
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.section_path import path_slope
 from ringsim.cable.state import ChainState
-from ringsim.cable.winches import Winches
-from ringsim.cable.winding.family import WinchState
+from ringsim.cable.winding.family import FeedbackWinding, WinchState
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Mechanism, Pose
 from ringsim.theory.ideal_points import UP
 
 Array = NDArray[np.float64]
-
-_SETTLED, _MOST_ANSWERS = 1e-12, 30
-"""Change of the winches' speeds (m/s) at which the search for them ends, and its length."""
 
 
 class Pull(NamedTuple):
@@ -40,8 +37,8 @@ class Pull(NamedTuple):
         See ringsim.cable.
     force
         Generalised force on phi, N m.
-    speeds
-        Of the winches with feedback, m/s.
+    commands
+        Speeds that the laws of the winches with feedback ask for, m/s.
     loss, power, elastic
         Power lost (W), power put in by the winches less the energy wound up with the rope (W),
         elastic energy (J).
@@ -49,7 +46,7 @@ class Pull(NamedTuple):
 
     chain: ChainState
     force: float
-    speeds: Array
+    commands: Array
     loss: float
     power: float
     elastic: float
@@ -73,7 +70,7 @@ class IdealCables:
     ropes
         Which spans form one rope; ``strike`` changes them.
     answering
-        The winches with feedback: their rope is a state of the motion.
+        The winches with feedback: their rope and speed are states of the motion.
     """
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
@@ -95,7 +92,6 @@ class IdealCables:
         start = mechanism.pose(_initial(scene, mechanism), np.zeros(mechanism.freedom))
         self.ropes = self._chain.start(self._points(start))
         self._spans = pulleys_of(scene.structure.sections) + 1
-        self._winches = Winches(self._cables)
         self._places = [
             _Place(number, end, winch)
             for number, cable in enumerate(self._cables)
@@ -120,15 +116,15 @@ class IdealCables:
         slip = min(cable.slip_speed for cable in self._cables)
         return min(max(1e-2 * soft, 1e-9), 1e-6), 1e-2 * slip
 
-    def pull(self, time: float, pose: Pose, stored: Array) -> Pull:
+    def pull(self, time: float, pose: Pose, motors: Array) -> Pull:
         """Evaluate the cables.
 
         Parameters
         ----------
         time
             For the winches' laws, s.
-        stored
-            Rope wound by each winch with feedback, m.
+        motors
+            Rope wound by each winch with feedback and its speed, m and m/s, shape (2, winches).
 
         Raises
         ------
@@ -136,7 +132,7 @@ class IdealCables:
             If a span has no length, or a winch has wound up its whole rope.
         """
         points, slopes = self._points(pose), self._paths @ pose.basis[1]
-        state = self._wind(time, pose, points, slopes * pose.rate[0], stored)
+        state = self._wind(time, points, slopes * pose.rate[0], motors)
         ropes = self.ropes
         longer = np.einsum("ij,ij->i", state.directions, slopes[ropes.far] - slopes[ropes.near])
         copies, cable, density = self._copies, ropes.cable, state.energy_density
@@ -144,7 +140,7 @@ class IdealCables:
         return Pull(
             state,
             -float((on_rope[ropes.of_span] * state.tensions) @ longer),
-            np.array([state.wound_rate[p.cable, p.end] for p in self.answering]),
+            self._commands(time, pose, state),
             float(on_pulley @ state.friction_loss + on_rope @ state.damping_loss),
             float(copies @ state.winch_power.sum(axis=1) - on_rope @ (density * state.wound_rates)),
             float(on_rope @ (density * state.natural)),
@@ -164,34 +160,45 @@ class IdealCables:
         alive = self.ropes.alive[first]
         return np.where(alive, (state.paths - state.natural)[first], -1.0)
 
-    def _wind(
-        self, time: float, pose: Pose, points: Array, velocities: Array, stored: Array
-    ) -> ChainState:
+    def _wind(self, time: float, points: Array, velocities: Array, motors: Array) -> ChainState:
         """The chain with its winches' ropes and speeds."""
         wound, speed = np.zeros((2, len(self._cables), 2))
         for number, end, winch in self._places:
             if not winch.feedback:
                 law = winch.at(time, WinchState())
                 wound[number, end], speed[number, end] = law.wound, law.speed
-        if not self.answering:
-            return self._chain.state(self.ropes, points, velocities, wound, speed)
-        for place, length in zip(self.answering, stored, strict=True):
-            wound[place.cable, place.end] = length
+        for place, length, rate in zip(self.answering, *motors, strict=True):
+            wound[place.cable, place.end], speed[place.cable, place.end] = length, rate
+        return self._chain.state(self.ropes, points, velocities, wound, speed)
+
+    def _commands(self, time: float, pose: Pose, state: ChainState) -> Array:
+        """Speeds that the laws with feedback ask for, m/s, shape (winches,).
+
+        Winches on one rope share what the structure gives free.
+        """
         ring, opening = self._mechanism.geometry, math.pi - 2.0 * float(pose.place[0])
-        slopes = np.array(
-            [
-                ring.sections * float(path_slope(ring.half_bar, cable.block_offset, opening))
-                for cable in self._cables
-            ]
-        )
-        for _ in range(_MOST_ANSWERS):
-            state = self._chain.state(self.ropes, points, velocities, wound, speed)
-            self._winches.advance(time, state, slopes)
-            _, found = self._winches.at(time, self.ropes, state.paths, state.path_rates)
-            if np.abs(found - speed).max() < _SETTLED:
-                break
-            speed = found
-        return state
+        on = [place for place in self.answering if place.winch.turns(time)]
+        ends = (self.ropes.first, self.ropes.last)
+        running = [int(ends[place.end][place.cable]) for place in on]
+        rest = state.path_rates + state.wound_rates
+        for place, rope in zip(on, running, strict=True):
+            rest[rope] -= state.wound_rate[place.cable, place.end]
+        found = np.zeros(len(self.answering))
+        for number, place in enumerate(self.answering):
+            law = place.winch.winding
+            if place not in on or not isinstance(law, FeedbackWinding):
+                continue
+            rope = int(ends[place.end][place.cable])
+            offset = self._cables[place.cable].block_offset
+            slope = ring.sections * float(path_slope(ring.half_bar, offset, opening))
+            reading = replace(
+                state.reading(place.cable, place.end, slope),
+                path_rate=float(rest[rope]) / running.count(rope),
+            )
+            tension = float(state.winch_tensions[place.cable, place.end])
+            least, most = law.limits()
+            found[number] = min(max(law.command(tension, reading), least), most)
+        return found
 
     def _points(self, pose: Pose) -> Array:
         points: Array = self._paths @ pose.basis[0]

@@ -136,9 +136,9 @@ class Integration:
         """Take steps until ``target``, an event, or a failure; whether there is more to do."""
         solver = self._solver(target)
         while solver.status == "running":
-            message = solver.step()
+            solver.step()
             if solver.status == "failed":
-                self._fail(self._motion.refusal or str(message).rstrip(".").lower())
+                self._fail(self._motion.refusal or self._cause())
                 return False
             contact = self._contact(solver)
             if contact is None:
@@ -225,6 +225,13 @@ class Integration:
     def _settle(self, time: float) -> None:
         settling = 0.0 if self._scene.stop is None else self._scene.solver.settling_time
         self._end = min(self._end, max(time, 0.0) + settling)
+
+    def _cause(self) -> str:
+        """Why steps became too small: a rope at twice its length is as good as used up."""
+        pull = self._motion.instant(self._time, self._state).pull
+        if pull is not None and pull.chain.strains.max() > 1.0:
+            return "a winch has wound up its whole rope (limit its winding law, or stop it)"
+        return "the step became too small"
 
     def _fail(self, cause: str) -> None:
         self.course.status = Status.SOLVER_FAILED

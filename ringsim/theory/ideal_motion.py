@@ -3,7 +3,8 @@
 The state holds the free coordinates and their rates; the direction up in space along the core's
 axes and the core's rotation, where loads act on a base that floats (they stay vertical while the
 ring tilts; without them it has no angular momentum, which gives the rotation); the rope wound by
-each winch with feedback; and the energies lost and supplied so far.
+each winch with feedback, and its speed, which follows the law's command within ``MOTOR_LAG``; and
+the energies lost and supplied so far.
 """
 
 from __future__ import annotations
@@ -24,6 +25,12 @@ from ringsim.theory.ideal_points import UP
 
 Array = NDArray[np.float64]
 
+MOTOR_LAG = 1e-6
+"""Time in s within which a motor takes up the speed that its law asks for.
+
+A law answers to a tension that answers to the speed: a motor without inertia would need the two
+solved together.  Ropes swing in milliseconds.
+"""
 _ANGLE, _RATE = 1e-6, 1e-4
 """Largest increments of angles (rad) and rates (rad/s) for derivatives of the equations."""
 
@@ -79,12 +86,11 @@ class IdealMotion:
         n = self.mechanism.freedom
         self._tilts = not self.mechanism.fixed and self.forces.load != 0.0
         tilt = 3 if self._tilts else 0
-        ends = np.cumsum(
-            [n, n, tilt, tilt, 0 if self.cables is None else len(self.cables.answering)]
-        )
+        motors = 0 if self.cables is None else 2 * len(self.cables.answering)
+        ends = np.cumsum([n, n, tilt, tilt, motors])
         self._place, self._rate = slice(0, n), slice(n, 2 * n)
         self._up, self._spin = slice(2 * n, ends[2]), slice(ends[2], ends[3])
-        self._wound = slice(ends[3], ends[4])
+        self._motors = slice(ends[3], ends[4])
         self.size = int(ends[4]) + 2
 
     def start(self) -> Array:
@@ -117,7 +123,7 @@ class IdealMotion:
         force, pull = acting.force, None
         if self.cables is not None:
             earlier = min(time, self.until * (1.0 - 1e-12))
-            pull = self.cables.pull(earlier, pose, state[self._wound])
+            pull = self.cables.pull(earlier, pose, state[self._motors].reshape(2, -1))
             force = force.copy()
             force[0] += pull.force
         spin = rigid[3:]
@@ -127,6 +133,8 @@ class IdealMotion:
 
     def rates(self, time: float, state: Array) -> Array:
         """Derivative of the state; NaN where the cables have no answer."""
+        if not np.isfinite(state).all():
+            return np.full(self.size, math.nan)
         try:
             now = self.instant(time, state)
         except ValueError as error:
@@ -140,7 +148,8 @@ class IdealMotion:
             found[self._spin] = now.spin_rate
         found[-2:] = now.acting.loss, 0.0
         if now.pull is not None:
-            found[self._wound] = now.pull.speeds
+            speeds = state[self._motors].reshape(2, -1)[1]
+            found[self._motors] = [*speeds, *((now.pull.commands - speeds) / MOTOR_LAG)]
             found[-2] += now.pull.loss
             found[-1] = now.pull.power
         return found
@@ -182,5 +191,5 @@ class IdealMotion:
         steps = np.full(self.size - 2, _ANGLE)
         steps[0] = min(_ANGLE, length)
         steps[self._rate] = min(_RATE, slip, 1e-3 * self.forces.slowest)
-        steps[self._wound] = min(_ANGLE, length)
+        steps[self._motors] = min(_ANGLE, length)
         return steps

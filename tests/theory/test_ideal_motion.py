@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from ideal_cases import pulled, six
-from ringsim.simulation import run_ideal, run_ideal_many
+from ringsim.simulation import run_ideal
 from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.ideal_ring import IdealRing
 from ringsim.variables import VARIABLES, Status
@@ -146,26 +146,6 @@ def test_any_driven_ring_ends_with_a_status_and_its_energy(stiffness, friction, 
     outcome = run_ideal(scene)
     assert not outcome.status.failed, outcome.reason
     assert value(outcome, "energy_error") < 1e-4
-
-
-def test_batch_gives_what_each_sample_gives_alone():
-    scenes = [
-        six(
-            cable__friction__coefficient=1e-4 * k,
-            cable__axial_stiffness=1e5 * k,
-            structure__vjoint_mass=0.01 * k,
-        )
-        for k in (1, 3, 5)
-    ]
-    scenes += [pulled(6), six(cable__friction={"kind": "capstan", "coefficient": 0.1})]
-    together = run_ideal_many(scenes)
-    for scene, outcome in zip(scenes, together, strict=True):
-        alone = run_ideal(scene)
-        assert alone.status == outcome.status == Status.OK
-        for name in ("deployment_time", "peak_tension", "slack_duration"):
-            if name in alone.values:
-                # Round-off may change a step: then the difference is the solver's own error.
-                np.testing.assert_allclose(outcome.values[name], alone.values[name], rtol=1e-5)
 
 
 def test_tension_feedback_settles_at_its_target():
