@@ -38,7 +38,8 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         )
     if not (math.isfinite(time) and time > 0.0):
         raise InputError(f"a deployment time of {time:g} s must be finite and above 0 s")
-    plain = scene.with_values({"record.stress": False, "solver.end_time": _PATIENCE * time})
+    end = max(_PATIENCE * time, scene.solver.step)
+    plain = scene.with_values({"record.stress": False, "solver.end_time": end})
     refuse_if_not_ideal(plain)
     least = _LEAST if scene.stop is None else max(_LEAST, scene.stop.stowed_angle + _CLOSE)
 

@@ -69,6 +69,8 @@ class IdealCables:
         Planes of each cable: two where both planes have cables that pull alike all the time.
     ropes
         Which spans form one rope; ``strike`` changes them.
+    spans
+        Of each cable.
     answering
         The winches with feedback: their rope and speed are states of the motion.
     """
@@ -91,7 +93,7 @@ class IdealCables:
         self._chain = Chain(self._cables, per_cable)
         start = mechanism.pose(_initial(scene, mechanism), np.zeros(mechanism.freedom))
         self.ropes = self._chain.start(self._points(start))
-        self._spans = pulleys_of(scene.structure.sections) + 1
+        self.spans = pulleys_of(scene.structure.sections) + 1
         self._places = [
             _Place(number, end, winch)
             for number, cable in enumerate(self._cables)
@@ -152,7 +154,7 @@ class IdealCables:
 
     def tensions(self, state: ChainState) -> Array:
         """Tensions by cable and span, N, shape (cables, spans)."""
-        return state.tensions.reshape(len(self.planes), self._spans)
+        return state.tensions.reshape(len(self.planes), self.spans)
 
     def stretches(self, state: ChainState) -> Array:
         """Path less natural length of the rope at each cable's first winch, m; -1 if it is cut."""

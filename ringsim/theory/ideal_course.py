@@ -32,19 +32,31 @@ MOST_EVALUATIONS = 400_000
 """Evaluations of the equations after which a run is given up."""
 MOST_CONTACTS = 1000
 """How often steps end at a stop; beyond, the error control alone resolves the kink."""
+_COLLOCATION = np.array([4.0 - math.sqrt(6.0), 4.0 + math.sqrt(6.0)]) / 10.0
+"""Points of Radau IIA within a step."""
 _LOOKS = np.linspace(0.0, 1.0, 17)
 _ALIKE = 1e-13
 
 
 @dataclass
 class Piece:
-    """Steps between two events: states, and their derivatives, at times; latches and ropes."""
+    """Steps between two events, with their latches and ropes.
+
+    Attributes
+    ----------
+    times, states, rates
+        Beginning and end of every step, the states there and their derivatives.
+    inner
+        Times and states at the collocation points within the steps, where cables are: what is
+        stiff is in balance there, and nowhere else between a step's ends.
+    """
 
     latched: bool
     ropes: Ropes | None
     times: list[float] = field(default_factory=list)
     states: list[Array] = field(default_factory=list)
     rates: list[Array] = field(default_factory=list)
+    inner: list[tuple[float, Array]] = field(default_factory=list)
 
 
 @dataclass
@@ -124,13 +136,20 @@ class Integration:
         cables = self._motion.cables
         self._piece = Piece(self._motion.latched, None if cables is None else cables.ropes)
         self.course.pieces.append(self._piece)
-        self._file(self._time, self._state)
+        self._file(self._time, self._state, self._rates(self._time, self._state))
 
-    def _file(self, time: float, state: Array, rates: Array | None = None) -> None:
+    def _file(self, time: float, state: Array, rates: Array) -> None:
         self._piece.times.append(time)
         self._piece.states.append(state)
-        self._piece.rates.append(self._rates(time, state) if rates is None else rates)
+        self._piece.rates.append(rates)
         self._time, self._state = time, state
+
+    def _file_step(self, solver: Radau) -> None:
+        if self._motion.cables is not None:
+            begin, curve = self._time, solver.dense_output()
+            points = begin + _COLLOCATION * (solver.t - begin)
+            self._piece.inner += [(float(time), curve(time)) for time in points]
+        self._file(float(solver.t), solver.y.copy(), solver.f.copy())
 
     def _go_on(self, target: float) -> bool:
         """Take steps until ``target``, an event, or a failure; whether there is more to do."""
@@ -142,7 +161,7 @@ class Integration:
                 return False
             contact = self._contact(solver)
             if contact is None:
-                self._file(float(solver.t), solver.y.copy(), solver.f.copy())
+                self._file_step(solver)
             else:
                 self._reach(*contact)
             if self._judge():
@@ -202,7 +221,7 @@ class Integration:
             solver.step()
             if solver.status == "failed":
                 raise ValueError("the step became too small at a stop")
-            self._file(float(solver.t), solver.y.copy(), solver.f.copy())
+            self._file_step(solver)
         self._state[0] = level if abs(self._state[0] - level) < 1e-6 else self._state[0]
 
     def _judge(self) -> bool:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ringsim.cable.cables import pulleys_of
 from ringsim.scene import Scene
@@ -16,8 +16,6 @@ from ringsim.theory.ideal_motion import Instant
 from ringsim.variables import PLANES, Fidelity, Outcome
 
 Array = NDArray[np.float64]
-_BETWEEN = (0.5,)
-"""Where in a step the largest tension is looked for, besides its ends."""
 
 
 class _Seen(NamedTuple):
@@ -32,8 +30,8 @@ def to_outcome(course: Course, scene: Scene, *, wall_time: float, cpu_time: floa
     """Put a run on the scene's output grid; what lies after its end is NaN.
 
     Angles come from the quintic that fits angle, rate and acceleration at both ends of a step,
-    energies lost and supplied from the cubic that fits them and their rates; all else follows
-    from the state.
+    energies lost and supplied from the cubic that fits them and their rates, tensions from one
+    through all points at which the steps are in balance; all else follows from the state.
     """
     count = math.floor(scene.solver.end_time / scene.record.interval * (1.0 + 1e-12))
     grid = np.arange(count + 1) * scene.record.interval
@@ -140,30 +138,46 @@ def _add_cables(
     """Tensions by plane and span; a plane without a cable is NaN."""
     cables = course.motion.cables
     assert cables is not None
-    on_grid = np.array([cables.tensions(i.pull.chain) for i in seen.instants if i.pull])
     wound = np.array([i.pull.chain.wound.sum(axis=1) for i in seen.instants if i.pull])
-    tensions = np.full((2, on_grid.shape[2], len(seen.times)), np.nan)
-    reeled, loose = np.full((2, len(seen.times)), np.nan), np.full(2, np.nan)
+    sizes = 2, cables.spans, len(seen.times)
+    tensions, reeled, loose = (
+        np.full(sizes, np.nan),
+        np.full(sizes[::2], np.nan),
+        np.full(2, np.nan),
+    )
     for number, planes in enumerate(cables.planes):
-        for plane in planes:
-            tensions[plane], reeled[plane] = on_grid[:, number].T, wound[:, number]
-            loose[plane] = 0.0
+        reeled[list(planes)], loose[list(planes)] = wound[:, number], 0.0
     peak = (-math.inf, math.nan)
     for piece, at_steps in zip(course.pieces, steps, strict=True):
-        ends = np.array(piece.times)
-        between = ends[:-1, None] + np.diff(ends)[:, None] * np.array(_BETWEEN)
-        inner = _at(course, piece, between.ravel())
-        order = np.argsort(np.concatenate([ends, inner.times]), kind="stable")
-        times = np.concatenate([ends, inner.times])[order]
-        states = [(at_steps.instants + inner.instants)[k].pull for k in order]
-        chains = [pull.chain for pull in states if pull is not None]
-        peak = max(peak, _top(times, np.array([float(c.tensions.max()) for c in chains])))
+        _at(course, piece, np.zeros(0))
+        inner = [(time, course.motion.instant(time, state)) for time, state in piece.inner]
+        line = sorted([*zip(piece.times, at_steps.instants, strict=True), *inner], key=_moment)
+        chains = [instant.pull.chain for _, instant in line if instant.pull is not None]
+        times = np.array([time for time, _ in line])
+        found = np.array([cables.tensions(chain) for chain in chains])
+        peak = max(peak, _top(times, found.max(axis=(1, 2))))
         stretch = np.array([cables.stretches(chain) for chain in chains])
+        own = (seen.times >= times[0]) & (seen.times <= times[-1])
+        curve = _through(times, found)
         for number, planes in enumerate(cables.planes):
             loose[list(planes)] += _time_below_zero(times, stretch[:, number])
+            for plane in planes:
+                tensions[plane][:, own] = curve(seen.times[own])[:, number].T
     values["cable_tension"], values["wound_length"] = whole(tensions), whole(reeled)
     values["slack_duration"] = loose
     values["peak_tension"], values["peak_tension_time"] = np.array(peak[0]), np.array(peak[1])
+
+
+def _moment(item: tuple[float, Instant]) -> float:
+    return item[0]
+
+
+def _through(times: Array, series: Array) -> Any:
+    """Shape-preserving cubic through a series, which may be one point."""
+    keep = np.append(True, np.diff(times) > 0.0)
+    if keep.sum() == 1:
+        return lambda where: np.repeat(series[:1], len(where), axis=0)
+    return PchipInterpolator(times[keep], series[keep], axis=0)
 
 
 def _top(times: Array, series: Array) -> tuple[float, float]:
