@@ -20,7 +20,7 @@ from ringsim.scene import Scene
 from ringsim.theory.ideal_course import Integration
 from ringsim.theory.ideal_net import FreeHub
 from ringsim.theory.ideal_outcome import to_outcome
-from ringsim.variables import Outcome
+from ringsim.variables import Outcome, Status
 
 _LIGHT_HUB = 1e-3
 """Largest mass of the net's hub over the ring's."""
@@ -93,7 +93,10 @@ def run_ideal(scene: Scene) -> Outcome:
     refuse_if_not_ideal(scene)
     wall, cpu = time.perf_counter(), time.process_time()
     with np.errstate(all="ignore"):
-        outcome = to_outcome(Integration(scene).run(), scene, wall_time=0.0, cpu_time=0.0)
+        try:
+            outcome = to_outcome(Integration(scene).run(), scene, wall_time=0.0, cpu_time=0.0)
+        except ValueError as error:  # the cables have no answer at the very start
+            outcome = Outcome(Status.SOLVER_FAILED, f"the ideal ring has no answer: {error}")
     outcome.values["wall_time"] = np.array(time.perf_counter() - wall)
     outcome.values["cpu_time"] = np.array(time.process_time() - cpu)
     return outcome
