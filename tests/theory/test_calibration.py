@@ -15,7 +15,7 @@ from ringsim.simulation import run, run_ideal
 from ringsim.theory.calibration import opening_angle_for
 
 CLOSE = 1e-5
-"""The angle is found to 1e-5 deg, a ten-thousandth of what 1e-5 of the time needs."""
+"""Of the time; the angle is found to 1e-5 deg."""
 WANTED = 7.0
 
 
