@@ -19,13 +19,13 @@ from ringsim.parts.solver import Solver
 from ringsim.scene import Scene
 from ringsim.theory.error_bars import OF_FINER, error_bars
 from ringsim.theory.faded_friction import with_remark
-from ringsim.theory.ideal_fidelity import run_ideal, run_ideal_many
+from ringsim.theory.ideal_fidelity import run_ideal
 from ringsim.variables import COUNTS, TIMINGS, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIDELITIES", "run", "run_ideal", "run_ideal_many", "simulate"]
+__all__ = ["FIDELITIES", "run", "run_ideal", "simulate"]
 
 
 def run(scene: Scene) -> Outcome:

@@ -173,6 +173,8 @@ def _quadrature(scene: Scene) -> list[Truth]:
     """Deployment time of a ring that only position-dependent loads drive, without losses."""
     if kind_of(scene.structure) != "pantograph-ring" or scene.cables is not None:
         return []
+    if not scene.structure.closed:
+        return []  # the quadrature keeps an arc's end assemblies upright, but they swing
     joints = scene.joints
     losses = (joints.pivot, joints.hinge, joints.vjoint)
     if any(law is not None for law in losses) or scene.faults or scene.loads is None:

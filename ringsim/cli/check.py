@@ -29,7 +29,7 @@ MOST_SECTIONS_FOR_MOBILITY = 72
 )  # fmt: skip
 @click.option(
     "--deploys-in", "time", type=float, metavar="SECONDS",
-    help="Find the initial opening angle from which the ideal ring deploys in this time.",
+    help="Find the initial opening angle from which the ideal fidelity deploys in this time.",
 )  # fmt: skip
 def command(scene: str, assignments: tuple[str, ...], time: float | None) -> None:
     """Check FILE (a scene file, or the name of a built-in scene) without running it.

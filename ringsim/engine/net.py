@@ -1,4 +1,8 @@
-"""Net springs from the upper corners to a free hub."""
+"""Net springs from the upper corners to a free hub.
+
+The hub starts where its strings balance: from anywhere else it would swing for the whole run, next
+to weightless as it is, with the energy of its first stretch.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,7 @@ from numpy.typing import NDArray
 
 from ringsim.engine.pantograph_ring import RingModel
 from ringsim.parts.persection import spread
+from ringsim.theory.ideal_net import FreeHub
 
 Array = NDArray[np.float64]
 _ONSET = 1e-4
@@ -44,7 +49,7 @@ def add_net(model: RingModel) -> HubNet | None:
     corners = model.fold.corners[0]
     hub = assembly.system.AddNode(
         item.NodePoint(
-            referenceCoordinates=list(corners.mean(axis=0)),
+            referenceCoordinates=list(FreeHub(net, len(corners)).hub(corners)),
         )
     )
     starts = [assembly.starts[int(node)][:3] for _, node in model.hinges[0]]

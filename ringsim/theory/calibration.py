@@ -9,22 +9,28 @@ from scipy.optimize import brentq
 from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.theory.energy_quadrature import opening_time
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.ideal_course import Integration
+from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 
-_WIDEST = 179.0
-"""Largest opening angle that is tried, deg."""
+_WIDEST, _LEAST = 179.0, 1.0
+"""Opening angles that are tried, deg."""
+_PATIENCE = 2.0
+"""A run is given up after so many times the wanted time."""
+_CLOSE = 1e-5
+"""To which the angle is found, deg."""
 
 
 def opening_angle_for(scene: Scene, time: float) -> float:
     """Initial opening angle in deg from which the scene's ideal ring deploys in ``time``.
 
-    The energy quadrature of ringsim.theory.energy_quadrature, solved for its lower end.
+    Every angle that is tried is a run of the ideal fidelity, with all that the scene holds:
+    loads, net, friction, cables, faults.
 
     Raises
     ------
     InputError
-        If no angle between 1 and 179 deg gives that time.
+        If no angle between 1 and 179 deg gives that time, or the ideal fidelity cannot
+        represent the scene.
     """
     if not isinstance(scene.structure, PantographRing):
         raise InputError(
@@ -32,34 +38,39 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         )
     if not (math.isfinite(time) and time > 0.0):
         raise InputError(f"a deployment time of {time:g} s must be finite and above 0 s")
-    ring = IdealRing.of(scene)
-    if ring.acceleration_from_rest(0.5 * (math.pi - math.radians(_WIDEST))) >= 0.0:
-        raise InputError(
-            f"scene {scene.name} does not open by its loads: give it loads.force > 0 "
-            "(cables are not part of this calculation)"
-        )
+    end = max(_PATIENCE * time, scene.solver.step)
+    plain = scene.with_values({"record.stress": False, "solver.end_time": end})
+    refuse_if_not_ideal(plain)
+    least = _LEAST if scene.stop is None else max(_LEAST, scene.stop.stowed_angle + _CLOSE)
 
     def excess(angle: float) -> float:
-        try:
-            return opening_time(ring, 0.5 * (math.pi - math.radians(angle))).time - time
-        except ValueError:
-            return math.inf
+        course = Integration(plain.with_values({"structure.opening_angle": angle})).run()
+        if course.status.failed:
+            raise InputError(f"from {angle:.4g} deg there is no answer: {course.reason}")
+        found = course.lock_time - time
+        return found if math.isfinite(found) else math.inf
 
-    widest = _WIDEST
-    if excess(widest) > 0.0:
+    high, slack = _WIDEST, excess(_WIDEST)
+    if slack > 0.0:
         raise InputError(
-            f"a deployment time of {time:g} s is too short: from {widest:g} deg the ideal ring "
-            "already takes longer, or it does not open at all; check loads and net"
+            f"a deployment time of {time:g} s is too short: from {_WIDEST:g} deg the ideal ring "
+            "takes longer, or it does not open at all: check loads, cables, net and friction"
         )
-    angle = widest
-    while excess(angle) < 0.0:
-        angle *= 0.9
-        if angle < 1.0:
+    low = high
+    while slack < 0.0:
+        if low <= least:
             raise InputError(
-                f"a deployment time of {time:g} s is too long: even from 1 deg the ideal ring "
-                "deploys sooner; check loads and masses"
+                f"a deployment time of {time:g} s is too long: even from {least:g} deg the ideal "
+                "ring deploys sooner; check loads, cables and masses"
             )
-    low, high = angle, angle / 0.9
-    while math.isinf(excess(low)):
-        low = 0.5 * (low + high)
-    return float(brentq(excess, low, min(high, widest), xtol=1e-9))
+        high, low = low, max(0.7 * low, least)
+        slack = excess(low)
+    while math.isinf(slack):
+        middle = 0.5 * (low + high)
+        if high - low < _CLOSE:
+            raise InputError(
+                f"a deployment time of {time:g} s is never met: near {low:.6g} deg it jumps past it"
+            )
+        found = excess(middle)
+        low, high, slack = (middle, high, found) if found >= 0.0 else (low, middle, slack)
+    return float(brentq(excess, low, high, xtol=_CLOSE))

@@ -1,33 +1,28 @@
-"""The ideal fidelity: a scene answered by its one coordinate, in a fraction of a second.
+"""The ideal fidelity: a scene answered by its ring of rigid rods.
 
-With rigid rods the ring has one degree of freedom.  What that cannot represent is refused; what
-it can is integrated to tolerances far below those of the full model
-(``ringsim.theory.ideal_steps``), so that the difference of the two is what the rods' elasticity
+A closed ring of rigid rods has one coordinate, an open arc up to five.  What they cannot represent
+is refused; what they can is integrated to tolerances far below those of the full model
+(``ringsim.theory.ideal_course``), so that the difference of the two is what the rods' elasticity
 does.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
-from ringsim.cable.bracket.bisector import BisectorBracket
 from ringsim.choice import kind_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
-from ringsim.parts.persection import spread
+from ringsim.parts.net import Net
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.faded_friction import with_remark
-from ringsim.theory.ideal_batch import Batch, equal_cables
+from ringsim.theory.ideal_course import Integration
+from ringsim.theory.ideal_net import FreeHub
 from ringsim.theory.ideal_outcome import to_outcome
-from ringsim.theory.ideal_ring import IdealRing
-from ringsim.theory.ideal_steps import Integration
-from ringsim.variables import Outcome
+from ringsim.variables import Outcome, Status
 
-MOST_AT_ONCE = 64
-"""Samples that are integrated together; more would only take memory."""
 _LIGHT_HUB = 1e-3
 """Largest mass of the net's hub over the ring's."""
 _CENTRED = 0.05
@@ -35,7 +30,7 @@ _CENTRED = 0.05
 
 
 def refuse_if_not_ideal(scene: Scene) -> None:
-    """Refuse what one coordinate cannot represent.
+    """Refuse what rigid rods cannot represent.
 
     Raises
     ------
@@ -46,8 +41,8 @@ def refuse_if_not_ideal(scene: Scene) -> None:
     kind = kind_of(scene.structure)
     if kind != "pantograph-ring":
         raise InputError(
-            f'structure.kind = "{kind}": the ideal fidelity knows the pantograph ring alone, whose '
-            "rigid rods leave one coordinate (use the full fidelity)"
+            f'structure.kind = "{kind}": the ideal fidelity knows the pantograph ring alone '
+            "(use the full fidelity)"
         )
     for number, fault in enumerate(scene.faults, 1):
         if isinstance(fault, StuckVJoint):
@@ -55,37 +50,26 @@ def refuse_if_not_ideal(scene: Scene) -> None:
                 f'faults[{number}].kind = "{fault.kind}": with rigid rods one stuck V-joint stops '
                 f"the whole ring, so the ideal fidelity has no answer {cure}"
             )
-    for _, cable in [] if scene.cables is None else scene.cables.present():
-        if not isinstance(cable.bracket, BisectorBracket):
-            raise InputError(
-                f'cables: bracket.kind = "{kind_of(cable.bracket)}": the ideal fidelity knows '
-                'pulleys on the bisector alone (choose "bisector", or use the full fidelity)'
-            )
     if scene.record.stress:
         raise InputError(
             "record.stress = true: rigid rods carry no stress in the ideal fidelity (set it to "
             "false, or use the full fidelity)"
         )
     if scene.net is not None:
-        _refuse_net(scene)
+        _refuse_net(scene, scene.net)
 
 
-def _refuse_net(scene: Scene) -> None:
-    ring, net = IdealRing.of(scene), scene.net
-    if net is None:
-        return
-    plan = ring.geometry.plan
-    arms = plan - plan.mean(axis=0)
-    arms = arms / np.linalg.norm(arms, axis=1)[:, None]
-    stiffness = spread(net.stiffness, len(plan))
-    aside = float(np.linalg.norm(stiffness @ arms))
-    if aside > _CENTRED * float(stiffness.sum()):
+def _refuse_net(scene: Scene, net: Net) -> None:
+    corners = scene.structure.geometry().fold(scene.structure.initial_phi).corners[0]
+    aside = FreeHub(net, len(corners)).imbalance(corners)
+    if net.damping > 0.0 and aside > _CENTRED:
         raise InputError(
-            f"net.stiffness: its pulls on the hub are out of balance by "
-            f"{100.0 * aside / stiffness.sum():.0f} % of their sum, and the ideal fidelity keeps "
-            "the hub in the middle (use one stiffness and a closed ring, or the full fidelity)"
+            f"net.damping = {net.damping:g} N s/m: the net's pulls on its hub are out of balance "
+            f"by {100.0 * aside:.0f} % of their sum, and the ideal fidelity finds the hub from the "
+            "springs alone (set it to 0, use one net.stiffness and a closed ring, or use the full "
+            "fidelity)"
         )
-    total = 2.0 * len(plan) * scene.structure.corner_mass
+    total = 2.0 * len(corners) * scene.structure.corner_mass
     if net.hub_mass > _LIGHT_HUB * total:
         raise InputError(
             f"net.hub_mass = {net.hub_mass:g} kg must be at most {_LIGHT_HUB * total:.2g} kg in "
@@ -99,81 +83,21 @@ def run_ideal(scene: Scene) -> Outcome:
     Returns
     -------
     Outcome
-        The variables of the full model where they exist; all sections open alike.
+        The variables of the full model where they exist; all sections open alike.  It always ends
+        with a status.
 
     Raises
     ------
     InputError
         If the ideal ring cannot represent the scene.
     """
-    return run_ideal_many([scene])[0]
-
-
-def run_ideal_many(scenes: Sequence[Scene]) -> list[Outcome]:
-    """Integrate many scenes, those with the same structure of the problem together.
-
-    Together go scenes with the same number of sections, cables at the same ends with the same
-    kinds of friction, and faults of the same kinds at the same places in the same order; any
-    number in them may differ.  Each sample keeps its own steps, so its numbers do not depend on
-    its company but for round-off (feedback laws: nothing at all).
-
-    Parameters
-    ----------
-    scenes
-        In any order.
-
-    Returns
-    -------
-    list of Outcome
-        In the order of ``scenes``.  ``wall_time`` and ``cpu_time`` of a sample are its share of
-        its batch's.
-
-    Raises
-    ------
-    InputError
-        If the ideal ring cannot represent one of the scenes.
-    """
-    groups: dict[str, list[int]] = {}
-    for number, scene in enumerate(scenes):
-        refuse_if_not_ideal(scene)
-        groups.setdefault(_likeness(scene), []).append(number)
-    found: dict[int, Outcome] = {}
-    for members in groups.values():
-        for first in range(0, len(members), MOST_AT_ONCE):
-            own = members[first : first + MOST_AT_ONCE]
-            found.update(zip(own, _run_alike([scenes[k] for k in own]), strict=True))
-    return [found[number] for number in range(len(scenes))]
-
-
-def _run_alike(scenes: list[Scene]) -> list[Outcome]:
+    refuse_if_not_ideal(scene)
     wall, cpu = time.perf_counter(), time.process_time()
-    courses = Integration(Batch(scenes)).run()
-    common_wall = (time.perf_counter() - wall) / len(scenes)
-    common_cpu = (time.process_time() - cpu) / len(scenes)
-    outcomes = []
-    for course, scene in zip(courses, scenes, strict=True):
-        wall, cpu = time.perf_counter(), time.process_time()
-        outcome = to_outcome(course, scene, wall_time=0.0, cpu_time=0.0)
-        outcome.values["wall_time"] = np.array(common_wall + time.perf_counter() - wall)
-        outcome.values["cpu_time"] = np.array(common_cpu + time.process_time() - cpu)
-        outcomes.append(with_remark(outcome, scene))
-    return outcomes
-
-
-def _likeness(scene: Scene) -> str:
-    """What two scenes must have in common to be integrated together."""
-    structure, cables = scene.structure, scene.cables
-    present = [] if cables is None else cables.present()
-    faults = [
-        (kind_of(f), sorted(f.model_dump(exclude={"time", "kind"}).items()))
-        for f in sorted(scene.faults, key=lambda f: f.time)
-    ]
-    return repr(
-        (
-            structure.sections,
-            structure.closed,
-            [(plane, cable.end, kind_of(cable.friction)) for plane, cable in present],
-            equal_cables(scene),
-            faults,
-        )
-    )
+    with np.errstate(all="ignore"):
+        try:
+            outcome = to_outcome(Integration(scene).run(), scene, wall_time=0.0, cpu_time=0.0)
+        except ValueError as error:  # the cables have no answer at the very start
+            outcome = Outcome(Status.SOLVER_FAILED, f"the ideal ring has no answer: {error}")
+    outcome.values["wall_time"] = np.array(time.perf_counter() - wall)
+    outcome.values["cpu_time"] = np.array(time.process_time() - cpu)
+    return with_remark(outcome, scene)

@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ringsim.scene import Scene
-from ringsim.theory import radau
-from ringsim.theory.batched_chain import ChainBatch
-from ringsim.theory.ideal_course import Course, Piece
-from ringsim.variables import COUNTS, PLANES, Fidelity, Outcome, Status
+from ringsim.theory.ideal_course import Course, Piece, quintic
+from ringsim.theory.ideal_motion import Instant
+from ringsim.variables import COUNTS, PLANES, Fidelity, Outcome
 
 Array = NDArray[np.float64]
-_INSIDE = np.concatenate([[0.0], radau.NODES])
+
+
+class _Seen(NamedTuple):
+    """A course at some times: states (times, size), and what belongs to each."""
+
+    times: Array
+    states: Array
+    instants: list[Instant]
 
 
 def to_outcome(course: Course, scene: Scene, *, wall_time: float, cpu_time: float) -> Outcome:
     """Put a run on the scene's output grid; what lies after its end is NaN.
 
-    Angles come from the quintic that fits angle, rate and acceleration at both ends of a step;
-    tensions from a shape-preserving cubic through the steps' stages, at which they are in balance
-    with the motion; lost and supplied energy from the quadrature that belongs to the steps.
+    Angles come from the quintic that fits angle, rate and acceleration at both ends of a step,
+    energies lost and supplied from the cubic that fits them and their rates, tensions from one
+    through all points at which the steps are in balance; all else follows from the state.
     """
     count = math.floor(scene.solver.end_time / scene.record.interval * (1.0 + 1e-12))
     grid = np.arange(count + 1) * scene.record.interval
@@ -34,35 +40,34 @@ def to_outcome(course: Course, scene: Scene, *, wall_time: float, cpu_time: floa
         "section": np.arange(1, sections + 1),
         "time": grid,
     }
-    if not course.pieces:
-        return Outcome(course.status, course.reason, coordinates, {})
-    end = course.end[0]
-    inside = grid <= end * (1.0 + 1e-12)
-    where = np.minimum(grid[inside], end)
+    end = course.pieces[-1].times[-1]
+    where = np.minimum(grid[grid <= end * (1.0 + 1e-12)], end)
+    seen = _on_grid(course, where)
     values: dict[str, Array] = {}
 
-    def on_grid(found: Array) -> Array:
-        whole = np.full((*found.shape[:-1], len(grid)), np.nan)
-        whole[..., inside] = found
-        return whole
+    def whole(found: Array) -> Array:
+        rest = np.full((*found.shape[:-1], len(grid) - len(where)), np.nan)
+        return np.concatenate([found, rest], axis=-1)
 
-    phi, rate, latched = _motion(course, where)
-    opening = on_grid(np.degrees(math.pi - 2.0 * phi))
+    opening = whole(np.degrees(math.pi - 2.0 * seen.states[:, 0]))
     values["opening_angle"] = np.broadcast_to(opening, (2, sections, len(grid))).copy()
     values["lock_time"] = np.full((2, sections), course.lock_time)
     values["deployment_time"] = np.array(course.lock_time)
-    values["asynchrony"] = on_grid(np.zeros(len(where)))
-    values["asynchrony_max"] = np.array(0.0)
-    _add_energies(values, course, where, (phi, rate, latched), on_grid)
-    if scene.cables is not None:
-        _add_cables(values, course, where, on_grid)
-        coordinates["span"] = np.arange(1, values["cable_tension"].shape[1] + 1)
-    values["constraint_violation"] = on_grid(np.zeros(len(where)))
-    values["constraint_error"] = np.array(0.0)
+    values["asynchrony"] = values["constraint_violation"] = whole(np.zeros(len(where)))
+    values["asynchrony_max"] = values["constraint_error"] = np.array(0.0)
+    steps = [_at(course, piece, np.array(piece.times)) for piece in course.pieces]
+    start = steps[0].instants[0]
+    parts = _energies(seen, start)
+    for name, series in parts.items():
+        values[name] = whole(series)
+    values["energy_error"] = np.array(_imbalance(steps, start))
+    if course.motion.cables is not None:
+        coordinates["span"] = np.arange(1, scene.spans + 1)
+        _add_cables(values, course, steps, seen, whole)
     counts = {
-        "steps": sum(len(piece.time) for piece in course.pieces),
-        "newton_iterations": course.newton_iterations,
-        "jacobians": course.tries,
+        "steps": sum(len(piece.times) - 1 for piece in course.pieces),
+        "newton_iterations": course.evaluations,
+        "jacobians": course.jacobians,
         "restarts": 0,
         "fidelity": int(Fidelity.IDEAL),
     }
@@ -72,159 +77,130 @@ def to_outcome(course: Course, scene: Scene, *, wall_time: float, cpu_time: floa
     values["tolerance_used"] = np.array(scene.solver.tolerance)
     values["final_time"] = np.array(end)
     values["wall_time"], values["cpu_time"] = np.array(wall_time), np.array(cpu_time)
-    return Outcome(Status(course.status), course.reason, coordinates, values)
+    return Outcome(course.status, course.reason, coordinates, values)
 
 
-def _motion(course: Course, where: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Angle and rate at times, rad and rad/s, and whether the latches hold."""
-
-    def joined(name: str) -> Any:
-        return np.concatenate([getattr(piece, name) for piece in course.pieces])
-
-    starts, step = joined("time"), joined("step")
-    k = np.clip(np.searchsorted(starts, where, side="right") - 1, 0, len(starts) - 1)
-    h = step[k]
-    s = np.minimum((where - starts[k]) / h, 1.0)
-    phi, rate, pull = (joined(name)[k] for name in ("phi", "rate", "pull"))
-    x0, v0, a0 = phi[:, 0], h * rate[:, 0], 0.5 * h**2 * pull[:, 0]
-    x1, v1, a1 = phi[:, 3], h * rate[:, 3], h**2 * pull[:, 3]
-    gap, slope, bend = x1 - x0 - v0 - a0, v1 - v0 - 2.0 * a0, a1 - 2.0 * a0
-    c3 = 10.0 * gap - 4.0 * slope + 0.5 * bend
-    c4 = -15.0 * gap + 7.0 * slope - bend
-    c5 = 6.0 * gap - 3.0 * slope + 0.5 * bend
-    terms = np.array([x0, v0, a0, c3, c4, c5])
-    powers = s ** np.arange(6)[:, None]
-    angle = np.sum(terms * powers, axis=0)
-    turning = np.sum(terms[1:] * powers[:-1] * np.arange(1, 6)[:, None], axis=0) / h
-    return angle, turning, joined("latched")[k]
+def _at(course: Course, piece: Piece, where: Array) -> _Seen:
+    """A piece at times within it."""
+    motion = course.motion
+    motion.latched, motion.until = piece.latched, piece.times[-1]
+    if motion.cables is not None and piece.ropes is not None:
+        motion.cables.ropes = piece.ropes
+    times, states = np.array(piece.times), np.array(piece.states)
+    found = np.repeat(states[:1], len(where), axis=0)
+    keep = np.append(True, np.diff(times) > 0.0)
+    if keep.sum() > 1 and len(where):
+        times, states, rates = times[keep], states[keep], np.array(piece.rates)[keep]
+        turn = motion.rate_of_phi
+        found = CubicHermiteSpline(times, states, rates)(where)
+        both = np.stack([states[:, :turn], states[:, turn : 2 * turn]], axis=1)
+        curve = quintic(times, both, rates[:, turn : 2 * turn])
+        found[:, :turn], found[:, turn : 2 * turn] = curve(where), curve.derivative()(where)
+    instants = [motion.instant(float(t), y) for t, y in zip(where, found, strict=True)]
+    return _Seen(where, found, instants)
 
 
-def _chain(piece: Piece) -> ChainBatch | None:
-    """The cables at the beginning and the stages of all steps, (1, steps * 4, ...)."""
-    equation = piece.equation
-    if equation.chain is None or equation.cables is None or equation.ropes is None:
-        return None
-    ends = (1, piece.phi.size, *piece.wound.shape[2:])
-    return equation.chain.evaluate(
-        equation.cables,
-        equation.ropes,
-        piece.phi.reshape(1, -1),
-        piece.rate.reshape(1, -1),
-        piece.wound.reshape(ends),
-        piece.speed.reshape(ends),
-    )
+def _on_grid(course: Course, where: Array) -> _Seen:
+    """All pieces at the output's times; the later one where two meet."""
+    last = np.searchsorted([piece.times[0] for piece in course.pieces], where, side="right") - 1
+    seen = [_at(course, piece, where[last == k]) for k, piece in enumerate(course.pieces)]
+    states = np.concatenate([part.states for part in seen])
+    return _Seen(where, states, [instant for part in seen for instant in part.instants])
 
 
-def _add_energies(
-    values: dict[str, Array],
-    course: Course,
-    where: Array,
-    motion: tuple[Array, Array, NDArray[np.bool_]],
-    on_grid: Any,
-) -> None:
-    """Energies on the grid, and the largest imbalance at any step."""
-    phi, rate, latched = motion
-    ring = course.pieces[0].equation.ring
-    kinetic, elastic, work = (e[0] for e in ring.energies(phi[None], rate[None], latched[None]))
-    begin = ring.energies(phi[:1, None], rate[:1, None], np.zeros((1, 1), dtype=bool))
-    load_start, stored_start = float(begin[2][0, 0]), float(begin[1][0, 0])
-    cables, lost, driven = np.zeros((3, len(where)))
-    lost_so_far, driven_so_far, before, cables_start = 0.0, 0.0, math.nan, 0.0
+def _energies(seen: _Seen, start: Instant) -> dict[str, Array]:
+    """Energies by their names, J; work counts from the start."""
+    now = seen.instants
+    lifted = np.array([i.acting.work for i in now]) - start.acting.work
+    return {
+        "kinetic_energy": np.array([i.kinetic for i in now]),
+        "elastic_energy": np.array([i.elastic for i in now]),
+        "work": lifted + seen.states[:, -1],
+        "dissipation": seen.states[:, -2],
+    }
+
+
+def _imbalance(steps: list[_Seen], start: Instant) -> float:
+    """Largest energy that is missing at any step over the largest exchanged."""
     wrong, exchanged = 0.0, 1e-300
-    for number, piece in enumerate(course.pieces):
-        shape = piece.phi.shape
-        held = np.broadcast_to(piece.latched[:, None], shape)
-        x, v, on = piece.phi.reshape(1, -1), piece.rate.reshape(1, -1), held.reshape(1, -1)
-        loss = ring.loss(x, v, on).reshape(shape)
-        parts = [e.reshape(shape) for e in ring.energies(x, v, on)]
-        power, stored = np.zeros(shape), np.zeros(shape)
-        chain = _chain(piece)
-        if chain is not None:
-            copies = piece.equation.copies
-            loss = loss + (chain.loss[0] @ copies).reshape(shape)
-            power = (chain.winch_power[0] @ copies).reshape(shape)
-            stored = (chain.elastic[0] @ copies).reshape(shape)
-        if number == 0:
-            cables_start = float(stored[0, 0])
-        else:
-            lost_so_far += before - float(stored[0, 0])
-        before = float(stored[-1, -1])
-
-        def summed(rates: Array, so_far: float, step: Array = piece.step) -> Array:
-            gained = step * (rates[:, 1:] @ radau.WEIGHTS)
-            return so_far + np.concatenate([[0.0], np.cumsum(gained)])
-
-        loss_sum, work_sum = summed(loss, lost_so_far), summed(power, driven_so_far)
-        lost_so_far, driven_so_far = loss_sum[-1], work_sum[-1]
-        nodes = np.append(piece.time, piece.time[-1] + piece.step[-1])
-        own = (where >= nodes[0]) & (where <= nodes[-1])
-        cables[own] = _through_stages(piece, stored)(where[own])
-        for series, total, rates in ((lost, loss_sum, loss), (driven, work_sum, power)):
-            slopes = np.append(rates[:, 0], rates[-1, -1])
-            series[own] = CubicHermiteSpline(nodes, total, slopes)(where[own])
-        moving, held_back, done = (p[:, 3] for p in parts)
-        spring = held_back - stored_start + stored[:, 3] - cables_start
-        supplied = done - load_start + work_sum[1:]
-        balance = moving + spring + loss_sum[1:] - supplied
+    for seen in steps:
+        parts = _energies(seen, start)
+        kinetic, elastic = parts["kinetic_energy"], parts["elastic_energy"] - start.elastic
+        balance = kinetic + elastic + parts["dissipation"] - parts["work"]
         wrong = max(wrong, float(np.abs(balance).max()))
-        exchanged = max(exchanged, *(float(np.abs(x).max()) for x in (supplied, moving, spring)))
-    values["kinetic_energy"] = on_grid(kinetic)
-    values["elastic_energy"] = on_grid(elastic + cables)
-    values["work"] = on_grid(work - load_start + driven)
-    values["dissipation"] = on_grid(lost)
-    values["energy_error"] = np.array(wrong / exchanged)
+        exchanged = max(
+            exchanged, *(float(np.abs(x).max()) for x in (kinetic, elastic, parts["work"]))
+        )
+    return wrong / exchanged
 
 
-def _add_cables(values: dict[str, Array], course: Course, where: Array, on_grid: Any) -> None:
-    """Tensions by plane and span; NaN where a plane has no cable, or the other one more spans."""
-    whole = course.pieces[0].equation.ropes
-    edge = np.zeros(1, dtype=int) if whole is None else whole.cable_starts
-    tensions = np.full((2, np.diff(edge).max(initial=0), len(where)), np.nan)
-    wound = np.full((2, len(where)), np.nan)
-    loose = np.full(2, np.nan)
-    peak, peak_time = -math.inf, math.nan
-    for piece in course.pieces:
-        chain = _chain(piece)
-        ropes = piece.equation.ropes
-        if chain is None or ropes is None or piece.equation.cables is None:
-            continue
-        times = piece.time[:, None] + piece.step[:, None] * _INSIDE
-        own = (where >= times[0, 0]) & (where <= times[-1, -1])
-        found = chain.tensions[0].reshape(*times.shape, -1)
-        alive = piece.equation.cables.alive[0, 0]
-        stretch = np.where(alive > 0.0, chain.stretch[0], -1.0)[:, ropes.first]
-        stretch = stretch.reshape(*times.shape, -1)
-        top = found.max(axis=-1)
-        if top.max() > peak:
-            peak, peak_time = float(top.max()), float(times.ravel()[np.argmax(top)])
-        for number, planes in enumerate(piece.equation.planes):
-            slack = _time_below_zero(times, stretch[..., number])
+def _add_cables(
+    values: dict[str, Array], course: Course, steps: list[_Seen], seen: _Seen, whole: Any
+) -> None:
+    """Tensions by plane and span; a plane without a cable is NaN."""
+    cables = course.motion.cables
+    assert cables is not None
+    wound = np.array([i.pull.chain.wound.sum(axis=1) for i in seen.instants if i.pull])
+    sizes = 2, cables.spans, len(seen.times)
+    tensions, reeled, loose = (
+        np.full(sizes, np.nan),
+        np.full(sizes[::2], np.nan),
+        np.full(2, np.nan),
+    )
+    for number, planes in enumerate(cables.planes):
+        reeled[list(planes)], loose[list(planes)] = wound[:, number], 0.0
+    peak = (-math.inf, math.nan)
+    for piece, at_steps in zip(course.pieces, steps, strict=True):
+        _at(course, piece, np.zeros(0))
+        inner = [(time, course.motion.instant(time, state)) for time, state in piece.inner]
+        line = sorted([*zip(piece.times, at_steps.instants, strict=True), *inner], key=_moment)
+        chains = [instant.pull.chain for _, instant in line if instant.pull is not None]
+        times = np.array([time for time, _ in line])
+        found = np.array([cables.tensions(chain) for chain in chains])
+        peak = max(peak, _top(times, np.nanmax(found, axis=(1, 2))))
+        stretch = np.array([cables.stretches(chain) for chain in chains])
+        own = (seen.times >= times[0]) & (seen.times <= times[-1])
+        curve, missing = _through(times, np.nan_to_num(found)), np.isnan(found[0])
+        for number, planes in enumerate(cables.planes):
+            loose[list(planes)] += _time_below_zero(times, stretch[:, number])
             for plane in planes:
-                at_spans = found[..., edge[number] : edge[number + 1]]
-                held = _through_stages(piece, at_spans)(where[own]).T
-                tensions[plane, : len(held), own] = held.T
-                ends = piece.wound[:, :, number].sum(axis=-1)
-                wound[plane, own] = _through_stages(piece, ends)(where[own])
-                loose[plane] = np.nan_to_num(loose[plane]) + slack
-    values["cable_tension"] = on_grid(tensions)
-    values["wound_length"] = on_grid(wound)
+                at_spans = np.where(missing, np.nan, curve(seen.times[own]))
+                tensions[plane][:, own] = at_spans[:, number].T
+    values["cable_tension"], values["wound_length"] = whole(tensions), whole(reeled)
     values["slack_duration"] = loose
-    values["peak_tension"], values["peak_tension_time"] = np.array(peak), np.array(peak_time)
+    values["peak_tension"], values["peak_tension_time"] = np.array(peak[0]), np.array(peak[1])
 
 
-def _through_stages(piece: Piece, found: Array) -> Any:
-    """Interpolation through the beginning of a piece and the stages of its steps."""
-    times = piece.time[:, None] + piece.step[:, None] * _INSIDE
-    line = np.concatenate([times[0, :1], times[:, 1:].ravel()])
-    series = np.concatenate([found[0, :1], found[:, 1:].reshape(-1, *found.shape[2:])])
-    keep = np.append(True, np.diff(line) > 0.0)
-    with np.errstate(all="ignore"):  # harmonic means of slopes that are next to nothing
-        return PchipInterpolator(line[keep], series[keep], axis=0)
+def _moment(item: tuple[float, Instant]) -> float:
+    return item[0]
+
+
+def _through(times: Array, series: Array) -> Any:
+    """Shape-preserving cubic through a series, which may be one point."""
+    keep = np.append(True, np.diff(times) > 0.0)
+    if keep.sum() == 1:
+        return lambda where: np.repeat(series[:1], len(where), axis=0)
+    return PchipInterpolator(times[keep], series[keep], axis=0)
+
+
+def _top(times: Array, series: Array) -> tuple[float, float]:
+    """Largest value and its time, of the parabola through the largest one and its neighbours."""
+    k = int(np.argmax(series))
+    if not 0 < k < len(series) - 1:
+        return float(series[k]), float(times[k])
+    t, x = times[k - 1 : k + 2] - times[k], series[k - 1 : k + 2] - series[k]
+    if t[0] == 0.0 or t[2] == 0.0:
+        return float(series[k]), float(times[k])
+    bend = (x[2] / t[2] - x[0] / t[0]) / (t[2] - t[0])
+    slope = x[0] / t[0] - bend * t[0]
+    if bend >= 0.0:
+        return float(series[k]), float(times[k])
+    return float(series[k] - 0.25 * slope**2 / bend), float(times[k] - 0.5 * slope / bend)
 
 
 def _time_below_zero(times: Array, series: Array) -> float:
     """Time for which a series, linear between its points, is negative."""
-    before, after = series[:, :-1], series[:, 1:]
+    before, after = series[:-1], series[1:]
     low, high = np.minimum(before, after), np.maximum(before, after)
     share = np.where(high < 0.0, 1.0, np.maximum(-low, 0.0) / np.maximum(high - low, 1e-300))
-    return float(np.sum(share * np.diff(times, axis=1)))
+    return float(np.sum(share * np.diff(times)))

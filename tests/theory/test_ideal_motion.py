@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from ideal_cases import pulled, six
-from ringsim.simulation import run_ideal, run_ideal_many
+from ringsim.simulation import run_ideal
 from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.ideal_ring import IdealRing
 from ringsim.variables import VARIABLES, Status
@@ -26,8 +26,11 @@ def value(outcome, name: str) -> float:
 @pytest.mark.parametrize("base", ["free", "fixed"])
 @pytest.mark.parametrize("net", [True, False])
 def test_without_cables_it_takes_the_time_of_the_energy_quadrature(sections, base, net):
+    """A ring that floats has no boom here: with one it pitches, and its loads stay vertical."""
     extra = {"net__neutral_length": 0.7116 * sections / 18} if net else {"net": "none"}
-    scene = pulled(sections, boom__base=base, **extra)
+    scene = pulled(
+        sections, boom={"kind": "rigid", "base": base} if base == "fixed" else "none", **extra
+    )
     outcome = run_ideal(scene)
     truth = opening_time(IdealRing.of(scene), scene.structure.initial_phi, panels=96)
     assert outcome.status == Status.OK
@@ -37,8 +40,28 @@ def test_without_cables_it_takes_the_time_of_the_energy_quadrature(sections, bas
     assert value(outcome, "energy_error") < BALANCE
 
 
+def test_loads_that_stay_vertical_open_a_pitching_ring_later():
+    """The quadrature lets the loads turn with the ring; the energy balance knows better.
+
+    A boom of 1.7 kg on a ring of 0.45 kg makes it pitch by 0.017 rad; 1 - cos of that is 1.5e-4.
+    """
+    scene = pulled(3, net="none", structure__aspect_ratio=1.0, boom__density=1e4)
+    outcome = run_ideal(scene)
+    turning = opening_time(IdealRing.of(scene), scene.structure.initial_phi).time
+    assert 1e-6 < value(outcome, "deployment_time") / turning - 1.0 < 1e-3
+    assert value(outcome, "energy_error") < BALANCE
+
+
+def test_an_odd_net_takes_the_time_of_the_energy_quadrature():
+    net = {"stiffness": 0.05, "neutral_length": 0.15}
+    scene = pulled(5, structure__aspect_ratio=0.8, net=net, boom="none", loads__force=0.05)
+    truth = opening_time(IdealRing.of(scene), scene.structure.initial_phi, panels=96)
+    found = value(run_ideal(scene), "deployment_time")
+    assert found == pytest.approx(truth.time, rel=1e-7, abs=2.0 * truth.uncertainty)
+
+
 def test_angle_between_the_steps_is_that_of_the_quadrature():
-    scene = pulled(net="none", record__interval=0.37)
+    scene = pulled(net="none", boom="none", record__interval=0.37)
     outcome = run_ideal(scene)
     ring, start = IdealRing.of(scene), scene.structure.initial_phi
     times = outcome.coordinates["time"]
@@ -51,12 +74,15 @@ def test_angle_between_the_steps_is_that_of_the_quadrature():
 def test_one_section_follows_its_rope():
     """Frictionless and nearly inextensible: the path shortens by what is wound.
 
+    Without an offset of the pins the end assemblies stay where they are.
+
     With 2 L(phi) = 2 L(phi_0) - v t the angle is known; the tension is what the joints ask for:
     T d(2 L)/dphi = 4 c phi' / 2 for either of the two cables.
     """
     speed, viscous = 0.005, 5.0
     scene = six(
-        structure__sections=1, structure__closed=False, net="none", boom="none",
+        structure__sections=1, structure__closed=False, structure__hinge_offset=0.0,
+        net="none", boom="none",
         joints={"vjoint": {"viscous": viscous}}, structure__opening_angle=60.0,
         cable__winch={"winding": {"kind": "constant", "speed": speed}},
         cable__friction={"kind": "none"}, cable__axial_stiffness=1e8,
@@ -128,7 +154,7 @@ def test_energy_balance_closes(values):
     assert np.nanmax(outcome.values["work"]) > 0.05
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(
     stiffness=st.floats(3.0, 7.0),
     friction=st.floats(0.0, 0.95),
@@ -141,31 +167,11 @@ def test_any_driven_ring_ends_with_a_status_and_its_energy(stiffness, friction, 
         cable__friction__coefficient=0.01 * friction,
         cable__winch__winding__speed=10.0**speed,
         joints__vjoint__viscous=10.0**viscous,
-        solver__end_time=5.0,
+        solver__end_time=2.0,
     )
     outcome = run_ideal(scene)
     assert not outcome.status.failed, outcome.reason
     assert value(outcome, "energy_error") < 1e-4
-
-
-def test_batch_gives_what_each_sample_gives_alone():
-    scenes = [
-        six(
-            cable__friction__coefficient=1e-4 * k,
-            cable__axial_stiffness=1e5 * k,
-            structure__vjoint_mass=0.01 * k,
-        )
-        for k in (1, 3, 5)
-    ]
-    scenes += [pulled(6), six(cable__friction={"kind": "capstan", "coefficient": 0.1})]
-    together = run_ideal_many(scenes)
-    for scene, outcome in zip(scenes, together, strict=True):
-        alone = run_ideal(scene)
-        assert alone.status == outcome.status == Status.OK
-        for name in ("deployment_time", "peak_tension", "slack_duration"):
-            if name in alone.values:
-                # Round-off may change a step: then the difference is the solver's own error.
-                np.testing.assert_allclose(outcome.values[name], alone.values[name], rtol=1e-5)
 
 
 def test_tension_feedback_settles_at_its_target():
@@ -175,8 +181,8 @@ def test_tension_feedback_settles_at_its_target():
     )
     outcome = run_ideal(scene)
     tension = outcome.values["cable_tension"][0, 0, 10:]
-    # The speed is held through a step of 0.05 s; the loop's own time is 4 m / (1e5 N * 0.02).
-    np.testing.assert_allclose(tension, 2.0, rtol=0.02)
+    # From 1 s on: the loop's own time is 4 m / (1e5 N * 0.02 m/s/N) = 2 ms.
+    np.testing.assert_allclose(tension, 2.0, rtol=2e-3)
 
 
 def test_late_winch_starts_late():

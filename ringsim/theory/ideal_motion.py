@@ -1,0 +1,195 @@
+"""The ideal ring in motion: one system of ordinary differential equations.
+
+The state holds the free coordinates and their rates; the direction up in space along the core's
+axes and the core's rotation, where loads act on a base that floats (they stay vertical while the
+ring tilts; without them it has no angular momentum, which gives the rotation); the rope wound by
+each winch with feedback, and its speed, which follows the law's command within ``MOTOR_LAG``; and
+the energies lost and supplied so far.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.cable.faults.family import CableFault
+from ringsim.parts.faults.family import Fault
+from ringsim.scene import Scene
+from ringsim.theory.ideal_cables import IdealCables, Pull
+from ringsim.theory.ideal_forces import Acting, Forces
+from ringsim.theory.ideal_mechanism import Mechanism, skew
+from ringsim.theory.ideal_points import UP
+
+Array = NDArray[np.float64]
+
+MOTOR_LAG = 1e-6
+"""Time in s within which a motor takes up the speed that its law asks for.
+
+A law answers to a tension that answers to the speed: a motor without inertia would need the two
+solved together.  Ropes swing in milliseconds.
+"""
+_ANGLE, _RATE = 1e-6, 1e-4
+"""Largest increments of angles (rad) and rates (rad/s) for derivatives of the equations."""
+
+
+class Instant(NamedTuple):
+    """Everything about one instant.
+
+    Attributes
+    ----------
+    acceleration
+        Of the free coordinates, rad/s^2.
+    spin_rate
+        Derivative of the core's rotation, rad/s^2.
+    spin
+        Its rotation, rad/s.
+    kinetic
+        Energy, J.
+    """
+
+    acceleration: Array
+    spin_rate: Array
+    spin: Array
+    kinetic: float
+    acting: Acting
+    pull: Pull | None
+
+    @property
+    def elastic(self) -> float:
+        """Energy stored in net, stops and cables, J."""
+        return self.acting.elastic + (0.0 if self.pull is None else self.pull.elastic)
+
+
+class IdealMotion:
+    """The equations of a scene's ideal ring.
+
+    Attributes
+    ----------
+    latched
+        Whether the V-joints' latches hold.
+    until
+        Time at which something is switched on or off next, s: laws of winches are taken from
+        before it.
+    refusal
+        Why the cables last had no answer; empty if they always had.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.mechanism = Mechanism(scene)
+        self.forces = Forces(scene, self.mechanism)
+        self.cables = None if scene.cables is None else IdealCables(scene, self.mechanism)
+        self.latched, self.until, self.refusal = False, math.inf, ""
+        self._initial = scene.structure.initial_phi
+        n = self.mechanism.freedom
+        self._tilts = not self.mechanism.fixed and self.forces.load != 0.0
+        tilt = 3 if self._tilts else 0
+        motors = 0 if self.cables is None else 2 * len(self.cables.answering)
+        ends = np.cumsum([n, n, tilt, tilt, motors])
+        self._place, self._rate = slice(0, n), slice(n, 2 * n)
+        self._up, self._spin = slice(2 * n, ends[2]), slice(ends[2], ends[3])
+        self._motors = slice(ends[3], ends[4])
+        self.size = int(ends[4]) + 2
+
+    def start(self) -> Array:
+        """State of the ring released at rest."""
+        state = np.zeros(self.size)
+        state[0] = self._initial
+        if self._tilts:
+            state[self._up] = UP
+        return state
+
+    @property
+    def rate_of_phi(self) -> int:
+        """Place of phi' in a state."""
+        return self.mechanism.freedom
+
+    def instant(self, time: float, state: Array) -> Instant:
+        """Evaluate everything at a state.
+
+        Raises
+        ------
+        ValueError
+            If the cables have no answer (ringsim.cable.chain).
+        """
+        mechanism = self.mechanism
+        pose = mechanism.pose(state[self._place], state[self._rate])
+        matrix = mechanism.mass(pose)
+        rigid = mechanism.rigid_rates(pose, matrix, state[self._spin] if self._tilts else None)
+        up = state[self._up] if self._tilts else mechanism.vertical(pose)
+        acting = self.forces.act(pose, up, self.latched)
+        force, pull = acting.force, None
+        if self.cables is not None:
+            earlier = min(time, self.until * (1.0 - 1e-12))
+            pull = self.cables.pull(earlier, pose, state[self._motors].reshape(2, -1))
+            force = force.copy()
+            force[0] += pull.force
+        spin = rigid[3:]
+        moving, turning = mechanism.accelerations(pose, matrix, spin, acting.couple, force)
+        rates = np.concatenate([rigid, pose.rate])
+        return Instant(moving, turning, spin, 0.5 * float(rates @ matrix @ rates), acting, pull)
+
+    def rates(self, time: float, state: Array) -> Array:
+        """Derivative of the state; NaN where the cables have no answer."""
+        if not np.isfinite(state).all():
+            return np.full(self.size, math.nan)
+        try:
+            now = self.instant(time, state)
+        except ValueError as error:
+            self.refusal = str(error)
+            return np.full(self.size, math.nan)
+        found = np.empty(self.size)
+        found[self._place] = state[self._rate]
+        found[self._rate] = now.acceleration
+        if self._tilts:
+            found[self._up] = -skew(now.spin) @ state[self._up]
+            found[self._spin] = now.spin_rate
+        found[-2:] = now.acting.loss, 0.0
+        if now.pull is not None:
+            speeds = state[self._motors].reshape(2, -1)[1]
+            found[self._motors] = [*speeds, *((now.pull.commands - speeds) / MOTOR_LAG)]
+            found[-2] += now.pull.loss
+            found[-1] = now.pull.power
+        return found
+
+    def jacobian(self, time: float, state: Array) -> Array:
+        """Derivatives of the rates by differences; nothing depends on the energies."""
+        found = np.zeros((self.size, self.size))
+        here = self.rates(time, state)
+        for k, step in enumerate(self._nudges()):
+            moved = state.copy()
+            moved[k] += step
+            found[:, k] = (self.rates(time, moved) - here) / (moved[k] - state[k])
+        return found
+
+    def strike(self, fault: Fault, time: float, state: Array) -> Array:
+        """The state after a cable fault; the energy that it lets go counts as lost."""
+        if self.cables is None or not isinstance(fault, CableFault):
+            return state
+        before = self.instant(time, state)
+        assert before.pull is not None
+        self.cables.strike(fault, before.pull.chain)
+        found = state.copy()
+        found[-2] += before.elastic - self.instant(time, state).elastic
+        return found
+
+    def tolerances(self, relative: float) -> Array:
+        """Absolute tolerance of every part of the state, for a relative one.
+
+        Coarser for the swings: an end assembly is light, and friction on its pins is stiff.
+        """
+        n = self.mechanism.freedom
+        found = np.full(self.size, 0.01 * relative)
+        found[1:n], found[n + 1 : 2 * n] = 0.3 * relative, 3.0 * relative
+        found[-2:] = 1e-3 * relative
+        return found
+
+    def _nudges(self) -> Array:
+        length, slip = (math.inf, math.inf) if self.cables is None else self.cables.nudges
+        steps = np.full(self.size - 2, _ANGLE)
+        steps[0] = min(_ANGLE, length)
+        steps[self._rate] = min(_RATE, slip, 1e-3 * self.forces.slowest)
+        steps[self._motors] = min(_ANGLE, length)
+        return steps

@@ -1,0 +1,152 @@
+"""What acts on the ideal ring and what resists it, against other formulations and the engine."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ideal_cases import pulled, six
+from ringsim.cable.chain import Chain
+from ringsim.engine.joints import friction_torque, stop_torque
+from ringsim.engine.net import net_forces
+from ringsim.theory.ideal_cables import IdealCables
+from ringsim.theory.ideal_forces import Forces
+from ringsim.theory.ideal_mechanism import Mechanism
+from ringsim.theory.ideal_net import FreeHub
+from ringsim.theory.ideal_points import UP
+
+ARC = {"structure__closed": False, "boom": "none", "net": "none", "structure__hinge_offset": 0.05}
+
+
+def acting(scene, free, rates, *, latched=False):
+    mechanism = Mechanism(scene)
+    pose = mechanism.pose(np.array(free), np.array(rates))
+    return Forces(scene, mechanism).act(pose, UP, latched), pose
+
+
+def diagonal_rate(shape, phi: float) -> float:
+    """d theta / d phi from cos(theta) = l cos(phi) / d."""
+    height = math.sqrt(shape.half_diagonal**2 - (shape.half_bar * math.cos(phi)) ** 2)
+    return shape.half_bar * math.sin(phi) / height
+
+
+@pytest.mark.parametrize("family", ["pivot", "hinge", "vjoint"])
+def test_joint_friction_takes_the_power_of_all_its_joints(family):
+    law = {"viscous": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], "coulomb": 0.02, "rate": 0.05}
+    values = {f"joints__{family}": law, "stop": "none", "net": "none", "loads__force": 0.0}
+    scene = pulled(sections=6, **values)
+    phi, rate = 0.7, -0.4
+    diagonal = diagonal_rate(scene.structure, phi)
+    speeds = {
+        "pivot": [2.0 * diagonal * rate],
+        "hinge": [rate] * 4 + [diagonal * rate] * 4,
+        "vjoint": [2.0 * rate] * 2,
+    }[family]
+    exact = sum(
+        float(friction_torque(getattr(scene.joints, family), section, 6, speed) * speed)
+        for section in range(6)
+        for speed in speeds
+    )
+    found, _ = acting(scene, [phi], [rate])
+    assert -found.force[0] * rate == pytest.approx(exact, rel=1e-12)
+    assert found.loss == pytest.approx(exact, rel=1e-12)
+
+
+def test_hinges_of_swinging_ends_turn_against_their_assemblies():
+    law = {"viscous": [0.1, 0.2, 0.4], "coulomb": 0.02, "rate": 0.05}
+    scene = pulled(sections=3, joints={"hinge": law}, loads__force=0.0, **ARC)
+    phi, rates = 0.7, np.array([-0.4, 0.3, -0.2, 0.5, 1.1])
+    turn = diagonal_rate(scene.structure, phi)
+    exact = 0.0
+    for section in range(3):
+        for k, sense in enumerate((-1.0, 1.0, 1.0, -1.0)):
+            # Left upper, left lower, right upper, right lower; inner assemblies keep upright.
+            swings = section == 0 if k < 2 else section == 2
+            swing = rates[1 + k] if swings else 0.0
+            for slope in (1.0, turn):
+                speed = sense * slope * rates[0] - swing
+                exact += float(friction_torque(scene.joints.hinge, section, 3, speed)) * speed
+    found, _ = acting(scene, [phi, 0.1, 0.2, 0.3, 0.4], rates)
+    assert -found.force @ rates == pytest.approx(exact, rel=1e-12)
+    assert found.loss == pytest.approx(exact, rel=1e-12)
+
+
+@pytest.mark.parametrize("latched", [False, True])
+def test_stops_are_the_engine_s(latched):
+    stop = {"stiffness": 150.0, "damping": 0.3, "stowed_angle": 10.0, "latch": True}
+    scene = pulled(sections=6, stop=stop, net="none", loads__force=0.0)
+    for phi in (-0.01, -2e-4, 0.3, 1.484, 1.55):
+        for rate in (-2.0, 0.0, 2.0):
+            folded, turning = np.array(2.0 * phi), np.array(2.0 * rate)
+            opening = stop_torque(scene.stop, folded, turning, np.array(latched))
+            # 12 joints; opening them is a negative change of phi, twice as fast.
+            found, _ = acting(scene, [phi], [rate], latched=latched)
+            assert found.force[0] == pytest.approx(-24.0 * float(opening), rel=1e-12, abs=1e-12)
+
+
+def test_damped_net_has_the_engine_s_law():
+    net = {"stiffness": 0.5, "damping": 0.2, "neutral_length": 0.3}
+    scene = pulled(sections=6, net=net, stop="none", loads__force=0.0)
+    geometry = scene.structure.geometry()
+    for phi, rate in ((0.2, -0.5), (0.2, 3.0), (1.3, 1.0)):
+        fold, by_phi = geometry.fold(phi).corners[0], geometry.fold_rate(phi).corners[0]
+        arms, moving = fold - fold.mean(axis=0), by_phi - by_phi.mean(axis=0)
+        lengths = np.linalg.norm(arms, axis=1)
+        slope = np.sum(arms * moving, axis=1) / lengths
+        parts = net_forces(lengths - 0.3, slope * rate, np.full(6, 0.5), 0.2, two_sided=False)
+        found, _ = acting(scene, [phi], [rate])
+        exact = -float(np.sum(sum(parts) * slope))
+        assert found.force[0] == pytest.approx(exact, rel=1e-12, abs=1e-15)
+        assert found.loss == pytest.approx(rate * float(parts[1] @ slope), rel=1e-12)
+
+
+@pytest.mark.parametrize("stiffness", [0.5, [0.5, 0.1, 0.5, 0.9, 0.2]])
+def test_hub_of_an_odd_net_lies_where_its_strings_balance(stiffness):
+    net = {"stiffness": stiffness, "neutral_length": 0.2}
+    scene = pulled(sections=5, structure__aspect_ratio=0.8, net=net)
+    geometry, hub_net = scene.structure.geometry(), FreeHub(scene.net, 5)
+    corners = geometry.fold(0.9).corners[0]
+    hub = hub_net.hub(corners)
+    arms = corners - hub
+    lengths = np.linalg.norm(arms, axis=1)
+    pulls = np.broadcast_to(stiffness, 5) * np.maximum(lengths - 0.2, 0.0)
+    assert np.linalg.norm(hub - corners.mean(axis=0)) > 5e-4  # not in the middle
+    assert np.abs((pulls / lengths) @ arms).max() < 1e-13
+    # By virtual work: the energy's slope is the generalised force, though the hub moves along.
+    step = 1e-5
+    energy = [hub_net.energy(geometry.fold(0.9 + e).corners[0]) for e in (-step, step)]
+    force, _ = acting(scene.with_values({"loads.force": 0.0}), [0.9], [0.0])
+    # Central differences: second order of the step.
+    assert force.force[0] == pytest.approx(-(energy[1] - energy[0]) / (2.0 * step), rel=1e-8)
+
+
+@pytest.mark.parametrize("end", ["first", "last", "both"])
+def test_cables_are_the_chain_on_the_fold_s_points(end):
+    """Points by ``RingGeometry``, power by the chain's own rates."""
+    friction = {"kind": "bearing", "coefficient": 0.0012}
+    scene = six(cable__end=end, cable__friction=friction, cable__damping_time=0.003)
+    mechanism = Mechanism(scene)
+    cables = IdealCables(scene, mechanism)
+    geometry, cable = scene.structure.geometry(), scene.cables.upper
+    for phi, rate, time in ((1.35, -0.3, 0.9), (0.8, -0.4, 8.0), (0.8, 0.4, 8.0)):
+        pose = mechanism.pose(np.array([phi]), np.array([rate]))
+        found = cables.pull(time, pose, np.zeros((2, 0)))
+        moved = float(found.chain.tensions @ found.chain.rates)
+        # Both planes are alike, so one cable stands for two.
+        assert found.force * rate == pytest.approx(-2.0 * moved, rel=1e-12)
+        fold, by_phi = geometry.fold(phi), geometry.fold_rate(phi)
+        down = np.array([0.0, 0.0, -1.0])
+        bar, h = geometry.half_bar, cable.block_offset
+        drop = (bar * math.sin(phi) + h) * down
+        block = 0.5 * (fold.left[0] + fold.right[0]) + drop
+        block_rate = 0.5 * (by_phi.left[0] + by_phi.right[0]) + bar * math.cos(phi) * down
+        path = np.stack([fold.left[0], block, fold.right[0]], axis=1).reshape(-1, 3)
+        moving = np.stack([by_phi.left[0], block_rate, by_phi.right[0]], axis=1).reshape(-1, 3)
+        if end == "last":
+            path, moving = path[::-1], moving[::-1]
+        path = np.concatenate([path[:1] + scene.cables.winch_distance * down, path])
+        moving = rate * np.concatenate([moving[:1], moving])
+        chain = Chain([cable], [len(path)])
+        state = chain.state(cables.ropes, path, moving, found.chain.wound, found.chain.wound_rate)
+        # A rope of 1e5 N over 4 m: 1e-15 m of round-off in its path are 3e-11 N.
+        np.testing.assert_allclose(found.chain.tensions, state.tensions, rtol=1e-9, atol=1e-9)

@@ -1,0 +1,67 @@
+"""Inertia of the ideal ring against its rods cut into pieces on the fold's own points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ideal_cases import pulled
+from ringsim.scene import Scene
+from ringsim.theory.ideal_ring import IdealRing
+
+PIECES = 200
+
+
+def summed(scene: Scene, phi: float, *, fixed: bool) -> float:
+    """Sum of m |dr/dphi|^2, with translation and rotation taken out of a ring that floats."""
+    shape, rods = scene.structure, scene.rods
+    geometry = shape.geometry()
+    fold, rate = geometry.fold(phi), geometry.fold_rate(phi)
+    parts = [
+        (np.full(place[..., 0].size, mass), place, moving)
+        for mass, place, moving in (
+            (shape.corner_mass, fold.corners, rate.corners),
+            (shape.vjoint_mass, fold.vjoints, rate.vjoints),
+        )
+    ]
+    share = (np.arange(PIECES) + 0.5)[:, None, None] / PIECES
+    diagonals = [("left", 0, "right", 1), ("left", 1, "right", 0)]
+    bars = [(a, k, b, k) for k in (0, 1) for a, b in (("left", "vjoints"), ("vjoints", "right"))]
+    for tube, ends in ((rods.diagonal, diagonals), (rods.bar, bars)):
+        for a, k, b, other in ends:
+            begin, end = getattr(fold, a)[k], getattr(fold, b)[other]
+            begin_rate, end_rate = getattr(rate, a)[k], getattr(rate, b)[other]
+            length = np.linalg.norm(end - begin, axis=1)[0]
+            places = (1 - share) * begin + share * end
+            moving = (1 - share) * begin_rate + share * end_rate
+            mass = rods.density * tube.area * length / PIECES
+            parts.append((np.full(places[..., 0].size, mass), places, moving))
+    m = np.concatenate([p[0] for p in parts])
+    r = np.concatenate([p[1].reshape(-1, 3) for p in parts])
+    v = np.concatenate([p[2].reshape(-1, 3) for p in parts])
+    if fixed:
+        v = v - rate.corners[0, 0]
+        return float(m @ np.sum(v**2, axis=1))
+    r, v = r - m @ r / m.sum(), v - m @ v / m.sum()
+    spin = np.einsum("i,ia,ib->ab", m, r, r)
+    turning = np.linalg.solve(np.trace(spin) * np.eye(3) - spin, np.cross(r, v).T @ m)
+    return float(m @ np.sum((v - np.cross(turning, r)) ** 2, axis=1))
+
+
+@pytest.mark.parametrize("sections", [5, 18])
+@pytest.mark.parametrize("base", ["free", "fixed"])
+@pytest.mark.parametrize("phi", [0.0, 0.5, 1.4])
+def test_inertia_is_that_of_its_pieces(sections, base, phi):
+    boom = {"kind": "rigid", "base": "fixed"} if base == "fixed" else "none"
+    scene = pulled(sections, boom=boom)
+    expected = summed(scene, phi, fixed=base == "fixed")
+    # The pieces leave out 1 / PIECES^2 of the rods' own turning, and their cross-sections: I / A
+    # over length^2 is 1.6e-4 of it for the bars.
+    assert IdealRing.of(scene).motion(phi).inertia == pytest.approx(expected, rel=3e-4)
+    wire = {"outer_diameter": 1e-3, "inner_diameter": 0.0}
+    heavy = {"rods__diagonal": wire, "rods__bar": wire, "rods__density": 3e4}
+    thin = pulled(sections, boom=boom, **heavy)
+    # Cross-sections that turn next to nothing, 1e-5, and what the pieces leave out, 1 / PIECES^2.
+    assert IdealRing.of(thin).motion(phi).inertia == pytest.approx(
+        summed(thin, phi, fixed=base == "fixed"), rel=4e-5
+    )
