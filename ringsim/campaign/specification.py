@@ -60,7 +60,7 @@ class Specification(Model):
     limits: Limits = Limits()
     retry: Retry = Retry()
     fidelity: Literal["full", "ideal"] = "full"
-    """full: the flexible multibody model; ideal: rigid rods, one coordinate."""
+    """full: the flexible multibody model; ideal: rigid rods."""
     error_bars_every: Annotated[int, Field(ge=0)] = 0
     """One sample in so many states its error bars (``solver.error_bars``); 0 for none."""
     max_failed: Annotated[int, Field(ge=0)] | None = None

@@ -32,7 +32,7 @@ EXIT_FAILED = 3
     type=click.Choice(["full", "ideal"]),
     default="full",
     show_default=True,
-    help="Full model, or the ideal ring of rigid rods (in a second; no asynchrony, no stress).",
+    help="Full model, or the ideal ring of rigid rods (in seconds; no asynchrony, no stress).",
 )
 @click.option(
     "--accuracy",
