@@ -79,7 +79,12 @@ _ALL = (
         "asynchrony", ("time",), "degree", "largest difference of opening angles between V-joints"
     ),
     Variable("asynchrony_max", (), "degree", "largest asynchrony up to the deployment time"),
-    Variable("rod_stress", ("rod", "section", "time"), "Pa", "axial + bending stress of a rod"),
+    Variable(
+        "rod_stress",
+        ("rod", "section", "time"),
+        "Pa",
+        "axial + bending stress of a rod, elastic + viscous",
+    ),
     Variable(
         "peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod", needs="stress"
     ),

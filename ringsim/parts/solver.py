@@ -120,4 +120,5 @@ class Record(Model):
     interval: Second = 0.1
     """Spacing of the output times."""
     stress: bool = False
-    """Record axial + bending stress at the ends of every rod."""
+    """Record axial + bending stress, elastic + viscous, at the ends of every rod.  Steps then
+    resolve the ring's own vibrations (``solver.deviation_tolerance``)."""
