@@ -71,7 +71,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         series (of the asynchrony the largest value); ``frontier`` (rung, output): whether no
         other setting of the scene's own model is both cheaper and better; ``cheapest`` (target,
         output): the rung among them, -1 if none will do; ``cost`` (rung): processor time without
-        the machine's moods, s; ``cpu_time``, ``residual_evaluations``, ``jacobians``,
+        the scatter of single timings, s; ``cpu_time``, ``residual_evaluations``, ``jacobians``,
         ``steps``, ``status`` and the settings (rung); and for each truth its distance from the
         reference and from every rung.
 

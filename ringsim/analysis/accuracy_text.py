@@ -103,7 +103,7 @@ def _errors(found: xr.Dataset, outputs: Sequence[str]) -> list[str]:
     lines = [
         "Errors, bold where no other setting is both cheaper and good for less; runs that two "
         "ladders share stand in the first. The cost is processor time, fitted to residuals, "
-        "Jacobians and steps over all runs, so that the machine's moods cancel:",
+        "Jacobians and steps over all runs, so that the scatter of single timings cancels:",
         "",
         f"| setting | steps | residuals | Jacobians | run | cost | {head} |",
         "|---|---|---|---|---|---|" + "---|" * len(outputs),

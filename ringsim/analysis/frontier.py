@@ -63,7 +63,7 @@ def _refines(fine: Rung, coarse: Rung) -> bool:
 
 
 def typical_cost(seconds: Array, work: Array, rungs: Sequence[Rung]) -> Array:
-    """Processor time of each setting without the machine's moods, shape (rung,), s.
+    """Processor time of each setting without the scatter of single timings, shape (rung,), s.
 
     Every piece of work costs the same within a ladder, but for a factor for the rods' formulation
     and elements: fitted to what was measured.  A fidelity costs what it did.

@@ -177,6 +177,8 @@ def _quadrature(scene: Scene) -> list[Truth]:
         return []  # the quadrature keeps an arc's end assemblies upright, but they swing
     joints = scene.joints
     losses = (joints.pivot, joints.hinge, joints.vjoint)
+    if scene.net is not None and scene.net.damping > 0.0:
+        return []
     if any(law is not None for law in losses) or scene.faults or scene.loads is None:
         return []
     try:

@@ -1,7 +1,10 @@
 """Kelvin-Voigt damping of geometrically exact rods, from how their strains change over a step.
 
 The strain of an element is the displacement e (six components) between the frames of its ends,
-both moved to its middle.  Damping is the force C de/dt, C = tau K / L, with
+both moved to its middle: exudyn's intrinsic measure, the logarithm of their relative motion, taken
+and applied half-way between them.  Taken in the first frame, it would lack how that frame turns,
+and a bent rod that turns would lose energy that nobody books.  Damping is the force C de/dt,
+C = tau K / L, with
 
     de/dt at t2 = a0 e2 + a1 e1 + a2 e0,   r = (t2 - t1) / (t1 - t0),
     a0 = (1 + 2 r) / (h (1 + r)),  a1 = -(1 + r) / h,  a2 = r^2 / (h (1 + r)),  h = t2 - t1,
@@ -13,10 +16,11 @@ only, and of a turning rod that error points along its axis, where C is largest.
 twentieth of a second it was a force as large as those that drive a ring.
 
 exudyn evaluates the force itself: it is a spring of stiffness a0 C whose unstretched length is
--(a1 e1 + a2 e0) / a0, both set before each attempt at a step.  In steps below tau / 2 such a spring
+-(a1 e1 + a2 e0) / a0, both set before each attempt at a step.  In steps below tau / 4 such a spring
 would be several times as stiff as the rod, and round-off of the positions would keep Newton from
-converging.  There the velocities are good (their error is that of a step of tau / 2 at most) and
-the force is C de/dt with them.
+converging.  There the velocities are good (their error is that of a step of tau / 4 at most) and
+the force is C de/dt with them, in the first frame: there exudyn's velocities are those that its
+damper works against, and in the intrinsic measure they are not.
 """
 
 from __future__ import annotations
@@ -33,8 +37,8 @@ _SHIFT = exu.OutputVariableType.DisplacementLocal
 _TURN = exu.OutputVariableType.Rotation
 _VELOCITY = exu.OutputVariableType.VelocityLocal
 _SPIN = exu.OutputVariableType.AngularVelocityLocal
-_SHORT = 0.5
-"""Steps below this share of tau take velocities: the spring is 1.5 / 0.5 times as stiff as the rod
+_SHORT = 0.25
+"""Steps below this share of tau take velocities: the spring is 1.5 / 0.25 times as stiff as the rod
 there, which ``STIFFENING`` allows for."""
 STIFFENING = 1.0 + 1.5 / _SHORT
 """Largest stiffness of a rod with its damper over that of the rod alone; 3/2 is a0 h of BDF2."""
@@ -92,7 +96,11 @@ class RodDampers:
             Its row in ``latest``.
         """
         self._dampers.append(
-            system.AddObject(item.ObjectConnectorRigidBodySpringDamper(markerNumbers=markers))
+            system.AddObject(
+                item.ObjectConnectorRigidBodySpringDamper(
+                    markerNumbers=markers, useIntrinsicFormulation=True
+                )
+            )
         )
         self._rows.append(damping)
         self._short = max(self._short, _SHORT * relaxation)
@@ -112,13 +120,16 @@ class RodDampers:
                 raise RuntimeError(f"the rods' dampers were not read at {start:.9g} s")
             self._past = [*self._past[-1:], (start, self._found.strains)]
         if time - start >= self._short:
-            self._by_velocity = False
+            if self._by_velocity:
+                self._intrinsic(system, wanted=True)
+                self._by_velocity = False
             self._lead, self._offsets = _difference(time, self._past)
             self._set(system, "stiffness", self._lead * np.array(self._rows))
             self._set(system, "offset", self._offsets)
             self._set(system, "damping", np.zeros((len(self._rows), 6, 6)))
         elif not self._by_velocity:
             self._by_velocity = True
+            self._intrinsic(system, wanted=False)
             self._set(system, "stiffness", np.zeros((len(self._rows), 6, 6)))
             self._set(system, "damping", np.array(self._rows))
 
@@ -132,13 +143,15 @@ class RodDampers:
         """
         if not self._dampers:
             return 0.0
-        strains = self._outputs(system, _SHIFT, _TURN)
         if self._by_velocity:
             rates = self._outputs(system, _VELOCITY, _SPIN)
-        elif self._past:
-            rates = self._lead * (strains - self._offsets)
+            self._intrinsic(system, wanted=True)
+            strains = self._outputs(system, _SHIFT, _TURN)
+            self._intrinsic(system, wanted=False)
         else:
-            rates = np.zeros_like(strains)
+            strains = self._outputs(system, _SHIFT, _TURN)
+            known = bool(self._past)
+            rates = self._lead * (strains - self._offsets) if known else np.zeros_like(strains)
         before = self._kept
         self.latest = np.einsum("nij,nj->ni", np.array(self._rows), rates)
         self._found = _Reading(time, strains, rates, self.latest, self._by_velocity)
@@ -157,6 +170,10 @@ class RodDampers:
     def _set(self, system: Any, name: str, values: Array) -> None:
         for damper, value in zip(self._dampers, values, strict=True):
             system.SetObjectParameter(damper, name, value)
+
+    def _intrinsic(self, system: Any, *, wanted: bool) -> None:
+        for damper in self._dampers:
+            system.SetObjectParameter(damper, "useIntrinsicFormulation", wanted)
 
     def _outputs(self, system: Any, shift: Any, turn: Any) -> Array:
         output = system.GetObjectOutput

@@ -2,9 +2,9 @@
 
 The integrator is of second order, so that doubling the steps multiplies an error by four and the
 two runs differ by three times the error of the finer one.  That holds on average; a single number
-(the largest of a trembling quantity, the time of one event) may agree by chance.  The bars
+(the largest of an oscillating quantity, the time of one event) may agree by chance.  The bars
 therefore take about the whole difference, and of times and angles the largest of all joints.
-The asynchrony as a function of time trembles with the ring's own vibrations, which long steps do
+The asynchrony as a function of time oscillates with the ring's own vibrations, which long steps do
 not follow: its bar at any time is made of the largest difference up to then, and an asynchrony
 below its bar says nothing.  What few elements leave out does not depend on the steps and is added:
 the rods' own inertia between two nodes, as a share that falls with the square of their number.

@@ -246,7 +246,7 @@ class Integration:
         self._end = min(self._end, max(time, 0.0) + settling)
 
     def _cause(self) -> str:
-        """Why steps became too small: a rope at twice its length is as good as used up."""
+        """Why steps became too small: a rope at twice its natural length is wound up."""
         pull = self._motion.instant(self._time, self._state).pull
         if pull is not None and pull.chain.strains.max() > 1.0:
             return "a winch has wound up its whole rope (limit its winding law, or stop it)"

@@ -73,8 +73,8 @@ def to_outcome(course: Course, scene: Scene, *, wall_time: float, cpu_time: floa
     }
     counts |= {f"total_{name}": counts[name] for name in COUNTS}
     values.update({name: np.array(number) for name, number in counts.items()})
-    values["step_used"] = np.array(np.nan)
-    values["tolerance_used"] = np.array(scene.solver.tolerance)
+    values["step_used"] = np.array(scene.solver.step)
+    values["tolerance_used"] = np.array(np.nan)
     values["final_time"] = np.array(end)
     values["wall_time"], values["cpu_time"] = np.array(wall_time), np.array(cpu_time)
     return Outcome(course.status, course.reason, coordinates, values)
@@ -150,6 +150,7 @@ def _add_cables(
     for number, planes in enumerate(cables.planes):
         reeled[list(planes)], loose[list(planes)] = wound[:, number], 0.0
     peak = (-math.inf, math.nan)
+    until = course.lock_time if math.isfinite(course.lock_time) else math.inf
     for piece, at_steps in zip(course.pieces, steps, strict=True):
         _at(course, piece, np.zeros(0))
         inner = [(time, course.motion.instant(time, state)) for time, state in piece.inner]
@@ -157,7 +158,9 @@ def _add_cables(
         chains = [instant.pull.chain for _, instant in line if instant.pull is not None]
         times = np.array([time for time, _ in line])
         found = np.array([cables.tensions(chain) for chain in chains])
-        peak = max(peak, _top(times, np.nanmax(found, axis=(1, 2))))
+        counts = times <= until
+        if counts.any():
+            peak = max(peak, _top(times[counts], np.nanmax(found[counts], axis=(1, 2))))
         stretch = np.array([cables.stretches(chain) for chain in chains])
         own = (seen.times >= times[0]) & (seen.times <= times[-1])
         curve, missing = _through(times, np.nan_to_num(found)), np.isnan(found[0])

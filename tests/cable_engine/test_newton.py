@@ -65,7 +65,7 @@ def test_full_newton_converges_quadratically_on_a_taut_truss() -> None:
 def test_the_reduced_tangent_converges_as_well() -> None:
     """What it leaves out of the decay is below what exudyn leaves out of the inertia."""
     exact, reduced = (residuals(exact=e, step=1e-2) for e in (True, False))
-    assert len(reduced) == len(exact)
+    assert len(reduced) <= len(exact) + 1
     assert reduced[2] == pytest.approx(exact[2], rel=0.1)
     # Linear at the end: each iteration at least thirds the residual.
     assert max(b / a for a, b in pairwise(reduced[1:])) < 0.34

@@ -44,7 +44,8 @@ class BarHalfBracket(Bracket):
             return None
         return (
             f"bracket.angle = {self.angle} deg must be at most {most:g} deg, 90 deg above "
-            "structure.opening_angle: the cable would fold the bars at first"
+            "structure.opening_angle: the cable would fold the bars at first "
+            "(lower it, or raise structure.opening_angle)"
         )
 
     def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
