@@ -6,8 +6,8 @@ With rigid rods every point is a function of the bar angle phi, so
 
 I = sum m |dr/dphi|^2 over all masses with the rigid-body motion taken out, W the work of the
 V-joint forces less the energy of the net.  A free ring keeps momentum and angular momentum at
-zero (its loads turn with it here; ringsim.theory.ideal_motion keeps them vertical); a fixed boom holds
-its hinge assembly.  The end assemblies of an open arc are held upright, as they are at rest.
+zero (its loads turn with it here; ringsim.theory.ideal_motion keeps them vertical); a fixed boom
+holds its hinge assembly.  The end assemblies of an open arc are held upright, as they are at rest.
 """
 
 from __future__ import annotations
