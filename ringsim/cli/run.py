@@ -107,7 +107,9 @@ def command(
         rows = [row for row in rows if row[1] != "total_steps"]
     for label, name, unit, style in rows:
         if name in values and np.isfinite(values[name].item()):
-            click.echo(f"  {label:20s}{format(values[name].item(), style)} {unit}".rstrip())
+            line = f"  {label:20s}{format(values[name].item(), style)} {unit}".rstrip()
+            bar = values.get(f"{name}_error")
+            click.echo(line if bar is None else f"{line} +- {bar.item():.2g}")
     dataset = to_dataset(outcome, chosen)
     save(dataset, target)
     click.echo(f"wrote {target}")

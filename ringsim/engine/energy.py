@@ -114,9 +114,22 @@ class EnergyMeter:
         self._since.keep()
         self._model.assembly.dampers.keep()
 
+    def note(self) -> str:
+        """What a run's reason must add about its balance; empty if it is known."""
+        if not self._untold:
+            return ""
+        return (
+            "; the energy balance is unknown, since slope-vector rods do not tell what their "
+            "damping takes: set rods.damping = 0 to have it"
+        )
+
+    @property
+    def _untold(self) -> bool:
+        return self._model.scene.rods.damping > 0.0 and not self._model.formulation.has_strains
+
     def _lost_in_rods(self, time: float) -> float:
         model = self._model
-        if model.scene.rods.damping > 0.0 and not model.formulation.has_strains:
+        if self._untold:
             return math.nan
         return model.assembly.dampers.lost(model.assembly.system, time)
 

@@ -100,6 +100,7 @@ class Integration:
             history.reason = self._explain(RuntimeError("it stopped before the end"))
         self._guard.conclude(history)
         history.reason += self._judge.note() if self._judge is not None else ""
+        history.reason += self._energy.note()
         close(history, self._system, solver)
         return history
 

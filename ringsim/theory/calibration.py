@@ -6,6 +6,7 @@ import math
 
 from scipy.optimize import brentq
 
+from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
@@ -14,8 +15,8 @@ from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 
 _WIDEST, _LEAST = 179.0, 1.0
 """Opening angles that are tried, deg."""
-_PATIENCE = 2.0
-"""A run is given up after so many times the wanted time."""
+_PATIENCE, _LONGEST = 2.0, 1e6
+"""A run is given up after so many times the wanted time, or after so many seconds."""
 _CLOSE = 1e-5
 """To which the angle is found, deg."""
 
@@ -38,10 +39,12 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         )
     if not (math.isfinite(time) and time > 0.0):
         raise InputError(f"a deployment time of {time:g} s must be finite and above 0 s")
-    end = max(_PATIENCE * time, scene.solver.step)
+    end = min(max(_PATIENCE * time, scene.solver.step), _LONGEST)
     plain = scene.with_values({"record.stress": False, "solver.end_time": end})
     refuse_if_not_ideal(plain)
-    least = _LEAST if scene.stop is None else max(_LEAST, scene.stop.stowed_angle + _CLOSE)
+    least = max(_LEAST, _least_of_brackets(scene))
+    if scene.stop is not None:
+        least = max(least, scene.stop.stowed_angle + _CLOSE)
 
     def excess(angle: float) -> float:
         course = Integration(plain.with_values({"structure.opening_angle": angle})).run()
@@ -74,3 +77,10 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         found = excess(middle)
         low, high, slack = (middle, high, found) if found >= 0.0 else (low, middle, slack)
     return float(brentq(excess, low, high, xtol=_CLOSE))
+
+
+def _least_of_brackets(scene: Scene) -> float:
+    """Opening angle from which every cable's bracket opens the ring, deg."""
+    cables = [] if scene.cables is None else [cable for _, cable in scene.cables.present()]
+    angles = [c.bracket.angle - 90.0 for c in cables if isinstance(c.bracket, BarHalfBracket)]
+    return max(angles, default=0.0)
