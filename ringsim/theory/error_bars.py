@@ -29,10 +29,10 @@ Array = NDArray[np.float64]
 SAFETY = {
     "deployment_time": 1.0,
     "opening_angle": 1.3,
-    "asynchrony": 4.5,
+    "asynchrony": 10.0,
     "asynchrony_max": 2.0,
     "peak_tension": 1.2,
-    "peak_rod_stress": 0.5,
+    "peak_rod_stress": 1.1,
 }
 """Bar over the difference of the two runs."""
 BETWEEN_READINGS = {"peak_tension": 2.0 * TENSION_BEND / 8.0}
