@@ -106,17 +106,18 @@ def point_masses(
     steep = _outer(along, _HEIGHT)
     masses, places = [np.full(points.vjoints[..., 0, 0].size, vjoint)], [points.vjoints]
     left, right, middle = points.left, points.right, points.vjoints
-    length = {id(diagonal): 2.0 * geometry.half_diagonal, id(bar): geometry.half_bar}
-    for start, end, across, tube in (
-        (left[1], right[0], ratio * tall - steep, diagonal),
-        (left[0], right[1], ratio * tall + steep, diagonal),
-        (left[0], middle[0], tall + slant, bar),
-        (middle[0], right[0], tall - slant, bar),
-        (left[1], middle[1], tall - slant, bar),
-        (middle[1], right[1], tall + slant, bar),
+    slanted = (*diagonal, 2.0 * geometry.half_diagonal)
+    folding = (*bar, geometry.half_bar)
+    for start, end, across, (density, inertia, length) in (
+        (left[1], right[0], ratio * tall - steep, slanted),
+        (left[0], right[1], ratio * tall + steep, slanted),
+        (left[0], middle[0], tall + slant, folding),
+        (middle[0], right[0], tall - slant, folding),
+        (left[1], middle[1], tall - slant, folding),
+        (middle[1], right[1], tall + slant, folding),
     ):
-        share = tube[0] * length[id(tube)] / 6.0
-        reach = math.sqrt(3.0 * tube[1] / tube[0])
+        share = density * length / 6.0
+        reach = math.sqrt(3.0 * inertia / density)
         centre = 0.5 * (start + end)
         sides = [centre + sign * reach * way for way in (across, normals) for sign in (1.0, -1.0)]
         masses.append(np.full(6 * len(start), share))
