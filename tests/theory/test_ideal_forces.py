@@ -144,8 +144,10 @@ def test_cables_are_the_chain_on_the_fold_s_points(end):
         moving = np.stack([by_phi.left[0], block_rate, by_phi.right[0]], axis=1).reshape(-1, 3)
         if end == "last":
             path, moving = path[::-1], moving[::-1]
-        path = np.concatenate([path[:1] + scene.cables.winch_distance * down, path])
-        moving = rate * np.concatenate([moving[:1], moving])
+        away = scene.cables.winch_distance * down
+        far = slice(-1, None) if end == "both" else slice(0, 0)
+        path = np.concatenate([path[:1] + away, path, path[far] + away])
+        moving = rate * np.concatenate([moving[:1], moving, moving[far]])
         chain = Chain([cable], [len(path)])
         state = chain.state(cables.ropes, path, moving, found.chain.wound, found.chain.wound_rate)
         # A rope of 1e5 N over 4 m: 1e-15 m of round-off in its path are 3e-11 N.
