@@ -65,6 +65,7 @@ def test_full_newton_converges_quadratically_on_a_taut_truss() -> None:
 def test_the_reduced_tangent_converges_as_well() -> None:
     """What it leaves out of the decay is below what exudyn leaves out of the inertia."""
     exact, reduced = (residuals(exact=e, step=1e-2) for e in (True, False))
+    # One more at the end, where it is linear: 4.2e-7 N are left where the exact one has 8e-8 N.
     assert len(reduced) <= len(exact) + 1
     assert reduced[2] == pytest.approx(exact[2], rel=0.1)
     # Linear at the end: each iteration at least thirds the residual.
