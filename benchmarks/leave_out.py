@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from ringsim.engine.planar_truss import build_truss
 
 from ringsim.choice import kind_of
 from ringsim.engine.build import build
-from ringsim.engine.planar_truss import build_truss
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run

@@ -15,7 +15,7 @@ import sys
 
 from ringsim.scene import load_scene
 from ringsim.theory.energy_quadrature import opening_time
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 
 OURS = """
 import ringsim, time
@@ -51,7 +51,7 @@ def once(code: str) -> tuple[float, float, int]:
 
 def main(rounds: int) -> None:
     scene = load_scene("ring18")
-    truth = opening_time(IdealRing.of(scene), scene.structure.initial_phi).time
+    truth = opening_time(OneCoordinate(scene), scene.structure.coordinate).time
     codes = {name: OURS.replace("{values}", repr(values)) for name, values in SETTINGS.items()}
     codes["plain exudyn"] = PLAIN
     runs: dict[str, list[tuple[float, float, int]]] = {name: [] for name in codes}

@@ -25,13 +25,13 @@ from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.solver import Record, Solver
-from ringsim.parts.structure.family import Structure
-from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.refusal import InputError, explain, known_or_nearest
+from ringsim.structures.family import Structure
+from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import Model
 
-for _package in ("structure", "rods", "boom", "faults"):
-    load_package(f"ringsim.parts.{_package}")
+for _package in ("parts.rods", "parts.boom", "parts.faults", "structures"):
+    load_package(f"ringsim.{_package}")
 
 if TYPE_CHECKING:
     AnyStructure = PantographRing

@@ -17,7 +17,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 from ringsim.variables import Status
 
 TIMEOUT = 1800.0
@@ -182,7 +182,7 @@ def _quadrature(scene: Scene) -> list[Truth]:
     if any(law is not None for law in losses) or scene.faults or scene.loads is None:
         return []
     try:
-        found = opening_time(IdealRing.of(scene), scene.structure.initial_phi)
+        found = opening_time(OneCoordinate(scene), scene.structure.coordinate)
     except ValueError:
         return []
     return [Truth("deployment_time", "energy quadrature of the ideal ring", found.time)]

@@ -8,13 +8,13 @@ import click
 import numpy as np
 
 from ringsim.choice import kind_of
-from ringsim.geometry.mobility import internal_mobility
-from ringsim.geometry.ring import RingGeometry
+from ringsim.layout.mobility import internal_mobility
 from ringsim.overrides import parse_assignment
-from ringsim.parts.structure.pantograph_ring import PantographRing
-from ringsim.parts.structure.planar_truss import PlanarTruss
 from ringsim.refusal import show
 from ringsim.scene import Scene, load_scene
+from ringsim.structures.pantograph_ring import PantographRing
+from ringsim.structures.planar_truss import PlanarTruss
+from ringsim.structures.ring_geometry import RingGeometry
 from ringsim.units import Model
 
 MOST_SECTIONS_FOR_MOBILITY = 72
@@ -77,11 +77,11 @@ def _of_ring(scene: Scene) -> list[tuple[str, str]]:
         ("structure", f"{kind_of(structure)}, {shape}, {_count(sections, 'section')}"),
         ("polygon", _polygon(geometry)),
         ("deployed", _size(geometry, 0.0)),
-        ("initial", f"{_size(geometry, structure.initial_phi)} at {structure.opening_angle} deg"),
+        ("initial", f"{_size(geometry, structure.coordinate)} at {structure.opening_angle} deg"),
         ("rods", f"{6 * sections} {kind_of(rods)} ({_count(rods.elements, 'element')} a rod half)"),
         ("points", f"{2 * corners} hinge assemblies, {2 * sections} V-joints, {sections} pivots"),
         ("joints", f"{11 * sections} revolutes"),
-        ("mobility", _mobility(geometry, structure.initial_phi)),
+        ("mobility", _mobility(geometry, structure.coordinate)),
         ("mass", f"{sum(masses.values()):.4g} kg: {_listed(masses)}"),
     ]
 
@@ -90,7 +90,7 @@ def _of_planar_truss(scene: Scene) -> list[tuple[str, str]]:
     truss, rods = scene.structure, scene.rods
     assert isinstance(truss, PlanarTruss)
     geometry = truss.geometry()
-    ends = [truss.initial_angle, truss.stowed_angle]
+    ends = [truss.coordinate, truss.stowed_angle]
     cable, strut = geometry.cable(ends), geometry.strut(ends)
     angles = [math.degrees(angle) for angle in ends]
     tubes = rods.diagonal.area + truss.strut_inner.area

@@ -19,7 +19,7 @@ from ringsim.engine.history import History
 from ringsim.engine.locks import Locks
 from ringsim.engine.outcome import lock_times
 from ringsim.engine.predictor import Predictor
-from ringsim.engine.readings import JointGroup, Openings, State
+from ringsim.engine.readings import Openings, State, joint_groups
 from ringsim.engine.scales import (
     contact_step,
     residual_tolerance,
@@ -30,7 +30,7 @@ from ringsim.engine.scales import (
 from ringsim.engine.settings import raise_own, solver_settings
 from ringsim.engine.step_judge import Reading, StepJudge
 from ringsim.engine.stepping import StepControl
-from ringsim.engine.stress import StressMeter
+from ringsim.engine.stress import BendingMeter, StressMeter
 from ringsim.variables import Status
 
 Array = NDArray[np.float64]
@@ -42,20 +42,18 @@ class Integration:
     """One run of a built model."""
 
     def __init__(self, built: Built) -> None:
-        ring, scene = built.ring, built.ring.scene
+        model, scene = built.model, built.model.scene
         self._built, self._scene = built, scene
-        self._system = ring.assembly.system
+        self._system = model.assembly.system
         self._solver = exu.MainSolverImplicitSecondOrder()
         self._settings = solver_settings(scene, residual_tolerance(built))
-        self._state = State(ring)
-        self._openings = Openings(ring)
-        self._energy = EnergyMeter(ring, built.net, built.forces, built.faults)
-        self._stress = StressMeter(ring) if scene.record.stress else None
-        families = {joint.family for joint in ring.joints}
-        self._gaps = [
-            JointGroup(ring, [j for j in ring.joints if j.family == family])
-            for family in sorted(families)
-        ]
+        self._state = State(model)
+        self._openings = Openings(model)
+        self._energy = EnergyMeter(model, built.hub, built.faults)
+        self._stress = StressMeter(model) if scene.record.stress else None
+        gauge = scene.structure.gauge
+        self._bending = BendingMeter(model, gauge) if gauge else None
+        self._gaps = joint_groups(model)
         self._state.refresh()
         self._locks = Locks(built, self._openings.read(self._state)[0])
         self._settled_at = math.inf
@@ -68,7 +66,7 @@ class Integration:
         bend = math.inf
         if constant and built.cables is not None:
             bend = max(cable.slack_width for cable in built.cables.chain.cables)
-        self._guard = Guard(scene.solver, usual_energy(scene), scene.structure.half_bar, bend)
+        self._guard = Guard(scene.solver, usual_energy(scene), scene.structure.reach, bend)
         self._fresh = True
         self._weighed: Reading | None = None
         self._shorter: float | None = None
@@ -77,10 +75,10 @@ class Integration:
 
     def run(self) -> History:
         """Integrate until all V-joints have locked and settled, or to the end time."""
-        history, solver, ring = self.history, self._solver, self._built.ring
+        history, solver, model = self.history, self._solver, self._built.model
         solver.SetUserFunctionUpdateCurrentTime(self._system, self._update_time)
         self._system.SetPostStepUserFunction(self._after_step)
-        self._system.SetPreNewtonResidualUserFunction(Predictor(ring.assembly, solver).apply)
+        self._system.SetPreNewtonResidualUserFunction(Predictor(model.assembly, solver).apply)
         if self._judge is not None:
             self._settings.timeIntegration.discontinuous.ignoreMaxIterations = False
             self._system.SetPostNewtonUserFunction(self._weigh)
@@ -109,13 +107,9 @@ class Integration:
         cables = self._scene.cables
         if cables is None:
             return np.zeros(0)
-        ring = self._scene.structure
-        angles = self.history.angles[-1]
+        structure, angles = self._scene.structure, self.history.angles[-1]
         return np.array(
-            [
-                float(np.sum(cable.path_slope(ring.half_bar, angles[plane])))
-                for plane, cable in cables.present()
-            ]
+            [structure.path_slope(cable, angles[plane]) for plane, cable in cables.present()]
         )
 
     def _update_time(self, solver: Any, system: Any, settings: Any) -> None:
@@ -209,10 +203,13 @@ class Integration:
             history.tensions.append(chain.tensions)
             history.slack.append(chain.is_slack[chain.ropes.first].astype(float))
             history.wound.append(chain.wound.sum(axis=1))
+            history.lengths.append(chain.lengths)
             self._chain = chain
         history.gaps.append(max(float(group.gaps(self._state).max()) for group in self._gaps))
         if self._stress is not None:
             history.stresses.append(self._stress.read())
+        if self._bending is not None:
+            history.strains.append(self._bending.read())
         return not self._guard.stops(history, self._locks.overrun(angles), float(angles.max()))
 
     def _read_cables(self, time: float) -> ChainState | None:
@@ -223,7 +220,7 @@ class Integration:
 
     def _note_end(self, time: float) -> None:
         """Let the run end once all V-joints have reached the same stop."""
-        if math.isfinite(self._settled_at):
+        if math.isfinite(self._settled_at) or not self._scene.structure.locks:
             return
         for reached, where in (
             (self._locks.deployed, "180 deg"),
@@ -251,7 +248,10 @@ class Integration:
         end = self._scene.solver.end_time
         if time < end * (1.0 - 1e-12):
             return False
-        if self.history.status == Status.UNFINISHED:
+        if not self._scene.structure.locks:
+            self.history.status = Status.OK
+            self.history.reason = f"the cable was wound until solver.end_time = {end:g} s"
+        elif self.history.status == Status.UNFINISHED:
             locked = int(self._locks.deployed.sum())
             self.history.reason = (
                 f"solver.end_time = {end:g} s was reached with {locked} of "

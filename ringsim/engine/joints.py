@@ -9,7 +9,7 @@ import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.pantograph_ring import RingModel
+from ringsim.engine.model import Model
 from ringsim.parts.joints import JointFriction, Stop
 from ringsim.parts.persection import spread
 
@@ -19,9 +19,9 @@ _ONSET = 1e-3
 """Depth in rad over which the damping of a stop comes in, so that contact starts smoothly."""
 
 
-def add_friction(model: RingModel) -> None:
+def add_friction(model: Model) -> None:
     """Friction connectors for the families that the scene names, and for no other."""
-    sections = model.geometry.sections
+    sections = model.scene.structure.sections
     laws = model.scene.joints
     families: dict[str, JointFriction | None] = {
         "pivot": laws.pivot,
@@ -29,7 +29,7 @@ def add_friction(model: RingModel) -> None:
         "vjoint": laws.vjoint,
     }
     for joint in model.joints:
-        law = families[joint.family]
+        law = families.get(joint.family)
         if law is None:
             continue
         viscous = float(spread(law.viscous, sections)[joint.section])
@@ -55,7 +55,7 @@ def friction_torque(
     return np.asarray(viscous * rate + coulomb * np.tanh(rate / law.rate))
 
 
-def add_stops(model: RingModel) -> list[list[Any]]:
+def add_stops(model: Model) -> list[list[Any]]:
     """A stop on every V-joint; returns the connectors, [plane][section].
 
     The angle is measured from the half-open joint, a quarter turn away, so that neither end of
@@ -64,15 +64,15 @@ def add_stops(model: RingModel) -> list[list[Any]]:
     stop = model.scene.stop
     if stop is None:
         return []
-    stops: list[list[Any]] = [[], []]
-    for plane, sense in enumerate((1.0, -1.0)):
-        turned = _about_z(sense * 0.5 * math.pi)
-        function = model.assembly.symbolic(
-            ("stop", sense), _stop_law(stop, sense), _TORSION, "springTorqueUserFunction"
-        )
-        for joint in model.vjoints[plane]:
-            first = model.assembly.node_marker(joint.gap[0], turned)
-            stops[plane].append(
+    stops: list[list[Any]] = []
+    for plane in model.openings():
+        stops.append([])
+        for joint, sense in plane:
+            first = model.assembly.node_marker(joint.nodes[0], _about_z(sense * 0.5 * math.pi))
+            function = model.assembly.symbolic(
+                ("stop", sense), _stop_law(stop, sense), _TORSION, "springTorqueUserFunction"
+            )
+            stops[-1].append(
                 model.assembly.torsion_spring(
                     first, joint.markers[1], springTorqueUserFunction=function
                 )
@@ -80,7 +80,7 @@ def add_stops(model: RingModel) -> list[list[Any]]:
     return stops
 
 
-def latch(model: RingModel, connector: Any) -> None:
+def latch(model: Model, connector: Any) -> None:
     """Make a stop act from both sides from now on."""
     model.assembly.system.SetObjectParameter(connector, "offset", 1.0)
 

@@ -33,7 +33,7 @@ class Locks:
     """
 
     def __init__(self, built: Built, angles: Array) -> None:
-        self._built, self._stop = built, built.ring.scene.stop
+        self._built, self._stop = built, built.model.scene.stop
         self._stowed_angle = 0.0 if self._stop is None else math.radians(self._stop.stowed_angle)
         self.deployed, self.stowed, self.latched = np.zeros((3, *angles.shape), dtype=bool)
         self._away = angles > self._stowed_angle + _APART
@@ -49,7 +49,7 @@ class Locks:
         deployed = angles >= math.pi
         if self._stop is not None and self._stop.latch:
             for plane, section in np.argwhere(deployed & ~self.deployed):
-                latch(self._built.ring, self._built.stops[plane][section])
+                latch(self._built.model, self._built.stops[plane][section])
                 self.latched[plane, section] = True
         self.deployed |= deployed
         self.stowed |= self._away & (angles <= self._stowed_angle)

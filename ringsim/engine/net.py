@@ -6,7 +6,6 @@ to weightless as it is, with the energy of its first stretch.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import exudyn as exu
@@ -14,56 +13,27 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.pantograph_ring import RingModel
-from ringsim.parts.persection import spread
-from ringsim.theory.ideal_net import FreeHub
+from ringsim.engine.model import Model
 
 Array = NDArray[np.float64]
 _ONSET = 1e-4
 """Stretch in m over which the damping of a spring comes in."""
 
 
-@dataclass(frozen=True)
-class HubNet:
-    """The hub's node and the springs' constants.
-
-    Attributes
-    ----------
-    hub
-        Node of the hub.
-    stiffness
-        Spring rates, one per upper corner, N/m.
-
-    """
-
-    hub: Any
-    stiffness: Array
-
-
-def add_net(model: RingModel) -> HubNet | None:
-    """The hub and its springs, if the scene has a net."""
-    net = model.scene.net
-    if net is None:
+def add_net(model: Model) -> Any:
+    """Build hub and springs of a layout with a net; returns the hub's node, None without."""
+    net, held = model.scene.net, model.layout.net
+    if net is None or held is None:
         return None
     assembly = model.assembly
-    corners = model.fold.corners[0]
-    hub = assembly.system.AddNode(
-        item.NodePoint(
-            referenceCoordinates=list(FreeHub(net, len(corners)).hub(corners)),
-        )
-    )
-    starts = [assembly.starts[int(node)][:3] for _, node in model.hinges[0]]
+    hub = assembly.system.AddNode(item.NodePoint(referenceCoordinates=list(held.hub)))
+    nodes = [model.bodies[number][1] for number in held.bodies]
+    starts = [assembly.starts[int(node)][:3] for node in nodes]
     assembly.starts[int(hub)] = np.mean(starts, axis=0)
-    body = assembly.system.AddObject(
-        item.ObjectMassPoint(
-            nodeNumber=hub,
-            mass=net.hub_mass,
-        )
-    )
+    body = assembly.system.AddObject(item.ObjectMassPoint(nodeNumber=hub, mass=held.mass))
     assembly.bodies.append(body)
     middle = assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=hub))
-    stiffness = spread(net.stiffness, len(corners))
-    for rate, (_, node) in zip(stiffness, model.hinges[0], strict=True):
+    for rate, node in zip(held.stiffness, nodes, strict=True):
         settings: dict[str, Any] = {"stiffness": float(rate), "damping": net.damping}
         if not net.two_sided:
             settings["springForceUserFunction"] = assembly.symbolic(
@@ -72,17 +42,13 @@ def add_net(model: RingModel) -> HubNet | None:
                 "ObjectConnectorSpringDamper",
                 "springForceUserFunction",
             )
+        end = assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=node))
         assembly.system.AddObject(
             item.ObjectConnectorSpringDamper(
-                markerNumbers=[
-                    middle,
-                    assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=node)),
-                ],
-                referenceLength=net.neutral_length,
-                **settings,
+                markerNumbers=[middle, end], referenceLength=net.neutral_length, **settings
             )
         )
-    return HubNet(hub, stiffness)
+    return hub
 
 
 def _one_sided(

@@ -9,23 +9,39 @@ import numpy as np
 from ringsim.engine.build import Built
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.rod_dampers import STIFFENING
+from ringsim.layout.bodies import OnRod
+from ringsim.layout.joints import JointOpening
+from ringsim.layout.of_scene import layout_of
 from ringsim.scene import Scene
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
+
+_SLIGHT = 1e-3
+"""Energy that does not matter, over the largest force of a structure's springs along a rod."""
 
 
 def usual_rate(scene: Scene) -> float:
-    """Mean opening rate in rad/s if the initial acceleration of the ideal ring lasted."""
-    ring = scene.structure
-    travel = math.pi - math.radians(ring.opening_angle)
-    pull = 2.0 * abs(IdealRing.of(scene).acceleration_from_rest(ring.initial_phi))
+    """Mean opening rate in rad/s if the initial acceleration of the ideal structure lasted."""
+    angles, rates = layout_of(scene).opening_angles()
+    travel = math.pi - float(angles.mean())
+    pull = abs(float(rates.mean())) * abs(_ideal(scene)[0])
     return max(math.sqrt(0.5 * pull * travel), travel / scene.solver.end_time)
 
 
 def usual_energy(scene: Scene) -> float:
-    """Kinetic energy in J of the ideal ring, as stowed, at its usual rate."""
-    ring = scene.structure
-    inertia = float(IdealRing.of(scene).motion(ring.initial_phi).inertia)
-    return 0.5 * inertia * (0.5 * usual_rate(scene)) ** 2
+    """Kinetic energy in J of the ideal structure, as stowed, at its usual rate.
+
+    Springs of its own set their own scale: what they would do along a rod.
+    """
+    if scene.structure.push > 0.0:
+        return _SLIGHT * scene.structure.push * scene.structure.reach
+    rate = float(layout_of(scene).opening_angles()[1].mean())
+    return 0.5 * _ideal(scene)[1] * (usual_rate(scene) / rate) ** 2
+
+
+def _ideal(scene: Scene) -> tuple[float, float]:
+    """Acceleration (rad/s^2) and inertia (kg m^2) of the one coordinate at the start."""
+    ideal, q = OneCoordinate(scene), scene.structure.coordinate
+    return ideal.acceleration_from_rest(q), ideal.motion(q).inertia
 
 
 def slight_energy(cables: CableDrive) -> float:
@@ -37,34 +53,38 @@ def slight_energy(cables: CableDrive) -> float:
 
 def contact_step(built: Built) -> float:
     """Step that resolves a V-joint's bounce: a twentieth of its period on the stop's spring."""
-    scene = built.ring.scene
-    if scene.stop is None:
+    model, scene = built.model, built.model.scene
+    joints = [joint for plane in model.layout.openings for joint in plane]
+    if scene.stop is None or not isinstance(joints[0], JointOpening):
         return scene.solver.step
-    rods, ring = scene.rods, scene.structure
-    half = rods.density * rods.bar.area * ring.half_bar**3 / 3.0
-    inertia = 2.0 * half + ring.vjoint_mass * ring.half_bar**2
+    joint = model.layout.joints[joints[0].joint]
+    inertia = 0.0
+    for mount in (joint.first, joint.second):
+        if isinstance(mount, OnRod):
+            rod = model.layout.rods[mount.rod]
+            ends = sum(mass for _, mass in rod.masses)
+            inertia += (rod.mass / 3.0 + ends) * rod.length**2
     return 2.0 * math.pi * math.sqrt(inertia / scene.stop.stiffness) / 20.0
 
 
 def rope_step(built: Built) -> float:
-    """Step that resolves how the ring, as stowed, swings on taut ropes: a fiftieth of the period.
+    """Step that resolves how the structure, as stowed, swings on taut ropes: a fiftieth of it.
 
     A winch that starts at once throws the ring into that swing, often with the largest tension of
     the run; the first V-joint moves before the others, so that it is faster than the ideal ring's.
     Infinite without cables.
     """
-    scene = built.ring.scene
+    scene, layout = built.model.scene, built.model.layout
     if built.cables is None:
         return math.inf
-    ring = scene.structure
-    inertia = 0.25 * float(IdealRing.of(scene).motion(ring.initial_phi).inertia)
+    angles, rates = layout.opening_angles()
+    inertia = _ideal(scene)[1] / float(rates.mean()) ** 2
     cables, content = built.cables.chain.cables, np.abs(built.cables.ropes.content)
-    opening = math.pi - 2.0 * ring.initial_phi
     stiffness = sum(
         cable.axial_stiffness
         / float(length)
-        * (ring.sections * float(cable.path_slope(ring.half_bar, opening))) ** 2
-        for cable, length in zip(cables, content, strict=True)
+        * scene.structure.path_slope(cable, angles[plane]) ** 2
+        for plane, cable, length in zip(built.cables.planes, cables, content, strict=True)
     )
     return 2.0 * math.pi * math.sqrt(inertia / stiffness) / 50.0
 
@@ -75,19 +95,13 @@ def residual_tolerance(built: Built) -> float:
     ``newton_tolerance`` times the driving forces, but above what round-off lets the residual
     reach: the stiffest element's rate EA / L times coordinates of order 1 m, per coordinate.
     """
-    scene = built.ring.scene
-    drive = float(np.linalg.norm(built.forces))
-    if scene.net is not None and built.net is not None:
-        drive += float(np.linalg.norm(built.net.stiffness)) * scene.net.neutral_length
-    stiffest = max(
-        np.max(scene.rods.young_modulus) * tube.area * scene.rods.elements / length
-        for tube, length in (
-            (scene.rods.diagonal, scene.structure.half_diagonal),
-            (scene.rods.bar, scene.structure.half_bar),
-        )
-    )
+    scene, layout = built.model.scene, built.model.layout
+    drive = float(np.linalg.norm([force for _, force in layout.forces])) + scene.structure.push
+    if scene.net is not None and layout.net is not None:
+        drive += float(np.linalg.norm(layout.net.stiffness)) * scene.net.neutral_length
+    stiffest = max(rod.young_modulus * rod.tube.area / rod.shortest for rod in layout.rods)
     if scene.rods.damping > 0.0:
         stiffest *= STIFFENING
-    size = built.ring.assembly.system.systemData.ODE2Size()
+    size = built.model.assembly.system.systemData.ODE2Size()
     round_off = 4.0 * np.finfo(float).eps * float(stiffest) * math.sqrt(size)
     return max(scene.solver.newton_tolerance * drive, round_off)

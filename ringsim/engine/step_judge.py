@@ -49,7 +49,7 @@ class StepJudge:
     """
 
     def __init__(self, built: Built) -> None:
-        scene, cables = built.ring.scene, built.cables
+        scene, cables = built.model.scene, built.cables
         self.locked = False
         slight = usual_energy(scene) if cables is None else slight_energy(cables)
         self._energy = EnergyControl(scene.solver, slight, tireless=cables is not None)

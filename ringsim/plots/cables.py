@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ringsim.cable.records import Cable
-from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.plots import style, wording
 from ringsim.scene import scene_from_toml
+from ringsim.structures.pantograph_ring import PantographRing
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.geometry.ring import RingGeometry
 from ringsim.scene import Scene
+from ringsim.structures.ring_geometry import RingGeometry
 
 Array = NDArray[np.float64]
 

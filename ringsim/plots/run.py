@@ -10,8 +10,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ringsim.parts.structure.pantograph_ring import PantographRing
-from ringsim.parts.structure.planar_truss import PlanarTruss
 from ringsim.plots import style
 from ringsim.plots.asynchrony import asynchrony
 from ringsim.plots.cables import cables
@@ -22,6 +20,8 @@ from ringsim.plots.planar_truss import strain_over_length, tension_over_length
 from ringsim.plots.ring import ring
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
+from ringsim.structures.pantograph_ring import PantographRing
+from ringsim.structures.planar_truss import PlanarTruss
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ import math
 from scipy.optimize import brentq
 
 from ringsim.cable.bracket.bar_half import BarHalfBracket
-from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.theory.ideal_course import Integration
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 

@@ -250,7 +250,7 @@ class IdealCables:
 
 
 def _initial(scene: Scene, mechanism: Mechanism) -> Array:
-    return np.append(scene.structure.initial_phi, np.zeros(mechanism.freedom - 1))
+    return np.append(scene.structure.coordinate, np.zeros(mechanism.freedom - 1))
 
 
 def _in_basis(cable: Cable) -> tuple[Array, Array]:

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.geometry.ring import RingGeometry
 from ringsim.scene import Scene
+from ringsim.structures.ring_geometry import RingGeometry
 from ringsim.theory.ideal_points import SIGN, UP, Points
 
 Array = NDArray[np.float64]

@@ -13,13 +13,13 @@ import time
 import numpy as np
 
 from ringsim.choice import kind_of
+from ringsim.layout.free_hub import FreeHub
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.net import Net
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.faded_friction import with_remark
 from ringsim.theory.ideal_course import Integration
-from ringsim.theory.ideal_net import FreeHub
 from ringsim.theory.ideal_outcome import to_outcome
 from ringsim.variables import Outcome, Status
 
@@ -60,7 +60,7 @@ def refuse_if_not_ideal(scene: Scene) -> None:
 
 
 def _refuse_net(scene: Scene, net: Net) -> None:
-    corners = scene.structure.geometry().fold(scene.structure.initial_phi).corners[0]
+    corners = scene.structure.geometry().fold(scene.structure.coordinate).corners[0]
     aside = FreeHub(net, len(corners)).imbalance(corners)
     if net.damping > 0.0 and aside > _CENTRED:
         raise InputError(

@@ -19,12 +19,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.layout.free_hub import FreeHub
 from ringsim.parts.joints import JointFriction, Stop
 from ringsim.parts.persection import spread
 from ringsim.scene import Scene
 from ringsim.theory.ideal_ends import SENSE
 from ringsim.theory.ideal_mechanism import Mechanism, Pose
-from ringsim.theory.ideal_net import FreeHub
 
 Array = NDArray[np.float64]
 

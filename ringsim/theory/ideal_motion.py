@@ -82,7 +82,7 @@ class IdealMotion:
         self.forces = Forces(scene, self.mechanism)
         self.cables = None if scene.cables is None else IdealCables(scene, self.mechanism)
         self.latched, self.until, self.refusal = False, math.inf, ""
-        self._initial = scene.structure.initial_phi
+        self._initial = scene.structure.coordinate
         n = self.mechanism.freedom
         self._tilts = not self.mechanism.fixed and self.forces.load != 0.0
         tilt = 3 if self._tilts else 0

@@ -35,8 +35,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ringsim.parts.structure.planar_truss import PlanarTruss
 from ringsim.scene import Scene
+from ringsim.structures.planar_truss import PlanarTruss
 
 Array = NDArray[np.float64]
 _REPETITIONS = 12

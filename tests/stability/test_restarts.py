@@ -16,8 +16,8 @@ from ringsim.execution.serial import Serial
 from ringsim.execution.solve import solve
 from ringsim.execution.work import Limits, Retry, Task, Work
 from ringsim.parts.solver import Solver
-from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.scene import load_scene
+from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.variables import COUNTS, Outcome, Status
 
 SCENE = load_scene("truss2")

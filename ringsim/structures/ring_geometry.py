@@ -10,11 +10,12 @@ keeps all rod lengths, so each is an exact, stress-free configuration.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.geometry.polygon import corners as polygon_corners
+from ringsim.structures.polygon import corners as polygon_corners
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ _SIGN = np.array([1.0, -1.0])
 
 @dataclass(frozen=True)
 class Fold:
-    """Point positions of one fold state, or their derivatives after phi (same shapes, metre).
+    """Point positions of one fold state, in metre.
 
     Attributes
     ----------
@@ -94,40 +95,28 @@ class RingGeometry:
         """Distance of neighbouring corners at 180 deg, in metre."""
         return 2.0 * (self.half_bar + self.hinge_offset)
 
-    def width(self, phi: float) -> float:
+    def width(self, phi: Any) -> Any:
         """Horizontal distance between the pins of a section, in metre."""
-        return float(2.0 * self.half_bar * np.cos(phi))
+        return 2.0 * self.half_bar * np.cos(phi)
 
-    def height(self, phi: float) -> float:
+    def height(self, phi: Any) -> Any:
         """Vertical distance between upper and lower corners, in metre."""
-        return float(np.sqrt(4.0 * self.half_diagonal**2 - self.width(phi) ** 2))
+        return np.sqrt(4.0 * self.half_diagonal**2 - self.width(phi) ** 2)
 
-    def fold(self, phi: float) -> Fold:
-        """Positions at the bar angle ``phi`` (rad, 0 deployed .. pi/2 fully stowed)."""
+    def fold(self, phi: Any) -> Fold:
+        """Positions at the bar angle ``phi`` (rad, 0 deployed .. pi/2 fully stowed).
+
+        A complex ``phi`` gives complex positions: its imaginary part carries derivatives.
+        """
         width, height = self.width(phi), self.height(phi)
         return self._place(
             chord=width + 2.0 * self.hinge_offset,
             offset=self.hinge_offset,
             half_height=0.5 * height,
-            joint_height=0.5 * height - self.half_bar * float(np.sin(phi)),
+            joint_height=0.5 * height - self.half_bar * np.sin(phi),
         )
 
-    def fold_rate(self, phi: float) -> Fold:
-        """Derivatives of all positions after phi, in metre per radian."""
-        width, height = self.width(phi), self.height(phi)
-        width_rate = -2.0 * self.half_bar * float(np.sin(phi))
-        height_rate = -width * width_rate / height
-        return self._place(
-            chord=width_rate,
-            offset=0.0,
-            half_height=0.5 * height_rate,
-            joint_height=0.5 * height_rate - self.half_bar * float(np.cos(phi)),
-        )
-
-    def _place(
-        self, *, chord: float, offset: float, half_height: float, joint_height: float
-    ) -> Fold:
-        """Place all points; linear in its arguments, so it also places their derivatives."""
+    def _place(self, *, chord: Any, offset: float, half_height: Any, joint_height: Any) -> Fold:
         up = np.array([0.0, 0.0, 1.0])
         lift = _SIGN[:, None, None] * half_height * up
         following = np.roll(self.plan, -1, axis=0)[: self.sections]

@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.geometry.ring import RingGeometry
+from ringsim.structures.ring_geometry import RingGeometry
 
 Array = NDArray[np.float64]
 

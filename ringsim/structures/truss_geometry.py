@@ -16,7 +16,7 @@ on the folded truss although neither length changes there.  Source: paper 001, f
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -86,9 +86,9 @@ class TrussGeometry:
         with np.errstate(invalid="ignore"):
             return np.asarray(np.arccos(cosine))
 
-    def points(self, angle: ArrayLike) -> TrussPoints:
+    def points(self, angle: Any) -> TrussPoints:
         """All points, at angles of any shape."""
-        g = np.asarray(angle, dtype=float)
+        g = np.asarray(angle)  # of any type: a complex angle carries derivatives
         zero = np.zeros_like(g)
         along = np.stack([np.sin(g), -np.cos(g), zero], axis=-1)
         up = np.stack([zero, zero + 1.0, zero], axis=-1)

@@ -5,12 +5,19 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import model_validator
 
 from ringsim.choice import kind_of
-from ringsim.geometry.planar_truss import TrussGeometry
-from ringsim.parts.structure.family import Structure
+from ringsim.layout.bodies import Lump
+from ringsim.layout.draft import Draft, Track
+from ringsim.layout.layout import Layout
+from ringsim.layout.pose import axes_along
+from ringsim.layout.springs import Contact, Spring
 from ringsim.parts.tube import Tube
+from ringsim.structures.family import Structure
+from ringsim.structures.truss_geometry import TrussGeometry
 from ringsim.units import DampingRate, Metre, Model, SpringRate
 
 RING_PARTS = ("stop", "boom", "net", "loads")
@@ -75,6 +82,8 @@ class PlanarTruss(Structure):
     sections: ClassVar[int] = 1
     closed: ClassVar[bool] = False
     pulleys: ClassVar[int] = 1
+    locks: ClassVar[bool] = False
+    gauge: ClassVar[str] = "upper_beam"
     long_names: ClassVar[dict[str, str]] = {
         "opening_angle": "angle between the beams and the fixed axis",
     }
@@ -123,7 +132,7 @@ class PlanarTruss(Structure):
                 f"and below {most_cable:.4g} m (beams and axis in line)"
             )
         shortest, longest = self.geometry().strut(
-            [self.stowed_angle, max(self.initial_angle, self.stowed_angle)]
+            [self.stowed_angle, max(self.coordinate, self.stowed_angle)]
         )
         if not shortest >= self.strut_tube_length > 0.5 * longest:
             raise ValueError(
@@ -181,10 +190,95 @@ class PlanarTruss(Structure):
         return float(self.geometry().cable(self.stowed_angle))
 
     @property
-    def initial_angle(self) -> float:
-        """Angle at the start, rad."""
+    def coordinate(self) -> float:
+        """Angle between the beams and the axis at the start, rad."""
         return float(self.geometry().angle(self.cable_length))
+
+    @property
+    def reach(self) -> float:
+        """See ``Structure``: a beam."""
+        return self.beam_length
+
+    @property
+    def push(self) -> float:
+        """See ``Structure``: of the deploying spring, folded."""
+        shortest = float(self.geometry().strut(self.stowed_angle))
+        return self.spring.stiffness * abs(self.spring.free_length - shortest)
 
     def geometry(self) -> TrussGeometry:
         """The ideal truss."""
         return TrussGeometry(self.beam_length, self.axis_length, self.strut_foot, self.strut_head)
+
+    def path_slope(self, cable: Any, angles: Any) -> float:
+        """See ``Structure``."""
+        del cable
+        return float(np.sum(self.geometry().cable_rate(angles)))
+
+    def layout(self, scene: Any, coordinate: Any) -> Layout:
+        """See ``Structure``; the coordinate is the beams' angle from the axis.
+
+        Everything moves in the plane x (outward), y (along the axis).  The beams are elastic; the
+        axis, 40 times stiffer in bending than they, the synchronising beam and the tubes of the
+        strut are rigid bodies.
+        """
+        draft, points, rods = Draft(scene), self.geometry().points(coordinate), scene.rods
+        height, down = self.axis_length, np.array([0.0, -self.axis_length, 0.0])
+        mass = rods.density * self.axis.area * height
+        axis = draft.body(points.lower, [_slender("axis", mass, -0.5 * down)])
+        mass = rods.density * self.bar_width * self.bar_depth * height
+        bar = draft.body(points.upper_end, [_slender("synchronising beam", mass, 0.5 * down)])
+        draft.joint("weld", "", 0, (None, axis), points.lower)
+
+        head = self.strut_head / self.beam_length
+        count = 2 * rods.elements
+        inside = min(max(round(head * count), 1), count - 1)
+        beyond = np.linspace(head, 1.0, count - inside + 1)[1:]
+        shares = [*np.linspace(0.0, head, inside + 1), *beyond]
+        young, across = float(np.max(rods.young_modulus)), np.array([0.0, 0.0, 1.0])
+        upper = draft.rod("upper_beam", 0, "beams", (points.upper, points.upper_end), across,
+                          rods.bar, shares, young)  # fmt: skip
+        lower = draft.rod("lower_beam", 0, "beams", (points.lower, points.lower_end), across,
+                          rods.bar, [0.0, 0.5, 1.0], young)  # fmt: skip
+        for body, beam, at in (
+            (axis, upper, points.upper),
+            (axis, lower, points.lower),
+            (bar, upper, points.upper_end),
+            (bar, lower, points.lower_end),
+        ):
+            draft.joint("revolute", "", 0, (body, beam), at)
+
+        along = axes_along(points.foot, points.head, across)
+        half = np.array([0.5 * self.strut_tube_length, 0.0, 0.0])
+        outer, inner = (
+            draft.body(at, [_slender("strut", self._tube_mass(rods.density, tube), centre)], along)
+            for at, centre, tube in (
+                (points.foot, half, rods.diagonal),
+                (points.head, -half, self.strut_inner),
+            )
+        )
+        draft.joint("revolute", "", 0, (axis, outer), points.foot, np.eye(3))
+        draft.joint("revolute", "", 0, (upper, inner), points.head)
+        draft.slide(outer, inner, along)
+        spring = self.spring
+        draft.springs.append(
+            Spring(outer.number, inner.number, spring.stiffness, spring.damping, spring.free_length)
+        )
+        draft.contacts.append(Contact(bar.number, 0, self.rest_distance, self.rest))
+        draft.chord_opening(0, bar, points.upper)
+        ends = [draft.on(axis, points.lower), draft.on(bar, points.upper_end)]
+        draft.tracks[0] = Track(ends, np.array([0.0, 1.0, 0.0]))
+        return draft.finish()
+
+    def _tube_mass(self, density: float, tube: Tube) -> float:
+        return density * tube.area * self.strut_tube_length
+
+
+def _slender(group: str, mass: float, centre: NDArray[np.float64]) -> Lump:
+    """A slender rod from the body's origin to twice ``centre``; about its own line it has little
+    inertia.
+    """
+    length = 2.0 * float(np.linalg.norm(centre))
+    along = 2.0 * centre / length
+    across = np.eye(3) - np.outer(along, along)
+    inertia = mass * length**2 * (across / 3.0 + 1e-4 * np.outer(along, along))
+    return Lump(group, mass, centre, inertia)
