@@ -20,7 +20,7 @@ from ringsim.layout.bodies import Body, InSpace, Lump, Mount, OnBody, OnRod, Rod
 from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.joints import ChordOpening, Joint, JointOpening, Opening
 from ringsim.layout.layout import Layout
-from ringsim.layout.pose import Pose, axes_along, cross, rate_of, real_of
+from ringsim.layout.pose import Pose, axes_along, rate_of, real_of
 from ringsim.layout.sheaves import BlockSheave, FixedSheave, Sheave
 from ringsim.layout.springs import BoomBeam, Contact, HubNet, Spring
 from ringsim.parts.boom.family import Boom

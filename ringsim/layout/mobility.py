@@ -1,147 +1,113 @@
-"""How many ways a ring of rigid parts can move, counted and computed.
+"""How many ways a structure of rigid parts can move, counted and computed.
 
-Bodies are the two diagonals and four bar halves of every section and the upper and lower hinge
-assembly of every corner; joints are the pivot, two V-joints and eight hinge pins of every
-section, each a revolute about the section's normal.
-
-The Kutzbach count 6 (bodies - 1) - 5 joints comes out far below zero (-7 N - 6 for a closed
-ring): it takes all constraints for independent, which parallel axes and equal lengths are not.
+The Kutzbach count 6 (bodies - 1) - constraints comes out far below zero for a ring (-7 N - 6 when
+closed): it takes all constraints for independent, which parallel axes and equal lengths are not.
 The true mobility at a fold state is the dimension of the null space of the constraint Jacobian.
 
-- A section for itself has five internal freedoms: it folds, and each of its four hinge
+- A section of a pantograph ring has five internal freedoms: it folds, and each of its four hinge
   assemblies tilts about the common axis of the two rods that it carries.
 - Where two sections meet, both share the upper and the lower hinge assembly.  Their normals
   differ, so neither assembly can tilt about both: the tilt is gone, and what is left makes
   both sections equally high.
 - An open arc therefore keeps five freedoms whatever its length (the fold, and the tilts of the
-  four assemblies at its ends), and a closed ring has one: the fold.
+  four assemblies at its ends; four if a boom joins two of them), and a closed ring has one.
 - At 180 deg exactly the state is singular: the bars lie straight, the sections' width is
   stationary, and each of the 2 N V-joints can start to move by itself instead of with the fold.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.structures.ring_geometry import RingGeometry
+from ringsim.layout.bodies import InSpace, Mount, OnBody
+from ringsim.layout.joints import Joint
+from ringsim.layout.layout import Layout
 
 Array = NDArray[np.float64]
 
 RANK_TOLERANCE = 1e-9
 """Singular values below this fraction of the largest are zeros.  Round-off leaves 1e-15; the
 smallest true one is 5e-4 half open and 6e-8 at 0.01 deg for a ring of 120 sections."""
-
-_ROD_ENDS = (
-    ("lower_left", "pivot", "upper_right"),
-    ("upper_left", "pivot", "lower_right"),
-    ("upper_left", "upper_vjoint"),
-    ("upper_vjoint", "upper_right"),
-    ("lower_left", "lower_vjoint"),
-    ("lower_vjoint", "lower_right"),
-)
-_HINGES = ("upper_left", "lower_left", "upper_right", "lower_right")
-_BODIES = len(_ROD_ENDS) + len(_HINGES)
-_LEFT = slice(6 * len(_ROD_ENDS), 6 * len(_ROD_ENDS) + 12)
-_RIGHT = slice(6 * len(_ROD_ENDS) + 12, 6 * _BODIES)
+_HELD = {
+    "revolute": ((0, 1, 2), (0, 1)),
+    "prismatic": ((1, 2), (0, 1, 2)),
+    "sleeve": ((0, 1), ()),
+    "weld": ((0, 1, 2), (0, 1, 2)),
+}
+"""Translations and rotations that a joint of each kind holds, along its own axes."""
 
 
-def kutzbach_count(sections: int, *, closed: bool) -> int:
-    """Mobility as 6 (bodies - 1) - 5 joints, which overconstrained linkages exceed."""
-    corners = sections if closed else sections + 1
-    return 6 * (6 * sections + 2 * corners - 1) - 5 * 11 * sections
+def internal_mobility(layout: Layout) -> int:
+    """Degrees of freedom of a structure of rigid parts beyond its six as one rigid body.
 
-
-def internal_mobility(geometry: RingGeometry, phi: float) -> int:
-    """Degrees of freedom of the ring of rigid parts beyond its six as one rigid body.
-
-    First the motions of one section are found (they are the same for all, seen along its own
-    axes), then those of all sections are joined at the hinge assemblies that they share.
+    First the motions of each section by itself are found, then those of all sections are joined at
+    the bodies that they share.  A boom counts as rigid; supports do not count.
 
     Parameters
     ----------
-    geometry
-        The ideal ring or arc.
-    phi
-        Bar angle of the fold state in rad, between 0 (deployed) and pi/2 (stowed).
+    layout
+        At the state in question, whose joints say by ``section`` what belongs together.
 
     Returns
     -------
     int
-        1 for a closed ring and 5 for an open arc; at 180 deg 2 N and 2 N + 4.
+        Of a pantograph ring 1, of an open arc 5; at 180 deg 2 N and 2 N + 4.
     """
-    points = _section_points(geometry, phi)
-    motions = _null_space(_section_jacobian(points))
-    corner = np.array([0.5 * geometry.width(phi) + geometry.hinge_offset, 0.0, 0.0])
-    corner = corner / geometry.half_diagonal
-    axes = np.stack(
-        [
-            geometry.directions,
-            -geometry.normals,
-            np.tile([0.0, 0.0, 1.0], (geometry.sections, 1)),
-        ],
-        axis=-1,
-    )
-    left = np.stack([_twists_at(motions[_LEFT], -corner, turn) for turn in axes])
-    right = np.stack([_twists_at(motions[_RIGHT], corner, turn) for turn in axes])
-
-    sections, free = geometry.sections, motions.shape[1]
-    shared = sections if geometry.closed else sections - 1
-    joined = np.zeros((shared, 12, sections, free))
-    for k in range(shared):
-        joined[k, :, k] += right[k]
-        joined[k, :, (k + 1) % sections] -= left[(k + 1) % sections]
-    rank = _rank(joined.reshape(shared * 12, sections * free))
-    return int(sections * free - rank - 6)
-
-
-def _section_points(geometry: RingGeometry, phi: float) -> dict[str, Array]:
-    """Joints of one section about its middle (along, outward, up), in half diagonals."""
-    width, height = geometry.width(phi), geometry.height(phi)
-    dip = geometry.half_bar * float(np.sin(phi))
-    points = {"pivot": (0.0, 0.0)}
-    for plane, sign in (("upper", 1.0), ("lower", -1.0)):
-        points[f"{plane}_left"] = (-0.5 * width, 0.5 * sign * height)
-        points[f"{plane}_right"] = (0.5 * width, 0.5 * sign * height)
-        points[f"{plane}_vjoint"] = (0.0, sign * (0.5 * height - dip))
-    return {
-        name: np.array([along, 0.0, up]) / geometry.half_diagonal
-        for name, (along, up) in points.items()
-    }
+    joints = [joint for joint in layout.joints if not isinstance(joint.first, InSpace)]
+    if layout.boom is not None:
+        joints.append(Joint("sleeve", "", 0, layout.boom.top, layout.boom.low))
+    size = max(rod.length for rod in layout.rods)
+    motions: dict[tuple[bool, int], list[tuple[int, Array]]] = {}
+    free: list[int] = []
+    for number in sorted({joint.section for joint in joints}):
+        own = [joint for joint in joints if joint.section == number]
+        parts = sorted({_part(mount) for joint in own for mount in (joint.first, joint.second)})
+        middle = np.mean([layout.pose(joint.first).place for joint in own], axis=0)
+        rows = np.concatenate([_row(layout, joint, parts, middle, size) for joint in own])
+        null = _null_space(rows).reshape(len(parts), 6, -1)
+        for part, twist in zip(parts, null, strict=True):
+            place = layout.bodies[part[1]].pose.place if part[0] else middle
+            arm = (place - middle) / size
+            at_part = np.concatenate([twist[:3] - _cross_matrix(arm) @ twist[3:], twist[3:]])
+            motions.setdefault(part, []).append((len(free), at_part))
+        free.append(null.shape[-1])
+    starts = np.concatenate([[0], np.cumsum(free)])
+    joined = []
+    for shared in motions.values():
+        for (one, first), (other, second) in pairwise(shared):
+            row = np.zeros((6, starts[-1]))
+            row[:, starts[one] : starts[one + 1]] += first
+            row[:, starts[other] : starts[other + 1]] -= second
+            joined.append(row)
+    rank = _rank(np.concatenate(joined)) if joined else 0
+    return int(starts[-1]) - rank - 6
 
 
-def _section_jacobian(points: dict[str, Array]) -> Array:
-    """Five velocity constraints per revolute, shape (55, 60).
-
-    Unknown per body: velocity of the point at the section's middle, then angular velocity.
-    """
-    rows = []
-    for name, point in points.items():
-        bodies = [body for body, ends in enumerate(_ROD_ENDS) if name in ends]
-        if name in _HINGES:
-            bodies.append(len(_ROD_ENDS) + _HINGES.index(name))
-        for other in bodies[:-1]:
-            row = np.zeros((5, _BODIES, 6))
-            row[:, other] = _pinned(point)
-            row[:, bodies[-1]] = -_pinned(point)
-            rows.append(row.reshape(5, -1))
-    return np.concatenate(rows)
+def _part(mount: Mount) -> tuple[bool, int]:
+    """Whether a body, and its number or that of the rod."""
+    if isinstance(mount, InSpace):
+        raise TypeError("a place in space is no part")
+    return (True, mount.body) if isinstance(mount, OnBody) else (False, mount.rod)
 
 
-def _pinned(point: Array) -> Array:
-    """What a revolute about the outward axis compares, shape (5, 6): v + w x r, w_x, w_z."""
-    compared = np.zeros((5, 6))
-    compared[:3, :3] = np.eye(3)
-    compared[:3, 3:] = -_cross_matrix(point)
-    compared[3, 3] = compared[4, 5] = 1.0
-    return compared
-
-
-def _twists_at(motions: Array, point: Array, turn: Array) -> Array:
-    """Twists of two bodies at ``point`` for every motion, turned into the ring's axes."""
-    velocity, spin = motions.reshape(2, 2, 3, -1).transpose(1, 0, 2, 3)
-    velocity = velocity - _cross_matrix(point) @ spin
-    return np.concatenate([turn @ velocity, turn @ spin], axis=1).reshape(12, -1)
+def _row(
+    layout: Layout, joint: Joint, parts: list[tuple[bool, int]], at: Array, size: float
+) -> Array:
+    """What a joint holds, (constraints, 6 parts): on velocity at a point, and angular velocity."""
+    pose = layout.pose(joint.first)
+    arm = (pose.place - at) / size
+    whole = np.zeros((6, 6))
+    whole[:3, :3], whole[:3, 3:] = pose.axes.T, -pose.axes.T @ _cross_matrix(arm)
+    whole[3:, 3:] = pose.axes.T
+    moved, turned = _HELD[joint.kind]
+    held = whole[[*moved, *(3 + axis for axis in turned)]]
+    row = np.zeros((len(held), len(parts), 6))
+    row[:, parts.index(_part(joint.first))] += held
+    row[:, parts.index(_part(joint.second))] -= held
+    return row.reshape(len(held), -1)
 
 
 def _cross_matrix(r: Array) -> Array:
@@ -155,7 +121,5 @@ def _null_space(matrix: Array) -> Array:
 
 
 def _rank(matrix: Array) -> int:
-    if matrix.size == 0:
-        return 0
     values = np.linalg.svd(matrix, compute_uv=False)
     return int(np.sum(values > RANK_TOLERANCE * values[0]))

@@ -69,6 +69,10 @@ class Structure(Model):
         """
         raise NotImplementedError
 
+    def describe(self) -> dict[str, str]:
+        """Its shape and size in words, by label, for ``ringsim check``."""
+        return {"structure": str(type(self).model_fields["kind"].default)}
+
     def path_slope(self, cable: Any, angles: Any) -> float:
         """Derivative of the ideal path of a cable after the opening angle, m/rad.
 

@@ -146,6 +146,23 @@ class PantographRing(Structure):
         """See ``Structure``: a bar half."""
         return self.half_bar
 
+    def describe(self) -> dict[str, str]:
+        """See ``Structure``."""
+        geometry = self.geometry()
+        shape = "closed ring" if self.closed else f"open arc of a {self.polygon}-gon"
+        count = f"{self.sections} section{'' if self.sections == 1 else 's'}"
+        # The first corner lies on the major axis of the ellipse.
+        major, (x, y) = float(geometry.plan[0, 0]), geometry.plan[1, :2]
+        minor = abs(y) / math.sqrt(1.0 - (x / major) ** 2)
+        chord = geometry.deployed_chord
+        return {
+            "structure": f"{kind_of(self)}, {shape}, {count}",
+            "polygon": f"equal chords of {chord:.4f} m on an ellipse with axes "
+            f"{2.0 * chord * major:.4f} m and {2.0 * chord * minor:.4f} m",
+            "deployed": _size(geometry, 0.0),
+            "initial": f"{_size(geometry, self.coordinate)} at {self.opening_angle} deg",
+        }
+
     def path_slope(self, cable: Any, angles: Any) -> float:
         """See ``Structure``."""
         return float(np.sum(cable.path_slope(self.half_bar, angles)))
@@ -245,3 +262,8 @@ class PantographRing(Structure):
             half_diagonal=self.half_diagonal,
             hinge_offset=self.hinge_offset,
         )
+
+
+def _size(geometry: RingGeometry, phi: float) -> str:
+    extent = np.ptp(geometry.fold(phi).corners.reshape(-1, 3), axis=0)
+    return " x ".join(f"{length:.3f}" for length in extent) + " m"

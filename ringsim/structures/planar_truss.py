@@ -209,6 +209,19 @@ class PlanarTruss(Structure):
         """The ideal truss."""
         return TrussGeometry(self.beam_length, self.axis_length, self.strut_foot, self.strut_head)
 
+    def describe(self) -> dict[str, str]:
+        """See ``Structure``."""
+        geometry, ends = self.geometry(), [self.coordinate, self.stowed_angle]
+        found = {"structure": f"{kind_of(self)}, two beams of {self.beam_length} m"}
+        for label, angle, cable, strut in zip(
+            ("initial", "at its rest"), ends, geometry.cable(ends), geometry.strut(ends),
+            strict=True,
+        ):  # fmt: skip
+            found[label] = (
+                f"{math.degrees(angle):.4g} deg, {cable:.4g} m of cable, strut {strut:.4g} m"
+            )
+        return found
+
     def path_slope(self, cable: Any, angles: Any) -> float:
         """See ``Structure``."""
         del cable
