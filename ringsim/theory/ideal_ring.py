@@ -82,7 +82,7 @@ class IdealRing:
         return float(self._at_rest(phi).force[0])
 
     def acceleration_from_rest(self, phi: float) -> float:
-        """Phi'' in rad/s^2 of the ring released at rest."""
+        """Acceleration phi'' in rad/s^2 of the ring released at rest."""
         return self.work_rate(phi) / self.motion(phi).inertia
 
     def _at_rest(self, phi: float) -> Acting:
