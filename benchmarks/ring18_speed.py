@@ -34,10 +34,10 @@ print(*run(), STEPS)
 
 
 SETTINGS = {
-    "ringsim, as it stands": {},
-    "ringsim, for 5e-4": {"solver.tolerance": 3e-4, "solver.newton_tolerance": 1e-4},
+    "ringsim, default settings": {},
+    "ringsim, `solver.tolerance = 1e-3`": {"solver.tolerance": 1e-3},
 }
-"""Names of our runs, and what they change of the scene."""
+"""Names of ringsim's runs, and the values that they change in the scene."""
 
 
 def once(code: str) -> tuple[float, float, int]:

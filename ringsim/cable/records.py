@@ -1,4 +1,4 @@
-"""What a scene says of a cable and its winches."""
+"""Records of a cable and its winches."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Winch(Model):
 
     winding: AnyWinding
     start_time: SecondOrZero = 0.0
-    """The law's time begins here; the drum stands still before."""
+    """Start of the law's time; the drum stands still before."""
     stop_time: SecondOrZero | None = None
     """The drum stands still from here on."""
 
@@ -64,7 +64,7 @@ class Winch(Model):
 
     @property
     def feedback(self) -> bool:
-        """Whether its law answers to the rope (``ringsim.cable.winches``)."""
+        """Whether its law depends on the tension (``ringsim.cable.winches``)."""
         return self.winding.feedback
 
     def turns(self, time: float) -> bool:
@@ -107,7 +107,7 @@ class Cable(Model):
     """Rope speed over a pulley at which 76 % of its friction acts (regularisation).  Left out, it
     follows the winding: see ``ringsim.cable.regularisation``."""
     slack_width: Annotated[Tension, Field(ge=1e-6)] = 0.05
-    """Width of the passage from slack to taut; at the natural length 0.69 of it pulls."""
+    """Width of the transition from slack to taut; tension at the natural length is 0.69 of it."""
     initial_slack: SignedMetre = 0.0
     """Natural length minus path length at the start; negative: the cable is pre-stretched."""
     block_offset: MetreOrZero = 0.105

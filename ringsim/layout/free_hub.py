@@ -1,4 +1,4 @@
-"""The net of an ideal ring: springs from the upper corners to a hub that weighs nothing.
+"""The net of an ideal ring: springs from the upper corners to a massless hub.
 
 The hub lies where the springs' pulls balance, sum k_i s_i u_i = 0 (s_i the stretch, u_i the
 direction from the hub): the least of a convex energy while they only pull.  The springs' work is
@@ -22,7 +22,7 @@ _ONSET = 1e-4
 """Stretch in m over which the damping of a string comes in."""
 _MOST = 60
 _BALANCED = 1e-14
-"""Pull on the hub over the largest string's, or its movement over the net's size, that is none."""
+"""Pull on the hub over the largest string's, or its movement over the net's size, taken as zero."""
 
 
 class NetForces(NamedTuple):

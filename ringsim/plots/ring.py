@@ -27,7 +27,7 @@ _WIDTH, _HIGHEST, _SIDE, _GAP = 10.6, 4.6, 0.3, 0.35
 _BELOW, _ABOVE, _BAR, _CAPTION = 1.2, 1.12, 0.46, 2.4
 """Room on the sheet, in inch: the drawing; beside, below and above it; a caption's width."""
 _FADE = 0.6
-"""How far the farthest line is blended with the white of the paper."""
+"""Share of white in the farthest line."""
 
 
 @dataclass(frozen=True)

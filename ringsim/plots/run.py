@@ -1,4 +1,4 @@
-"""All figures of a run that apply to it."""
+"""All figures that apply to a run."""
 
 from __future__ import annotations
 

@@ -123,7 +123,7 @@ def on_the_boom(
     """p, its derivatives after (phi, b, psi_3, psi_4), and p'' at zero accelerations of these.
 
     The second derivatives come from sin(psi_1) h = a (1 - cos b), differentiated twice.  NaN
-    where the boom would not let the lower assembly pass.
+    where the boom blocks the lower assembly.
     """
     offset, b, b_rate, phi_rate = geometry.hinge_offset, free[1], rates[1], rates[0]
     h, h_slope, h_bend = 2.0 * geometry.half_diagonal * basis[:, 3]

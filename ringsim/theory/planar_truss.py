@@ -25,7 +25,7 @@ f(0) = 1/3 being the textbook's deflection at a force between two supports.  It 
 strut and turns it: F, D and T are those of the displaced head, found by repetition.  Left out:
 the shortening of the beam's chord (of the order w^2 / b) and its stretch N / (E A).  The strain
 of the outer fibre is M r / (E I).
-Source: paper 001, section 4, for the features; statics by hand.
+Source: paper 001, section 4, for the features; own statics.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from ringsim.structures.planar_truss import PlanarTruss
 
 Array = NDArray[np.float64]
 _REPETITIONS = 12
-"""Each takes the error of the deflection down a hundredfold: it changes the moment by 1 %."""
+"""Each reduces the error of the deflection a hundredfold, as it changes the moment by 1 %."""
 
 
 @dataclass(frozen=True)
@@ -130,12 +130,12 @@ def bending_strain(scene: Scene, cable: ArrayLike, station: ArrayLike) -> Array:
 
 
 def _wave(scene: Scene, pull: Array) -> NDArray[np.complex128]:
-    """Wave number n, 1/m: real in a taut beam, imaginary in a pressed one, never quite zero."""
+    """Wave number n, 1/m: real in tension, imaginary in compression, never exactly zero."""
     return np.asarray(np.sqrt(pull / _stiffness(scene) + 1e-12j))
 
 
 def _taut(z: NDArray[np.complex128]) -> Array:
-    """f(z) = (z coth z - 1) / z^2, by its series where the quotient would lose its digits."""
+    """f(z) = (z coth z - 1) / z^2, by its series where the quotient would lose precision."""
     square = z * z
     small = np.abs(square) < 1e-4
     safe = np.where(small, 1.0, z)

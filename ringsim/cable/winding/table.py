@@ -47,7 +47,7 @@ class TableWinding(PrescribedWinding):
         if self.lengths[0] != 0.0:
             raise ValueError(
                 f"lengths = {self.lengths[0]:g} m, ... must start at 0: the rope wound before "
-                "the start belongs into the cable's initial slack"
+                "the start belongs to the cable's initial slack"
             )
         return self
 
