@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,45 +76,42 @@ class Layout:
             found["hub"] = self.net.mass
         return found
 
-    def inertia(self) -> Array:
-        """Mass matrix of (V, W, q'), shape (7, 7): rigid motion about the origin, and the fold.
+    def point_masses(self) -> tuple[Array, Array, Array]:
+        """Point masses that move as the rigid parts do, with the same inertia.
 
-        A rod of mass m is m / 6 at its ends and 2 m / 3 in its middle (Simpson's rule, exact for
-        what is quadratic along it), and its cross-sections turn with it; the net's hub and a
-        flexible boom are left out.
+        A part of mass m is six of m / 6 at c +- r_k n_k about its centre of mass c, where
+        r_k^2 = 3 e_k / m with e_k, n_k the principal values and directions of its second moments
+        tr(J) / 2 - J about c.  A rod so has two at its ends.  The net's hub and a flexible boom are
+        left out.
+
+        Returns
+        -------
+        tuple
+            Masses, kg, their places and the derivatives of these after the coordinate, m; shapes
+            (n,), (n, 3) and (n, 3).  Bodies come first in their order, then rods, then the masses
+            on rods' nodes.
         """
-        points, spins = [], []
+        found: list[tuple[float, Array, Array]] = []
         for body in self.bodies:
-            centre = body.centre
-            axes, arm = body.pose.axes, centre
-            shift = body.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-            points.append((body.mass, *body.pose.at(arm)))
-            spins.append((axes @ (body.inertia - shift) @ axes.T, body.pose.turn))
+            mass, centre = body.mass, body.centre
+            seconds = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
+            values, axes = np.linalg.eigh(seconds - mass * np.outer(centre, centre))
+            arms = axes * np.sqrt(3.0 * np.maximum(values, 0.0) / mass)
+            for arm in (*arms.T, *-arms.T):
+                found.append((mass / 6.0, *body.pose.at(centre + arm)))
         for rod in self.rods:
-            for share, part in ((0.0, 1.0), (0.5, 4.0), (1.0, 1.0)):
-                pose = rod.station(share)
-                points.append((part / 6.0 * rod.mass, pose.place, pose.rate))
-            second = rod.density * rod.length * rod.tube.second_moment
-            axes = rod.start.axes
-            spins.append((axes @ np.diag([2 * second, second, second]) @ axes.T, rod.start.turn))
+            middle, across = (
+                rod.station(0.5),
+                math.sqrt(3.0 * rod.tube.second_moment / rod.tube.area),
+            )
+            arms = np.diag([0.5 * rod.length, across, across])
+            found += [(rod.mass / 6.0, *middle.at(arm)) for arm in (*arms, *-arms)]
+        for rod in self.rods:
             for station, mass in rod.masses:
                 pose = rod.station(rod.stations[station])
-                points.append((mass, pose.place, pose.rate))
-        matrix = np.zeros((7, 7))
-        weights = np.array([p[0] for p in points])
-        places, rates = np.array([p[1] for p in points]), np.array([p[2] for p in points])
-        reach = np.zeros((len(points), 3, 7))
-        reach[:, range(3), range(3)] = 1.0
-        x, y, z = places.T
-        reach[:, 0, 4], reach[:, 0, 5], reach[:, 1, 5] = z, -y, x
-        reach[:, 1, 3], reach[:, 2, 3], reach[:, 2, 4] = -z, y, -x
-        reach[:, :, 6] = rates
-        matrix += np.einsum("i,iaj,iak->jk", weights, reach, reach)
-        for tensor, turn in spins:
-            turning = np.zeros((3, 7))
-            turning[:, 3:6], turning[:, 6] = np.eye(3), turn
-            matrix += turning.T @ tensor @ turning
-        return matrix
+                found.append((mass, pose.place, pose.rate))
+        masses, places, rates = zip(*found, strict=True)
+        return np.array(masses), np.array(places), np.array(rates)
 
     def sheave(self, sheave: Sheave) -> tuple[Array, Array]:
         """Place of a sheave in space and its derivative after the coordinate, shape (3,), m."""
