@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError, model_validator
 from ringsim.cable.cables import Cables, pulleys_of
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.records import Cable
-from ringsim.choice import kind_of, load_package, one_of
+from ringsim.choice import OneOf
 from ringsim.overrides import section_of, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.faults.family import Fault
@@ -30,20 +30,10 @@ from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.refusal import InputError, explain, known_or_nearest
 from ringsim.units import Model
 
-for _package in ("structure", "rods", "boom", "faults"):
-    load_package(f"ringsim.parts.{_package}")
-
 if TYPE_CHECKING:
     AnyStructure = PantographRing
-    AnyRods = Rods
-    AnyBoom = Boom
-    AnyFault = Fault
 else:
-    AnyStructure = one_of(Structure)
-    AnyRods = one_of(Rods)
-    AnyBoom = one_of(Boom)
-    AnyFault = one_of(Fault)
-
+    AnyStructure = Annotated[Structure, OneOf(default="pantograph-ring")]
 
 MOST_RECORDS = 1_000_000
 """Output times of one run, at most."""
@@ -55,25 +45,16 @@ class Scene(Model):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
     title: Annotated[str, Field(max_length=300)] = ""
     structure: AnyStructure = PantographRing()
-    rods: AnyRods = GeometricallyExactRods()
+    rods: Annotated[Rods, OneOf()] = GeometricallyExactRods()
     joints: Joints = Joints()
     stop: Stop | None = Stop()
-    boom: AnyBoom | None = None
+    boom: Annotated[Boom, OneOf()] | None = None
     net: Net | None = None
     loads: Loads | None = None
     cables: Cables | None = None
-    faults: Annotated[tuple[AnyFault, ...], ListIn] = ()
+    faults: Annotated[tuple[Annotated[Fault, OneOf()], ...], ListIn] = ()
     solver: Solver = Solver()
     record: Record = Record()
-
-    @model_validator(mode="before")
-    @classmethod
-    def _ring_unless_said(cls, table: Any) -> Any:
-        """A structure that does not say its kind is a pantograph ring."""
-        structure = table.get("structure") if isinstance(table, dict) else None
-        if not isinstance(structure, dict) or "kind" in structure:
-            return table
-        return table | {"structure": {"kind": kind_of(PantographRing()), **structure}}
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
