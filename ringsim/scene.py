@@ -17,7 +17,7 @@ from ringsim.choice import OneOf
 from ringsim.overrides import section_of, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.faults.family import Fault
-from ringsim.parts.joints import Joints, Stop
+from ringsim.parts.joints import Joints
 from ringsim.parts.loads import Loads
 from ringsim.parts.net import Net
 from ringsim.parts.persection import ListIn
@@ -25,6 +25,8 @@ from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.solver import Record, Solver
+from ringsim.parts.stop.family import Stop
+from ringsim.parts.stop.spring_damper import SpringDamperStop
 from ringsim.parts.structure.family import Structure
 from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.refusal import InputError, explain, known_or_nearest
@@ -47,7 +49,7 @@ class Scene(Model):
     structure: AnyStructure = PantographRing()
     rods: Annotated[Rods, OneOf()] = GeometricallyExactRods()
     joints: Joints = Joints()
-    stop: Stop | None = Stop()
+    stop: Annotated[Stop, OneOf(default="spring-damper")] | None = SpringDamperStop()
     boom: Annotated[Boom, OneOf()] | None = None
     net: Net | None = None
     loads: Loads | None = None

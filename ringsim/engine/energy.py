@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from ringsim.cable.state import ChainState
 from ringsim.engine.faults import Faults
-from ringsim.engine.joints import friction_torque, stop_torque
-from ringsim.engine.net import HubNet, net_forces
+from ringsim.engine.net import HubNet
 from ringsim.engine.pantograph_ring import RingModel
 from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.work import StepWork
-from ringsim.parts.joints import JointFriction
+from ringsim.parts.joint_friction.family import JointFriction
+from ringsim.parts.persection import at_section
 
 Array = NDArray[np.float64]
 _KINETIC = exu.OutputVariableType.KineticEnergy
@@ -85,14 +85,15 @@ class EnergyMeter:
         kinetic = sum(self._output(body, _KINETIC) for body in self._model.assembly.bodies)
         elastic = float(sum(self._output(element, _POTENTIAL) for element in self._elements))
         lifted = (state.position - state.reference)[self._lifts]
-        damped = [self._stop_damping(angles, rates, latched)]
-        for law, group, sections in self._friction:
+        in_stops, stop_damping = self._stop_energy(angles, rates, latched)
+        damped = [stop_damping]
+        for law, group in self._friction:
             rate = group.rate(state)
-            damped.append((friction_torque(law, group.sections, sections, rate), rate))
+            damped.append((law.torque(rate), rate))
         stored, net_damping = self._net_energy(state)
         stuck, stuck_damping = self._faults.stuck_energy(angles, rates)
         damped += [net_damping, stuck_damping]
-        elastic += stored + stuck + self._stored_in_stops(angles, latched)
+        elastic += stored + stuck + in_stops
         if chain is not None:
             elastic += float(chain.elastic_energy.sum())
         passed = self._since.since(
@@ -133,33 +134,20 @@ class EnergyMeter:
             return math.nan
         return model.assembly.dampers.lost(model.assembly.system, time)
 
-    def _friction_groups(self) -> list[tuple[JointFriction, JointGroup, int]]:
-        laws = self._model.scene.joints
+    def _friction_groups(self) -> list[tuple[JointFriction, JointGroup]]:
         found = []
-        for family, law in (("pivot", laws.pivot), ("hinge", laws.hinge), ("vjoint", laws.vjoint)):
-            if law is not None:
-                joints = [joint for joint in self._model.joints if joint.family == family]
-                group = JointGroup(self._model, joints)
-                found.append((law, group, self._model.geometry.sections))
+        for family, law in self._model.scene.joints.present().items():
+            joints = [joint for joint in self._model.joints if joint.family == family]
+            group = JointGroup(self._model, joints)
+            found.append((at_section(law, group.sections), group))
         return found
 
-    def _stored_in_stops(self, angles: Array, latched: Array) -> float:
+    def _stop_energy(self, angles: Array, rates: Array, latched: Array) -> tuple[float, Damping]:
         stop = self._model.scene.stop
         if stop is None:
-            return 0.0
-        folded = np.pi - angles
-        stowed = np.pi - np.radians(stop.stowed_angle)
-        ends = np.maximum(-folded, 0.0) + np.maximum(folded - stowed, 0.0)
-        return 0.5 * stop.stiffness * float(np.sum(np.where(latched, folded, ends) ** 2))
-
-    def _stop_damping(self, angles: Array, rates: Array, latched: Array) -> Damping:
-        stop = self._model.scene.stop
-        if stop is None:
-            return _NOTHING
-        folded, turning = np.pi - angles, -rates
-        spring = stop_torque(stop, folded, np.zeros_like(turning), latched)
-        torque = stop_torque(stop, folded, turning, latched)
-        return (torque - spring).ravel(), turning.ravel()
+            return 0.0, _NOTHING
+        reaction = stop.torque(np.pi - angles, -rates, latched)
+        return float(np.sum(reaction.stored)), (reaction.damping.ravel(), -rates.ravel())
 
     def _net_energy(self, state: State) -> tuple[float, Damping]:
         net = self._model.scene.net
@@ -169,7 +157,5 @@ class EnergyMeter:
         moving = state.velocity[self._corners] - state.velocity[self._hub]
         lengths = np.linalg.norm(arms, axis=1)
         stretch, rate = lengths - net.neutral_length, np.sum(arms * moving, axis=1) / lengths
-        spring, damper = net_forces(
-            stretch, rate, self._net.stiffness, net.damping, two_sided=net.two_sided
-        )
-        return 0.5 * float(np.sum(spring * stretch)), (damper, rate)
+        tension = at_section(net, np.arange(len(arms))).tension(stretch, rate)
+        return float(np.sum(tension.stored)), (tension.damping, rate)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from ringsim.engine.assembly import Assembly, Frame
 from ringsim.engine.cable_path import CablePath, FixedStop
 from ringsim.engine.cables import CableDrive
+from ringsim.engine.laws import SYMBOLIC, symbolic_law
 from ringsim.engine.rods import beam_section
 from ringsim.engine.rods_geometrically_exact import GeometricallyExact
 from ringsim.geometry.planar_truss import TrussPoints
@@ -27,8 +27,6 @@ from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
 FORMULATION = GeometricallyExact()
-_ONSET = 1e-5
-"""Depth in metre over which the damping of the rest comes in, so that contact starts smoothly."""
 
 
 @dataclass(frozen=True)
@@ -210,43 +208,10 @@ def _add_rest(model: TrussModel, rest: Rest) -> None:
         system.AddMarker(item.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
         for node in (ground, model.bar)
     ]
-    law = model.assembly.symbolic(
-        "rest",
-        _rest_law(rest, room),
+    law = symbolic_law(
+        model.assembly,
         "ObjectConnectorCoordinateSpringDamper",
-        "springForceUserFunction",
+        "rest",
+        lambda place, rate, _: -rest.push(-room - place, -rate, SYMBOLIC).total,
     )
-    system.AddObject(
-        item.ObjectConnectorCoordinateSpringDamper(
-            markerNumbers=markers, springForceUserFunction=law
-        )
-    )
-
-
-def rest_force(rest: Rest, distance: float, rate: float, room: float) -> tuple[float, float]:
-    """The same law in numpy: whole push and its elastic part, N.
-
-    Parameters
-    ----------
-    distance, rate
-        Of the upper outer joint from the axis, m and m/s.
-    room
-        Distance at which contact begins, m.
-    """
-    depth = max(room - distance, 0.0)
-    spring = rest.stiffness * depth
-    return max(spring - rest.damping * rate * min(depth / _ONSET, 1.0), 0.0), spring
-
-
-def _rest_law(rest: Rest, room: float) -> Any:
-    k, d = rest.stiffness, rest.damping
-
-    def law(
-        mbs: Any, t: Any, itemNumber: Any, displacement: Any, velocity: Any,  # noqa: N803
-        stiffness: Any, damping: Any, offset: Any,
-    ) -> Any:  # fmt: skip
-        least, most = exu.symbolic.min, exu.symbolic.max
-        depth = most(-room - displacement, 0.0)
-        return -most(k * depth - d * velocity * least(depth / _ONSET, 1.0), 0.0)
-
-    return law
+    system.AddObject(item.ObjectConnectorCoordinateSpringDamper(markerNumbers=markers, **law))

@@ -19,7 +19,7 @@ from ringsim.engine import quaternions
 from ringsim.engine.closing import close
 from ringsim.engine.energy import Energies
 from ringsim.engine.guard import Guard
-from ringsim.engine.planar_truss import TrussModel, rest_force
+from ringsim.engine.planar_truss import TrussModel
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.engine.settings import raise_own, solver_settings
@@ -241,17 +241,14 @@ class TrussReader:
         first, second = (velocity[tube[:3]] for tube in self._tubes)
         strut = float(np.linalg.norm(head - foot))
         closing = float((second - first) @ (head - foot)) / strut
-        spring, rest = model.truss.spring, model.truss.rest
         distance, rate = float(position[self._bar[0]]), float(velocity[self._bar[0]])
-        room = model.truss.rest_distance
-        push, held = rest_force(rest, distance, rate, room)
-        elastic += 0.5 * spring.stiffness * (strut - spring.free_length) ** 2
-        elastic += 0.5 * rest.stiffness * max(room - distance, 0.0) ** 2
-        elastic += float(chain.elastic_energy.sum())
+        spring = model.truss.spring.tension(strut, closing)
+        rest = model.truss.rest.push(model.truss.rest_distance - distance, -rate)
+        elastic += float(spring.stored + rest.stored + chain.elastic_energy.sum())
         dampers = model.assembly.dampers
         in_beams = dampers.lost(model.assembly.system, time)
-        forces = np.array([spring.damping * closing, held - push])
-        passed = self._since.since(time, forces, np.array([closing, rate]), chain)
+        forces = np.array([spring.damping, rest.damping])
+        passed = self._since.since(time, forces, np.array([closing, -rate]), chain)
         self._since.keep()
         dampers.keep()
         return Energies(kinetic, elastic, 0.0, passed.lost + in_beams, passed.driven)

@@ -43,7 +43,7 @@ def contact_step(built: Built) -> float:
     rods, ring = scene.rods, scene.structure
     half = rods.density * rods.bar.area * ring.half_bar**3 / 3.0
     inertia = 2.0 * half + ring.vjoint_mass * ring.half_bar**2
-    return 2.0 * math.pi * math.sqrt(inertia / scene.stop.stiffness) / 20.0
+    return 2.0 * math.pi * math.sqrt(inertia / scene.stop.contact_stiffness()) / 20.0
 
 
 def rope_step(built: Built) -> float:

@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import model_validator
 
 from ringsim.choice import kind_of
 from ringsim.geometry.planar_truss import TrussGeometry
+from ringsim.parts.springs import Reaction, one_sided, two_sided
 from ringsim.parts.structure.family import Structure
 from ringsim.parts.tube import Tube
 from ringsim.units import DampingRate, Metre, Model, SpringRate
 
 RING_PARTS = ("stop", "boom", "net", "loads")
+REST_ONSET = 1e-5
+"""Depth over which the rest's damper comes in, m: 1 N on the default spring, less than the 1.5 N
+that the cable holds where the rest is met."""
 
 
 class DeployingSpring(Model):
@@ -23,6 +28,10 @@ class DeployingSpring(Model):
     free_length: Metre = 0.316
     """Length of the strut at which the spring is without force."""
     damping: DampingRate = 5.0
+
+    def tension(self, length: Any, rate: Any = 0.0) -> Reaction:
+        """Of a strut of some length (m), at its rate (m/s); the spring pushes: negative."""
+        return two_sided(length - self.free_length, rate, self.stiffness, self.damping)
 
 
 class Rest(Model):
@@ -36,6 +45,10 @@ class Rest(Model):
     """Between the fixed axis and the synchronising beam at the end of contraction."""
     stiffness: SpringRate = 1e5
     damping: DampingRate = 100.0
+
+    def push(self, depth: Any, rate: Any, xp: Any = np) -> Reaction:
+        """Against a depth (m) and its rate (m/s), none where it is negative."""
+        return one_sided(depth, rate, self.stiffness, self.damping, REST_ONSET, xp)
 
 
 class PlanarTruss(Structure):
