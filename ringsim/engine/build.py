@@ -13,7 +13,7 @@ from ringsim.engine.cables import CableDrive
 from ringsim.engine.faults import Faults
 from ringsim.engine.joints import add_friction, add_stops
 from ringsim.engine.loads import add_loads
-from ringsim.engine.net import HubNet, add_net
+from ringsim.engine.net import add_net
 from ringsim.engine.pantograph_ring import RingModel, build_ring
 from ringsim.engine.ring_path import ring_path
 from ringsim.engine.rods import Formulation
@@ -37,6 +37,8 @@ class Built:
 
     Attributes
     ----------
+    hub
+        Node of the net's hub; None without a net.
     forces
         Loads along z on the V-joints, shape (2, sections), N.
     stops
@@ -49,7 +51,7 @@ class Built:
     """
 
     ring: RingModel
-    net: HubNet | None
+    hub: Any
     forces: Array
     stops: list[list[Any]]
     cables: CableDrive | None
@@ -60,7 +62,7 @@ def build(scene: Scene) -> Built:
     """Build every part that the scene names, and nothing else."""
     ring = build_ring(scene, FORMULATIONS[type(scene.rods)])
     add_boom(ring)
-    net = add_net(ring)
+    hub = add_net(ring)
     forces = add_loads(ring)
     add_friction(ring)
     stops = add_stops(ring)
@@ -71,4 +73,4 @@ def build(scene: Scene) -> Built:
     ring.assembly.finish()
     if cables is not None:
         cables.locate()
-    return Built(ring, net, forces, stops, cables, faults)
+    return Built(ring, hub, forces, stops, cables, faults)

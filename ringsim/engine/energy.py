@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import exudyn as exu
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ringsim.cable.state import ChainState
 from ringsim.engine.faults import Faults
-from ringsim.engine.net import HubNet
 from ringsim.engine.pantograph_ring import RingModel
 from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.work import StepWork
@@ -47,8 +46,8 @@ class EnergyMeter:
     damp inside and do not tell, so with damping their balance is unknown (NaN).
     """
 
-    def __init__(self, model: RingModel, net: HubNet | None, forces: Array, faults: Faults) -> None:
-        self._model, self._net, self._forces, self._faults = model, net, forces, faults
+    def __init__(self, model: RingModel, hub: Any, forces: Array, faults: Faults) -> None:
+        self._model, self._forces, self._faults = model, forces, faults
         assembly = model.assembly
         self._output = assembly.system.GetObjectOutputBody
         self._elements = [e for rods in model.rods.values() for rod in rods for e in rod.elements]
@@ -57,11 +56,11 @@ class EnergyMeter:
         )
         self._friction = self._friction_groups()
         self._since = StepWork()
-        if net is not None:
+        if hub is not None:
             self._corners = np.array(
                 [assembly.coordinates_of(node)[:3] for _, node in model.hinges[0]]
             )
-            self._hub = assembly.coordinates_of(net.hub)[:3]
+            self._hub = assembly.coordinates_of(hub)[:3]
 
     def read(
         self,
@@ -151,7 +150,7 @@ class EnergyMeter:
 
     def _net_energy(self, state: State) -> tuple[float, Damping]:
         net = self._model.scene.net
-        if self._net is None or net is None:
+        if net is None:
             return 0.0, _NOTHING
         arms = state.position[self._corners] - state.position[self._hub]
         moving = state.velocity[self._corners] - state.velocity[self._hub]

@@ -49,7 +49,7 @@ class Integration:
         self._settings = solver_settings(scene, residual_tolerance(built))
         self._state = State(ring)
         self._openings = Openings(ring)
-        self._energy = EnergyMeter(ring, built.net, built.forces, built.faults)
+        self._energy = EnergyMeter(ring, built.hub, built.forces, built.faults)
         self._stress = StressMeter(ring) if scene.record.stress else None
         families = {joint.family for joint in ring.joints}
         self._gaps = [

@@ -6,43 +6,21 @@ to weightless as it is, with the energy of its first stretch.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import exudyn.itemInterface as item
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.laws import SYMBOLIC, symbolic_law
 from ringsim.engine.pantograph_ring import RingModel
 from ringsim.parts.net import Net
-from ringsim.parts.persection import at_section, spread
+from ringsim.parts.persection import at_section
 from ringsim.theory.ideal_net import FreeHub
 
-Array = NDArray[np.float64]
-_SPRING = "ObjectConnectorSpringDamper"
 
-
-@dataclass(frozen=True)
-class HubNet:
-    """The hub's node and the springs' constants.
-
-    Attributes
-    ----------
-    hub
-        Node of the hub.
-    stiffness
-        Spring rates, one per upper corner, N/m.
-
-    """
-
-    hub: Any
-    stiffness: Array
-
-
-def add_net(model: RingModel) -> HubNet | None:
-    """The hub and its springs, if the scene has a net."""
+def add_net(model: RingModel) -> Any:
+    """The hub and its springs, if the scene has a net; returns the hub's node, or None."""
     net = model.scene.net
     if net is None:
         return None
@@ -64,7 +42,7 @@ def add_net(model: RingModel) -> HubNet | None:
                 **_string(assembly, at_section(net, corner)),
             )
         )
-    return HubNet(hub, spread(net.stiffness, len(corners)))
+    return hub
 
 
 def _string(assembly: Assembly, net: Net) -> dict[str, Any]:
@@ -72,5 +50,8 @@ def _string(assembly: Assembly, net: Net) -> dict[str, Any]:
     if net.two_sided:
         return linear
     return linear | symbolic_law(
-        assembly, _SPRING, net, lambda stretch, rate, _: net.tension(stretch, rate, SYMBOLIC).total
+        assembly,
+        "ObjectConnectorSpringDamper",
+        net,
+        lambda stretch, rate, _: net.tension(stretch, rate, SYMBOLIC).total,
     )

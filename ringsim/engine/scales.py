@@ -9,6 +9,7 @@ import numpy as np
 from ringsim.engine.build import Built
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.rod_dampers import STIFFENING
+from ringsim.parts.persection import spread
 from ringsim.scene import Scene
 from ringsim.theory.ideal_ring import IdealRing
 
@@ -43,7 +44,7 @@ def contact_step(built: Built) -> float:
     rods, ring = scene.rods, scene.structure
     half = rods.density * rods.bar.area * ring.half_bar**3 / 3.0
     inertia = 2.0 * half + ring.vjoint_mass * ring.half_bar**2
-    return 2.0 * math.pi * math.sqrt(inertia / scene.stop.contact_stiffness()) / 20.0
+    return 2.0 * math.pi * math.sqrt(inertia / scene.stop.stiffness) / 20.0
 
 
 def rope_step(built: Built) -> float:
@@ -77,8 +78,9 @@ def residual_tolerance(built: Built) -> float:
     """
     scene = built.ring.scene
     drive = float(np.linalg.norm(built.forces))
-    if scene.net is not None and built.net is not None:
-        drive += float(np.linalg.norm(built.net.stiffness)) * scene.net.neutral_length
+    if scene.net is not None:
+        stiffness = spread(scene.net.stiffness, len(built.ring.hinges[0]))
+        drive += float(np.linalg.norm(stiffness)) * scene.net.neutral_length
     stiffest = max(
         np.max(scene.rods.young_modulus) * tube.area * scene.rods.elements / length
         for tube, length in (

@@ -53,20 +53,6 @@ class Acting(NamedTuple):
     loss: float
 
 
-class _Joints:
-    """Joints of one family: slopes of those that turn alike, and how many each section has."""
-
-    def __init__(self, law: JointFriction, kinds: Array, sections: Array) -> None:
-        self._law, self._kinds, self._sections = law, kinds, sections
-
-    def act(self, turn: float, rates: Array) -> tuple[Array, float]:
-        """Generalised force and power lost; ``turn`` is dtheta/dphi."""
-        slopes = self._kinds[0] + turn * self._kinds[1]
-        speed = slopes @ rates
-        torque = (self._sections * self._law.torque(speed[:, None])).sum(axis=1)
-        return -torque @ slopes, float(torque @ speed)
-
-
 class Forces:
     """Everything that acts on the ideal ring of a scene, without its cables.
 
@@ -105,9 +91,11 @@ class Forces:
         force[0] = self.load * up[2] * rise[1]
         couple = self.load * rise[0] * np.array([-up[1], up[0], 0.0])
         turn = (ring.half_bar / ring.half_diagonal) * float(s[0, 2] / s[0, 3])
-        for joints in self._joints:
-            torque, lost = joints.act(turn, pose.rate)
-            force, loss = force + torque, loss + lost
+        for law, (by_phi, by_theta), number in self._joints:
+            slopes = by_phi + turn * by_theta
+            speed = slopes @ pose.rate
+            torque = (number * law.torque(speed[:, None])).sum(axis=1)
+            force, loss = force - torque @ slopes, loss + float(torque @ speed)
         elastic = 0.0
         if self._net is not None:
             net = self._net.forces(*self._mechanism.corner_motion(pose), pose.rate)
@@ -121,8 +109,10 @@ class Forces:
         return Acting(force, couple, elastic, self.load * float(up[2] * rise[0]), loss)
 
 
-def _joints(scene: Scene, sections: int) -> list[_Joints]:
-    """Each family's joints that turn alike, with how many of them every section has."""
+def _joints(scene: Scene, sections: int) -> list[tuple[JointFriction, Array, Array]]:
+    """Law of each family; its rates per phi' and theta', shape (2, kinds, coordinates), one for
+    joints that turn alike; how many of them each section has, shape (kinds, sections).
+    """
     closed = scene.structure.closed
     width = 1 if closed else 5
     fold, swings = np.eye(width)[0], np.eye(width)[1:]
@@ -143,5 +133,5 @@ def _joints(scene: Scene, sections: int) -> list[_Joints]:
                 kinds += [(SENSE[k] * fold - swing, nothing), (-swing, SENSE[k] * fold)]
                 where += [place, place]
         each = at_section(law, np.arange(sections))
-        found.append(_Joints(each, np.array(kinds).transpose(1, 0, 2), np.array(where)))
+        found.append((each, np.array(kinds).transpose(1, 0, 2), np.array(where)))
     return found
