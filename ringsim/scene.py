@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
@@ -13,11 +13,11 @@ from pydantic import Field, ValidationError, model_validator
 from ringsim.cable.cables import Cables, pulleys_of
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.records import Cable
-from ringsim.choice import kind_of, load_package, one_of
+from ringsim.choice import OneOf
 from ringsim.overrides import section_of, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.faults.family import Fault
-from ringsim.parts.joints import Joints, Stop
+from ringsim.parts.joints import Joints
 from ringsim.parts.loads import Loads
 from ringsim.parts.net import Net
 from ringsim.parts.persection import ListIn
@@ -25,25 +25,14 @@ from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.solver import Record, Solver
+from ringsim.parts.stop.family import Stop
+from ringsim.parts.stop.spring_damper import SpringDamperStop
 from ringsim.refusal import InputError, explain, known_or_nearest
 from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import Model
 
-for _package in ("parts.rods", "parts.boom", "parts.faults", "structures"):
-    load_package(f"ringsim.{_package}")
-
-if TYPE_CHECKING:
-    AnyStructure = PantographRing
-    AnyRods = Rods
-    AnyBoom = Boom
-    AnyFault = Fault
-else:
-    AnyStructure = one_of(Structure)
-    AnyRods = one_of(Rods)
-    AnyBoom = one_of(Boom)
-    AnyFault = one_of(Fault)
-
+AnyStructure = Annotated[Structure, OneOf(default="pantograph-ring")]
 
 MOST_RECORDS = 1_000_000
 """Output times of one run, at most."""
@@ -55,25 +44,16 @@ class Scene(Model):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
     title: Annotated[str, Field(max_length=300)] = ""
     structure: AnyStructure = PantographRing()
-    rods: AnyRods = GeometricallyExactRods()
+    rods: Annotated[Rods, OneOf()] = GeometricallyExactRods()
     joints: Joints = Joints()
-    stop: Stop | None = Stop()
-    boom: AnyBoom | None = None
+    stop: Annotated[Stop, OneOf(default="spring-damper")] | None = SpringDamperStop()
+    boom: Annotated[Boom, OneOf()] | None = None
     net: Net | None = None
     loads: Loads | None = None
     cables: Cables | None = None
-    faults: Annotated[tuple[AnyFault, ...], ListIn] = ()
+    faults: Annotated[tuple[Annotated[Fault, OneOf()], ...], ListIn] = ()
     solver: Solver = Solver()
     record: Record = Record()
-
-    @model_validator(mode="before")
-    @classmethod
-    def _ring_unless_said(cls, table: Any) -> Any:
-        """A structure that does not say its kind is a pantograph ring."""
-        structure = table.get("structure") if isinstance(table, dict) else None
-        if not isinstance(structure, dict) or "kind" in structure:
-            return table
-        return table | {"structure": {"kind": kind_of(PantographRing()), **structure}}
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:

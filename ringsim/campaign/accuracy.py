@@ -175,11 +175,9 @@ def _quadrature(scene: Scene) -> list[Truth]:
         return []
     if not scene.structure.closed:
         return []  # the quadrature keeps an arc's end assemblies upright, but they swing
-    joints = scene.joints
-    losses = (joints.pivot, joints.hinge, joints.vjoint)
     if scene.net is not None and scene.net.damping > 0.0:
         return []
-    if any(law is not None for law in losses) or scene.faults or scene.loads is None:
+    if scene.joints.present() or scene.faults or scene.loads is None:
         return []
     try:
         found = opening_time(OneCoordinate(scene), scene.structure.coordinate)

@@ -61,7 +61,7 @@ class Side:
         """Places, shape (n, 3), m."""
         nodes = state.position[self._where]
         if self._arms is None:
-            return np.asarray(nodes[:, :3])
+            return np.array(nodes[:, :3])
         return nodes[:, :3] + np.einsum(
             "nij,nj->ni", quaternions.axes_of(nodes[:, 3:7]), self._arms
         )

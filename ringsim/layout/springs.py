@@ -15,20 +15,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Spring:
-    """A spring with a damper between the origins of two bodies."""
+    """A linear spring with a damper between the origins of two bodies.
+
+    ``law`` is its record (ringsim.parts): ``stiffness``, ``damping``, ``free_length``, and
+    ``tension(length, rate)`` as a ``ringsim.parts.springs.Reaction``.
+    """
 
     first: int
     second: int
-    stiffness: float
-    damping: float
-    free_length: float
+    law: Any
 
 
 @dataclass(frozen=True)
 class Contact:
     """A body's origin that may not come closer than ``room`` to the plane x_axis = 0.
 
-    ``law`` is the record that holds its force (ringsim.parts).
+    ``law`` is its record, with ``push(depth, rate, xp)`` as a ``Reaction``.
     """
 
     body: int

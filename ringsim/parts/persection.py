@@ -8,8 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Discriminator, Tag
 
+from ringsim.units import Model
+
 Array = NDArray[np.float64]
 _T = TypeVar("_T")
+_Record = TypeVar("_Record", bound=Model)
 
 ONE, EACH = "one value", "a value each"
 
@@ -32,6 +35,15 @@ PerSection = Annotated[
     BeforeValidator(_as_tuple),
 ]
 """One value for all sections, or a list (TOML array) with one value for each."""
+
+
+def at_section(record: _Record, where: int | NDArray[np.int64]) -> _Record:
+    """A record whose lists hold the values of one section (floats), or of several (arrays)."""
+    lists = {name: value for name, value in record if isinstance(value, tuple)}
+    one = isinstance(where, int)
+    return record.model_copy(
+        update={n: v[where] if one else np.asarray(v)[where] for n, v in lists.items()}
+    )
 
 
 def spread(value: float | tuple[float, ...], sections: int) -> Array:

@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.choice import load_package, one_of
+from ringsim.choice import OneOf
 from ringsim.refusal import InputError
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Axis, Design
@@ -21,15 +21,8 @@ from ringsim.sampling.paths import each_of, field_at, refuse_fixed, unit_at
 from ringsim.scene import Scene, place_of
 from ringsim.variables import COORDINATES, VARIABLES
 
-for _package in ("distributions", "distributions.continuous", "designs"):
-    load_package(f"ringsim.sampling.{_package}")
-
-if TYPE_CHECKING:
-    AnyDistribution = Distribution
-    AnyDesign = Design
-else:
-    AnyDistribution = one_of(Distribution)
-    AnyDesign = one_of(Design)
+AnyDistribution = Annotated[Distribution, OneOf()]
+AnyDesign = Annotated[Design, OneOf()]
 
 
 @dataclass(frozen=True)

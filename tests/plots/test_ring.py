@@ -12,7 +12,6 @@ from ringsim.plots.camera import Camera
 from ringsim.plots.ring import facing_azimuth, instants, lines_at, ring
 from ringsim.variables import Status
 
-
 LEFT = [*range(6), *range(12, 18)]
 """Left halves of the bars of six sections, upper plane first."""
 
