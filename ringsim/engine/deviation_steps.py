@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.engine.scales import usual_rate
+from ringsim.layout.of_scene import layout_of
 from ringsim.parts.solver import NO_DEVIATIONS
 from ringsim.scene import Scene
 
@@ -40,11 +41,11 @@ _FADING = 20.0
 
 def deviation_steps(scene: Scene) -> DeviationSteps | None:
     """What a scene asks for: nothing without ``record.stress``, or with constant steps."""
-    solver, structure = scene.solver, scene.structure
+    solver = scene.solver
     followed = solver.deviation_tolerance < NO_DEVIATIONS and solver.step_control == "motion"
     if not (scene.record.stress and followed):
         return None
-    travel = math.pi - math.radians(structure.opening_angle)
+    travel = math.pi - float(layout_of(scene).opening_angles()[0].mean())
     return DeviationSteps(solver.deviation_tolerance, travel / usual_rate(scene))
 
 

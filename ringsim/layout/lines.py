@@ -68,8 +68,8 @@ def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> di
         top = layout.pose(layout.boom.top).place
         found["boom"] = [(top, top - [0.0, 0.0, layout.boom.record.length])]
     if layout.net is not None:
-        for body in layout.net.bodies:
-            line = layout.bodies[body].pose.place, layout.net.hub
+        for number in layout.net.bodies:
+            line = layout.bodies[number].pose.place, layout.net.hub
             taut = np.linalg.norm(line[0] - line[1]) > taut_beyond
             found.setdefault("net, taut" if taut else "net, slack", []).append(line)
     middle = _middle(np.array([body.pose.place for body in layout.bodies]))

@@ -73,8 +73,9 @@ class OneCoordinate:
         )
         if net is None:
             return done
-        places, _ = _upper_corners(layout)
-        return done - FreeHub(net, len(places)).energy(places)
+        places, rates = _upper_corners(layout)
+        hub = FreeHub(net, len(places))
+        return done - hub.forces(places, rates[:, :, None], np.zeros(1)).energy
 
     def work_rate(self, q: float) -> float:
         """Generalised force dW/dq, J/rad."""
