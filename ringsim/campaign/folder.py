@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from ringsim.campaign.specification import Campaign
-from ringsim.execution.work import Retry
 from ringsim.refusal import InputError
 from ringsim.sampling.table import Table
 from ringsim.scene import Scene, scene_from_toml
@@ -54,11 +53,6 @@ class Folder:
     def output(self) -> Output:
         """How the merged file is stored."""
         return Output.model_validate_json(self.attributes["output"])
-
-    @property
-    def retry(self) -> Retry:
-        """What is done about runs that the solver could not finish."""
-        return Retry.model_validate_json(self.attributes["retry"])
 
 
 def open_folder(path: Path) -> Folder:
@@ -152,7 +146,6 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder:
         "campaign_name": wanted.name,
         "scene": campaign.scene.to_toml(),
         "output": wanted.output.model_dump_json(),
-        "retry": wanted.retry.model_dump_json(),
     }
     for draft in path.glob(f".{NAME}.*{DRAFT}"):
         draft.unlink(missing_ok=True)
@@ -176,7 +169,6 @@ def _identity(campaign: Campaign, table: Table, solver: str) -> str:
         "scene": campaign.scene.to_toml(),
         "inputs": [column.path for column in table.columns],
         "seed": campaign.specification.seed,
-        "retry": campaign.specification.retry.model_dump(),
         "solver": solver,
         "version": version("ringsim"),
     }
@@ -197,7 +189,6 @@ def refuse_another(campaign: Campaign, old: Folder, table: Table, solver: str) -
         suspects = {
             "its scene": campaign.scene.to_toml() != old.attributes["scene"],
             "its seed": campaign.specification.seed != int(old.attributes["seed"]),
-            "its retry": campaign.specification.retry != old.retry,
             "the version of ringsim": old.attributes["ringsim_version"] != version("ringsim"),
             "its inputs": paths != [column.path for column in old.table.columns],
             "its solver": solver != old.solver,

@@ -87,7 +87,7 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, part: Part, solver: 
 def run_once(campaign: Campaign, table: Table, sample: int, solver: str) -> Result:
     """Run one sample in a solver process and keep nothing."""
     wanted = campaign.specification
-    slot = Slot(solver, campaign.scene.to_table(), wanted.limits, wanted.retry)
+    slot = Slot(solver, campaign.scene.to_table(), wanted.limits)
     try:
         slot.submit(Task(sample, table.values_of(sample)))
         while True:

@@ -25,7 +25,6 @@ class Stored:
 
     status: Status
     reason: str
-    step: float
     values: dict[str, NDArray[Any]]
 
 
@@ -51,18 +50,17 @@ def stored(campaign: Folder, sample: int) -> Stored | None:
     owner, row = latest(found.shards, campaign.table.samples)
     if owner[sample] < 0:
         return None
-    names = ["status", "reason", "largest_step", *VARIABLES]
+    names = ["status", "reason", *VARIABLES]
     values = rows_of(found.shards[owner[sample]].path, names, row[sample : sample + 1])
     first = {name: each[0] for name, each in values.items()}
     return Stored(
         Status(int(first.pop("status"))),
         str(first.pop("reason")),
-        float(first.pop("largest_step")),
         first,
     )
 
 
-def replay(campaign: Folder, sample: int, *, step: float | None = None) -> Result:
+def replay(campaign: Folder, sample: int) -> Result:
     """Run one sample in this process; what the solver prints goes to the terminal.
 
     Parameters
@@ -71,20 +69,8 @@ def replay(campaign: Folder, sample: int, *, step: float | None = None) -> Resul
         The folder.
     sample
         Which sample.
-    step
-        Largest time step, if a repeated attempt is to be replayed.
-
-    Raises
-    ------
-    InputError
-        If there is no such sample.
     """
-    scene = sample_scene(campaign, sample)
-    shrink = 1.0
-    if step is not None and np.isfinite(step):
-        shrink = step / scene.solver.step
-    values, own = campaign.table.values_of(sample), campaign.retry.times == 0
-    task = Task(sample, values, shrink, restarts=own)
+    task = Task(sample, campaign.table.values_of(sample))
     return solve(load_solver(campaign.solver), campaign.scene, task)
 
 

@@ -227,7 +227,6 @@ def _work(
         scene=campaign.scene.to_table(),
         values_of=campaign.table.values_of,
         limits=choices.limits,
-        retry=campaign.retry,
         keep=store.keep,
         started=progress.started if progress is not None else lambda sample: None,
         finished=finished,

@@ -6,11 +6,11 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError
 
-from ringsim.execution.work import Limits, Retry
+from ringsim.execution.work import Limits
 from ringsim.refusal import InputError, explain, known_or_nearest
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.table import AnyDesign, AnyDistribution, Table, draw, with_error_bars
@@ -42,6 +42,10 @@ def _flat(inner: Callable[[Any], bool]) -> Callable[[Any], Any]:
 class Specification(Model):
     """Content of a campaign file."""
 
+    gone: ClassVar[dict[str, str]] = {
+        "retry": "runs that fail start anew by themselves, see solver.restarts; leave it out",
+    }
+
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
     title: Annotated[str, Field(max_length=300)] = ""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
@@ -58,7 +62,6 @@ class Specification(Model):
     correlations: list[Correlation] = Field(default_factory=list)
     design: AnyDesign
     limits: Limits = Limits()
-    retry: Retry = Retry()
     fidelity: Literal["full", "ideal"] = "full"
     """full: the flexible multibody model; ideal: rigid rods."""
     error_bars_every: Annotated[int, Field(ge=0)] = 0

@@ -27,7 +27,7 @@ class Local:
         """Run samples; see :class:`Scheduler`."""
         queue = deque(samples)
         count = min(self.workers, len(queue))
-        slots = [Slot(work.solver, work.scene, work.limits, work.retry) for _ in range(count)]
+        slots = [Slot(work.solver, work.scene, work.limits) for _ in range(count)]
         try:
             while True:
                 reason = work.stop()

@@ -38,7 +38,7 @@ class Mpi:
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """Run samples; see :class:`Scheduler`.  Only rank 0's samples are looked at."""
-        slot = Slot(work.solver, work.scene, work.limits, work.retry)
+        slot = Slot(work.solver, work.scene, work.limits)
         try:
             return (
                 self._schedule(deque(samples), slot, work)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ringsim.execution.solve import fresh_scene, load_solver, retold, solve
+from ringsim.execution.solve import fresh_scene, load_solver, solve
 from ringsim.execution.work import Work
-from ringsim.variables import Status
 
 
 class Serial:
@@ -21,19 +20,7 @@ class Serial:
             if reason:
                 return reason
             work.started(sample)
-            task, attempts, first = work.task(sample), 1, ""
-            result = solve(solver, base, task)
-            while (
-                result.status in (Status.SOLVER_FAILED, Status.DIVERGED)
-                and attempts <= work.retry.times
-            ):
-                first = first or result.reason
-                task = replace(task, shrink=task.shrink * work.retry.step_factor)
-                attempts += 1
-                result = solve(solver, base, task)
-            result = replace(
-                result, attempts=attempts, reason=retold(result.reason, attempts, first)
-            )
+            result = solve(solver, base, work.task(sample))
             work.keep(result)
             work.finished(replace(result, arrays=(), body=b""))
         return work.stop()

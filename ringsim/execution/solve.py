@@ -52,15 +52,9 @@ def solve(solver: Solver, base: Scene, task: Task) -> Result:
     task
         Which sample.
     """
-    step, begin = float("nan"), time.monotonic()
+    begin = time.monotonic()
     try:
-        scene = base.with_values(task.values)
-        if task.shrink != 1.0:
-            scene = scene.with_values({"solver.step": scene.solver.step * task.shrink})
-        if not task.restarts:
-            scene = scene.with_values({"solver.restarts": 0})
-        step = scene.solver.step
-        outcome = solver(scene)
+        outcome = solver(base.with_values(task.values))
         arrays, body = pack(outcome.coordinates | outcome.values)
         status, reason, log = Status(outcome.status), str(outcome.reason), ""
         fault = not_finite(outcome) if not status.failed else ""
@@ -77,7 +71,6 @@ def solve(solver: Solver, base: Scene, task: Task) -> Result:
         status=status,
         reason=plain(" ".join(reason.split())[:1000]),
         log=plain(log),
-        step=step,
         seconds=time.monotonic() - begin,
         finished=time.time(),
         arrays=arrays,
@@ -127,10 +120,3 @@ def _trace() -> str:
 def fresh_scene(table: dict[str, Any]) -> Scene:
     """The scene of nested tables that have been checked before."""
     return Scene.model_validate(table)
-
-
-def retold(reason: str, attempts: int, first: str) -> str:
-    """The reason of a run, with what became of the attempts before it."""
-    return (
-        f"{reason} (attempt {attempts}, with a smaller step; first: {first})" if first else reason
-    )

@@ -25,28 +25,12 @@ class Limits(Model):
     """Runs after which a solver process is replaced by a fresh one."""
 
 
-class Retry(Model):
-    """Repeating a run that the solver could not finish, each time with a smaller step.
-
-    Where it does, runs do not start anew by themselves (``solver.restarts``): a sample is
-    attempted 1 + times times, not (1 + times) (1 + restarts) times.
-    """
-
-    times: Annotated[int, Field(ge=0, le=10)] = 0
-    step_factor: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
-    """Factor on solver.step from one attempt to the next."""
-
-
 @dataclass(frozen=True)
 class Task:
     """One run that is asked for."""
 
     sample: int
     values: dict[str, Any]
-    shrink: float = 1.0
-    """Factor on the scene's largest step."""
-    restarts: bool = True
-    """Whether the run may start anew by itself (``solver.restarts``)."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +45,8 @@ class Work:
         Base scene as nested tables.
     values_of
         Inputs of a sample by scene path.
-    limits, retry
-        Bounds on one run, and what to repeat.
+    limits
+        Bounds on one run.
     keep
         Stores a result; called in the process that supervised the run.
     started, finished
@@ -75,15 +59,14 @@ class Work:
     scene: dict[str, Any]
     values_of: Callable[[int], dict[str, Any]]
     limits: Limits
-    retry: Retry
     keep: Callable[[Result], None]
     started: Callable[[int], None]
     finished: Callable[[Result], None]
     stop: Callable[[], str]
 
     def task(self, sample: int) -> Task:
-        """The first run of a sample."""
-        return Task(sample, self.values_of(sample), restarts=self.retry.times == 0)
+        """The run of a sample."""
+        return Task(sample, self.values_of(sample))
 
 
 class Scheduler(Protocol):

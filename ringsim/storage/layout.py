@@ -28,8 +28,6 @@ PER_SAMPLE = {
         VARIABLES["status"],
         Variable("reason", (), "1", "why the run ended so", "str"),
         Variable("log", (), "1", "end of what a failed run printed", "str"),
-        Variable("attempts", (), "1", "runs that were made of the sample", "i4"),
-        Variable("largest_step", (), "s", "largest time step of the run that counts"),
     )
 }
 """What is known of every sample beside its outputs."""

@@ -36,12 +36,8 @@ class Result:
         One sentence: why it ended so.
     log
         The end of what a failed run printed.
-    attempts
-        Runs that were made; more than one if a failed run was repeated.
-    step
-        Largest time step of the run that counts, in s.
     seconds
-        Elapsed time of all attempts.
+        Elapsed time of the run.
     finished
         When it ended, as seconds since 1970.
     arrays
@@ -54,8 +50,6 @@ class Result:
     status: Status
     reason: str
     log: str = ""
-    attempts: int = 1
-    step: float = float("nan")
     seconds: float = float("nan")
     finished: float = 0.0
     arrays: tuple[tuple[str, str, tuple[int, ...]], ...] = ()
@@ -79,9 +73,7 @@ class Result:
         return json.dumps(table, separators=(",", ":")).encode()
 
 
-_FIELDS = (
-    "sample", "status", "reason", "log", "attempts", "step", "seconds", "finished", "arrays",
-)  # fmt: skip
+_FIELDS = ("sample", "status", "reason", "log", "seconds", "finished", "arrays")
 
 
 def precedence(status: Any, finished: Any) -> Any:

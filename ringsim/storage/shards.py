@@ -34,7 +34,7 @@ _CHUNK_BYTES = 1 << 16
 """Small, so that a few samples of a shard can be read without the others."""
 _TIMES = {
     "finished": Variable("finished", (), "s", "end of the run, since 1970-01-01T00:00:00Z"),
-    "seconds": Variable("seconds", (), "s", "elapsed time of all runs of the sample"),
+    "seconds": Variable("seconds", (), "s", "elapsed time of the run"),
 }
 _ROW_BYTES = 100_000
 """Reading one row takes as long as reading so many bytes of rows that stand together."""
@@ -109,7 +109,7 @@ def _fill(path: Path, ordered: list[Result], campaign: str) -> None:
             if name in arrays[0]:
                 add_coordinate(file, name, arrays[0][name])
         for name, definition in (PER_SAMPLE | _TIMES).items():
-            found = [getattr(r, "step" if name == "largest_step" else name) for r in ordered]
+            found = [getattr(r, name) for r in ordered]
             column = blank(definition, (len(ordered),))
             column[:] = [plain(text) for text in found] if definition.dtype == "str" else found
             add_variable(file, definition, compression=0)[:] = column
