@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from ringsim.campaign.specification import Campaign
+from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError
 from ringsim.sampling.table import Table
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.design_file import NAME, read_design, write_design
-from ringsim.storage.files import DRAFT, busy, locked, tries, unwritable
 from ringsim.storage.layout import Output
+from ringsim.storage.locks import GO_ON, busy, locked, tries
 from ringsim.storage.provenance import provenance
 from ringsim.storage.shards import ASIDE, FOLDER
 from ringsim.storage.store import JOURNALS, create_folders
@@ -95,7 +96,7 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> Folder:
             f"{path}: its name is not UTF-8: choose another folder with --out"
         ) from None
     table = campaign.draw()
-    try:
+    with writing(path / NAME, GO_ON):
         for _ in tries():
             found = _as_it_is(campaign, path, table, solver)
             if found is not None:
@@ -105,8 +106,6 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> Folder:
                 if alone:
                     found = _as_it_is(campaign, path, table, solver)
                     return found or _write(campaign, path, table, solver)
-    except OSError as error:
-        raise unwritable(path / NAME, error) from error
     raise busy(path)
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ringsim.campaign.folder import Folder
-from ringsim.storage.files import DRAFT, in_turn, unwritable
+from ringsim.files import DRAFT, writing
+from ringsim.storage.locks import GO_ON, in_turn
 from ringsim.storage.merge import NAME, merge_shards
 from ringsim.storage.provenance import provenance
 from ringsim.storage.store import survey
@@ -53,25 +54,22 @@ def merge(campaign: Folder, *, execution: str, set_aside: bool, partly: bool) ->
         If the folder cannot be written to.
     """
     path = campaign.path / NAME
-    try:
-        with in_turn(campaign.path / "lock-merge"):
-            for draft in campaign.path.glob(f".{NAME}.*{DRAFT}"):
-                draft.unlink(missing_ok=True)
-            found = survey(
-                campaign.path, campaign.identity, campaign.table.samples, set_aside=set_aside
-            )
-            left, failed = int((~found.sealed).sum()), len(found.failed)
-            if left and not partly:
-                return Merged(left, failed, None)
-            failed += merge_shards(
-                campaign.path,
-                found.shards,
-                campaign.table,
-                campaign.output,
-                _attributes(campaign, execution),
-            )
-    except OSError as error:
-        raise unwritable(path, error) from error
+    with writing(path, GO_ON), in_turn(campaign.path / "lock-merge"):
+        for draft in campaign.path.glob(f".{NAME}.*{DRAFT}"):
+            draft.unlink(missing_ok=True)
+        found = survey(
+            campaign.path, campaign.identity, campaign.table.samples, set_aside=set_aside
+        )
+        left, failed = int((~found.sealed).sum()), len(found.failed)
+        if left and not partly:
+            return Merged(left, failed, None)
+        failed += merge_shards(
+            campaign.path,
+            found.shards,
+            campaign.table,
+            campaign.output,
+            _attributes(campaign, execution),
+        )
     return Merged(left, failed, path)
 
 

@@ -18,12 +18,11 @@ from ringsim.campaign.watch import Progress, Stop, stopping_on_signals
 from ringsim.execution.cost import longest_first, relative_cost
 from ringsim.execution.launch import polite_barrier
 from ringsim.execution.work import Limits, Scheduler, Work
+from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.refusal import InputError
-from ringsim.storage.files import reserved
+from ringsim.storage.locks import reserved
 from ringsim.storage.record import Result
 from ringsim.storage.store import Store, Survey, recover, survey
-
-DONE, TOO_MANY_FAILED, INTERRUPTED = 0, 3, 130
 
 
 @dataclass(frozen=True)
@@ -117,7 +116,7 @@ def run_campaign(folder: Path, choices: Choices) -> int:
         campaign = open_folder(folder)
         _run_missing(campaign, choices, stop)
         try:
-            return _conclude(campaign, choices, stop) if choices.rank == 0 else DONE
+            return _conclude(campaign, choices, stop) if choices.rank == 0 else EXIT_DONE
         finally:
             # Until rank 0 has merged: a signal would end the others, and they the whole job.
             if choices.communicator is not None:
@@ -243,7 +242,7 @@ def _conclude(campaign: Folder, choices: Choices, stop: Stop) -> int:
         )
     except KeyboardInterrupt:
         _tell(f"{stop.reason}; the samples are not merged yet: the same command goes on with that")
-        return INTERRUPTED
+        return EXIT_INTERRUPTED
     finally:
         stop.at_once = False
     left, failed = merged.left, merged.failed
@@ -263,8 +262,8 @@ def _conclude(campaign: Folder, choices: Choices, stop: Stop) -> int:
     elif left:
         _tell(f"this part is done; {left} samples of other parts are left")
     if over_budget or failed == campaign.table.samples:
-        return TOO_MANY_FAILED
-    return INTERRUPTED if left and (stop.signalled or choices.part.whole) else DONE
+        return EXIT_FAILED
+    return EXIT_INTERRUPTED if left and (stop.signalled or choices.part.whole) else EXIT_DONE
 
 
 def _tell(line: str) -> None:

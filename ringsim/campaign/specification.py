@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, ValidationError
 
 from ringsim.execution.work import Limits
+from ringsim.files import parse_toml, read_text
 from ringsim.refusal import InputError, explain, known_or_nearest
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.table import AnyDesign, AnyDistribution, Table, draw, with_error_bars
@@ -123,22 +123,9 @@ def load_campaign(path: Path) -> Campaign:
     InputError
         If it cannot be read, or if its content or its scene is refused.
     """
+    text = read_text(path)
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path.name}: not a text file: byte {error.start + 1} is not UTF-8; save it as UTF-8"
-        ) from None
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path.name}: not valid TOML: {error}; correct that line") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path.name}: not a campaign: {error}") from None
-    try:
-        specification = Specification.model_validate(table)
+        specification = Specification.model_validate(parse_toml(text, path.name))
     except ValidationError as error:
         raise InputError(explain(error, Specification, path.name)) from None
     name, builtin = specification.scene, builtin_scenes()

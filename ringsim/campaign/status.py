@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ringsim.campaign.folder import Folder
-from ringsim.storage.files import in_use
 from ringsim.storage.layout import NOT_RUN
+from ringsim.storage.locks import in_use
 from ringsim.storage.store import Survey, survey
 from ringsim.variables import Status
 

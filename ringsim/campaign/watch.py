@@ -16,6 +16,7 @@ from typing import Any
 
 from tqdm import tqdm
 
+from ringsim.files import whole
 from ringsim.storage.record import Result
 
 STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
@@ -162,7 +163,5 @@ class Progress:
             "failed": self.failed,
             "running": {sample: now - begin for sample, begin in self.running.items()},
         }
-        draft = self.path.with_name(f"{self.path.name}.{os.getpid()}")
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError), whole(self.path, lasting=False) as draft:
             draft.write_text(json.dumps(content), encoding="utf-8")
-            os.replace(draft, self.path)

@@ -13,11 +13,11 @@ from ringsim.campaign.folder import prepare_folder
 from ringsim.campaign.plan import plan
 from ringsim.campaign.run import Choices, Part, run_campaign
 from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
-from ringsim.cli import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.execution.launch import aborting, describe, launched_size, mpi_world
 from ringsim.execution.local import Local
 from ringsim.execution.mpi import Mpi
 from ringsim.execution.serial import Serial
+from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.refusal import InputError
 
 

@@ -10,7 +10,8 @@ import click
 
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.merging import merge
-from ringsim.storage.files import locked, unwritable
+from ringsim.files import writing
+from ringsim.storage.locks import GO_ON, locked
 from ringsim.storage.store import recover
 
 
@@ -25,10 +26,8 @@ def command(folder: Path) -> None:
     logging.basicConfig(format="%(message)s")
     campaign = open_folder(folder)
     with contextlib.ExitStack() as held:
-        try:
+        with writing(folder / "lock", GO_ON):
             alone = held.enter_context(locked(folder / "lock"))
-        except OSError as error:
-            raise unwritable(folder / "lock", error) from error
         if alone:
             recover(folder, campaign.identity, "")
     merged = merge(campaign, execution="merged on its own", set_aside=alone, partly=True)

@@ -9,7 +9,7 @@ import click
 
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.replay import differences, outcome_of, replay, sample_scene, stored
-from ringsim.cli import EXIT_DONE, EXIT_FAILED
+from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 
 
 @click.command()

@@ -9,9 +9,9 @@ from typing import Any
 import netCDF4
 import numpy as np
 
+from ringsim.files import whole
 from ringsim.refusal import InputError
 from ringsim.sampling.table import Column, Table
-from ringsim.storage.files import whole
 from ringsim.storage.layout import add_dimension, add_samples, open_new
 
 NAME = "design.nc"
@@ -31,17 +31,13 @@ def write_design(folder: Path, table: Table, attributes: Mapping[str, Any]) -> N
 
     Raises
     ------
-    OSError
+    OSError, RuntimeError
         If the disk is full.
     """
-    with whole(folder / NAME) as draft:
-        try:
-            with open_new(draft) as file:
-                file.setncatts(dict(attributes))
-                add_samples(file, np.arange(table.samples))
-                add_inputs(file, table, compression=4)
-        except RuntimeError as error:
-            raise OSError(str(error)) from error
+    with whole(folder / NAME) as draft, open_new(draft) as file:
+        file.setncatts(dict(attributes))
+        add_samples(file, np.arange(table.samples))
+        add_inputs(file, table, compression=4)
 
 
 def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:

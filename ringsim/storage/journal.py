@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from ringsim.storage.files import sync
+from ringsim.files import sync
 from ringsim.storage.record import Result, from_header
 
 _FRAME = struct.Struct("<8sIQ16s")

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.files import whole
 from ringsim.sampling.table import Table
 from ringsim.storage.design_file import add_inputs
-from ringsim.storage.files import whole
 from ringsim.storage.layout import (
     CHUNK_BYTES,
     PER_SAMPLE,
@@ -66,7 +66,7 @@ def merge_shards(
 
     Raises
     ------
-    OSError
+    OSError, RuntimeError
         If the disk is full; an older file stays.
     """
     axes, names, fits = _common(shards)
@@ -78,20 +78,16 @@ def merge_shards(
     } | PER_SAMPLE
     owner, row = latest(shards, table.samples)
     path = folder / NAME
-    with whole(path) as draft:
-        try:
-            with open_new(draft) as file:
-                file.setncatts(dict(attributes))
-                add_samples(file, np.arange(table.samples))
-                for name, values in axes.items():
-                    add_coordinate(file, name, values)
-                add_inputs(file, table, compression=output.compression)
-                for name, variable in wanted.items():
-                    digits = output.significant_digits.get(name)
-                    add_variable(file, variable, compression=output.compression, digits=digits)
-                _copy(file, shards, fits, (owner, row), wanted)
-        except RuntimeError as error:
-            raise OSError(str(error)) from error
+    with whole(path) as draft, open_new(draft) as file:
+        file.setncatts(dict(attributes))
+        add_samples(file, np.arange(table.samples))
+        for name, values in axes.items():
+            add_coordinate(file, name, values)
+        add_inputs(file, table, compression=output.compression)
+        for name, variable in wanted.items():
+            digits = output.significant_digits.get(name)
+            add_variable(file, variable, compression=output.compression, digits=digits)
+        _copy(file, shards, fits, (owner, row), wanted)
     return int((~fits[owner[owner >= 0]]).sum())
 
 

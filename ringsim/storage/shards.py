@@ -14,7 +14,7 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.storage.files import DRAFT, digest, sync
+from ringsim.files import DRAFT, sync
 from ringsim.storage.layout import (
     COORDINATE,
     PER_SAMPLE,
@@ -24,6 +24,7 @@ from ringsim.storage.layout import (
     blank,
     open_new,
 )
+from ringsim.storage.locks import digest
 from ringsim.storage.record import Result, plain, precedence
 from ringsim.variables import VARIABLES, Variable
 

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.storage.files import DRAFT, locked, unwritable
+from ringsim.files import DRAFT, writing
 from ringsim.storage.journal import Journal, read_journal
 from ringsim.storage.layout import NOT_RUN
+from ringsim.storage.locks import GO_ON, locked
 from ringsim.storage.record import Result, precedence
 from ringsim.storage.shards import FOLDER, Shard, latest, read_shards, write_shards
 from ringsim.variables import Status
@@ -50,14 +51,12 @@ class Store:
         InputError
             If the disk is full; what was stored before remains.
         """
-        try:
+        with writing(self._path, GO_ON):
             if self._journal is None:
                 self._journal = Journal(self._path)
             self._journal.append(result)
             if self._journal.samples >= self._shard_samples or self._journal.size >= SHARD_BYTES:
                 self._seal()
-        except OSError as error:
-            raise unwritable(self._path, error) from error
 
     def close(self) -> None:
         """Turn what is in the journal into a shard.
@@ -67,10 +66,8 @@ class Store:
         InputError
             If the disk is full; the journal remains, and the next run takes it up.
         """
-        try:
+        with writing(self._path, GO_ON):
             self._seal()
-        except OSError as error:
-            raise unwritable(self._path, error) from error
 
     def _seal(self) -> None:
         if self._journal is None:
@@ -109,15 +106,13 @@ def recover(folder: Path, campaign: str, share: str) -> None:
             draft.unlink(missing_ok=True)
     for path in sorted((folder / JOURNALS).glob("*.journal")):
         owner = path.name.rpartition("-rank")[0]
-        try:
+        with writing(path, GO_ON):
             if share in ("", owner):
                 _adopt(path, folder, campaign)
                 continue
             with locked(folder / f"lock-{owner}", unsure=False) as free:
                 if free:
                     _adopt(path, folder, campaign)
-        except OSError as error:
-            raise unwritable(path, error) from error
 
 
 def _adopt(path: Path, folder: Path, campaign: str) -> None:

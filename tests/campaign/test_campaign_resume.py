@@ -9,8 +9,8 @@ from ringsim.campaign.folder import open_folder
 from ringsim.execution.solve import load_solver, solve
 from ringsim.execution.work import Task
 from ringsim.refusal import InputError
-from ringsim.storage.files import reserved
 from ringsim.storage.journal import read_journal
+from ringsim.storage.locks import reserved
 from ringsim.storage.record import Result
 from ringsim.storage.shards import write_shards
 from ringsim.storage.store import Store, create_folders, survey

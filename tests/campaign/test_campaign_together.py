@@ -18,7 +18,7 @@ from ringsim.campaign.merging import merge
 from ringsim.campaign.run import Choices, run_campaign
 from ringsim.execution.serial import Serial
 from ringsim.execution.work import Limits
-from ringsim.storage.files import in_turn, locked
+from ringsim.storage.locks import in_turn, locked
 
 
 def blocked(pid):

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and locks on folders."""
+"""Locks: which process may run which samples of a campaign's folder."""
 
 from __future__ import annotations
 
@@ -6,43 +6,20 @@ import contextlib
 import fcntl
 import hashlib
 import os
-import secrets
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from ringsim.files import writing
 from ringsim.refusal import InputError
 
-DRAFT = ".draft"
+GO_ON = (
+    "make room or choose another folder, then give the same command again: finished samples are "
+    "kept"
+)
+"""What to do when a campaign's folder cannot be written to."""
+
 _LOCK_TRIES, _LOCK_PAUSE = 10, 0.1
-
-
-@contextlib.contextmanager
-def whole(path: Path) -> Iterator[Path]:
-    """A draft to write to; it gets its name once it is complete and on the disk.
-
-    Parameters
-    ----------
-    path
-        The final name; an older file of that name is replaced.
-    """
-    draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}{DRAFT}")
-    try:
-        yield draft
-        sync(draft)
-        os.replace(draft, path)
-        sync(path.parent)
-    finally:
-        draft.unlink(missing_ok=True)
-
-
-def sync(path: Path) -> None:
-    """Make the operating system write a file or folder to the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def digest(path: Path) -> str:
@@ -132,12 +109,10 @@ def reserved(folder: Path, writer: str, *, alone: bool) -> Iterator[None]:
     with contextlib.ExitStack() as held:
         for _ in tries():
             with contextlib.ExitStack() as wanted:
-                try:
+                with writing(folder / f"lock-{writer}", GO_ON):
                     free = wanted.enter_context(locked(folder / "lock", shared=not alone)) and (
                         wanted.enter_context(locked(folder / f"lock-{writer}"))
                     )
-                except OSError as error:
-                    raise unwritable(folder / f"lock-{writer}", error) from error
                 if free:
                     held.enter_context(wanted.pop_all())
                     break
@@ -168,12 +143,3 @@ def in_use(folder: Path, writer: str) -> bool:
         return False
     with locked(path, shared=True) as free:
         return not free
-
-
-def unwritable(path: Path, error: BaseException) -> InputError:
-    """The refusal for a file that cannot be written, with the cure."""
-    reason = getattr(error, "strerror", None) or str(error)
-    return InputError(
-        f"{path}: cannot be written: {reason}; make room or choose another folder, then give the "
-        "same command again: finished samples are kept"
-    )
