@@ -80,12 +80,7 @@ def run_cases(folder: Path, cases: Cases, workers: int) -> Path:
     campaign = load_campaign(file)
     home = folder / cases.name
     prepare_folder(campaign, home, solver=SOLVERS[cases.fidelity])
-    choices = Choices(
-        scheduler=Local(workers),
-        workers=workers,
-        limits=campaign.specification.limits,
-        description=f"{workers} local workers",
-    )
+    choices = Choices(Local(workers), campaign.specification.limits)
     if run_campaign(home, choices) == EXIT_INTERRUPTED:
         raise KeyboardInterrupt
     return home / MERGED

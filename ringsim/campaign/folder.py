@@ -16,11 +16,11 @@ from ringsim.refusal import InputError
 from ringsim.sampling.table import Table
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.design_file import NAME, read_design, write_design
-from ringsim.storage.layout import Output
+from ringsim.storage.journal import FOLDER
 from ringsim.storage.locks import GO_ON, busy, locked, tries
+from ringsim.storage.netcdf import Output
 from ringsim.storage.provenance import provenance
-from ringsim.storage.shards import ASIDE, FOLDER
-from ringsim.storage.store import JOURNALS, create_folders
+from ringsim.storage.survey import Survey, survey
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,10 @@ class Folder:
     scene: Scene
     solver: str
     attributes: dict[str, Any]
+
+    def survey(self) -> Survey:
+        """What it holds of every sample."""
+        return survey(self.path, self.identity, self.table.samples)
 
     @property
     def output(self) -> Output:
@@ -101,7 +105,7 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> Folder:
             found = _as_it_is(campaign, path, table, solver)
             if found is not None:
                 return found
-            create_folders(path)
+            (path / FOLDER).mkdir(parents=True, exist_ok=True)
             with locked(path / "lock") as alone:
                 if alone:
                     found = _as_it_is(campaign, path, table, solver)
@@ -126,13 +130,12 @@ def _refuse_strangers(path: Path) -> None:
         raise InputError(
             f"{path}: this folder holds {strangers[0]} and no campaign: choose a new one with --out"
         )
-    for inside, results in ((FOLDER, "shard-*.nc"), (JOURNALS, "*.journal")):
-        if any((path / inside).glob(results)):
-            raise InputError(
-                f"{path}: this folder holds results in {inside}, but its {NAME} is gone, so nobody "
-                f"knows which campaign they belong to: bring {NAME} back, or choose a new folder "
-                "with --out"
-            )
+    if any((path / FOLDER).glob("*.journal")):
+        raise InputError(
+            f"{path}: this folder holds results in {FOLDER}, but its {NAME} is gone, so nobody "
+            f"knows which campaign they belong to: bring {NAME} back, or choose a new folder "
+            "with --out"
+        )
 
 
 def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder:
@@ -160,7 +163,7 @@ def _entries(path: Path) -> list[Path]:
 
 
 def _ours(name: str) -> bool:
-    return name in (FOLDER, JOURNALS, ASIDE) or name.startswith((".design", "lock", "progress"))
+    return name.startswith((FOLDER, "lock", "progress", ".design", ".progress"))
 
 
 def _identity(campaign: Campaign, table: Table, solver: str) -> str:

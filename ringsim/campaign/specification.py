@@ -15,7 +15,7 @@ from ringsim.refusal import InputError, explain, known_or_nearest
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.table import AnyDesign, AnyDistribution, Table, draw, with_error_bars
 from ringsim.scene import Scene, builtin_scenes, load_scene
-from ringsim.storage.layout import Output
+from ringsim.storage.netcdf import Output
 from ringsim.units import Model
 
 SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_ideal"}

@@ -17,7 +17,7 @@ from typing import Any
 from tqdm import tqdm
 
 from ringsim.files import whole
-from ringsim.storage.record import Result
+from ringsim.storage.result import Result
 
 STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 _PLAIN_SECONDS = 30.0
@@ -25,7 +25,7 @@ _FILE_SECONDS = 1.0
 
 
 @dataclass
-class Stop:
+class StopRequest:
     """Whether the campaign is to stop, and why; falsy text means go on.
 
     Attributes
@@ -42,10 +42,6 @@ class Stop:
     signalled: bool = False
     at_once: bool = False
 
-    def asked(self) -> str:
-        """The reason to stop, or an empty string."""
-        return self.reason
-
     def note(self, reason: str, *, signalled: bool) -> None:
         """Wish for a stop; the first reason counts."""
         if not self.reason:
@@ -53,9 +49,9 @@ class Stop:
 
 
 @contextlib.contextmanager
-def stopping_on_signals() -> Iterator[Stop]:
+def stopping_on_signals() -> Iterator[StopRequest]:
     """Turn the first stop signal into a wish; a second one ends the process as usual."""
-    stop = Stop()
+    stop = StopRequest()
 
     def note(number: int, _frame: Any) -> None:
         stop.note(f"stopped by {signal.Signals(number).name}", signalled=True)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from ringsim.execution.solve import fresh_scene, load_solver, solve
-from ringsim.execution.work import Work
+from ringsim.execution.work import Scheduler, Work
 
 
-class Serial:
+class Serial(Scheduler):
     """One sample after the other; a crash takes everything with it, limits do not hold."""
+
+    description = "in one process"
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """Run samples; see :class:`Scheduler`."""
@@ -22,5 +23,5 @@ class Serial:
             work.started(sample)
             result = solve(solver, base, work.task(sample))
             work.keep(result)
-            work.finished(replace(result, arrays=(), body=b""))
+            work.finished(result)
         return work.stop()

@@ -21,7 +21,7 @@ from ringsim.execution.launch import OF_MPI
 from ringsim.execution.solve import LOG_CHARACTERS
 from ringsim.execution.work import Limits, Task
 from ringsim.refusal import InputError
-from ringsim.storage.record import Result
+from ringsim.storage.result import Result
 from ringsim.variables import Status
 
 TICK = 0.2

@@ -13,7 +13,7 @@ import numpy as np
 from ringsim.execution.work import Task
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.storage.record import Result, pack, plain
+from ringsim.storage.result import Result, pack, plain
 from ringsim.variables import VARIABLES, Outcome, Status
 
 Solver = Callable[[Scene], Outcome]
@@ -55,16 +55,16 @@ def solve(solver: Solver, base: Scene, task: Task) -> Result:
     begin = time.monotonic()
     try:
         outcome = solver(base.with_values(task.values))
-        arrays, body = pack(outcome.coordinates | outcome.values)
+        form, body = pack(outcome.coordinates | outcome.values)
         status, reason, log = Status(outcome.status), str(outcome.reason), ""
         fault = not_finite(outcome) if not status.failed else ""
         if fault:
             status, reason = Status.DIVERGED, fault
     except MemoryError:
         status, reason, log = Status.MEMORY, "the run needed more memory than allowed", _trace()
-        arrays, body = (), b""
+        form, body = "", b""
     except (Exception, SystemExit) as error:
-        status, log, arrays, body = Status.ERROR, _trace(), (), b""
+        status, log, form, body = Status.ERROR, _trace(), "", b""
         reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     return Result(
         sample=task.sample,
@@ -73,7 +73,7 @@ def solve(solver: Solver, base: Scene, task: Task) -> Result:
         log=plain(log),
         seconds=time.monotonic() - begin,
         finished=time.time(),
-        arrays=arrays,
+        form=form,
         body=body,
     )
 

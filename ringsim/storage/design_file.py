@@ -12,7 +12,7 @@ import numpy as np
 from ringsim.files import whole
 from ringsim.refusal import InputError
 from ringsim.sampling.table import Column, Table
-from ringsim.storage.layout import add_dimension, add_samples, open_new
+from ringsim.storage.netcdf import add_dimension, add_samples, open_new
 
 NAME = "design.nc"
 

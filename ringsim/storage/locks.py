@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import hashlib
 import os
 import time
 from collections.abc import Iterator
@@ -22,14 +21,8 @@ GO_ON = (
 _LOCK_TRIES, _LOCK_PAUSE = 10, 0.1
 
 
-def digest(path: Path) -> str:
-    """BLAKE2 checksum of a file's bytes, 32 hexadecimal digits."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
-
-
 @contextlib.contextmanager
-def locked(path: Path, *, shared: bool = False, unsure: bool = True) -> Iterator[bool]:
+def locked(path: Path, *, shared: bool = False) -> Iterator[bool]:
     """Hold an advisory lock; gives False at once if another process holds it.
 
     Parameters
@@ -38,8 +31,6 @@ def locked(path: Path, *, shared: bool = False, unsure: bool = True) -> Iterator
         The file that carries the lock; created if it is not there.
     shared
         Whether others may hold it at the same time, shared as well.
-    unsure
-        What is given on a file system without locks.
 
     Raises
     ------
@@ -54,7 +45,7 @@ def locked(path: Path, *, shared: bool = False, unsure: bool = True) -> Iterator
         except BlockingIOError:
             held = False
         except OSError:
-            held = unsure
+            held = True  # a file system without locks
         yield held
     finally:
         os.close(descriptor)

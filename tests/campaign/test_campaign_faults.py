@@ -180,7 +180,7 @@ def test_much_that_is_printed_stays_with_its_own_sample(bench):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_results_that_do_not_fit_together_cost_only_themselves(workers, bench):
-    file = bench.write_listed([30] * 10, more="[output]\nshard_samples = 3\n")
+    file = bench.write_listed([30] * 10)
     start = ("campaign", file, "--workers", workers, "--out", "out")
     bench.run(*start, solver="fake_solver:shapeless")
     result = bench.result("out")

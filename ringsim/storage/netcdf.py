@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import netCDF4
 import numpy as np
@@ -11,16 +10,15 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ringsim.refusal import known_or_nearest
-from ringsim.storage.record import MISSING_COUNT
+from ringsim.storage.result import COORDINATE, MISSING_COUNT
 from ringsim.units import Model
-from ringsim.variables import COORDINATES, VARIABLES, Status, Variable
+from ringsim.variables import VARIABLES, Status, Variable
 
 NOT_RUN = -1
 """Value of ``status`` for samples that have not been run."""
 
 CHUNK_BYTES = 1 << 20
-
-COORDINATE = {variable.name: variable for variable in COORDINATES}
+"""Size of what is compressed at once, about."""
 
 PER_SAMPLE = {
     v.name: v
@@ -36,7 +34,11 @@ Digits = Annotated[int, Field(ge=1, le=15)]
 
 
 class Output(Model):
-    """How files store the results."""
+    """How ``campaign.nc`` stores the results."""
+
+    gone: ClassVar[dict[str, str]] = {
+        "shard_samples": "results are kept in journals of any length; leave it out",
+    }
 
     compression: Annotated[int, Field(ge=0, le=9)] = 4
     """Level of zlib; 0 stores plain numbers."""
@@ -44,8 +46,6 @@ class Output(Model):
     """Decimal digits that are kept, by variable; the rest is rounded away before compression."""
     leave_out: list[str] = Field(default_factory=list)
     """Output variables that the merged file does not hold."""
-    shard_samples: Annotated[int, Field(ge=1, le=100_000)] = 256
-    """Samples in a shard, at most."""
 
     @model_validator(mode="after")
     def _known(self) -> Output:
@@ -90,8 +90,6 @@ def add_variable(
     *,
     compression: int,
     digits: int | None = None,
-    chunk_bytes: int = CHUNK_BYTES,
-    attributes: Mapping[str, Any] | None = None,
 ) -> Any:
     """Create a variable over ``sample`` and its own dimensions.
 
@@ -105,10 +103,6 @@ def add_variable(
         Level of zlib (with shuffle); 0 for none.
     digits
         Significant decimal digits to keep.
-    chunk_bytes
-        Size of what is read and compressed at once, about.
-    attributes
-        Further attributes.
     """
     dims = ("sample", *definition.dims)
     shape = tuple(file.dimensions[dim].size for dim in dims)
@@ -119,7 +113,7 @@ def add_variable(
     else:
         size = np.dtype(kind).itemsize
         row = max(1, int(np.prod(shape[1:], dtype=np.int64)) * size)
-        rows = max(1, min(shape[0], chunk_bytes // row))
+        rows = max(1, min(shape[0], CHUNK_BYTES // row))
         options["chunksizes"] = (rows, *(max(1, n) for n in shape[1:]))
         options["compression"] = "zlib" if compression else None
         options["complevel"] = compression or None
@@ -138,8 +132,6 @@ def add_variable(
     if definition.name == "status":
         variable.flag_values = np.array([NOT_RUN, *Status], dtype="i1")
         variable.flag_meanings = " ".join(["not_run", *(s.word for s in Status)])
-    for name, value in (attributes or {}).items():
-        variable.setncattr(name, value)
     return variable
 
 
