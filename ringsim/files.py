@@ -91,6 +91,7 @@ def whole(path: Path, *, lasting: bool = True) -> Iterator[Path]:
     """
     draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}{DRAFT}")
     try:
+        draft.touch()  # tells why a folder refuses a file, in better words than HDF5
         yield draft
         if lasting:
             sync(draft)

@@ -13,7 +13,7 @@ from typing import Any
 from ringsim.campaign.specification import Campaign
 from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError
-from ringsim.sampling.table import Table
+from ringsim.sampling.columns import Table
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.design_file import NAME, read_design, write_design
 from ringsim.storage.journal import FOLDER

@@ -13,7 +13,7 @@ from ringsim.campaign.status import in_words
 from ringsim.execution.cost import relative_cost
 from ringsim.execution.slot import TICK, Slot
 from ringsim.execution.work import Task
-from ringsim.sampling.table import Table
+from ringsim.sampling.columns import Table
 from ringsim.storage.design_file import NAME
 from ringsim.storage.netcdf import NOT_RUN
 from ringsim.storage.result import Result

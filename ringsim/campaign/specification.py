@@ -12,8 +12,9 @@ from pydantic import BeforeValidator, Field, ValidationError
 from ringsim.execution.work import Limits
 from ringsim.files import parse_toml, read_text
 from ringsim.refusal import InputError, explain, known_or_nearest
+from ringsim.sampling.columns import Table
 from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.table import AnyDesign, AnyDistribution, Table, draw, with_error_bars
+from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import Scene, builtin_scenes, load_scene
 from ringsim.storage.netcdf import Output
 from ringsim.units import Model
@@ -102,15 +103,15 @@ class Campaign:
         """
         wanted = self.specification
         try:
-            table = draw(
+            return draw(
                 self.scene,
                 wanted.inputs,
                 wanted.correlations,
                 wanted.design,
                 seed=wanted.seed,
                 folder=self.file.parent,
+                error_bars_every=wanted.error_bars_every,
             )
-            return with_error_bars(table, wanted.error_bars_every)
         except InputError as error:
             raise InputError(f"{self.file.name}: {error}") from None
 

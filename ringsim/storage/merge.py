@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.files import whole
-from ringsim.sampling.table import Table
-from ringsim.storage.design_file import add_inputs
+from ringsim.sampling.columns import Table, add_inputs
 from ringsim.storage.netcdf import (
     CHUNK_BYTES,
     PER_SAMPLE,

@@ -56,12 +56,6 @@ class Output(Model):
         return self
 
 
-def add_dimension(file: Any, name: str, size: int) -> None:
-    """Create a dimension, unless it is there."""
-    if name not in file.dimensions:
-        file.createDimension(name, size)
-
-
 def add_coordinate(file: Any, name: str, values: NDArray[Any]) -> None:
     """Create a dimension with its coordinate variable."""
     definition = COORDINATE[name]
