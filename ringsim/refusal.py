@@ -204,7 +204,10 @@ def _suffix(value: Any, unit: str) -> str:
 
 
 def _hint(key: str, owner: type[BaseModel] | None) -> str:
-    return known_or_nearest(key, owner.model_fields) if owner is not None else "it has no keys"
+    """What to write instead of an unknown key: a model may tell of those that it once had."""
+    if owner is None:
+        return "it has no keys"
+    return getattr(owner, "gone", {}).get(key) or known_or_nearest(key, owner.model_fields)
 
 
 def _toml(value: Any) -> str:

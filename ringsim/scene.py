@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
+import os
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,13 +14,13 @@ from ringsim.cable.cables import Cables, pulleys_of
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.records import Cable
 from ringsim.choice import OneOf
+from ringsim.files import parse_toml, read_text
 from ringsim.overrides import section_of, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.faults.family import Fault
 from ringsim.parts.joints import Joints
 from ringsim.parts.loads import Loads
 from ringsim.parts.net import Net
-from ringsim.parts.persection import ListIn
 from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
@@ -30,7 +30,7 @@ from ringsim.parts.stop.spring_damper import SpringDamperStop
 from ringsim.refusal import InputError, explain, known_or_nearest
 from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
-from ringsim.units import Model
+from ringsim.units import ListIn, Model
 
 AnyStructure = Annotated[Structure, OneOf(default="pantograph-ring")]
 
@@ -214,15 +214,7 @@ def scene_from_toml(text: str, *, source: str) -> Scene:
     InputError
         If the text is not TOML, or its content is refused.
     """
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{source}: not valid TOML: {error}; correct that line") from None
-    except RecursionError:
-        raise InputError(f"{source}: not a scene: its lists or tables nest too deeply") from None
-    except ValueError as error:
-        raise InputError(f"{source}: a number cannot be read: {error}") from None
-    return scene_from_table(table, source=source)
+    return scene_from_table(parse_toml(text, source), source=source)
 
 
 def builtin_scenes() -> dict[str, str]:
@@ -244,23 +236,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
     if str(name_or_path) in builtin:
         return scene_from_toml(builtin[str(name_or_path)], source=f"scene {name_or_path}")
     path = Path(name_or_path)
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
+    if not os.path.exists(path):  # Path.exists raises for names that are too long
         hint = known_or_nearest(str(name_or_path), builtin)
-        raise InputError(
-            f"{path}: no such file, and no built-in scene of that name ({hint})"
-        ) from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: this is a folder: give the name of a scene file") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: cannot be read: {reason}") from None
-    try:
-        text = content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path.name}: not a text file: byte {error.start + 1} is not UTF-8; "
-            "save it as UTF-8 text"
-        ) from None
-    return scene_from_toml(text, source=path.name)
+        raise InputError(f"{path}: no such file, and no built-in scene of that name ({hint})")
+    return scene_from_toml(read_text(path), source=path.name)

@@ -6,7 +6,6 @@ of the built-in scenes come with the package.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -22,6 +21,7 @@ from ringsim.analysis.errors import GROUPS, OUTPUTS
 from ringsim.analysis.frontier import WORTH_A_CHANGE
 from ringsim.analysis.ladder import PATHS, STANDING
 from ringsim.choice import kind_of
+from ringsim.files import parse_toml, read_text
 from ringsim.parts.solver import NO_DEVIATIONS
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_toml
@@ -212,11 +212,7 @@ def read_evidence(path: Path) -> Evidence:
     InputError
         If it cannot be read.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
-    return _from_toml(text, str(path))
+    return _from_toml(read_text(path), str(path))
 
 
 def evidence_for(scene: Scene) -> Evidence:
@@ -247,8 +243,8 @@ def likest(scene: Scene) -> str:
 
 
 def _from_toml(text: str, name: str) -> Evidence:
+    table = parse_toml(text, name)
     try:
-        table = tomllib.loads(text)
         settings = tuple(
             Setting(
                 dict(s["values"]),
@@ -262,7 +258,7 @@ def _from_toml(text: str, name: str) -> Evidence:
             raise KeyError("settings")
         name_of = str(table["scene"])
         return Evidence(name_of, dict(table["kind"]), dict(table["references"]), settings)
-    except (tomllib.TOMLDecodeError, AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"{name}: not the settings of an accuracy study ({error}): make it with "
             "ringsim accuracy"

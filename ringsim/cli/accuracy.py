@@ -8,9 +8,9 @@ from pathlib import Path
 
 import click
 
-from ringsim.cli import EXIT_FAILED
+from ringsim.exit_codes import EXIT_FAILED
+from ringsim.files import write_text
 from ringsim.overrides import parse_assignment
-from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 
 
@@ -63,16 +63,9 @@ def command(
     found.attrs["scene"] = chosen.to_toml()
     save(found, folder / "accuracy.nc")
     text = tables(found, str(found.attrs["title"]))
-    _write(folder / "accuracy.md", text)
-    _write(folder / "settings.toml", to_toml(evidence_of(found)))
+    write_text(folder / "accuracy.md", text)
+    write_text(folder / "settings.toml", to_toml(evidence_of(found)))
     draw_accuracy(found, folder / "accuracy.png")
     click.echo(text)
     for name in ("accuracy.nc", "accuracy.md", "accuracy.png", "settings.toml"):
         click.echo(f"wrote {folder / name}")
-
-
-def _write(file: Path, text: str) -> None:
-    try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written: {error.strerror}") from None

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from ringsim.cli import EXIT_DONE, EXIT_FAILED
-from ringsim.refusal import InputError
+from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
+from ringsim.files import write_text
 
 _SEED = 1
 
@@ -55,10 +55,7 @@ def command(out: Path, workers: int, *, quick: bool, percent: float) -> int:
     whole = run_check(out, groups, whole, share=0.01 * percent, seed=_SEED, workers=workers)
     save(whole, out / "stability.nc")
     style.write(stability(whole), out / "stability.png")
-    try:
-        (out / "stability.md").write_text(to_markdown(whole), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{out / 'stability.md'}: cannot be written: {error.strerror}") from None
+    write_text(out / "stability.md", to_markdown(whole))
     click.echo(summary(whole))
     for name in ("stability.nc", "stability.png", "stability.md"):
         click.echo(f"wrote {out / name}")

@@ -48,11 +48,11 @@ def test_text_and_figure_are_written(quick) -> None:
 
 def test_the_same_command_goes_on_without_running_anything_again(quick) -> None:
     out, said = quick
-    stamps = {path: path.stat().st_mtime_ns for path in out.glob("*/*/shards/*.nc")}
+    stamps = {path: path.stat().st_mtime_ns for path in out.glob("*/*/journals/*")}
     again = CliRunner().invoke(
         cli, ["stability", "--quick", "--out", str(out)], standalone_mode=False
     )
     assert again.return_value == 0
     assert told(again.output) == told(said)
     assert stamps
-    assert {path: path.stat().st_mtime_ns for path in out.glob("*/*/shards/*.nc")} == stamps
+    assert {path: path.stat().st_mtime_ns for path in out.glob("*/*/journals/*")} == stamps

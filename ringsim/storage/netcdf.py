@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import netCDF4
 import numpy as np
@@ -11,16 +10,15 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ringsim.refusal import known_or_nearest
-from ringsim.storage.record import MISSING_COUNT
+from ringsim.storage.result import COORDINATE, MISSING_COUNT
 from ringsim.units import Model
-from ringsim.variables import COORDINATES, VARIABLES, Status, Variable
+from ringsim.variables import VARIABLES, Status, Variable
 
 NOT_RUN = -1
 """Value of ``status`` for samples that have not been run."""
 
 CHUNK_BYTES = 1 << 20
-
-COORDINATE = {variable.name: variable for variable in COORDINATES}
+"""Size of what is compressed at once, about."""
 
 PER_SAMPLE = {
     v.name: v
@@ -28,8 +26,6 @@ PER_SAMPLE = {
         VARIABLES["status"],
         Variable("reason", (), "1", "why the run ended so", "str"),
         Variable("log", (), "1", "end of what a failed run printed", "str"),
-        Variable("attempts", (), "1", "runs that were made of the sample", "i4"),
-        Variable("largest_step", (), "s", "largest time step of the run that counts"),
     )
 }
 """What is known of every sample beside its outputs."""
@@ -38,7 +34,11 @@ Digits = Annotated[int, Field(ge=1, le=15)]
 
 
 class Output(Model):
-    """How files store the results."""
+    """How ``campaign.nc`` stores the results."""
+
+    gone: ClassVar[dict[str, str]] = {
+        "shard_samples": "results are kept in journals of any length; leave it out",
+    }
 
     compression: Annotated[int, Field(ge=0, le=9)] = 4
     """Level of zlib; 0 stores plain numbers."""
@@ -46,8 +46,6 @@ class Output(Model):
     """Decimal digits that are kept, by variable; the rest is rounded away before compression."""
     leave_out: list[str] = Field(default_factory=list)
     """Output variables that the merged file does not hold."""
-    shard_samples: Annotated[int, Field(ge=1, le=100_000)] = 256
-    """Samples in a shard, at most."""
 
     @model_validator(mode="after")
     def _known(self) -> Output:
@@ -56,12 +54,6 @@ class Output(Model):
                 hint = known_or_nearest(name, VARIABLES)
                 raise ValueError(f"{name} is not an output variable ({hint})")
         return self
-
-
-def add_dimension(file: Any, name: str, size: int) -> None:
-    """Create a dimension, unless it is there."""
-    if name not in file.dimensions:
-        file.createDimension(name, size)
 
 
 def add_coordinate(file: Any, name: str, values: NDArray[Any]) -> None:
@@ -92,8 +84,6 @@ def add_variable(
     *,
     compression: int,
     digits: int | None = None,
-    chunk_bytes: int = CHUNK_BYTES,
-    attributes: Mapping[str, Any] | None = None,
 ) -> Any:
     """Create a variable over ``sample`` and its own dimensions.
 
@@ -107,10 +97,6 @@ def add_variable(
         Level of zlib (with shuffle); 0 for none.
     digits
         Significant decimal digits to keep.
-    chunk_bytes
-        Size of what is read and compressed at once, about.
-    attributes
-        Further attributes.
     """
     dims = ("sample", *definition.dims)
     shape = tuple(file.dimensions[dim].size for dim in dims)
@@ -121,7 +107,7 @@ def add_variable(
     else:
         size = np.dtype(kind).itemsize
         row = max(1, int(np.prod(shape[1:], dtype=np.int64)) * size)
-        rows = max(1, min(shape[0], chunk_bytes // row))
+        rows = max(1, min(shape[0], CHUNK_BYTES // row))
         options["chunksizes"] = (rows, *(max(1, n) for n in shape[1:]))
         options["compression"] = "zlib" if compression else None
         options["complevel"] = compression or None
@@ -140,8 +126,6 @@ def add_variable(
     if definition.name == "status":
         variable.flag_values = np.array([NOT_RUN, *Status], dtype="i1")
         variable.flag_meanings = " ".join(["not_run", *(s.word for s in Status)])
-    for name, value in (attributes or {}).items():
-        variable.setncattr(name, value)
     return variable
 
 

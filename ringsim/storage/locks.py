@@ -1,58 +1,28 @@
-"""Files that appear whole or not at all, and locks on folders."""
+"""Locks: which process may run which samples of a campaign's folder."""
 
 from __future__ import annotations
 
 import contextlib
 import fcntl
-import hashlib
 import os
-import secrets
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from ringsim.files import writing
 from ringsim.refusal import InputError
 
-DRAFT = ".draft"
+GO_ON = (
+    "make room or choose another folder, then give the same command again: finished samples are "
+    "kept"
+)
+"""What to do when a campaign's folder cannot be written to."""
+
 _LOCK_TRIES, _LOCK_PAUSE = 10, 0.1
 
 
 @contextlib.contextmanager
-def whole(path: Path) -> Iterator[Path]:
-    """A draft to write to; it gets its name once it is complete and on the disk.
-
-    Parameters
-    ----------
-    path
-        The final name; an older file of that name is replaced.
-    """
-    draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}{DRAFT}")
-    try:
-        yield draft
-        sync(draft)
-        os.replace(draft, path)
-        sync(path.parent)
-    finally:
-        draft.unlink(missing_ok=True)
-
-
-def sync(path: Path) -> None:
-    """Make the operating system write a file or folder to the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
-def digest(path: Path) -> str:
-    """BLAKE2 checksum of a file's bytes, 32 hexadecimal digits."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
-
-
-@contextlib.contextmanager
-def locked(path: Path, *, shared: bool = False, unsure: bool = True) -> Iterator[bool]:
+def locked(path: Path, *, shared: bool = False) -> Iterator[bool]:
     """Hold an advisory lock; gives False at once if another process holds it.
 
     Parameters
@@ -61,8 +31,6 @@ def locked(path: Path, *, shared: bool = False, unsure: bool = True) -> Iterator
         The file that carries the lock; created if it is not there.
     shared
         Whether others may hold it at the same time, shared as well.
-    unsure
-        What is given on a file system without locks.
 
     Raises
     ------
@@ -77,7 +45,7 @@ def locked(path: Path, *, shared: bool = False, unsure: bool = True) -> Iterator
         except BlockingIOError:
             held = False
         except OSError:
-            held = unsure
+            held = True  # a file system without locks
         yield held
     finally:
         os.close(descriptor)
@@ -132,12 +100,10 @@ def reserved(folder: Path, writer: str, *, alone: bool) -> Iterator[None]:
     with contextlib.ExitStack() as held:
         for _ in tries():
             with contextlib.ExitStack() as wanted:
-                try:
+                with writing(folder / f"lock-{writer}", GO_ON):
                     free = wanted.enter_context(locked(folder / "lock", shared=not alone)) and (
                         wanted.enter_context(locked(folder / f"lock-{writer}"))
                     )
-                except OSError as error:
-                    raise unwritable(folder / f"lock-{writer}", error) from error
                 if free:
                     held.enter_context(wanted.pop_all())
                     break
@@ -168,12 +134,3 @@ def in_use(folder: Path, writer: str) -> bool:
         return False
     with locked(path, shared=True) as free:
         return not free
-
-
-def unwritable(path: Path, error: BaseException) -> InputError:
-    """The refusal for a file that cannot be written, with the cure."""
-    reason = getattr(error, "strerror", None) or str(error)
-    return InputError(
-        f"{path}: cannot be written: {reason}; make room or choose another folder, then give the "
-        "same command again: finished samples are kept"
-    )
