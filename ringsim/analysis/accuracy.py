@@ -93,46 +93,46 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     choice = eligible(rungs)
     ranked = np.where(choice[:, None], good, np.nan)
     graded, orders = observed_orders(errors, rungs)
-    found = xr.Dataset(
-        {
-            "error": (("rung", "output"), error, _words("error relative to the reference", "1")),
-            "bound": (
-                ("rung", "output"), good,
-                _words("largest error of this and all finer settings and the reference", "1"),
-            ),
-            "order": (("graded", "output"), orders, _words("observed order", "1")),
-            "uncertainty": ("output", own, _words("uncertainty of the reference, relative", "1")),
-            "reference": (
-                "output", [errors.best.get(name, np.nan) for name in outputs],
-                _words("extrapolated reference, SI units and degrees", ""),
-            ),
-            "frontier": (
-                ("rung", "output"), frontier(cost, ranked),
-                _words("whether no setting is both cheaper and better", ""),
-            ),
-            "cheapest": (
-                ("target", "output"), cheapest(in_favour(cost, rungs), ranked, TARGETS),
-                _words("the cheapest rung within the target, -1 if there is none", ""),
-            ),
-            "cost": ("rung", cost, _words("processor time, as fitted", "s")),
-            "residual_evaluations": (
-                "rung", residuals, _words("residuals that Newton evaluated in accepted steps", "1"),
-            ),
-            "eligible": ("rung", choice, _words("whether it may be recommended", "")),
-            "status": ("rung", results.status.to_numpy(), _words("how the run ended", "")),
-            "ladder": ("rung", [rung.ladder for rung in rungs], _words("what is varied", "")),
-            "label": ("rung", [rung.label for rung in rungs], _words("the setting", "")),
-        },
-        coords={"output": outputs, "target": list(TARGETS), "graded": graded},
-    )  # fmt: skip
-    for name, count in counts.items():
-        found[name] = ("rung", count, _words(*_COUNTS[name]))
+    ladders = [rung.ladder for rung in rungs]
+    pick = cheapest(in_favour(cost, ladders), ranked, TARGETS)
+    best = [errors.best.get(name, np.nan) for name in outputs]
+    both, one = ("rung", "output"), ("rung",)
+    rows: list[tuple[str, tuple[str, ...], Any, str, str]] = [
+        ("error", both, error, "error relative to the reference", "1"),
+        ("bound", both, good,
+         "largest error of this and all finer settings and the reference", "1"),
+        ("order", ("graded", "output"), orders, "observed order", "1"),
+        ("uncertainty", ("output",), own, "uncertainty of the reference, relative", "1"),
+        ("reference", ("output",), best, "extrapolated reference, SI units and degrees", ""),
+        ("frontier", both, frontier(cost, ranked),
+         "whether no setting is both cheaper and better", ""),
+        ("cheapest", ("target", "output"), pick,
+         "the cheapest rung within the target, -1 if there is none", ""),
+        ("cost", one, cost, "processor time, as fitted", "s"),
+        ("residual_evaluations", one, residuals,
+         "residuals that Newton evaluated in accepted steps", "1"),
+        ("eligible", one, choice, "whether it may be recommended", ""),
+        ("status", one, results.status.to_numpy(), "how the run ended", ""),
+        ("ladder", one, ladders, "what is varied", ""),
+        ("label", one, [rung.label for rung in rungs], "the setting", ""),
+        *((name, one, count, *_COUNTS[name]) for name, count in counts.items()),
+    ]  # fmt: skip
     if "reason" in results:
-        found["reason"] = ("rung", results.reason.to_numpy().astype(str), _words("why", ""))
+        rows.append(("reason", one, results.reason.to_numpy().astype(str), "why", ""))
     for path in PATHS:
-        words = _words(f"setting {path}", "s" if path == "solver.step" else "")
-        found[path.replace(".", "_")] = ("rung", [rung.values[path] for rung in rungs], words)
+        units = "s" if path == "solver.step" else ""
+        values = [rung.values[path] for rung in rungs]
+        rows.append((path.replace(".", "_"), one, values, f"setting {path}", units))
+    found = xr.Dataset(
+        {name: (dims, values, _words(text, units)) for name, dims, values, text, units in rows},
+        coords={"output": outputs, "target": list(TARGETS), "graded": graded},
+    )
     return _add_truths(found, errors, truths)
+
+
+def settings_at(found: xr.Dataset, rung: int) -> dict[str, Any]:
+    """The settings of a rung of a study by scene path."""
+    return {path: found[path.replace(".", "_")].values.tolist()[rung] for path in PATHS}
 
 
 def _words(long_name: str, units: str) -> Mapping[str, str]:
