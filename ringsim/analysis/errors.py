@@ -83,19 +83,11 @@ class Errors:
                 self.uncertainty[group] = max(self.uncertainty[m] for m in present)
 
     def until_the_end(self, name: str) -> xr.DataArray:
-        """A variable, series only up to the earliest deployment time of the references.
-
-        Series keep their last value from the end of a run on: a locked V-joint stays locked.
-        """
+        """A variable, series only up to the earliest deployment time of the references."""
         values = self.results[name]
         if "time" not in values.dims:
             return values
-        values = values.sel(time=values.time <= self._end).transpose(..., "time")
-        # By hand, because DataArray.ffill needs bottleneck or numbagg.
-        series = values.to_numpy()
-        last = np.where(np.isfinite(series), np.arange(series.shape[-1]), 0)
-        held = np.take_along_axis(series, np.maximum.accumulate(last, axis=-1), axis=-1)
-        return values.copy(data=held)
+        return held(values.sel(time=values.time <= self._end))
 
     def best_of(self, name: str) -> Limit:
         """The reference of a variable, in its unit."""
@@ -127,3 +119,14 @@ class Errors:
         scale = self.scale(name, best.value)
         error = abs(values - best.value).max(inner(values)).to_numpy() / scale
         return error, best.uncertainty / scale, best.value
+
+
+def held(values: xr.DataArray) -> xr.DataArray:
+    """Series with their last value kept from the end of a run on: a locked V-joint stays locked.
+
+    What ``DataArray.ffill`` does, which needs bottleneck or numbagg.
+    """
+    series = values.transpose(..., "time").to_numpy()
+    last = np.where(np.isfinite(series), np.arange(series.shape[-1]), 0)
+    kept = np.take_along_axis(series, np.maximum.accumulate(last, axis=-1), axis=-1)
+    return values.transpose(..., "time").copy(data=kept)

@@ -63,15 +63,22 @@ def command(
     found.attrs["scene"] = chosen.to_toml()
     save(found, folder / "accuracy.nc")
     text = tables(found, str(found.attrs["title"]))
-    _write(folder / "accuracy.md", text)
-    _write(folder / "settings.toml", to_toml(evidence_of(found)))
+    write_text(folder / "accuracy.md", text)
+    write_text(folder / "settings.toml", to_toml(evidence_of(found)))
     draw_accuracy(found, folder / "accuracy.png")
     click.echo(text)
     for name in ("accuracy.nc", "accuracy.md", "accuracy.png", "settings.toml"):
         click.echo(f"wrote {folder / name}")
 
 
-def _write(file: Path, text: str) -> None:
+def write_text(file: Path, text: str) -> None:
+    """Write a text file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
     try:
         file.write_text(text, encoding="utf-8")
     except OSError as error:
