@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -29,18 +28,10 @@ NEEDED = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Truth:
-    """A value that does not come from the multibody model.
+class Truth(NamedTuple):
+    """A value that does not come from the multibody model: one of ``OUTPUTS`` in its unit.
 
-    Attributes
-    ----------
-    output
-        Which of ``OUTPUTS``.
-    source
-        Where it comes from, in words.
-    value
-        In the unit of the output; for the opening angle the mean one over time, shape (time,).
+    Of the opening angle it is the mean one over time, shape (time,).
     """
 
     output: str
@@ -56,8 +47,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     results
         ``NEEDED`` variables over the dimension ``rung``, one entry per rung.
     rungs
-        The settings, those of the reference among them
-        (:func:`ringsim.analysis.ladder.references`).
+        The settings, those of the reference among them.
     truths
         Independent values, if the scene has any.
 
@@ -70,10 +60,9 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         reference, relative; ``reference`` (output): its value, in the output's unit, NaN for
         series (of the asynchrony the largest value); ``frontier`` (rung, output): whether no
         other setting of the scene's own model is both cheaper and better; ``cheapest`` (target,
-        output): the rung among them, -1 if none will do; ``cost`` (rung): processor time without
-        the scatter of single timings, s; ``cpu_time``, ``residual_evaluations``, ``jacobians``,
-        ``steps``, ``status`` and the settings (rung); and for each truth its distance from the
-        reference and from every rung.
+        output): the rung among them, -1 if there is none; ``cost`` (rung): processor time without
+        the scatter of single timings, s; counts, status and settings (rung); ``from_truth``
+        (rung, truth) and ``reference_from_truth`` (truth): distances from the truths, relative.
 
     Raises
     ------
@@ -143,23 +132,20 @@ def _add_truths(found: xr.Dataset, errors: Errors, truths: Sequence[Truth]) -> x
     """How far every rung and the reference are from values of other origin, relative."""
     if not truths:
         return found
-    rows, distance, references_own = [], [], []
-    for truth in truths:
-        values, best = errors.until_the_end(truth.output), errors.best_of(truth.output).value
+    distance, references_own = [], []
+    for name, _, value in truths:
+        values, best = errors.until_the_end(name), errors.best_of(name).value
         both = xr.concat([values, best.expand_dims("rung")], "rung")
-        if truth.output == "opening_angle":
+        if name == "opening_angle":
             mean = both.mean(("plane", "section"))
-            expected = xr.DataArray(truth.value, dims="time", coords={"time": errors.results.time})
-            gap = abs(mean - expected).max("time")
-            apart = (gap / errors.scale(truth.output, best)).to_numpy()
+            expected = xr.DataArray(value, dims="time", coords={"time": errors.results.time})
+            apart = (abs(mean - expected).max("time") / errors.scale(name, best)).to_numpy()
         else:
-            apart = np.abs(both.to_numpy() / truth.value - 1.0)
-        rows.append(f"{truth.output}: {truth.source}")
+            apart = np.abs(both.to_numpy() / value - 1.0)
         distance.append(np.where(errors.good, apart[:-1], np.nan))
         references_own.append(apart[-1])
     long_name = "distance from values of other origin, relative"
     found["from_truth"] = (("rung", "truth"), np.array(distance).T, _words(long_name, "1"))
-    found["reference_from_truth"] = (
-        "truth", references_own, _words(f"reference: {long_name}", "1"),
-    )  # fmt: skip
-    return found.assign_coords(truth=rows)
+    own = ("truth", references_own, _words(f"reference: {long_name}", "1"))
+    rows = [f"{truth.output}: {truth.source}" for truth in truths]
+    return found.assign(reference_from_truth=own).assign_coords(truth=rows)

@@ -36,25 +36,14 @@ the asynchrony as a difference of opening angles; relative to itself it is an ou
 class Errors:
     """Errors, uncertainties and reference values by output.
 
-    Attributes
-    ----------
-    results
-        As they came, over the dimension ``rung``.
-    in_time, in_space
-        Rungs of the reference (:func:`ringsim.analysis.ladder.references`).
-    good
-        Whether a rung ended well, shape (rung,).
-    of
-        Relative errors, shape (rung,) each, by output and group of outputs; NaN where a run
-        failed or has none.
-    uncertainty
-        Of the reference, relative.
-    best
-        The reference's value in the output's unit, where it is a single one.
+    ``of`` has relative errors, shape (rung,) each, by output and group of outputs, NaN where a run
+    failed or has none; ``uncertainty`` that of the reference, relative; ``best`` the reference's
+    value in the output's unit, where it is a single one; ``good``, shape (rung,), whether a rung
+    ended well; ``in_time`` and ``in_space`` are the rungs of the reference.
     """
 
     def __init__(self, results: xr.Dataset, rungs: Sequence[Rung]) -> None:
-        """Compare; raises ValueError if a reference run did not end well."""
+        """Compare results over ``rung``; raises ValueError if a reference run did not end well."""
         self.results = results
         self.in_time, self.in_space = references(list(rungs))
         places = sorted({*self.in_time, *self.in_space})

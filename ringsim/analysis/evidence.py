@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import tomllib
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import tomli_w
 import xarray as xr
 from pydantic import ConfigDict, Field, ValidationError
 
@@ -33,13 +33,12 @@ CHOICES = (*GROUPS, *OUTPUTS, "energy")
 
 
 class Setting(Model):
-    """One setting with its measured errors and cost."""
+    """One setting by scene path, with its measured errors and cost."""
 
     model_config = ConfigDict(extra="ignore")  # files of earlier versions hold more
     seconds: float
     """Processor time of a run, s."""
     values: dict[str, Any]
-    """By scene path."""
     errors: dict[str, float]
     """What the setting is good for, relative, by output and group of outputs."""
 
@@ -47,25 +46,17 @@ class Setting(Model):
 class Evidence(Model):
     """The settings of one scene that are worth their cost, cheapest first.
 
-    The scene's own setting comes before others that are hardly cheaper.
+    The scene's own setting comes before others that are hardly cheaper.  ``kind`` is that of
+    :func:`kind_of_scene`.
     """
 
     model_config = ConfigDict(extra="ignore")
     scene: str
-    """Its name."""
     kind: dict[str, Any]
-    """What it is, see :func:`kind_of_scene`."""
     settings: Annotated[tuple[Setting, ...], ListIn, Field(min_length=1)]
 
     def pick(self, accuracy: float, of: str = JUDGED_BY) -> Setting:
-        """The cheapest setting that is good for such an error.
-
-        Parameters
-        ----------
-        accuracy
-            Relative error.
-        of
-            One of ``CHOICES``.
+        """The cheapest setting that is good for a relative error of one of ``CHOICES``.
 
         Raises
         ------
@@ -93,13 +84,7 @@ class Evidence(Model):
         return values
 
     def require_like(self, scene: Scene) -> None:
-        """Refuse evidence of another kind of scene.
-
-        Raises
-        ------
-        InputError
-            One line with what differs.
-        """
+        """Raise InputError, with what differs, if this is evidence of another kind of scene."""
         for name, value in kind_of_scene(scene).items():
             if value != self.kind.get(name):
                 raise InputError(
@@ -122,10 +107,7 @@ def kind_of_scene(scene: Scene) -> dict[str, Any]:
 def evidence_of(found: xr.Dataset) -> Evidence:
     """The settings of a study that some accuracy picks: each is best so far in some output.
 
-    Parameters
-    ----------
-    found
-        From :func:`ringsim.analysis.accuracy.judge`; its scene is the attribute ``scene``.
+    ``found`` is from :func:`ringsim.analysis.accuracy.judge`; its attribute ``scene`` is its scene.
     """
     scene = scene_from_toml(found.attrs["scene"], source="the study's scene")
     outputs = [str(name) for name in found.output.values]
@@ -134,10 +116,9 @@ def evidence_of(found: xr.Dataset) -> Evidence:
     settings: list[Setting] = []
     best: dict[str, float] = {}
     for rung in np.argsort(cost, kind="stable")[: usable.sum()].tolist():
-        bounds = dict(zip(outputs, found.bound.values[rung].tolist(), strict=True))
-        errors = {name: _rounded_up(bound) for name, bound in bounds.items() if np.isfinite(bound)}
-        better = {name: e for name, e in errors.items() if e < best.get(name, np.inf)}
-        if better:
+        bounds = zip(outputs, found.bound.values[rung].tolist(), strict=True)
+        errors = {name: _rounded_up(bound) for name, bound in bounds if np.isfinite(bound)}
+        if better := {name: e for name, e in errors.items() if e < best.get(name, np.inf)}:
             best |= better
             values = settings_at(found, rung)
             del values["rods.kind"], values["solver.step_control"]
@@ -152,42 +133,36 @@ def _rounded_up(error: float) -> float:
     return float(f"{1.0049 * error:.2e}")
 
 
-def to_toml(evidence: Evidence) -> str:
-    """As a file."""
-    return tomli_w.dumps(evidence.model_dump())
-
-
-def read_evidence(path: Path) -> Evidence:
+def read_evidence(path: Path | Traversable) -> Evidence:
     """The settings.toml of a study.
 
     Raises
     ------
     InputError
-        If it cannot be read.
+        If it cannot be read, or holds something else.
     """
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {error}") from None
-    return _from_toml(text, str(path))
+    try:
+        found = Evidence.model_validate(tomllib.loads(text))
+        if not all({"solver.step", "rods.elements"} <= set(s.values) for s in found.settings):
+            raise ValueError("a setting without solver.step or rods.elements")
+        return found
+    except ValueError as error:  # also those of tomllib and pydantic
+        first = error.errors()[0] if isinstance(error, ValidationError) else None
+        fault = f"{'.'.join(map(str, first['loc']))}: {first['msg']}" if first else error
+        raise InputError(
+            f"{path}: not the settings of an accuracy study ({fault}): make it with "
+            "ringsim accuracy"
+        ) from None
 
 
 def evidence_for(scene: Scene) -> Evidence:
-    """The evidence of the built-in scene that is most like a scene.
-
-    Raises
-    ------
-    InputError
-        If there is none of such scenes.
-    """
-    name = likest(scene)
-    file = resources.files("ringsim") / "scenes" / "evidence" / f"{name}.toml"
-    if not file.is_file():
-        raise InputError(
-            f"--accuracy: no settings for scenes like {name} come with ringsim: give --evidence "
-            "from ringsim accuracy on your scene"
-        )
-    return _from_toml(file.read_text(encoding="utf-8"), file.name)
+    """The evidence of the built-in scene that is most like a scene."""
+    folder = resources.files("ringsim") / "scenes" / "evidence"
+    return read_evidence(folder / f"{likest(scene)}.toml")
 
 
 def likest(scene: Scene) -> str:
@@ -197,18 +172,3 @@ def likest(scene: Scene) -> str:
     if scene.cables is None:
         return "ring18"
     return "ring18-cable" if scene.structure.closed else "truss2"
-
-
-def _from_toml(text: str, name: str) -> Evidence:
-    try:
-        found = Evidence.model_validate(tomllib.loads(text))
-        if not all({"solver.step", "rods.elements"} <= set(s.values) for s in found.settings):
-            raise ValueError("a setting without solver.step or rods.elements")
-        return found
-    except ValueError as error:  # of tomllib and pydantic, too
-        first = error.errors()[0] if isinstance(error, ValidationError) else None
-        fault = f"{'.'.join(map(str, first['loc']))}: {first['msg']}" if first else error
-        raise InputError(
-            f"{name}: not the settings of an accuracy study ({fault}): make it with "
-            "ringsim accuracy"
-        ) from None

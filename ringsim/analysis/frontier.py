@@ -21,24 +21,14 @@ WORTH_A_CHANGE = 0.9
 differences are within the fit of the cost and the luck of single steps."""
 _SAME = ("solver.step_control", "rods.kind")
 _SMALLER = (
-    "solver.step",
-    "solver.tolerance",
-    "solver.deviation_tolerance",
-    "solver.newton_tolerance",
-)
+    "solver.step", "solver.tolerance", "solver.deviation_tolerance", "solver.newton_tolerance",
+)  # fmt: skip
 
 
 def bounds(error: Array, rungs: Sequence[Rung], uncertainty: Array) -> Array:
     """Errors that settings are good for, shape (rung, output); NaN where a run failed.
 
-    Parameters
-    ----------
-    error
-        Shape (rung, output), NaN where there is none.
-    rungs
-        The settings.
-    uncertainty
-        Of the reference, shape (output,).
+    ``error`` has that shape, too, and ``uncertainty``, of the reference, shape (output,).
     """
     found = np.array(error)
     for k, rung in enumerate(rungs):
@@ -63,16 +53,8 @@ def typical_cost(seconds: Array, work: Array, rungs: Sequence[Rung]) -> Array:
     """Processor time of each setting without the scatter of single timings, shape (rung,), s.
 
     Every piece of work costs the same within a ladder, but for a factor for the rods' formulation
-    and elements: fitted to what was measured.  A fidelity costs what it did.
-
-    Parameters
-    ----------
-    seconds
-        As measured, shape (rung,).
-    work
-        Counts of what takes time, shape (rung, kinds).
-    rungs
-        The settings.
+    and elements: fitted to the measured ``seconds``, shape (rung,), and the counts of ``work``,
+    shape (rung, kinds).  A fidelity keeps its own time.
     """
     cost, measured = np.array(seconds, dtype=float), np.isfinite(seconds)
     sizes = [

@@ -17,21 +17,15 @@ from ringsim.parts.solver import NO_DEVIATIONS
 from ringsim.scene import Scene
 
 PATHS = (
-    "solver.step_control",
-    "solver.step",
-    "solver.tolerance",
-    "solver.deviation_tolerance",
-    "solver.spectral_radius",
-    "solver.newton_tolerance",
-    "rods.kind",
-    "rods.elements",
-)
+    "solver.step_control", "solver.step", "solver.tolerance", "solver.deviation_tolerance",
+    "solver.spectral_radius", "solver.newton_tolerance", "rods.kind", "rods.elements",
+)  # fmt: skip
 """Scene paths that a ladder varies."""
 STANDING = "as it stands"
 _HALVINGS = {"x 2": -1, "x 1": 0, "x 1/2": 1, "x 1/4": 2, "x 1/8": 3, "x 1/16": 4}
 """Rungs of "steps" by the factor on every step, with the exponent of 1/2."""
-_IN_TIME = ("x 1/4", "x 1/8", "x 1/16")
-"""The rungs of "steps" that the reference is made of."""
+_IN_TIME = 1.0 / 4.0
+"""Size of the rungs of "steps" from which on the reference is made of them."""
 _FINE, _MIDDLE = 3, 2
 """Halvings of the steps at which elements and rod formulations are compared."""
 _TIGHT = 1e-6
@@ -53,31 +47,18 @@ on the number of elements."""
 
 @dataclass(frozen=True)
 class Rung:
-    """One setting.
+    """One setting: a value for each of ``PATHS``.
 
-    Attributes
-    ----------
-    ladder
-        What it varies: "as it stands", "steps", "constant step", "elements", "formulation",
-        "dissipation", "newton", "setting", or "fidelity".
-    label
-        In words, unique in a ladder.
-    size
-        What an order of convergence refers to: a step in s or over that of the scene, or
-        1 / elements; 0 where none does.
-    values
-        All of ``PATHS``.
+    ``ladder`` says what it varies ("as it stands", "steps", "constant step", "elements",
+    "formulation", "dissipation", "newton", "setting", or "fidelity"), ``label`` is unique in a
+    ladder, and ``size`` is what an order of convergence refers to: a step in s or over that of the
+    scene, or 1 / elements; 0 where none does.
     """
 
     ladder: str
     label: str
     size: float
     values: Mapping[str, Any]
-
-    @property
-    def stressed(self) -> bool:
-        """Whether the rods' formulation gives stresses."""
-        return str(self.values["rods.kind"]) != "ancf"
 
 
 def ladder(scene: Scene) -> list[Rung]:
@@ -144,7 +125,7 @@ def references(rungs: list[Rung]) -> tuple[list[int], list[int]]:
 
     Steps halve and elements double from one to the next.
     """
-    in_time = [k for k, r in enumerate(rungs) if r.ladder == "steps" and r.label in _IN_TIME]
+    in_time = [k for k, r in enumerate(rungs) if r.ladder == "steps" and r.size <= _IN_TIME]
     return in_time, [k for k, r in enumerate(rungs) if r.ladder == "elements"]
 
 

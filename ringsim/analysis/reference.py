@@ -48,13 +48,7 @@ def limit(values: xr.DataArray) -> Limit:
 
 
 def reference(in_time: xr.DataArray, in_space: xr.DataArray) -> Limit:
-    """Limit of steps and elements: that of the steps, and what more elements change.
-
-    Parameters
-    ----------
-    in_time, in_space
-        Three levels each along ``rung``.
-    """
+    """Limit of three levels of steps, and what three levels of elements change, along ``rung``."""
     steps, elements = limit(in_time), limit(in_space)
     more = elements.value - in_space.isel(rung=0, drop=True)
     return Limit(steps.value + more, steps.uncertainty + elements.uncertainty)
@@ -63,12 +57,8 @@ def reference(in_time: xr.DataArray, in_space: xr.DataArray) -> Limit:
 def order(values: xr.DataArray, noise: float) -> float:
     """Observed order of three levels along ``rung``; NaN unless changes shrink above the noise.
 
-    Parameters
-    ----------
-    values
-        Of any shape; each level has half the length of elements of the one before.
-    noise
-        Largest effect of anything else, in their unit.
+    Each level has half the length of elements of the one before; ``noise`` is the largest effect
+    of anything else, in the unit of the values.
     """
     first, last = (float(c) for c in abs(values.diff("rung")).max(inner(values)))
     if not first > last > noise:

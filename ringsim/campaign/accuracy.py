@@ -29,11 +29,12 @@ class ReferenceRunError(Exception):
 
 
 def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.Dataset:
-    """Errors and cost of all settings of a scene's ladder.
+    """Errors and cost of all settings of a scene's ladder (``judge``).
 
     A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
     cheapest run of the reference goes first, then the whole reference, then the rest, so that a
-    scene which cannot be studied costs little.
+    scene which cannot be studied costs little.  The ideal fidelity is a setting too, where it can
+    represent the scene.
 
     Parameters
     ----------
@@ -45,12 +46,6 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
         Solver processes.
     timeout
         Longest time of one rung, s.
-
-    Returns
-    -------
-    xr.Dataset
-        See :func:`ringsim.analysis.accuracy.judge`.  The ideal fidelity is a setting too, where
-        it can represent the scene.
 
     Raises
     ------
@@ -113,7 +108,8 @@ class _Study:
         """Name and ``record.stress`` of a rung's campaign: all in one have results of one shape."""
         if kind_of(self.scene.structure) == "planar-truss":  # a strain for each of its elements
             return f"{stage}-elements-{rung.values['rods.elements']}", False
-        return (stage, True) if rung.stressed else (f"{stage}-unstressed", False)
+        stressed = rung.values["rods.kind"] != "ancf"  # whose elements report no forces
+        return (stage, True) if stressed else (f"{stage}-unstressed", False)
 
 
 def _require_ok(rungs: Sequence[Rung], results: xr.Dataset) -> None:

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import click
+import tomli_w
 
 from ringsim.cli import EXIT_FAILED
 from ringsim.overrides import parse_assignment
@@ -49,7 +50,7 @@ def command(
     folder = out or Path("runs") / f"accuracy-{chosen.name}"
 
     from ringsim.analysis.accuracy_text import tables
-    from ringsim.analysis.evidence import evidence_of, to_toml
+    from ringsim.analysis.evidence import evidence_of
     from ringsim.campaign.accuracy import ReferenceRunError, run_ladder
     from ringsim.dataset import save
     from ringsim.plots.accuracy import draw_accuracy
@@ -64,7 +65,7 @@ def command(
     save(found, folder / "accuracy.nc")
     text = tables(found, str(found.attrs["title"]))
     write_text(folder / "accuracy.md", text)
-    write_text(folder / "settings.toml", to_toml(evidence_of(found)))
+    write_text(folder / "settings.toml", tomli_w.dumps(evidence_of(found).model_dump()))
     draw_accuracy(found, folder / "accuracy.png")
     click.echo(text)
     for name in ("accuracy.nc", "accuracy.md", "accuracy.png", "settings.toml"):

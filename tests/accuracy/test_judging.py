@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import tomli_w
 import xarray as xr
 
 from ringsim.analysis.accuracy import NEEDED, Truth, judge
 from ringsim.analysis.accuracy_text import in_words, tables
-from ringsim.analysis.evidence import evidence_of, likest, read_evidence, to_toml
+from ringsim.analysis.evidence import evidence_of, likest, read_evidence
 from ringsim.analysis.ladder import PATHS, ladder, references
 from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
@@ -91,7 +92,11 @@ def test_orders(study: xr.Dataset) -> None:
 
 
 def test_cost_is_free_of_the_scatter_of_timings(study: xr.Dataset) -> None:
-    own = [k for k, r in enumerate(RUNGS) if r.stressed and r.values["rods.elements"] == 1]
+    own = [
+        k
+        for k, r in enumerate(RUNGS)
+        if r.values["rods.kind"] != "ancf" and r.values["rods.elements"] == 1
+    ]
     steps = study.steps.to_numpy()[own]
     measured = study.cpu_time.to_numpy()[own] / steps
     assert measured.max() / measured.min() > 1.05
@@ -160,7 +165,7 @@ def test_tables_name_settings_as_overrides(study: xr.Dataset) -> None:
 def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tmp_path) -> None:
     evidence = evidence_of(study)
     file = tmp_path / "settings.toml"
-    file.write_text(to_toml(evidence))
+    file.write_text(tomli_w.dumps(evidence.model_dump()))
     assert read_evidence(file) == evidence
     seconds = [s.seconds for s in evidence.settings]
     assert seconds == sorted(seconds)
@@ -174,7 +179,7 @@ def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tm
     assert (kept["rods.elements"], kept["solver.step"]) == (3, 0.1)
     with pytest.raises(InputError, match="best setting"):
         evidence.pick(1e-8)
-    good = to_toml(evidence)
+    good = tomli_w.dumps(evidence.model_dump())
     wrong = (
         "settings = 3", good.replace("motion = ", "motion = 'a' #"), good[:40], "",
         good.replace('"solver.step"', '"solver.stop"'),
