@@ -84,14 +84,7 @@ def cause_of(reason: str) -> str:
 
 
 def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr.Dataset:
-    """The cells of one campaign.
-
-    Parameters
-    ----------
-    campaign
-        A merged campaign.
-    x, y
-        Values of the two axes for each of its samples.
+    """The cells of a merged campaign, given the values of the two axes for each of its samples.
 
     Returns
     -------
@@ -120,18 +113,16 @@ def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr
         found["final_angle"] = held(mean).isel(time=-1).values
     for name in _SCALARS:
         values = campaign[name].values if name in campaign else unknown
-        # Counts that are missing are -1.
-        counts = values.dtype.kind == "i"
-        found[name] = np.where(counts & (values < 0), np.nan, values.astype(float))
+        missing = (values.dtype.kind == "i") & (values < 0)  # counts that are missing are -1
+        found[name] = np.where(missing, np.nan, values.astype(float))
     return _described(xr.Dataset({name: ("cell", values) for name, values in found.items()}))
 
 
 def _described(cells: xr.Dataset) -> xr.Dataset:
     """Add what each variable means, and its unit."""
-    for name in cells:
-        units, long_name = _MEANING.get(str(name), ("", ""))
-        cells[name].attrs |= {"long_name": long_name} if long_name else {}
-        cells[name].attrs |= {"units": units} if units else {}
+    for name, (units, long_name) in _MEANING.items():
+        if name in cells:
+            cells[name].attrs |= {"long_name": long_name} | ({"units": units} if units else {})
     return cells
 
 
@@ -155,14 +146,7 @@ def judged(cells: xr.Dataset) -> xr.Dataset:
 def chosen_for_check(cells: xr.Dataset, share: float, seed: int) -> NDArray[np.int64]:
     """Cells to run again with smaller steps: a random share of those that are ok, at least one.
 
-    Parameters
-    ----------
-    cells
-        The judged map.
-    share
-        Between 0 and 1.
-    seed
-        Of the choice.
+    ``share`` is between 0 and 1, ``seed`` that of the choice.
     """
     good = np.flatnonzero((cells["verdict"] == OK).values)
     count = min(len(good), max(1, round(share * len(good))))
@@ -177,10 +161,8 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
     ----------
     cells
         The map.
-    which
-        Numbers of the cells that were run again.
-    finer
-        Those cells, in this order, as :func:`cells_of` gives them.
+    which, finer
+        Numbers of the cells that were run again, and what they gave then, in this order.
 
     Returns
     -------
@@ -215,18 +197,10 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
 
 
 def joined(groups: Sequence[tuple[dict[str, str], xr.Dataset]]) -> xr.Dataset:
-    """One map of all groups.
+    """One map of all groups, with the dimensions ``group`` and ``cell``, judged.
 
-    Parameters
-    ----------
-    groups
-        Name, title and the axes' labels and units (``name``, ``title``, ``x_label``, ``x_units``,
-        ``y_label``, ``y_units``), and the cells of each group.
-
-    Returns
-    -------
-    xr.Dataset
-        Dimensions ``group`` and ``cell``; ``of_group`` is the number of each cell's group.
+    A group has its words (``name``, ``title``, ``x_label``, ``x_units``, ``y_label``, ``y_units``)
+    and its cells; ``of_group`` is the number of each cell's group.
     """
     parts = [
         cells.assign(of_group=("cell", np.full(cells.sizes["cell"], number)))

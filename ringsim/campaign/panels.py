@@ -10,20 +10,16 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ringsim.refusal import InputError
-from ringsim.sampling.paths import field_at, unit_at
+from ringsim.sampling.paths import field_at, refuse_fixed, unit_at
 from ringsim.scene import Scene
 from ringsim.variables import PLANES
 
 DECADE = 10.0
 """HIGH over LOW from which on values are spaced geometrically."""
-
-_SPREADS = (1.0, 0.3, 0.0)
-"""Exponents on the factors of a default axis, tried in turn until the scene accepts the value."""
 _DEFAULTS = (
     (
         ("cables.*.axial_stiffness", "net.stiffness"),
@@ -37,24 +33,16 @@ _DEFAULTS = (
 )
 """Panels where none are asked for: for each axis the first path at which the scene has a positive
 number.  A panel without one of its axes is left out."""
-_FACTORS = {"solver.step": (0.2, 5.0)}
-"""Ends of a default axis over the scene's own value, where not a decade to each side: the cost of
-a run grows with 1 / step."""
+_FACTOR, _STEP_FACTOR = 10.0, 5.0
+"""Ends of a default axis over the scene's own value, and below it; less for solver.step, because
+the cost of a run grows with 1 / step."""
+_SPREADS = (1.0, 0.3)
+"""Exponents on that factor, tried in turn: a bound of the field may be near."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """One axis of a panel.
-
-    Attributes
-    ----------
-    label, units
-        On the map; the values are in these units.
-    paths
-        Scene paths that all get the value.
-    values
-        In rising order.
-    """
+    """One axis of a panel: values in rising order that all ``paths`` of a scene get."""
 
     label: str
     units: str
@@ -65,22 +53,19 @@ class Sweep:
         """A value by scene path."""
         return dict.fromkeys(self.paths, value)
 
+    def shapes(self, scene: Scene) -> bool:
+        """Whether the values change the shape of a result, so that each is a campaign."""
+        try:
+            for path in self.paths:
+                refuse_fixed(scene, path)
+        except InputError:
+            return True
+        return False
+
 
 @dataclass(frozen=True)
 class Panel:
-    """All pairs of the values of two axes, on one scene.
-
-    Attributes
-    ----------
-    name
-        Of its folder.
-    title
-        On the map.
-    scene
-        What all cells vary.
-    x, y
-        The axes.
-    """
+    """All pairs of the values of two axes, on one scene; ``name`` is that of its folder."""
 
     name: str
     title: str
@@ -94,16 +79,7 @@ class Panel:
 
 
 def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
-    """Panels for the axes that a user asks for, two to a panel; default ones if there are none.
-
-    Parameters
-    ----------
-    scene
-        What the cells vary.
-    over
-        Texts ``PATH=LOW..HIGH``.
-    points
-        Values of each axis; fewer where whole numbers in the range are fewer.
+    """Panels for axes ``PATH=LOW..HIGH``, two to a panel; default ones if there are none.
 
     Raises
     ------
@@ -115,17 +91,14 @@ def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
             f"--over {over[-1]}: has no partner, and a panel has two axes: give one more --over "
             "PATH=LOW..HIGH, or leave this one out"
         )
-    pairs = _defaults(scene, points)
-    if over:
-        axes = [sweep_of(scene, text, points) for text in over]
-        pairs = list(zip(axes[::2], axes[1::2], strict=True))
-    if not pairs:
+    axes = [sweep_of(scene, text, points) for text in over] or _defaults(scene, points)
+    if not axes:
         raise InputError(
             f"--over is missing: {scene.name} holds none of the default pairs of axes: give two "
             "--over PATH=LOW..HIGH"
         )
     found = []
-    for number, (x, y) in enumerate(pairs, 1):
+    for number, (x, y) in enumerate(zip(axes[::2], axes[1::2], strict=True), 1):
         if twice := set(x.paths) & set(y.paths):
             raise InputError(
                 f"--over {x.label}, --over {y.label}: both axes of panel {number} vary "
@@ -171,12 +144,10 @@ def sweep_of(scene: Scene, text: str, points: int) -> Sweep:
 
 def _sweep(scene: Scene, path: str, low: float, high: float, points: int) -> Sweep:
     paths = _expanded(scene, path)
-    values = np.linspace(low, high, points)
-    if low > 0.0 and high >= DECADE * low:
-        values = np.geomspace(low, high, points)
+    spaced = np.geomspace if low > 0.0 and high >= DECADE * low else np.linspace
+    values = spaced(low, high, points)
     values[1:-1] = [float(f"{value:.6g}") for value in values[1:-1]]
-    whole = all(_is_whole(_own_value(scene, each)) for each in paths)
-    if whole:
+    if type(_own_value(scene, paths[0])) is int:
         if not (low.is_integer() and high.is_integer()):
             raise InputError(
                 f"{path} takes whole numbers only: give LOW and HIGH without fractions"
@@ -199,7 +170,7 @@ def _expanded(scene: Scene, path: str) -> tuple[str, ...]:
     return tuple(f"{head}.{name}.{tail}" for name in present)
 
 
-def _own_value(scene: Scene, path: str) -> Any:
+def _own_value(scene: Scene, path: str) -> object:
     """What a scene has at a path; None if it does not have it."""
     try:
         return field_at(scene, path)
@@ -207,43 +178,21 @@ def _own_value(scene: Scene, path: str) -> Any:
         return None
 
 
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
+def _defaults(scene: Scene, points: int) -> list[Sweep]:
+    """The axes of the default panels for which a scene has both."""
+    pairs = [[_around(scene, paths, points) for paths in pair] for pair in _DEFAULTS]
+    return [sweep for x, y in pairs if x and y for sweep in (x, y)]
 
 
-def _defaults(scene: Scene, points: int) -> list[tuple[Sweep, Sweep]]:
-    pairs = []
-    for alternatives in _DEFAULTS:
-        found = [_first(scene, paths, points) for paths in alternatives]
-        x, y = found
-        if x is not None and y is not None:
-            pairs.append((x, y))
-    return pairs
-
-
-def _first(scene: Scene, alternatives: Sequence[str], points: int) -> Sweep | None:
+def _around(scene: Scene, alternatives: Sequence[str], points: int) -> Sweep | None:
     """An axis around the scene's own value at the first of some paths that it has."""
-    for path in alternatives:
+    for path, spread in itertools.product(alternatives, _SPREADS):
         try:
-            paths = _expanded(scene, path)
-        except InputError:
-            continue
-        own = _own_value(scene, paths[0])
-        if isinstance(own, float) and own > 0.0:
-            factors = _FACTORS.get(path, (1.0 / DECADE, DECADE))
-            low, high = (_accepted(scene, paths, own, factor) for factor in factors)
-            if low < high:
+            own = _own_value(scene, _expanded(scene, path)[0])
+            if isinstance(own, float) and own > 0.0:
+                factor = (_STEP_FACTOR if path == "solver.step" else _FACTOR) ** spread
+                low, high = (float(f"{end:.3g}") for end in (own / factor, own * factor))
                 return _sweep(scene, path, low, high, points)
-    return None
-
-
-def _accepted(scene: Scene, paths: tuple[str, ...], own: float, factor: float) -> float:
-    """The scene's own value times a factor, or less of it where that is refused."""
-    for spread in _SPREADS:
-        value = float(f"{own * factor**spread:.3g}")
-        try:
-            scene.with_values(dict.fromkeys(paths, value))
         except InputError:
             continue
-        return value
-    return own
+    return None

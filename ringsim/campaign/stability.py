@@ -11,10 +11,8 @@ import xarray as xr
 
 from ringsim.analysis.stability import cells_of, checked, chosen_for_check, joined
 from ringsim.campaign.cases import Cases, run_cases
-from ringsim.campaign.panels import Panel, Sweep
+from ringsim.campaign.panels import Panel
 from ringsim.parts.solver import MOST_STEPS
-from ringsim.refusal import InputError
-from ringsim.sampling.paths import refuse_fixed
 from ringsim.scene import Scene
 
 TIMEOUT = 600.0
@@ -34,16 +32,7 @@ class _Piece:
 
 
 def run_map(folder: Path, panels: Sequence[Panel], workers: int) -> xr.Dataset:
-    """Run all cells that are still missing.
-
-    Parameters
-    ----------
-    folder
-        Each panel has a folder of its own in it.
-    panels
-        What to run.
-    workers
-        Solver processes.
+    """Run all cells that are still missing, each panel in a folder of its own.
 
     Returns
     -------
@@ -59,9 +48,11 @@ def run_map(folder: Path, panels: Sequence[Panel], workers: int) -> xr.Dataset:
     """
     found = []
     for panel in panels:
-        words = {"name": panel.name, "title": panel.title}
-        for axis, sweep in (("x", panel.x), ("y", panel.y)):
-            words |= {f"{axis}_label": sweep.label, f"{axis}_units": sweep.units}
+        words = {
+            "name": panel.name, "title": panel.title,
+            "x_label": panel.x.label, "x_units": panel.x.units,
+            "y_label": panel.y.label, "y_units": panel.y.units,
+        }  # fmt: skip
         parts = [_run(folder, piece, workers) for piece in _pieces(panel)]
         found.append((words, xr.concat(parts, dim="cell")))
     return joined(found)
@@ -71,30 +62,16 @@ def run_check(
     folder: Path, panels: Sequence[Panel], whole: xr.Dataset, *, share: float, seed: int,
     workers: int,
 ) -> xr.Dataset:  # fmt: skip
-    """Run a random share of the ok cells again with smaller steps, and compare.
+    """Run a random share of the ok cells again with smaller steps, compare, and judge again.
 
     The largest step is a quarter, the tolerance a sixteenth of those of the start that counts;
-    constant steps are a quarter of those that Newton let the cell take.
-
-    Parameters
-    ----------
-    folder, panels, workers
-        As for :func:`run_map`.
-    whole
-        What that gave.
-    share, seed
-        See ``ringsim.analysis.stability.chosen_for_check``.
-
-    Returns
-    -------
-    xr.Dataset
-        The map, judged again.
+    constant steps are a quarter of those that Newton let the cell take.  ``whole`` is what
+    :func:`run_map` gave; ``share`` and ``seed`` choose the cells.
     """
     which = chosen_for_check(whole, share, seed)
     finer, begin = [], 0
     for piece in (piece for panel in panels for piece in _pieces(panel)):
-        end = begin + len(piece.cells)
-        mine = which[(which >= begin) & (which < end)]
+        mine = which[(which >= begin) & (which < begin + len(piece.cells))]
         if len(mine):
             own = [piece.cells[cell - begin] for cell in mine]
             starts = 1 + whole["restarts"].values[mine].astype(int)
@@ -104,31 +81,23 @@ def run_check(
             mark = hashlib.sha256(repr(([cell[:2] for cell in own], how)).encode()).hexdigest()[:6]
             again = replace(piece, name=f"{piece.name}-check-{mark}", cells=own)
             finer.append(_run(folder, again, workers, finer=how))
-        begin = end
+        begin += len(piece.cells)
     return checked(whole, which, xr.concat(finer, dim="cell")) if finer else whole
-
-
-def _shapes(scene: Scene, sweep: Sweep) -> bool:
-    """Whether a sweep changes the shape of a result."""
-    try:
-        for path in sweep.paths:
-            refuse_fixed(scene, path)
-    except InputError:
-        return True
-    return False
 
 
 def _pieces(panel: Panel) -> list[_Piece]:
     """The campaigns of a panel; an axis that shapes the result needs one for each value."""
-    x_shapes, y_shapes = (_shapes(panel.scene, sweep) for sweep in (panel.x, panel.y))
+    shaping = [sweep.shapes(panel.scene) for sweep in (panel.x, panel.y)]
     found: dict[str, _Piece] = {}
     for x, y in panel.cells():
-        words = [f"{x:g}"] * x_shapes + [f"{y:g}"] * y_shapes
-        name = "-".join([panel.name, *words]).replace("+", "")
-        shared = (panel.x.at(x) if x_shapes else {}) | (panel.y.at(y) if y_shapes else {})
+        name = panel.name
+        shared: dict[str, float] = {}
+        own: dict[str, float] = {}
+        for shapes, sweep, value in zip(shaping, (panel.x, panel.y), (x, y), strict=True):
+            (shared if shapes else own).update(sweep.at(value))
+            name += f"-{value:g}".replace("+", "") if shapes else ""
         if name not in found:
             found[name] = _Piece(name, panel, panel.scene.with_values(shared), [])
-        own = {k: v for k, v in (panel.x.at(x) | panel.y.at(y)).items() if k not in shared}
         found[name].cells.append((x, y, own))
     return list(found.values())
 
@@ -136,10 +105,10 @@ def _pieces(panel: Panel) -> list[_Piece]:
 def _run(
     folder: Path, piece: _Piece, workers: int, finer: Sequence[tuple[int, float]] = ()
 ) -> xr.Dataset:
-    """The cells of a piece; refined as often as ``finer`` says, and with more time then.
+    """The cells of a piece; in a check with smaller steps and with more time.
 
-    It also holds the mean step in s that each cell took; constant ones are no longer than a
-    quarter of that.
+    ``finer`` says how often each cell is refined, and the mean step in s that it took: constant
+    ones are no longer than a quarter of that.
     """
     rows = []
     for number, (_, _, row) in enumerate(piece.cells):
@@ -157,13 +126,8 @@ def _run(
             if piece.scene.record.stress:
                 changes["solver.deviation_tolerance"] = fine.deviation_tolerance
         rows.append(row | changes or {"solver.step": solver.step})  # a campaign varies something
-    cases = Cases(
-        name=piece.name,
-        title=f"Stability map: {piece.panel.title}",
-        scene=piece.scene,
-        cases=rows,
-        timeout=TIMEOUT * (_PATIENCE if finer else 1.0),
-    )
+    title, timeout = f"Stability map: {piece.panel.title}", TIMEOUT * (_PATIENCE if finer else 1.0)
+    cases = Cases(piece.name, title, piece.scene, rows, timeout)
     x, y, _ = zip(*piece.cells, strict=True)
     with xr.open_dataset(run_cases(folder / piece.panel.name, cases, workers)) as campaign:
         return cells_of(campaign, x, y)

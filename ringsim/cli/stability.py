@@ -51,14 +51,9 @@ _SEED = 1
     show_default=True, help="Percentage of the ok cells that are run again with smaller steps.",
 )  # fmt: skip
 def command(
-    scene: str,
-    settings: tuple[str, ...],
-    over: tuple[str, ...],
-    points: int,
-    out: Path | None,
-    workers: int,
-    percent: float,
-) -> int:
+    scene: str, settings: tuple[str, ...], over: tuple[str, ...], points: int, out: Path | None,
+    workers: int, percent: float,
+) -> int:  # fmt: skip
     """Map around SCENE: which pairs of values run well, and how runs end elsewhere.
 
     Each panel has two axes, for example --over cables.*.axial_stiffness=1e3..1e7 --over
@@ -67,9 +62,7 @@ def command(
     after an interruption.  Exit codes: 0 every cell is ok, or ended with a named cause; 2 bad
     input; 3 some cells are wrong.
     """
-    chosen = load_scene(scene)
-    if settings:
-        chosen = chosen.with_values(dict(parse_assignment(text) for text in settings))
+    chosen = load_scene(scene).with_values(dict(parse_assignment(text) for text in settings))
 
     from ringsim.campaign.panels import panels_over
 
@@ -84,24 +77,7 @@ def command(
 
 
 def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float) -> int:
-    """Run the panels and the check of some cells, write the map's files, and say how it ended.
-
-    Parameters
-    ----------
-    folder
-        For the map and its campaigns.
-    panels
-        What to run.
-    workers
-        Solver processes.
-    percent
-        Percentage of the ok cells that are checked.
-
-    Returns
-    -------
-    int
-        Exit code: 3 if a cell is wrong.
-    """
+    """Run panels, check some percent of the ok cells, and write the map; returns the exit code."""
     from ringsim.analysis.stability import WRONG
     from ringsim.analysis.stability_text import summary, to_markdown
     from ringsim.campaign.stability import run_check, run_map
