@@ -7,6 +7,7 @@ import os
 import secrets
 import tomllib
 from collections.abc import Iterator
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ DRAFT = ".draft"
 """How names of files end that are still being written; nobody reads them."""
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path | Traversable) -> str:
     """The text of a file.
 
     Raises

@@ -62,9 +62,8 @@ class Side:
         nodes = state.position[self._where]
         if self._arms is None:
             return np.array(nodes[:, :3])
-        return nodes[:, :3] + np.einsum(
-            "nij,nj->ni", quaternions.axes_of(nodes[:, 3:7]), self._arms
-        )
+        turned = np.einsum("nij,nj->ni", quaternions.axes_of(nodes[:, 3:7]), self._arms)
+        return np.asarray(nodes[:, :3] + turned)
 
 
 class JointGroup:

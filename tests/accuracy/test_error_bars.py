@@ -227,9 +227,9 @@ def test_budget_says_which_error_dominates() -> None:
     )
     campaign.status[0] = 2
     found = error_budget(campaign)
-    assert list(found.output.values) == ["deployment_time", "asynchrony_max"]
-    assert int(found.bars[0]) == 9
-    assert float(found.standard_error[0]) == pytest.approx(values[1:].std(ddof=1) / 99**0.5)
+    assert [budget.output for budget in found] == ["deployment_time", "asynchrony_max"]
+    assert found[0].bars == 9
+    assert found[0].standard_error == pytest.approx(values[1:].std(ddof=1) / 99**0.5)
     first, second = budget_lines(found)
     assert "sampling error dominates" in first
     assert "numerical error dominates" in second

@@ -154,8 +154,9 @@ def test_a_rung_of_an_accuracy_study_never_starts_anew(monkeypatch, tmp_path) ->
         raise KeyboardInterrupt
 
     monkeypatch.setattr(accuracy, "run_cases", refuse)
+    scene = SCENE.with_values({"solver.restarts": 5})
     with pytest.raises(KeyboardInterrupt):
-        accuracy.run_ladder(tmp_path, SCENE.with_values({"solver.restarts": 5}), workers=1)
+        accuracy.run_ladder(tmp_path, scene, workers=1, timeout=60.0)
     (cases,) = asked
     assert cases.scene.solver.restarts == 0
     assert not any("solver.restarts" in case for case in cases.cases)
