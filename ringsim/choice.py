@@ -54,12 +54,12 @@ def kind_of(record: Model) -> str:
 
 
 def leaves_of(family: type[Model]) -> list[type[Model]]:
-    """The kinds of a family, or the class itself if it is none."""
+    """The kinds of a family, each with a ``kind`` of its own; one may extend another."""
     package, _, file = family.__module__.rpartition(".")
     if file == "family":
         _load(package)
-    below = family.__subclasses__()
-    return [leaf for sub in below for leaf in leaves_of(sub)] if below else [family]
+    own = [family] if "kind" in family.__annotations__ else []
+    return own + [kind for below in family.__subclasses__() for kind in leaves_of(below)]
 
 
 @functools.cache

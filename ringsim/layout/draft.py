@@ -253,16 +253,16 @@ class Draft:
         if boom.base == "fixed":
             space = InSpace(upper.place, np.eye(3))
             self.joints.append(Joint("weld", "", 0, space, OnBody(top.number, *_HERE)))
-        if not isinstance(boom, RigidBoom):
-            return BoomBeam(OnBody(top.number, *_HERE), OnBody(low.number, *_HERE), boom)
         tube = boom.tube
         across = 0.125 * boom.mass * (tube.outer_diameter**2 + tube.inner_diameter**2)
         along = boom.mass * boom.length**2 / 3.0 + 0.5 * across
         centre = np.array([0.0, 0.0, -0.5 * boom.length])
         lump = Lump("boom", boom.mass, centre, np.diag([along, along, across]))
+        ends = OnBody(top.number, *_HERE), OnBody(low.number, *_HERE)
+        if not isinstance(boom, RigidBoom):
+            return BoomBeam(*ends, boom, lump)
         body = self.bodies[top.number]
         self.bodies[top.number] = replace(body, lumps=(*body.lumps, lump))
-        ends = OnBody(top.number, *_HERE), OnBody(low.number, *_HERE)
         self.joints.append(Joint("sleeve", "", 0, *ends))
         return None
 

@@ -70,7 +70,7 @@ class Layout:
         ]:
             found[group] = found.get(group, 0.0) + mass
         if self.boom is not None:
-            found["boom"] = found.get("boom", 0.0) + self.boom.record.mass
+            found["boom"] = self.boom.lump.mass
         if self.net is not None:
             found["hub"] = self.net.mass
         return found
@@ -79,13 +79,15 @@ class Layout:
         """Mass matrix of (V, W, q'), shape (7, 7): rigid motion about the origin, and the fold.
 
         A rod of mass m is m / 6 at its ends and 2 m / 3 in its middle (Simpson's rule, exact for
-        what is quadratic along it), and its cross-sections turn with it; the net's hub and a
-        flexible boom are left out.
+        what is quadratic along it), and its cross-sections turn with it.  A flexible boom counts as
+        rigid; the net's hub is left out.
         """
         points, spins = [], []
-        for body in self.bodies:
-            centre = body.centre
-            axes, arm = body.pose.axes, centre
+        bodies = list(self.bodies)
+        if self.boom is not None:
+            bodies.append(Body(self.bodies[self.boom.top.body].pose, (self.boom.lump,)))
+        for body in bodies:
+            axes, arm = body.pose.axes, body.centre
             shift = body.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
             points.append((body.mass, *body.pose.at(arm)))
             spins.append((axes @ (body.inertia - shift) @ axes.T, body.pose.turn))

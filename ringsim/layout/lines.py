@@ -60,13 +60,12 @@ def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> di
     found["hinge assemblies"] = [
         (layout.bodies[key[0]].pose.place, place) for key, place in pins.items()
     ]
-    for body in layout.bodies:
-        for lump in body.lumps:
-            if lump.group == "boom":
-                found["boom"] = [(body.pose.place, body.pose.at(2.0 * lump.centre)[0])]
+    lumps = [(body.pose, lump) for body in layout.bodies for lump in body.lumps]
     if layout.boom is not None:
-        top = layout.pose(layout.boom.top).place
-        found["boom"] = [(top, top - [0.0, 0.0, layout.boom.record.length])]
+        lumps.append((layout.pose(layout.boom.top), layout.boom.lump))
+    for pose, lump in lumps:
+        if lump.group == "boom":
+            found["boom"] = [(pose.place, pose.at(2.0 * lump.centre)[0])]
     if layout.net is not None:
         for number in layout.net.bodies:
             line = layout.bodies[number].pose.place, layout.net.hub

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.layout.bodies import OnBody
+from ringsim.layout.bodies import Lump, OnBody
 
 Array = NDArray[np.float64]
 
@@ -63,8 +63,12 @@ class HubNet:
 
 @dataclass(frozen=True)
 class BoomBeam:
-    """A flexible boom: clamped at ``top``, while ``low`` slides along it."""
+    """A flexible boom: clamped at ``top``, while ``low`` slides along it.
+
+    ``record`` is the scene's, ``lump`` what it would be as a rigid part of the body at its top.
+    """
 
     top: OnBody
     low: OnBody
     record: Any
+    lump: Lump

@@ -85,15 +85,15 @@ class Bench:
         self.width = 7 * len(drive.path.nodes)
         self.reference = np.array(
             [
-                self.built.ring.assembly.system.GetNodeParameter(n, "referenceCoordinates")
+                self.built.model.assembly.system.GetNodeParameter(n, "referenceCoordinates")
                 for n in drive.path.nodes
             ]
         )
         number = {int(node): k for k, node in enumerate(drive.path.nodes)}
         self.pairs = [
-            (number[int(joint.gap[0])], number[int(joint.gap[1])])
-            for plane in self.built.ring.vjoints
-            for joint in plane
+            (number[int(joint.nodes[0])], number[int(joint.nodes[1])])
+            for plane in self.built.model.openings()
+            for joint, _ in plane
         ]
 
     def motion(self, rng: np.random.Generator, place: Array) -> Motion:

@@ -29,7 +29,7 @@ def residuals(*, exact: bool, step: float) -> list[float]:
     built = build(scene)
     assert built.cables is not None
     built.cables.exact_tangent = exact
-    system, solver = built.ring.assembly.system, exu.MainSolverImplicitSecondOrder()
+    system, solver = built.model.assembly.system, exu.MainSolverImplicitSecondOrder()
     settings = solver_settings(scene, 1e-7)
     settings.timeIntegration.newton.useModifiedNewton = False
     settings.timeIntegration.adaptiveStep = False

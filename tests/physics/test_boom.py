@@ -25,7 +25,7 @@ def test_the_lower_hinge_slides_from_element_to_element() -> None:
     built = build(scene)
     history = Integration(built).run()
     assert history.status.word == "unfinished"
-    element, place = built.ring.assembly.system.systemData.GetDataCoordinates()
+    element, place = built.model.assembly.system.systemData.GetDataCoordinates()
     height = scene.structure.geometry().height(0.5 * (np.pi - float(history.angles[-1].mean())))
     length = scene.boom.length / 8  # type: ignore[union-attr]
     start = scene.structure.geometry().height(scene.structure.coordinate)
@@ -36,7 +36,7 @@ def test_the_lower_hinge_slides_from_element_to_element() -> None:
 
 def momenta(built: Built) -> tuple[Array, Array]:
     """Momentum (kg m/s) and angular momentum (kg m^2/s) from exudyn's own mass matrix."""
-    assembly = built.ring.assembly
+    assembly = built.model.assembly
     system, data = assembly.system, assembly.system.systemData
     places = np.asarray(data.GetODE2Coordinates()) + np.asarray(
         data.GetODE2Coordinates(exu.ConfigurationType.Reference)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from fold_rates import fold_rate
 
 from ideal_cases import pulled, six
 from ringsim.cable.chain import Chain
@@ -89,7 +90,7 @@ def test_damped_net_has_the_engine_s_law():
     scene = pulled(sections=6, net=net, stop="none", loads__force=0.0)
     geometry = scene.structure.geometry()
     for phi, rate in ((0.2, -0.5), (0.2, 3.0), (1.3, 1.0)):
-        fold, by_phi = geometry.fold(phi).corners[0], geometry.fold_rate(phi).corners[0]
+        fold, by_phi = geometry.fold(phi).corners[0], fold_rate(geometry, phi).corners[0]
         arms, moving = fold - fold.mean(axis=0), by_phi - by_phi.mean(axis=0)
         lengths = np.linalg.norm(arms, axis=1)
         slope = np.sum(arms * moving, axis=1) / lengths
@@ -134,7 +135,7 @@ def test_cables_are_the_chain_on_the_fold_s_points(end):
         moved = float(found.chain.tensions @ found.chain.rates)
         # Both planes are alike, so one cable stands for two.
         assert found.force * rate == pytest.approx(-2.0 * moved, rel=1e-12)
-        fold, by_phi = geometry.fold(phi), geometry.fold_rate(phi)
+        fold, by_phi = geometry.fold(phi), fold_rate(geometry, phi)
         down = np.array([0.0, 0.0, -1.0])
         bar, h = geometry.half_bar, cable.block_offset
         drop = (bar * math.sin(phi) + h) * down

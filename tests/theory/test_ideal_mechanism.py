@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fold_rates import fold_rate
 
 from ideal_cases import pulled
 from ringsim.scene import Scene
@@ -16,7 +17,7 @@ def summed(scene: Scene, phi: float, *, fixed: bool) -> float:
     """Sum of m |dr/dphi|^2, with translation and rotation taken out of a ring that floats."""
     shape, rods = scene.structure, scene.rods
     geometry = shape.geometry()
-    fold, rate = geometry.fold(phi), geometry.fold_rate(phi)
+    fold, rate = geometry.fold(phi), fold_rate(geometry, phi)
     parts = [
         (np.full(place[..., 0].size, mass), place, moving)
         for mass, place, moving in (
