@@ -4,42 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from ring_runs import ideal_time, ring, run
 from ringsim.engine.build import build
-from ringsim.engine.joints import stop_torque
 from ringsim.engine.locks import Locks
-from ringsim.parts.joints import Stop
 from ringsim.simulation import run as outcome_of
 from ringsim.simulation import simulate
 from ringsim.variables import Status
-
-FOLDED = st.floats(-0.2, math.pi)
-RATE = st.floats(-50.0, 50.0)
-
-
-@given(FOLDED, RATE)
-def test_a_stop_only_pushes_into_the_range(folded: float, rate: float) -> None:
-    stop = Stop(stowed_angle=30.0)
-    torque = float(stop_torque(stop, np.array(folded), np.array(rate), np.array(False)))
-    stowed = math.pi - math.radians(30.0)
-    if folded < 0.0:
-        assert torque <= 0.0  # opened too far: folds
-    elif folded > stowed:
-        assert torque >= 0.0  # folded too far: opens
-    else:
-        assert torque == 0.0
-
-
-@given(FOLDED, RATE)
-def test_the_stop_only_takes_energy_by_its_damper(folded: float, rate: float) -> None:
-    stop = Stop(stowed_angle=30.0)
-    still = stop_torque(stop, np.array(folded), np.array(0.0), np.array(False))
-    moving = stop_torque(stop, np.array(folded), np.array(rate), np.array(False))
-    # The torque opens; the angle folds at this rate.
-    assert float((moving - still) * rate) >= 0.0
 
 
 def test_an_open_joint_bounces_and_a_latched_one_stays() -> None:
