@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from ringsim.cable.state import ChainState
 from ringsim.engine import quaternions
 from ringsim.engine.closing import close
-from ringsim.engine.energy import Energies
-from ringsim.engine.guard import Guard
 from ringsim.engine.planar_truss import TrussModel, rest_force
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.engine.settings import raise_own, solver_settings
 from ringsim.engine.work import StepWork
+from ringsim.stepping.guard import Guard
+from ringsim.stepping.instant import Energies, Instant
+from ringsim.stepping.scales import Scales
 from ringsim.variables import Status
 
 Array = NDArray[np.float64]
@@ -83,7 +84,8 @@ class TrussIntegration:
         self._reader = TrussReader(model)
         slight = _SLIGHT * self._push() * model.truss.beam_length
         slack = max(cable.slack_width for cable in model.cable.chain.cables)
-        self._guard = Guard(solver, slight, model.truss.beam_length, slack)
+        scales = Scales(0.0, slight, math.pi, model.truss.beam_length, slack_tension=slack)
+        self._guard = Guard(solver, scales)
         self.history = TrussHistory()
 
     def run(self) -> TrussHistory:
@@ -105,7 +107,9 @@ class TrussIntegration:
             else:
                 history.status = Status.OK
                 history.reason = f"the cable was wound until solver.end_time = {end:g} s"
-        self._guard.conclude(history)
+        refused = self._guard.verdict()
+        if refused and history.status == Status.OK:
+            history.status, history.reason = Status.DIVERGED, refused
         close(history, self._system, solver)
         return history
 
@@ -129,7 +133,15 @@ class TrussIntegration:
             chain, slope = self._reader.chain, self._reader.path_slope
             step = self._model.scene.solver.step
             self._model.cable.advance(time, step, chain, np.array([slope]))
-            return not self._guard.stops(self.history)
+            found = self.history
+            angles, rates = (np.array([[one[-1]]]) for one in (found.angles, found.rates))
+            last = Instant(
+                time, angles, rates, found.energies[-1], found.gaps[-1], found.tensions[-1]
+            )
+            refused = self._guard.judge(last)
+            if refused:
+                found.status, found.reason = Status.DIVERGED, refused
+            return not refused
         self.history.status = Status.DIVERGED
         self.history.reason = f"the state is not finite at {time:.6g} s: reduce solver.step"
         return False
