@@ -102,7 +102,7 @@ def standing_of(name: str) -> Standing:
     if kind_of(scene.structure) != "planar-truss":
         scene = scene.with_values({"record.stress": True})
     outcome = run(scene)
-    coarse = run(scene.model_copy(update={"solver": scene.solver.coarsened()}))
+    coarse = run(scene.model_copy(update={"solver": scene.solver.scaled(2.0)}))
     bars = apart(outcome, coarse)
     stated = error_bars(outcome, coarse, scene.rods.elements, scene.solver.tolerance)
     bars |= {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import exudyn as exu
 import numpy as np
@@ -16,6 +16,7 @@ from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.work import StepWork
 from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.persection import at_section
+from ringsim.stepping.instant import Energies
 
 Array = NDArray[np.float64]
 _KINETIC = exu.OutputVariableType.KineticEnergy
@@ -23,19 +24,6 @@ _POTENTIAL = exu.OutputVariableType.PotentialEnergy
 Damping = tuple[Array, Array]
 """Damping forces and the rates that they act against."""
 _NOTHING: Damping = (np.zeros(0), np.zeros(0))
-
-
-class Energies(NamedTuple):
-    """Energies in J: kinetic, elastic and work of the loads at one instant; since the instant
-    before, what was lost in friction, dampers and stops, and what the winches put in less the
-    strain energy that they wind up.
-    """
-
-    kinetic: float
-    elastic: float
-    work: float
-    lost: float
-    driven: float = 0.0
 
 
 class EnergyMeter:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ringsim.parts.structure.planar_truss import DeployingSpring, Rest
 from scipy.integrate import quad, solve_ivp
 
 from law_cases import records
@@ -22,6 +21,7 @@ from ringsim.parts.net import Net
 from ringsim.parts.persection import at_section
 from ringsim.parts.stop.family import Stop
 from ringsim.parts.stop.spring_damper import SpringDamperStop
+from ringsim.structures.planar_truss import DeployingSpring, Rest
 from ringsim.units import Model
 
 FRICTION = st.deferred(lambda: any_kind(JointFriction))

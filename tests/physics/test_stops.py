@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from ring_runs import ideal_time, ring, run
-from ringsim.engine.build import build
-from ringsim.engine.locks import Locks
 from ringsim.simulation import run as outcome_of
 from ringsim.simulation import simulate
+from ringsim.stepping.instant import Energies, Instant
+from ringsim.stepping.locks import Locks, StopContact
 from ringsim.variables import Status
 
 
@@ -46,10 +46,13 @@ def test_reversed_forces_fold_an_open_ring() -> None:
 
 
 def locks(opening: float) -> tuple[Locks, np.ndarray]:
-    """The memory of a ring that starts at an opening angle, its stowed stop at 40 deg."""
-    built = build(ring(3, structure__opening_angle=opening, stop__stowed_angle=40.0))
+    """The memory of joints that start at an opening angle, their stowed stop at 40 deg."""
     angles = np.full((2, 3), math.radians(opening))
-    return Locks(built, angles), angles
+    return Locks(angles, math.radians(40.0)), angles
+
+
+def contact(memory: Locks, angles: np.ndarray, rates: np.ndarray) -> StopContact:
+    return memory.contact(Instant(0.0, angles, rates, Energies(0.0, 0.0, 0.0, 0.0)))
 
 
 def test_joints_that_bounce_have_reached_the_stowed_stop() -> None:
@@ -63,21 +66,21 @@ def test_joints_that_bounce_have_reached_the_stowed_stop() -> None:
         assert memory.stowed[place]
     assert memory.stowed.all()
     # They rest near the stop, with contact steps, and wait for no first meeting.
-    contact = memory.contact(angles, folding)
-    assert contact.resting_rate == 1.0
-    assert contact.time_to_next == math.inf
+    found = contact(memory, angles, folding)
+    assert found.resting_rate == 1.0
+    assert found.time_to_next == math.inf
     # Far from it they are free again.
-    assert memory.contact(np.full((2, 3), math.radians(60.0)), folding).resting_rate == 0.0
+    assert contact(memory, np.full((2, 3), math.radians(60.0)), folding).resting_rate == 0.0
 
 
 def test_the_first_joint_to_meet_the_stowed_stop_sets_the_step() -> None:
     memory, angles = locks(90.0)
     rates = np.zeros((2, 3))
     rates[1, 2] = -2.0
-    contact = memory.contact(angles, rates)
-    assert contact.time_to_next == pytest.approx(math.radians(50.0) / 2.0)
-    assert contact.rate_of_next == 2.0
-    assert contact.resting_rate == 0.0
+    found = contact(memory, angles, rates)
+    assert found.time_to_next == pytest.approx(math.radians(50.0) / 2.0)
+    assert found.rate_of_next == 2.0
+    assert found.resting_rate == 0.0
 
 
 def test_a_ring_that_starts_on_its_stowed_stop_has_not_folded() -> None:
@@ -85,7 +88,7 @@ def test_a_ring_that_starts_on_its_stowed_stop_has_not_folded() -> None:
     memory.note(angles - 1e-3)
     assert not memory.stowed.any()
     # Pressed into the stop it needs contact steps all the same.
-    assert memory.contact(angles - 1e-3, np.full((2, 3), 0.5)).resting_rate == 0.5
+    assert contact(memory, angles - 1e-3, np.full((2, 3), 0.5)).resting_rate == 0.5
     for opened in (60.0, 39.9):
         memory.note(np.full((2, 3), math.radians(opened)))
     assert memory.stowed.all()

@@ -7,45 +7,52 @@ import itertools
 import numpy as np
 import pytest
 
-from ringsim.engine.tension_control import TensionControl
 from ringsim.parts.solver import Solver
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
+from ringsim.stepping.instant import Energies, Instant
+from ringsim.stepping.repeats import TensionBend
 from ringsim.variables import Status
 
 SOLVER = Solver(step=0.1, tolerance=2e-3)
-SLIGHT = 0.05
+SLACK = 0.05
+REST = Energies(0.0, 0.0, 0.0, 0.0)
 
 
-def control_after(*tensions: float) -> TensionControl:
+def instant(time: float, tension: float) -> Instant:
+    return Instant(time, *np.zeros((2, 2, 3)), REST, 0.0, np.array([tension]))
+
+
+def control_after(*tensions: float) -> TensionBend:
     """A control that has taken steps of 10 ms between these tensions."""
-    control = TensionControl(SOLVER, SLIGHT)
+    control = TensionBend(SOLVER, SLACK)
     for before, after in itertools.pairwise(tensions):
-        control.accept(0.01, np.array([before]), np.array([after]))
+        control.accept(instant(0.0, before), instant(0.01, after))
     return control
+
+
+def shorter(control: TensionBend, step: float, before: float, after: float) -> float | None:
+    return control.shorter(instant(0.0, before), instant(step, after))
 
 
 def test_a_straight_tension_is_never_refused() -> None:
     control = control_after(1.0, 2.0, 3.0)
-    assert control.shorter(0.02, np.array([3.0]), np.array([5.0])) is None
+    assert shorter(control, 0.02, 3.0, 5.0) is None
     assert control.limit == pytest.approx(1.5 * 0.01)
 
 
 def test_a_kink_is_repeated_in_proportion_to_the_root_of_its_bend() -> None:
-    control = control_after(1.0, 1.0, 1.0)
     allowed = 15.0 * SOLVER.tolerance * 1.6  # of the largest, reached in the step itself
-    shorter = control.shorter(0.01, np.array([1.0]), np.array([1.6]))
-    assert shorter == pytest.approx(0.01 * 0.8 * np.sqrt(allowed / 0.6))
+    asked = shorter(control_after(1.0, 1.0, 1.0), 0.01, 1.0, 1.6)
+    assert asked == pytest.approx(0.01 * 0.8 * np.sqrt(allowed / 0.6))
 
 
 def test_tensions_within_the_slack_width_are_left_alone() -> None:
-    control = control_after(0.0, 1e-5, 0.0)
-    assert control.shorter(0.01, np.array([0.0]), np.array([1e-3])) is None
+    assert shorter(control_after(0.0, 1e-5, 0.0), 0.01, 0.0, 1e-3) is None
 
 
 def test_the_smallest_step_is_never_repeated() -> None:
-    control = control_after(1.0, 1.0)
-    assert control.shorter(1e-4 * SOLVER.step, np.array([1.0]), np.array([9.0])) is None
+    assert shorter(control_after(1.0, 1.0), 1e-4 * SOLVER.step, 1.0, 9.0) is None
 
 
 def slow_ring(**values: object) -> Scene:

@@ -7,11 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from ringsim.engine.deviation_steps import MOST, DeviationSteps, deviation_steps
 from ringsim.parts.solver import NO_DEVIATIONS, Solver
-from ringsim.scene import load_scene
+from ringsim.stepping.deviations import MOST, DeviationSteps
+from ringsim.stepping.instant import Energies, Instant
+from ringsim.stepping.run_control import RunControl
+from ringsim.stepping.scales import Scales
 
 AMPLITUDE, FREQUENCY, DURATION, TOLERANCE = 1e-3, 10.0, 20.0, 0.02
+REST = Energies(0.0, 0.0, 0.0, 0.0)
 
 
 def limit_of(step: float, tolerance: float = TOLERANCE, amplitude: float = AMPLITUDE) -> float:
@@ -21,7 +24,7 @@ def limit_of(step: float, tolerance: float = TOLERANCE, amplitude: float = AMPLI
         apart = np.array([1.0, -1.0]) * amplitude
         angles = time**2 + apart * np.sin(FREQUENCY * time)
         rates = 2.0 * time + apart * FREQUENCY * np.cos(FREQUENCY * time)
-        limits.append(control.limit(float(time), angles, rates))
+        limits.append(control.limit(Instant(float(time), angles, rates, REST)))
     return min(limits[-math.ceil(2.0 * math.pi / FREQUENCY / step) :])
 
 
@@ -40,8 +43,8 @@ def test_it_goes_with_the_root_of_the_tolerance_and_not_with_the_amplitude() -> 
 
 def test_a_common_motion_asks_for_nothing() -> None:
     control = DeviationSteps(TOLERANCE, DURATION)
-    found = [control.limit(t, np.full(4, t**3), np.full(4, 3.0 * t**2)) for t in (0.0, 0.1, 0.2)]
-    assert found[-1] == math.inf
+    common = [Instant(t, np.full(4, t**3), np.full(4, 3.0 * t**2), REST) for t in (0.0, 0.1, 0.2)]
+    assert [control.limit(instant) for instant in common][-1] == math.inf
 
 
 def test_no_step_is_shorter_than_a_share_of_the_run() -> None:
@@ -49,22 +52,36 @@ def test_no_step_is_shorter_than_a_share_of_the_run() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "followed"),
+    ("asked", "values", "followed"),
     [
-        ({}, False),
-        ({"record.stress": True}, True),
-        ({"record.stress": True, "solver.deviation_tolerance": NO_DEVIATIONS}, False),
-        ({"record.stress": True, "solver.step_control": "constant"}, False),
+        (False, {}, False),
+        (True, {}, True),
+        (True, {"deviation_tolerance": NO_DEVIATIONS}, False),
+        (True, {"step_control": "constant"}, False),
     ],
 )
-def test_scenes_ask_for_them_by_their_outputs(values: dict[str, object], followed: bool) -> None:
-    assert (deviation_steps(load_scene("ring18").with_values(values)) is not None) is followed
+def test_runs_follow_them_where_they_are_asked_to(asked, values, followed) -> None:
+    """After three instants of a vibration the next step is shorter than the motion asks for."""
+    steps = []
+    for follow in (False, asked):
+        start = Instant(0.0, np.zeros((1, 2)), np.zeros((1, 2)), REST)
+        control = RunControl(
+            Solver(tolerance=0.1, **values),
+            Scales(0.1, 1.0, travel=2.0, length=1.0),
+            start,
+            follow_deviations=follow,
+        )
+        for k in range(1, 9):
+            rates = 0.1 + 0.05 * np.cos(30.0 * k) * np.array([[1.0, -1.0]])
+            control.accept(Instant(0.1 * k, 0.1 * rates, rates, REST))
+        steps.append(control.next_step())
+    assert (steps[1] < steps[0]) is followed
 
 
 def test_other_runs_of_a_scene_scale_them_with_the_steps() -> None:
     solver = Solver(deviation_tolerance=0.02)
-    assert solver.coarsened().deviation_tolerance == pytest.approx(0.08)
-    assert solver.halved().deviation_tolerance == pytest.approx(0.005)
+    assert solver.scaled(2.0).deviation_tolerance == pytest.approx(0.08)
+    assert solver.scaled(0.5).deviation_tolerance == pytest.approx(0.005)
     assert solver.refined(1).deviation_tolerance == pytest.approx(0.02 / 16.0)
     off = Solver(deviation_tolerance=NO_DEVIATIONS)
-    assert off.coarsened().deviation_tolerance == off.refined(2).deviation_tolerance
+    assert off.scaled(2.0).deviation_tolerance == off.refined(2).deviation_tolerance

@@ -18,14 +18,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ringsim.engine.scales import usual_rate
-from ringsim.layout.of_scene import layout_of
-from ringsim.parts.solver import NO_DEVIATIONS
-from ringsim.scene import Scene
+from ringsim.stepping.instant import Array, Instant
 
-Array = NDArray[np.float64]
 _GLOBAL_ERROR = 0.1 / 15.0
 """C.  The integrator's local constant is 0.1, but local errors of a vibration cancel for the most
 part: on rings of 6 and 18 sections errors against MBDyn are a fifteenth of what their sum would
@@ -39,44 +34,21 @@ _FADING = 20.0
 """Steps over which the largest d''' fades, so that its passage through zero opens no step."""
 
 
-def deviation_steps(scene: Scene) -> DeviationSteps | None:
-    """What a scene asks for: nothing without ``record.stress``, or with constant steps."""
-    solver = scene.solver
-    followed = solver.deviation_tolerance < NO_DEVIATIONS and solver.step_control == "motion"
-    if not (scene.record.stress and followed):
-        return None
-    travel = math.pi - float(layout_of(scene).opening_angles()[0].mean())
-    return DeviationSteps(solver.deviation_tolerance, travel / usual_rate(scene))
-
-
 class DeviationSteps:
     """The largest step that keeps the joints' deviations from their mean right."""
 
     def __init__(self, tolerance: float, duration: float) -> None:
-        """Start at rest.
-
-        Parameters
-        ----------
-        tolerance
-            Error over the largest deviation that may add up over the run.
-        duration
-            Of the run, roughly, s.
+        """Start at rest; an error of so much of the largest deviation may add up over the run,
+        which takes about ``duration`` (s).
         """
         self._share = tolerance / (_GLOBAL_ERROR * duration)
         self._shortest = duration / MOST
         self._past: list[tuple[float, Array]] = []
         self._largest, self._bend, self._limit = _LEAST, 0.0, math.inf
 
-    def limit(self, time: float, angles: Array, rates: Array) -> float:
-        """Largest next step, s; infinite until three readings far enough apart are known.
-
-        Parameters
-        ----------
-        time
-            Of the reading, s.
-        angles, rates
-            Opening angles and their rates, any shape, rad and rad/s.
-        """
+    def limit(self, now: Instant) -> float:
+        """Largest next step, s; infinite until three readings far enough apart are known."""
+        time, angles, rates = now[:3]
         self._largest = max(self._largest, float(np.max(np.abs(angles - angles.mean()))))
         if self._past and time - self._past[-1][0] < 0.9 * self._shortest:
             return self._limit
