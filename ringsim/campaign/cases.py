@@ -21,7 +21,6 @@ from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.execution.local import Local
 from ringsim.exit_codes import EXIT_INTERRUPTED
 from ringsim.files import write_text, writing
-from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.storage.merge import NAME as MERGED
 
@@ -97,28 +96,14 @@ def write_cases(folder: Path, cases: Cases) -> Path:
         "design": {"kind": "list", "file": rows.name},
         "limits": {"timeout": cases.timeout},
     }
+    listed = io.StringIO()
+    writer = csv.DictWriter(listed, list(cases.cases[0]), lineterminator="\n")
+    writer.writeheader()
+    for case in cases.cases:
+        writer.writerow({k: str(v).lower() if isinstance(v, bool) else v for k, v in case.items()})
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     write_text(scene, cases.scene.to_toml())
-    write_text(rows, _csv(cases.cases))
+    write_text(rows, listed.getvalue())
     write_text(file, tomli_w.dumps(table))
     return file
-
-
-def _csv(cases: Sequence[Mapping[str, Any]]) -> str:
-    paths = list(cases[0])
-    for number, case in enumerate(cases):
-        if list(case) != paths:
-            raise InputError(
-                f"case {number} has values for {', '.join(case)}, and must have them for "
-                f"{', '.join(paths)}"
-            )
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(paths)
-    writer.writerows([[_word(value) for value in case.values()] for case in cases])
-    return text.getvalue()
-
-
-def _word(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -17,7 +17,7 @@ from ringsim.sampling.columns import Table
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.design_file import NAME, read_design, write_design
 from ringsim.storage.journal import FOLDER
-from ringsim.storage.locks import GO_ON, busy, locked, tries
+from ringsim.storage.locks import GO_ON, locked, tries
 from ringsim.storage.netcdf import Output
 from ringsim.storage.provenance import provenance
 from ringsim.storage.survey import Survey, survey
@@ -101,7 +101,7 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> None:
         ) from None
     table = campaign.draw()
     with writing(path / NAME, GO_ON):
-        for _ in tries():
+        for _ in tries(path):
             if _is_ready(campaign, path, table, solver):
                 return
             (path / FOLDER).mkdir(parents=True, exist_ok=True)
@@ -110,7 +110,6 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> None:
                     if not _is_ready(campaign, path, table, solver):
                         _write(campaign, path, table, solver)
                     return
-    raise busy(path)
 
 
 def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool:

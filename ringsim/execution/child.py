@@ -34,10 +34,11 @@ def main() -> None:
 
 
 def _serve(pipe: Connection, setup: dict[str, Any]) -> None:
-    from ringsim.execution.solve import fresh_scene, load_solver, solve
+    from ringsim.execution.solve import load_solver, solve
+    from ringsim.scene import Scene
 
     try:
-        solver, base = load_solver(setup["solver"]), fresh_scene(setup["scene"])
+        solver, base = load_solver(setup["solver"]), Scene.model_validate(setup["scene"])
     except InputError as error:
         pipe.send(str(error))
         return
