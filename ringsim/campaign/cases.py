@@ -27,28 +27,18 @@ from ringsim.storage.merge import NAME as MERGED
 
 @dataclass(frozen=True)
 class Cases:
-    """Variations of one scene that are to be run.
-
-    Attributes
-    ----------
-    name, title
-        Of the campaign.
-    scene
-        What all cases vary.
-    cases
-        Values by scene path, the same paths in each, one value (no lists) to a path.
-    timeout
-        Longest time of one run, s.
-    fidelity
-        "full" or "ideal".
-    """
+    """Variations of one scene that are to be run."""
 
     name: str
     title: str
     scene: Scene
+    """What all cases vary."""
     cases: Sequence[Mapping[str, Any]]
+    """Values by scene path, the same paths in each, one value (no lists) to a path."""
     timeout: float = 3600.0
+    """Longest time of one run, s."""
     fidelity: str = "full"
+    """``"full"`` or ``"ideal"``."""
 
 
 def run_cases(folder: Path, cases: Cases, workers: int) -> Path:

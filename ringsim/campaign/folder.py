@@ -25,30 +25,19 @@ from ringsim.storage.survey import Survey, survey
 
 @dataclass(frozen=True)
 class Folder:
-    """A prepared campaign folder.
-
-    Attributes
-    ----------
-    path
-        Where it is.
-    identity
-        Digest of everything that decides about the results.
-    table
-        Inputs of all samples.
-    scene
-        Scene that they vary.
-    solver
-        ``module:function`` that runs one sample.
-    attributes
-        Global attributes of the design.
-    """
+    """A prepared campaign folder."""
 
     path: Path
     identity: str
+    """Digest of everything that decides about the results."""
     table: Table
+    """Inputs of all samples."""
     scene: Scene
+    """Scene that they vary."""
     solver: str
+    """``module:function`` that runs one sample."""
     attributes: dict[str, Any]
+    """Global attributes of the design."""
 
     def survey(self) -> Survey:
         """What it holds of every sample."""

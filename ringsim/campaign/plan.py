@@ -15,7 +15,6 @@ from ringsim.execution.slot import TICK, Slot
 from ringsim.execution.work import Task
 from ringsim.sampling.columns import Table
 from ringsim.storage.design_file import NAME
-from ringsim.storage.netcdf import NOT_RUN
 from ringsim.storage.result import Result
 from ringsim.storage.survey import survey
 
@@ -45,15 +44,13 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver
         If the folder belongs to another campaign.
     """
     table = campaign.draw()
-    status = np.full(table.samples, NOT_RUN, dtype=np.int8)
-    seconds = np.full(table.samples, np.nan)
+    identity = ""
     if (folder / NAME).exists():
         old = open_folder(folder)
         refuse_another(campaign, old, table, solver)
-        found = survey(folder, old.identity, table.samples)
-        status, seconds = found.status, found.seconds
-    mine = share.holds(np.arange(table.samples))
-    todo = np.flatnonzero(mine & (status == NOT_RUN))
+        identity = old.identity
+    found = survey(folder, identity, table.samples)
+    todo = found.missing[share.holds(found.missing)]
     cost = relative_cost(table, campaign.scene)
     kind = campaign.specification.design.model_dump()["kind"]
     lines = [
@@ -65,9 +62,9 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver
     ]
     if len(todo) == 0:
         return [*lines, "  nothing is left to run"]
-    known = np.flatnonzero(np.isfinite(seconds))
+    known = np.flatnonzero(np.isfinite(found.seconds))
     if len(known):
-        per_cost = float(seconds[known].sum() / cost[known].sum())
+        per_cost = float(found.seconds[known].sum() / cost[known].sum())
         basis = f"from {len(known)} samples that are done"
     else:
         trial = int(todo[np.argsort(cost[todo])[len(todo) // 2]])

@@ -74,19 +74,7 @@ class Specification(Model):
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign file with the scene that it names.
-
-    Attributes
-    ----------
-    file
-        The campaign file.
-    text
-        Its text.
-    specification
-        Its content.
-    scene
-        The scene that its samples vary.
-    """
+    """A campaign file, its text and content, and the scene that its samples vary."""
 
     file: Path
     text: str

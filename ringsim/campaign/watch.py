@@ -26,21 +26,14 @@ _FILE_SECONDS = 1.0
 
 @dataclass
 class StopRequest:
-    """Whether the campaign is to stop, and why; falsy text means go on.
-
-    Attributes
-    ----------
-    reason
-        Why.
-    signalled
-        Whether a signal asked for it.
-    at_once
-        Whether a signal interrupts what is being done, instead of waiting to be asked for.
-    """
+    """Whether the campaign is to stop, and why; falsy text means go on."""
 
     reason: str = ""
+    """Why."""
     signalled: bool = False
+    """Whether a signal asked for it."""
     at_once: bool = False
+    """Whether a signal interrupts what is being done, instead of waiting to be asked for."""
 
     def note(self, reason: str, *, signalled: bool) -> None:
         """Wish for a stop; the first reason counts."""
@@ -70,26 +63,18 @@ def stopping_on_signals() -> Iterator[StopRequest]:
 
 @dataclass
 class Progress:
-    """Counts samples, and tells the terminal and the progress file.
-
-    Attributes
-    ----------
-    path
-        The progress file.
-    name
-        Of the campaign.
-    total, done, failed
-        Samples of this process's share: all, finished, failed among the finished.
-    workers
-        Samples that run at the same time.
-    """
+    """Counts samples, and tells the terminal and the progress file."""
 
     path: Path
+    """The progress file."""
     name: str
+    """Of the campaign."""
     total: int
     done: int
     failed: int
+    """Samples of this process's share: all, finished, failed among the finished."""
     workers: int
+    """Samples that run at the same time."""
     running: dict[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
