@@ -44,14 +44,7 @@ class Cases:
 def run_cases(folder: Path, cases: Cases, workers: int) -> Path:
     """Run the cases that are still missing, and merge them.
 
-    Parameters
-    ----------
-    folder
-        Where the files and the campaign's folder go; it is created.
-    cases
-        What to run.
-    workers
-        Solver processes.
+    Files and the campaign's folder go into ``folder``, which is created.
 
     Returns
     -------

@@ -66,16 +66,7 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> None:
     """Create a campaign's folder, or check that it is this campaign's.
 
     A design may have grown since: if its first samples are those of the folder, the new ones
-    are added.
-
-    Parameters
-    ----------
-    campaign
-        What is to be run.
-    path
-        The folder.
-    solver
-        ``module:function`` that runs one sample.
+    are added.  The solver is the ``module:function`` that runs one sample.
 
     Raises
     ------

@@ -29,8 +29,6 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
 
     Parameters
     ----------
-    campaign
-        The folder.
     execution
         Who computed it, in words.
     partly

@@ -11,13 +11,7 @@ from ringsim.execution.work import Scheduler, Work
 
 
 class Local(Scheduler):
-    """A number of solver processes, supervised by one event loop.
-
-    Parameters
-    ----------
-    workers
-        Samples that run at the same time.
-    """
+    """A number of solver processes, supervised by one event loop."""
 
     def __init__(self, workers: int) -> None:
         self.workers, self.description = workers, f"{workers} local workers"

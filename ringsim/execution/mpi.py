@@ -24,13 +24,7 @@ _T = TypeVar("_T")
 
 
 class Mpi(Scheduler):
-    """All ranks of a communicator; each must call :meth:`run` with its own work.
-
-    Parameters
-    ----------
-    communicator
-        From mpi4py.
-    """
+    """All ranks of a communicator of mpi4py; each must call :meth:`run` with its own work."""
 
     def __init__(self, communicator: Any) -> None:
         from mpi4py import MPI

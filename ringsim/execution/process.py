@@ -28,11 +28,6 @@ _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 class SolverProcess:
     """A process that serves a pipe (``ringsim.execution.child``), in a folder of its own.
 
-    Parameters
-    ----------
-    setup
-        What the process is told first.
-
     Raises
     ------
     InputError

@@ -40,17 +40,7 @@ def load_solver(name: str) -> Run:
 
 
 def solve(solver: Run, base: Scene, task: Task) -> Result:
-    """Run one sample.
-
-    Parameters
-    ----------
-    solver
-        Maps a scene to an outcome.
-    base
-        Scene that the sample varies.
-    task
-        Which sample.
-    """
+    """Run one sample of the scene ``base``."""
     begin, log, form, body = time.monotonic(), "", "", b""
     try:
         outcome = solver(base.with_values(task.values))

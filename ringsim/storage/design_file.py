@@ -18,16 +18,7 @@ NAME = "design.nc"
 
 
 def write_design(folder: Path, table: Table, attributes: Mapping[str, Any]) -> None:
-    """Write all inputs of all samples.
-
-    Parameters
-    ----------
-    folder
-        The campaign's folder.
-    table
-        The samples.
-    attributes
-        Global attributes: identity, texts and provenance.
+    """Write all inputs of all samples; the attributes are identity, texts and provenance.
 
     Raises
     ------

@@ -61,16 +61,7 @@ def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[
 
 @contextlib.contextmanager
 def reserved(folder: Path, writer: str, *, alone: bool) -> Iterator[None]:
-    """Keep a second process from running the same samples.
-
-    Parameters
-    ----------
-    folder
-        The campaign's folder.
-    writer
-        Name of the share of samples that is run.
-    alone
-        Whether no other share may run at the same time.
+    """Keep a second process from running the samples of the share ``writer``, or if ``alone`` any.
 
     Raises
     ------

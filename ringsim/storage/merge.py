@@ -36,22 +36,9 @@ UNFIT = (
 def write_merged(
     folder: Path, found: Survey, table: Table, output: Output, attributes: Mapping[str, Any]
 ) -> int:
-    """Write ``campaign.nc``, whole or not at all.
+    """Write ``campaign.nc`` of what was found in a folder, whole or not at all.
 
     Samples that have not been run have the status "not_run" and missing values.
-
-    Parameters
-    ----------
-    folder
-        The campaign's folder.
-    found
-        What it holds.
-    table
-        The inputs.
-    output
-        Compression, digits and variables to leave out.
-    attributes
-        Global attributes.
 
     Returns
     -------

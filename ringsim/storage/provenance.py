@@ -14,15 +14,7 @@ _PACKAGES = ("ringsim", "exudyn", "numpy", "scipy", "netCDF4", "mpi4py")
 
 
 def provenance(*, name: str, title: str, action: str) -> dict[str, Any]:
-    """Global attributes that say by whom, when, where and with what a file was made.
-
-    Parameters
-    ----------
-    name, title
-        Of the campaign.
-    action
-        What was done, in one or two words.
-    """
+    """Global attributes that say by whom, when, where and with what a campaign's file was made."""
     now = datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
     software = f"ringsim {version('ringsim')}"
     return {

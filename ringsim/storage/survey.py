@@ -62,16 +62,8 @@ class Survey:
 def survey(folder: Path, campaign: str, samples: int) -> Survey:
     """Look through the journals; see :func:`precedence` for samples that were run twice.
 
-    Records that are damaged, or of another campaign, are told in a warning of the log.
-
-    Parameters
-    ----------
-    folder
-        The campaign's folder.
-    campaign
-        Identity of the campaign.
-    samples
-        Number of samples in its design.
+    Records that are damaged, or of a campaign with another identity than ``campaign``, are told in
+    a warning of the log.
     """
     journals = sorted((folder / FOLDER).glob("*.journal"))
     status = np.full(samples, NOT_RUN, dtype=np.int8)
