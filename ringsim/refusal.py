@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from ringsim.choice import leaves_of
 from ringsim.parts.persection import EACH, ONE
-from ringsim.units import Model, Unit
+from ringsim.units import Model, unit_of
 
 MOST_NAMED = 3
 """So many further faults are named beside the one that is described."""
@@ -76,7 +76,8 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     path, owner, field = _walk(fault["loc"], model)
     where = ".".join(path)
     kind, value = fault["type"], fault["input"]
-    unit = _unit(field)
+    symbol = unit_of(field) if field is not None else "1"
+    unit = f" {symbol}" if symbol != "1" else ""
     shown = f"{where} = {show(value)}{_suffix(value, unit)}"
     limits = fault.get("ctx", {})
     match kind:
@@ -180,22 +181,6 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     if typing.get_origin(annotation) in _NESTING:
         return [m for part in typing.get_args(annotation) for m in _models_in(part)]
     return []
-
-
-def _unit(field: FieldInfo | None) -> str:
-    if field is None:
-        return ""
-    found = [m.symbol for m in field.metadata if isinstance(m, Unit)]
-    found += _units_in(field.annotation)
-    return f" {found[0]}" if found and found[0] != "1" else ""
-
-
-def _units_in(annotation: Any) -> list[str]:
-    found = [m.symbol for m in getattr(annotation, "__metadata__", ()) if isinstance(m, Unit)]
-    for part in typing.get_args(annotation):
-        if not isinstance(part, Unit):
-            found += _units_in(part)
-    return found
 
 
 def _suffix(value: Any, unit: str) -> str:

@@ -21,48 +21,30 @@ from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.execution.local import Local
 from ringsim.exit_codes import EXIT_INTERRUPTED
 from ringsim.files import write_text, writing
-from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.storage.merge import NAME as MERGED
 
 
 @dataclass(frozen=True)
 class Cases:
-    """Variations of one scene that are to be run.
-
-    Attributes
-    ----------
-    name, title
-        Of the campaign.
-    scene
-        What all cases vary.
-    cases
-        Values by scene path, the same paths in each, one value (no lists) to a path.
-    timeout
-        Longest time of one run, s.
-    fidelity
-        "full" or "ideal".
-    """
+    """Variations of one scene that are to be run."""
 
     name: str
     title: str
     scene: Scene
+    """What all cases vary."""
     cases: Sequence[Mapping[str, Any]]
+    """Values by scene path, the same paths in each, one value (no lists) to a path."""
     timeout: float = 3600.0
+    """Longest time of one run, s."""
     fidelity: str = "full"
+    """``"full"`` or ``"ideal"``."""
 
 
 def run_cases(folder: Path, cases: Cases, workers: int) -> Path:
     """Run the cases that are still missing, and merge them.
 
-    Parameters
-    ----------
-    folder
-        Where the files and the campaign's folder go; it is created.
-    cases
-        What to run.
-    workers
-        Solver processes.
+    Files and the campaign's folder go into ``folder``, which is created.
 
     Returns
     -------
@@ -97,28 +79,14 @@ def write_cases(folder: Path, cases: Cases) -> Path:
         "design": {"kind": "list", "file": rows.name},
         "limits": {"timeout": cases.timeout},
     }
+    listed = io.StringIO()
+    writer = csv.DictWriter(listed, list(cases.cases[0]), lineterminator="\n")
+    writer.writeheader()
+    for case in cases.cases:
+        writer.writerow({k: str(v).lower() if isinstance(v, bool) else v for k, v in case.items()})
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     write_text(scene, cases.scene.to_toml())
-    write_text(rows, _csv(cases.cases))
+    write_text(rows, listed.getvalue())
     write_text(file, tomli_w.dumps(table))
     return file
-
-
-def _csv(cases: Sequence[Mapping[str, Any]]) -> str:
-    paths = list(cases[0])
-    for number, case in enumerate(cases):
-        if list(case) != paths:
-            raise InputError(
-                f"case {number} has values for {', '.join(case)}, and must have them for "
-                f"{', '.join(paths)}"
-            )
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(paths)
-    writer.writerows([[_word(value) for value in case.values()] for case in cases])
-    return text.getvalue()
-
-
-def _word(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

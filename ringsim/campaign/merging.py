@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ringsim.campaign.folder import Folder
 from ringsim.files import DRAFT, writing
-from ringsim.storage.locks import GO_ON, in_turn
+from ringsim.storage.locks import GO_ON, locked
 from ringsim.storage.merge import NAME, write_merged
 from ringsim.storage.provenance import provenance
 
@@ -29,8 +29,6 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
 
     Parameters
     ----------
-    campaign
-        The folder.
     execution
         Who computed it, in words.
     partly
@@ -42,7 +40,7 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
         If the folder cannot be written to.
     """
     path = campaign.path / NAME
-    with writing(path, GO_ON), in_turn(campaign.path / "lock-merge"):
+    with writing(path, GO_ON), locked(campaign.path / "lock-merge", wait=True):
         for draft in campaign.path.glob(f".{NAME}.*{DRAFT}"):
             draft.unlink(missing_ok=True)
         found = campaign.survey()

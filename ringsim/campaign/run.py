@@ -25,27 +25,18 @@ from ringsim.storage.locks import reserved
 
 @dataclass(frozen=True)
 class Choices:
-    """How a campaign is to be run this time.
-
-    Attributes
-    ----------
-    scheduler
-        Who computes.
-    limits
-        Bounds on each run.
-    max_failed
-        Failures that are put up with, in the whole campaign; None for any number.
-    share
-        The samples of this process.
-    retry_failed
-        Run the failed samples again.
-    """
+    """How a campaign is to be run this time."""
 
     scheduler: Scheduler
+    """Who computes."""
     limits: Limits
+    """Bounds on each run."""
     max_failed: int | None = None
+    """Failures that are put up with, in the whole campaign; None for any number."""
     share: Share = WHOLE
+    """The samples of this process."""
     retry_failed: bool = False
+    """Run the failed samples again."""
 
 
 def run_campaign(folder: Path, choices: Choices) -> int:

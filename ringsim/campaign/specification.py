@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -23,21 +22,16 @@ SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_id
 """What maps a scene to its outcome, by fidelity."""
 
 
-def _flat(inner: Callable[[Any], bool]) -> Callable[[Any], Any]:
-    """Join nested tables to dotted paths, down to tables that ``inner`` keeps."""
-
-    def flatten(table: Any, prefix: str = "") -> Any:
-        if not isinstance(table, dict):
-            return table
-        found: dict[str, Any] = {}
-        for name, value in table.items():
-            if isinstance(value, dict) and not inner(value):
-                found |= flatten(value, f"{prefix}{name}.")
-            else:
-                found[f"{prefix}{name}"] = value
-        return found
-
-    return flatten
+def _flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
+    """Join nested tables to dotted paths, down to tables that have the key ``whole``."""
+    if prefix and (not isinstance(table, dict) or whole in table):
+        return {prefix: table}
+    if not isinstance(table, dict):
+        return table
+    found: dict[str, Any] = {}
+    for name, inner in table.items():
+        found |= _flat(inner, whole, f"{prefix}.{name}" if prefix else name)
+    return found
 
 
 class Specification(Model):
@@ -52,12 +46,10 @@ class Specification(Model):
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     scene: str
     """Built-in scene, or scene file looked up beside the campaign file."""
-    set: Annotated[dict[str, Any], BeforeValidator(_flat(lambda table: False))] = Field(
-        default_factory=dict
-    )
+    set: Annotated[dict[str, Any], BeforeValidator(_flat)] = Field(default_factory=dict)
     """Values by scene path that all samples share."""
     inputs: Annotated[
-        dict[str, AnyDistribution], BeforeValidator(_flat(lambda table: "kind" in table))
+        dict[str, AnyDistribution], BeforeValidator(lambda table: _flat(table, "kind"))
     ] = Field(default_factory=dict)
     """Distribution by scene path."""
     correlations: list[Correlation] = Field(default_factory=list)
@@ -74,19 +66,7 @@ class Specification(Model):
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign file with the scene that it names.
-
-    Attributes
-    ----------
-    file
-        The campaign file.
-    text
-        Its text.
-    specification
-        Its content.
-    scene
-        The scene that its samples vary.
-    """
+    """A campaign file, its text and content, and the scene that its samples vary."""
 
     file: Path
     text: str

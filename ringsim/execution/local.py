@@ -11,13 +11,7 @@ from ringsim.execution.work import Scheduler, Work
 
 
 class Local(Scheduler):
-    """A number of solver processes, supervised by one event loop.
-
-    Parameters
-    ----------
-    workers
-        Samples that run at the same time.
-    """
+    """A number of solver processes, supervised by one event loop."""
 
     def __init__(self, workers: int) -> None:
         self.workers, self.description = workers, f"{workers} local workers"
@@ -33,19 +27,11 @@ class Local(Scheduler):
                 if reason:
                     return reason
                 for slot in slots:
-                    if queue and not slot.busy:
-                        sample = queue.popleft()
-                        slot.submit(work.task(sample))
-                        work.started(sample)
-                busy = [slot for slot in slots if slot.busy]
+                    slot.serve(queue, work)
+                busy = [slot.pipe for slot in slots if slot.busy]
                 if not busy:
                     return work.stop()
-                wait([slot.pipe for slot in busy], timeout=TICK)
-                for slot in busy:
-                    result = slot.poll()
-                    if result is not None:
-                        work.keep(result)
-                        work.finished(result)
+                wait(busy, timeout=TICK)
         finally:
             for slot in slots:
                 slot.close()

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ringsim.execution.solve import fresh_scene, load_solver, solve
+from ringsim.execution.solve import load_solver, solve
 from ringsim.execution.work import Scheduler, Work
+from ringsim.scene import Scene
 
 
 class Serial(Scheduler):
@@ -15,7 +16,7 @@ class Serial(Scheduler):
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """Run samples; see :class:`Scheduler`."""
-        solver, base = load_solver(work.solver), fresh_scene(work.scene)
+        solver, base = load_solver(work.solver), Scene.model_validate(work.scene)
         for sample in samples:
             reason = work.stop()
             if reason:

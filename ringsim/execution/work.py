@@ -36,34 +36,23 @@ class Task:
 
 @dataclass(frozen=True)
 class Work:
-    """The samples' content, and where results go.
-
-    Attributes
-    ----------
-    solver
-        ``module:function`` that maps a scene to an outcome.
-    scene
-        Base scene as nested tables.
-    values_of
-        Inputs of a sample by scene path.
-    limits
-        Bounds on one run.
-    keep
-        Stores a result; called in the process that supervised the run.
-    stop
-        A reason to stop, or an empty string; asked often.
-    started, finished
-        Tell rank 0 what goes on; results of other ranks come without their arrays.
-    """
+    """The samples' content, and where results go."""
 
     solver: str
+    """``module:function`` that maps a scene to an outcome."""
     scene: dict[str, Any]
+    """Base scene as nested tables."""
     values_of: Callable[[int], dict[str, Any]]
+    """Inputs of a sample by scene path."""
     limits: Limits
+    """Bounds on one run."""
     keep: Callable[[Result], None]
+    """Stores a result; called in the process that supervised the run."""
     stop: Callable[[], str]
+    """A reason to stop, or an empty string; asked often."""
     started: Callable[[int], None] = lambda sample: None
     finished: Callable[[Result], None] = lambda result: None
+    """Tell rank 0 what goes on; results of other ranks come without their arrays."""
 
     def task(self, sample: int) -> Task:
         """The run of a sample."""

@@ -11,32 +11,22 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Column:
-    """The values of one input over all samples.
-
-    Attributes
-    ----------
-    name
-        Name in netCDF files: the path with underscores.
-    path
-        Scene path that the values are written to.
-    dim
-        Second dimension of ``values``, or empty: what there is a value for, "section", "corner"
-        "pulley" or "pulley_of_two_winches" (one more), or "place_k" for lists of any other
-        length k.
-    units
-        SI unit of the field.
-    origin
-        The distribution, in words.
-    values
-        Shape (samples,), or (samples, k) with a value for each place.
-    """
+    """The values of one input over all samples."""
 
     name: str
+    """Name in netCDF files: the path with underscores."""
     path: str
+    """Scene path that the values are written to."""
     dim: str
+    """Second dimension of ``values``, or empty: what there is a value for, "section", "corner"
+    "pulley" or "pulley_of_two_winches" (one more), or "place_k" for lists of any other length
+    k."""
     units: str
+    """SI unit of the field."""
     origin: str
+    """The distribution, in words."""
     values: NDArray[Any]
+    """Shape (samples,), or (samples, k) with a value for each place."""
 
 
 @dataclass(frozen=True)

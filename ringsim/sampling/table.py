@@ -42,12 +42,6 @@ def draw(
         Scene that the samples vary.
     inputs
         Distribution by scene path.
-    correlations
-        Pairs of inputs that depend on each other.
-    design
-        How samples are placed.
-    seed
-        Seed of the campaign.
     folder
         Where files that the design names are looked up.
     error_bars_every

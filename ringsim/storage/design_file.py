@@ -12,31 +12,22 @@ import numpy as np
 from ringsim.files import whole
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Table, add_inputs, read_inputs
-from ringsim.storage.netcdf import add_samples, open_new
+from ringsim.storage.netcdf import add_coordinate
 
 NAME = "design.nc"
 
 
 def write_design(folder: Path, table: Table, attributes: Mapping[str, Any]) -> None:
-    """Write all inputs of all samples.
-
-    Parameters
-    ----------
-    folder
-        The campaign's folder.
-    table
-        The samples.
-    attributes
-        Global attributes: identity, texts and provenance.
+    """Write all inputs of all samples; the attributes are identity, texts and provenance.
 
     Raises
     ------
     OSError, RuntimeError
         If the disk is full.
     """
-    with whole(folder / NAME) as draft, open_new(draft) as file:
+    with whole(folder / NAME) as draft, netCDF4.Dataset(draft, "w") as file:
         file.setncatts(dict(attributes))
-        add_samples(file, np.arange(table.samples))
+        add_coordinate(file, "sample", np.arange(table.samples))
         add_inputs(file, table, compression=4)
 
 

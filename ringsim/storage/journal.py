@@ -97,14 +97,8 @@ def read_journal(path: Path, campaign: str) -> Iterator[tuple[int, Result | None
     """The records of a journal in the order in which they were written, with their places.
 
     None stands for bytes between two records that are no record of this campaign: one that is
-    damaged does not hide those behind it. What a writer left unfinished at the end is left out.
-
-    Parameters
-    ----------
-    path
-        The file; it may still be growing.
-    campaign
-        Identity of the campaign.
+    damaged does not hide those behind it.  What a writer left unfinished at the end is left out:
+    the file may still be growing.
     """
     with path.open("rb") as file:
         place, size = 0, os.fstat(file.fileno()).st_size

@@ -22,7 +22,7 @@ _LOCK_TRIES, _LOCK_PAUSE = 10, 0.1
 
 
 @contextlib.contextmanager
-def locked(path: Path, *, shared: bool = False) -> Iterator[bool]:
+def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[bool]:
     """Hold an advisory lock; gives False at once if another process holds it.
 
     Parameters
@@ -31,97 +31,66 @@ def locked(path: Path, *, shared: bool = False) -> Iterator[bool]:
         The file that carries the lock; created if it is not there.
     shared
         Whether others may hold it at the same time, shared as well.
+    wait
+        Wait until nobody else holds it.
 
     Raises
     ------
     OSError
         If the file cannot be created.
     """
-    descriptor = _open_lock(path)
     try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError:
+        if not path.exists():
+            raise
+        descriptor = os.open(path, os.O_RDONLY)  # does as well, in folders that are read-only
+    try:
+        kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+        held = True  # also on a file system without locks
         try:
-            fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-            held = True
+            fcntl.flock(descriptor, kind if wait else kind | fcntl.LOCK_NB)
         except BlockingIOError:
             held = False
         except OSError:
-            held = True  # a file system without locks
+            pass
         yield held
     finally:
         os.close(descriptor)
 
 
 @contextlib.contextmanager
-def in_turn(path: Path) -> Iterator[None]:
-    """Wait for an advisory lock and hold it.
-
-    Raises
-    ------
-    OSError
-        If the file that carries the lock cannot be created.
-    """
-    descriptor = _open_lock(path)
-    try:
-        with contextlib.suppress(OSError):
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)
-
-
-def _open_lock(path: Path) -> int:
-    """A descriptor for a lock; one for reading does as well, in folders that are read-only."""
-    try:
-        return os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    except OSError:
-        if not path.exists():
-            raise
-        return os.open(path, os.O_RDONLY)
-
-
-@contextlib.contextmanager
 def reserved(folder: Path, writer: str, *, alone: bool) -> Iterator[None]:
-    """Keep a second process from running the same samples.
-
-    Parameters
-    ----------
-    folder
-        The campaign's folder.
-    writer
-        Name of the share of samples that is run.
-    alone
-        Whether no other share may run at the same time.
+    """Keep a second process from running the samples of the share ``writer``, or if ``alone`` any.
 
     Raises
     ------
     InputError
         If another process runs them already, or if the folder cannot be written to.
     """
-    with contextlib.ExitStack() as held:
-        for _ in tries():
-            with contextlib.ExitStack() as wanted:
-                with writing(folder / f"lock-{writer}", GO_ON):
-                    free = wanted.enter_context(locked(folder / "lock", shared=not alone)) and (
-                        wanted.enter_context(locked(folder / f"lock-{writer}"))
-                    )
-                if free:
-                    held.enter_context(wanted.pop_all())
-                    break
-        else:
-            raise busy(folder)
-        yield
+    for _ in tries(folder):
+        with contextlib.ExitStack() as held:
+            with writing(folder / f"lock-{writer}", GO_ON):
+                free = held.enter_context(locked(folder / "lock", shared=not alone)) and (
+                    held.enter_context(locked(folder / f"lock-{writer}"))
+                )
+            if free:
+                yield
+                return
 
 
-def tries() -> Iterator[int]:
-    """Count up, with pauses, for as long as it pays to wait for a lock."""
+def tries(folder: Path) -> Iterator[int]:
+    """Count up, with pauses, for as long as it pays to wait for a lock.
+
+    Raises
+    ------
+    InputError
+        After that, since another process runs the campaign.
+    """
     for number in range(_LOCK_TRIES):
         yield number
         time.sleep(_LOCK_PAUSE)
-
-
-def busy(folder: Path) -> InputError:
-    """The refusal for a campaign that another process runs."""
-    return InputError(
+    raise InputError(
         f"{folder}: another process runs this campaign just now: wait for it, or stop it (ringsim "
         "status tells which it is)"
     )

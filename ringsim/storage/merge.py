@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,10 +17,8 @@ from ringsim.storage.netcdf import (
     PER_SAMPLE,
     Output,
     add_coordinate,
-    add_samples,
     add_variable,
     blank,
-    open_new,
 )
 from ringsim.storage.result import COORDINATE
 from ringsim.storage.survey import Survey
@@ -37,22 +36,9 @@ UNFIT = (
 def write_merged(
     folder: Path, found: Survey, table: Table, output: Output, attributes: Mapping[str, Any]
 ) -> int:
-    """Write ``campaign.nc``, whole or not at all.
+    """Write ``campaign.nc`` of what was found in a folder, whole or not at all.
 
     Samples that have not been run have the status "not_run" and missing values.
-
-    Parameters
-    ----------
-    folder
-        The campaign's folder.
-    found
-        What it holds.
-    table
-        The inputs.
-    output
-        Compression, digits and variables to leave out.
-    attributes
-        Global attributes.
 
     Returns
     -------
@@ -71,9 +57,9 @@ def write_merged(
         for name, variable in VARIABLES.items()
         if name in names | scalars and name not in PER_SAMPLE and name not in output.leave_out
     } | PER_SAMPLE
-    with whole(folder / NAME) as draft, open_new(draft) as file:
+    with whole(folder / NAME) as draft, netCDF4.Dataset(draft, "w") as file:
         file.setncatts(dict(attributes))
-        add_samples(file, np.arange(table.samples))
+        add_coordinate(file, "sample", np.arange(table.samples))
         for name, values in axes.items():
             add_coordinate(file, name, values)
         add_inputs(file, table, compression=output.compression)

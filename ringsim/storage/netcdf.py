@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar
 
-import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ringsim.refusal import known_or_nearest
-from ringsim.storage.result import COORDINATE, MISSING_COUNT
+from ringsim.storage.result import MISSING_COUNT
 from ringsim.units import Model
-from ringsim.variables import VARIABLES, Status, Variable
+from ringsim.variables import COORDINATES, VARIABLES, Status, Variable
 
 NOT_RUN = -1
 """Value of ``status`` for samples that have not been run."""
 
 CHUNK_BYTES = 1 << 20
 """Size of what is compressed at once, about."""
+
+COORDINATE = {
+    v.name: v
+    for v in (Variable("sample", ("sample",), "1", "sample of the campaign", "i8"), *COORDINATES)
+}
 
 PER_SAMPLE = {
     v.name: v
@@ -57,34 +62,22 @@ class Output(Model):
 
 
 def add_coordinate(file: Any, name: str, values: NDArray[Any]) -> None:
-    """Create a dimension with its coordinate variable."""
+    """Create a dimension with its coordinate variable in an open netCDF4 dataset."""
     definition = COORDINATE[name]
     file.createDimension(name, len(values))
-    kind: Any = str if definition.dtype == "str" else definition.dtype
-    variable = file.createVariable(name, kind, (name,))
+    text = definition.dtype == "str"
+    variable = file.createVariable(name, str if text else definition.dtype, (name,))
     variable.long_name = definition.long_name
-    if kind is not str:
+    if not text:
         variable.units = definition.units
-    variable[:] = values.astype(object) if kind is str else values
-
-
-def add_samples(file: Any, samples: NDArray[np.int64]) -> None:
-    """Create the dimension ``sample`` with the samples' indices."""
-    file.createDimension("sample", len(samples))
-    variable = file.createVariable("sample", "i8", ("sample",))
-    variable.standard_name = "realization"
-    variable.long_name = "sample of the campaign"
-    variable.units = "1"
-    variable[:] = samples
+    if name == "sample":
+        variable.standard_name = "realization"
+    variable[:] = values.astype(object) if text else values
 
 
 def add_variable(
-    file: Any,
-    definition: Variable,
-    *,
-    compression: int,
-    digits: int | None = None,
-) -> Any:
+    file: Any, definition: Variable, *, compression: int, digits: int | None = None
+) -> None:
     """Create a variable over ``sample`` and its own dimensions.
 
     Parameters
@@ -100,33 +93,28 @@ def add_variable(
     """
     dims = ("sample", *definition.dims)
     shape = tuple(file.dimensions[dim].size for dim in dims)
+    text = definition.dtype == "str"
     options: dict[str, Any] = {}
-    kind: Any = definition.dtype
-    if kind == "str":
-        kind = str
-    else:
-        size = np.dtype(kind).itemsize
-        row = max(1, int(np.prod(shape[1:], dtype=np.int64)) * size)
-        rows = max(1, min(shape[0], CHUNK_BYTES // row))
+    if not text:
+        row = math.prod(shape[1:]) * np.dtype(definition.dtype).itemsize
+        rows = max(1, min(shape[0], CHUNK_BYTES // max(1, row)))
         options["chunksizes"] = (rows, *(max(1, n) for n in shape[1:]))
-        options["compression"] = "zlib" if compression else None
-        options["complevel"] = compression or None
-        options["shuffle"] = bool(compression)
-        if kind.startswith("f"):
-            options["fill_value"] = np.nan
-            if digits is not None:
-                options |= {"significant_digits": digits, "quantize_mode": "GranularBitRound"}
-        elif definition.name in VARIABLES and definition.name != "status":
-            options["fill_value"] = MISSING_COUNT
-    variable = file.createVariable(definition.name, kind, dims, **options)
+        if definition.name != "status":  # whose "not_run" is a value like others
+            options["fill_value"] = blank(definition, ())[()]
+        if compression:
+            options |= {"compression": "zlib", "complevel": compression, "shuffle": True}
+        if definition.dtype.startswith("f") and digits is not None:
+            options |= {"significant_digits": digits, "quantize_mode": "GranularBitRound"}
+    variable = file.createVariable(
+        definition.name, str if text else definition.dtype, dims, **options
+    )
     variable.set_auto_maskandscale(False)
     variable.long_name = definition.long_name
-    if kind is not str:
+    if not text:
         variable.units = definition.units
     if definition.name == "status":
         variable.flag_values = np.array([NOT_RUN, *Status], dtype="i1")
         variable.flag_meanings = " ".join(["not_run", *(s.word for s in Status)])
-    return variable
 
 
 def blank(definition: Variable, shape: tuple[int, ...]) -> NDArray[Any]:
@@ -137,8 +125,3 @@ def blank(definition: Variable, shape: tuple[int, ...]) -> NDArray[Any]:
         return np.full(shape, NOT_RUN, dtype="i1")
     kind = np.dtype(definition.dtype)
     return np.full(shape, np.nan if kind.kind == "f" else MISSING_COUNT, dtype=kind)
-
-
-def open_new(path: Any) -> Any:
-    """A new netCDF-4 file."""
-    return netCDF4.Dataset(path, "w", format="NETCDF4")

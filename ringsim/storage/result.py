@@ -27,36 +27,24 @@ _COMPRESSION = 1
 
 @dataclass(frozen=True)
 class Result:
-    """How one sample ended, and what it gave.
-
-    Attributes
-    ----------
-    sample
-        Index of the sample.
-    status
-        How the run ended.
-    reason
-        One sentence: why it ended so.
-    log
-        The end of what a failed run printed.
-    seconds
-        Elapsed time of the run.
-    finished
-        When it ended, as seconds since 1970.
-    form
-        The same for results whose arrays have the same names, shapes and coordinates.
-    body
-        The arrays, see :func:`pack`.
-    """
+    """How one sample ended, and what it gave."""
 
     sample: int
+    """Index of the sample."""
     status: Status
+    """How the run ended."""
     reason: str
+    """One sentence: why it ended so."""
     log: str = ""
+    """The end of what a failed run printed."""
     seconds: float = float("nan")
+    """Elapsed time of the run."""
     finished: float = 0.0
+    """When it ended, as seconds since 1970."""
     form: str = ""
+    """The same for results whose arrays have the same names, shapes and coordinates."""
     body: bytes = field(default=b"", repr=False)
+    """The arrays, see :func:`pack`."""
 
     def header(self) -> bytes:
         """Everything but the body."""

@@ -20,26 +20,18 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Survey:
-    """What a folder holds of every sample.
-
-    Attributes
-    ----------
-    status
-        Status of each sample, NOT_RUN where there is no result.
-    seconds
-        Elapsed time of each sample, NaN where there is no result.
-    form
-        Form of each sample's result, an index of ``forms``; -1 where there is no result.
-    forms
-        See :class:`Result`.
-    """
+    """What a folder holds of every sample."""
 
     campaign: str
     journals: list[Path]
     status: NDArray[np.int8]
+    """Status of each sample, NOT_RUN where there is no result."""
     seconds: NDArray[np.float64]
+    """Elapsed time of each sample, NaN where there is no result."""
     form: NDArray[np.int64]
+    """Form of each sample's result, an index of ``forms``; -1 where there is no result."""
     forms: list[str]
+    """See :class:`Result`."""
     owner: NDArray[np.int64]
     """Journal with the result that counts of each sample, -1 where there is none."""
     place: NDArray[np.int64]
@@ -70,16 +62,8 @@ class Survey:
 def survey(folder: Path, campaign: str, samples: int) -> Survey:
     """Look through the journals; see :func:`precedence` for samples that were run twice.
 
-    Records that are damaged, or of another campaign, are told in a warning of the log.
-
-    Parameters
-    ----------
-    folder
-        The campaign's folder.
-    campaign
-        Identity of the campaign.
-    samples
-        Number of samples in its design.
+    Records that are damaged, or of a campaign with another identity than ``campaign``, are told in
+    a warning of the log.
     """
     journals = sorted((folder / FOLDER).glob("*.journal"))
     status = np.full(samples, NOT_RUN, dtype=np.int8)

@@ -18,7 +18,7 @@ from ringsim.campaign.merging import merge
 from ringsim.campaign.run import Choices, run_campaign
 from ringsim.execution.serial import Serial
 from ringsim.execution.work import Limits
-from ringsim.storage.locks import in_turn, locked
+from ringsim.storage.locks import locked
 
 
 def blocked(pid):
@@ -32,7 +32,7 @@ def test_stop_signal_interrupts_a_merge_and_the_next_run_merges(number, copied, 
     out = copied.folder / "out"
     (out / "campaign.nc").unlink()
     (out / ".campaign.nc.0123.draft").write_text("left by a merge that was killed")
-    with in_turn(out / "lock-merge"):
+    with locked(out / "lock-merge", wait=True):
         process = copied.start(*START)
         end = time.monotonic() + 60.0
         while not blocked(process.pid):

@@ -52,7 +52,7 @@ def awaited(slot, seconds=60.0):
 
 
 def process_of(result):
-    return int(result.unpack()["steps"])
+    return int(result.arrays()["steps"])
 
 
 def test_process_is_kept_for_the_next_sample(slots):

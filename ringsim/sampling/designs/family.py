@@ -53,12 +53,6 @@ class Design(Model):
 
         Parameters
         ----------
-        factors
-            What to draw.
-        correlations
-            Pairs of factors that depend on each other.
-        seed
-            Seed of the campaign.
         folder
             Where files that the design names are looked up.
 
