@@ -8,7 +8,7 @@ that only the setting they vary has an effect; the others are settings that a us
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -120,7 +120,7 @@ def standing(scene: Scene) -> dict[str, Any]:
     return found | {"solver.deviation_tolerance": _deviations(scene)}
 
 
-def references(rungs: list[Rung]) -> tuple[list[int], list[int]]:
+def references(rungs: Sequence[Rung]) -> tuple[list[int], list[int]]:
     """Places of the three rungs with ever finer steps, and of the three with ever more elements.
 
     Steps halve and elements double from one to the next.

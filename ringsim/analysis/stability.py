@@ -40,9 +40,11 @@ CAUSES = (
 )
 """Word of a cause, and the words by which a reason names it; the first that occurs counts."""
 
-TIME_PROMISE, ANGLE_PROMISE, TENSION_PROMISE = 0.01, 0.5, 0.05
+PROMISES = TIME_PROMISE, ANGLE_PROMISE, TENSION_PROMISE = 0.01, 0.5, 0.05
 """What an ok cell promises: relative error of the deployment time, error in degree of the mean
 angle where a run ended before, and error of the largest tension over itself."""
+DIFFERENCES = ("time_difference", "angle_difference", "tension_difference")
+"""Their errors, as a finer run shows them."""
 MORE_STEPS = 1.5
 """Steps of a finer run over those of the cell, at least; Newton may have cut both to the same."""
 ENERGY_PROMISE = Solver().energy_tolerance
@@ -179,14 +181,9 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
     angles = abs(mine["final_angle"] - finer["final_angle"]).values
     angles = np.where(np.isfinite(finer["deployment_time"]), np.nan, angles)
     over = np.zeros(len(which), dtype=bool)
-    for name, promise, apart in (
-        ("time", TIME_PROMISE, times),
-        ("angle", ANGLE_PROMISE, angles),
-        ("tension", TENSION_PROMISE, tensions),
-    ):
-        difference = np.full(cells.sizes["cell"], np.nan)
-        difference[which] = apart
-        found[f"{name}_difference"] = ("cell", difference)
+    for name, promise, apart in zip(DIFFERENCES, PROMISES, (times, angles, tensions), strict=True):
+        found[name] = ("cell", np.full(cells.sizes["cell"], np.nan))
+        found[name].values[which] = apart
         over |= apart > promise
     hardly = (finer["steps"].values < MORE_STEPS * mine["steps"].values) & ~over
     unproven = (finer["status"] != Status.OK).values | hardly

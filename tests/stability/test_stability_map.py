@@ -19,8 +19,7 @@ from ringsim.analysis.stability import (
     joined,
     judged,
 )
-from ringsim.analysis.stability_borders import borders
-from ringsim.analysis.stability_text import summary, to_markdown
+from ringsim.analysis.stability_text import borders, summary, to_markdown
 from ringsim.parts.solver import Solver
 from ringsim.plots.stability import stability
 from ringsim.variables import Status
@@ -142,9 +141,8 @@ def test_borders_name_the_ranges_and_what_lies_beyond() -> None:
     group["x"].values[:] = [1, 2, 3, 4, 5] * 2
     group["y"].values[:] = [7] * 5 + [8] * 5
     along, across = borders(joined([(WORDS, group)]))
-    assert (along.sure, along.ok) == ((2.0, 3.0), (1.0, 5.0))
-    assert (along.below, along.above) == ("Newton", "end time")
-    assert across.sure is None
+    assert along == ["group", "stiffness (N)", "2 .. 3", "1 .. 5", "Newton", "end time"]
+    assert across == ["group", "speed (m/s)", "none", "7 .. 8", "-", "-"]
 
 
 def test_text_and_figure_tell_every_kind_of_cell() -> None:
