@@ -117,19 +117,11 @@ def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr
         values = campaign[name].values if name in campaign else unknown
         missing = (values.dtype.kind == "i") & (values < 0)  # counts that are missing are -1
         found[name] = np.where(missing, np.nan, values.astype(float))
-    return _described(xr.Dataset({name: ("cell", values) for name, values in found.items()}))
-
-
-def _described(cells: xr.Dataset) -> xr.Dataset:
-    """Add what each variable means, and its unit."""
-    for name, (units, long_name) in _MEANING.items():
-        if name in cells:
-            cells[name].attrs |= {"long_name": long_name} | ({"units": units} if units else {})
-    return cells
+    return xr.Dataset({name: ("cell", values) for name, values in found.items()})
 
 
 def judged(cells: xr.Dataset) -> xr.Dataset:
-    """Add the ``verdict`` of every cell.
+    """Add the ``verdict`` of every cell, and what each variable means.
 
     A cell that ended before its goal is "ended", sound as its motion may be.  One that is ok with
     an energy error over its tolerance, or whose check (see :func:`checked`) failed, is "wrong".
@@ -141,8 +133,11 @@ def judged(cells: xr.Dataset) -> xr.Dataset:
     wrong = (~good & nameless) | crashed | (good & (cells["energy_error"] > ENERGY_PROMISE).values)
     if "check" in cells:
         wrong |= (cells["check"] == "differs").values
-    verdict = np.where(wrong, WRONG, np.where(good, OK, ENDED))
-    return cells.assign(verdict=("cell", verdict))
+    found = cells.assign(verdict=("cell", np.where(wrong, WRONG, np.where(good, OK, ENDED))))
+    for name, (units, long_name) in _MEANING.items():
+        if name in found:
+            found[name].attrs |= {"long_name": long_name} | ({"units": units} if units else {})
+    return found
 
 
 def chosen_for_check(cells: xr.Dataset, share: float, seed: int) -> NDArray[np.int64]:
@@ -190,7 +185,7 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
     check = np.full(cells.sizes["cell"], "", dtype="U8")
     check[which] = np.where(unproven, "unproven", np.where(over, "differs", "holds"))
     found["check"] = ("cell", check)
-    return judged(_described(found))
+    return judged(found)
 
 
 def joined(groups: Sequence[tuple[dict[str, str], xr.Dataset]]) -> xr.Dataset:
@@ -199,11 +194,8 @@ def joined(groups: Sequence[tuple[dict[str, str], xr.Dataset]]) -> xr.Dataset:
     A group has its words (``name``, ``title``, ``x_label``, ``x_units``, ``y_label``, ``y_units``)
     and its cells; ``of_group`` is the number of each cell's group.
     """
-    parts = [
-        cells.assign(of_group=("cell", np.full(cells.sizes["cell"], number)))
-        for number, (_, cells) in enumerate(groups)
-    ]
-    whole = xr.concat(parts, dim="cell")
+    whole = xr.concat([cells for _, cells in groups], dim="cell")
+    whole["of_group"] = ("cell", np.repeat(range(len(groups)), [len(c.x) for _, c in groups]))
     for key in groups[0][0]:
         whole[key] = ("group", np.array([words[key] for words, _ in groups], dtype=object))
-    return _described(judged(whole))
+    return judged(whole)
