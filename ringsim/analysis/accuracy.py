@@ -22,9 +22,7 @@ _COUNTS = {
     "newton_iterations": ("iterations of Newton's method", "1"),
     "jacobians": ("Jacobians built and factorised", "1"),
 }
-NEEDED = (
-    *OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "final_time",
-)  # fmt: skip
+NEEDED = (*OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "final_time")
 
 
 class Truth(NamedTuple):
@@ -45,10 +43,8 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     ----------
     results
         ``NEEDED`` variables over the dimension ``rung``, one entry per rung.
-    rungs
-        The settings, those of the reference among them.
-    truths
-        Independent values, if the scene has any.
+    rungs, truths
+        The settings, those of the reference among them, and independent values, if any.
 
     Returns
     -------

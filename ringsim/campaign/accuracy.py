@@ -35,18 +35,8 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
     A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
     cheapest run of the reference goes first, then the whole reference, then the rest, so that a
     scene which cannot be studied costs little.  The ideal fidelity is a setting too, where it can
-    represent the scene.
-
-    Parameters
-    ----------
-    folder
-        Where the campaigns' folders go; a study that was interrupted goes on.
-    scene
-        Any scene that ends well at fine settings.
-    workers
-        Solver processes.
-    timeout
-        Longest time of one rung, s.
+    represent the scene.  ``folder`` holds the campaigns, and a study that was interrupted goes on;
+    ``timeout`` is the longest time of one rung, s.
 
     Raises
     ------
@@ -135,14 +125,13 @@ class _Study:
 
 
 def _require_ok(rungs: Sequence[Rung], results: xr.Dataset) -> None:
-    for k, rung in enumerate(rungs):
-        ended = Status(int(results.status[k]))
-        if ended != Status.OK:
-            settings = ", ".join(f"{path} = {rung.values[path]}" for path in PATHS)
+    for rung, code, reason in zip(rungs, results.status.values, results.reason.values, strict=True):
+        if code != Status.OK:
+            settings = ", ".join(f"{path} = {value}" for path, value in rung.values.items())
             raise ReferenceRunError(
-                f"the reference run with {settings} ended as {ended.word}: "
-                f"{str(results.reason[k].item()) or 'no reason given'}: change the scene so that "
-                "it ends well with fine steps, or give it more time (--timeout) in a new folder"
+                f"the reference run with {settings} ended as {Status(code).word}: "
+                f"{reason or 'no reason given'}: change the scene so that it ends well with fine "
+                "steps, or give it more time (--timeout) in a new folder"
             )
 
 
