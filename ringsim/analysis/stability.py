@@ -56,9 +56,9 @@ _SCALARS = (
 )  # fmt: skip
 _MEANING = {name: (VARIABLES[name].units, VARIABLES[name].long_name) for name in _SCALARS} | {
     "status": ("1", VARIABLES["status"].long_name),
-    "x": ("1", "value on the first axis, in the units of the cell's group"),
-    "y": ("1", "value on the second axis, in the units of the cell's group"),
-    "of_group": ("1", "number of the cell's group"),
+    "x": ("1", "value on the first axis, in the units of the cell's panel"),
+    "y": ("1", "value on the second axis, in the units of the cell's panel"),
+    "of_group": ("1", "number of the cell's panel"),
     "reason": ("", "why the run ended so"),
     "cause": ("", "the reason in a word"),
     "verdict": ("", "ok, ended with a cause, or wrong"),
@@ -189,10 +189,10 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
 
 
 def joined(groups: Sequence[tuple[dict[str, str], xr.Dataset]]) -> xr.Dataset:
-    """One map of all groups, with the dimensions ``group`` and ``cell``, judged.
+    """One map of all panels, with the dimensions ``group`` (a panel) and ``cell``, judged.
 
-    A group has its words (``name``, ``title``, ``x_label``, ``x_units``, ``y_label``, ``y_units``)
-    and its cells; ``of_group`` is the number of each cell's group.
+    A panel has its words (``name``, ``title``, ``x_label``, ``x_units``, ``y_label``, ``y_units``)
+    and its cells; ``of_group`` is the number of each cell's panel.
     """
     whole = xr.concat([cells for _, cells in groups], dim="cell")
     whole["of_group"] = ("cell", np.repeat(range(len(groups)), [len(c.x) for _, c in groups]))

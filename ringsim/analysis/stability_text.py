@@ -16,7 +16,7 @@ _LONGEST_REASON = 300
 
 def to_markdown(whole: xr.Dataset) -> str:
     """A judged map as a Markdown text."""
-    head = ["group", "axis", "all cells ok", "any cell ok", "below", "above"]
+    head = ["panel", "axis", "all cells ok", "any cell ok", "below", "above"]
     parts = ["# Stability map", summary(whole)]
     if "check" in whole:
         parts += _checks(whole)
@@ -35,7 +35,7 @@ def summary(whole: xr.Dataset) -> str:
     anew = int(np.sum((whole["restarts"].values > 0) & (verdict == OK)))
     minutes = float(np.nansum(whole["cpu_time"].values)) / 60.0
     return (
-        f"{len(verdict)} cells in {whole.sizes['group']} groups: {', '.join(words)}; "
+        f"{len(verdict)} cells in {whole.sizes['group']} panels: {', '.join(words)}; "
         f"{anew} of the ok ones after a new start with smaller steps; "
         f"{minutes:.1f} minutes of processor time"
     )

@@ -148,7 +148,7 @@ def test_borders_name_the_ranges_and_what_lies_beyond() -> None:
 def test_text_and_figure_tell_every_kind_of_cell() -> None:
     whole = joined([(WORDS, cells(*ENDS)), (WORDS | {"title": "other"}, cells(GOOD, restarts=[1]))])
     text = to_markdown(whole)
-    assert "7 cells in 2 groups: 3 ended, 2 ok, 2 wrong" in text
+    assert "7 cells in 2 panels: 3 ended, 2 ok, 2 wrong" in text
     assert "1 of the ok ones after a new start" in summary(whole)
     assert NEWTON in text
     figure = stability(whole)
