@@ -34,8 +34,9 @@ def summary(whole: xr.Dataset) -> str:
     words = [f"{np.sum(verdict == word)} {word}" for word in np.unique(verdict)]
     anew = int(np.sum((whole["restarts"].values > 0) & (verdict == OK)))
     minutes = float(np.nansum(whole["cpu_time"].values)) / 60.0
+    panels = f"{whole.sizes['group']} panel{'s' if whole.sizes['group'] > 1 else ''}"
     return (
-        f"{len(verdict)} cells in {whole.sizes['group']} panels: {', '.join(words)}; "
+        f"{len(verdict)} cells in {panels}: {', '.join(words)}; "
         f"{anew} of the ok ones after a new start with smaller steps; "
         f"{minutes:.1f} minutes of processor time"
     )

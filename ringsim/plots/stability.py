@@ -1,4 +1,4 @@
-"""The stability map: one panel per group, one square per cell."""
+"""The stability map: a panel for each pair of axes, a square for each cell."""
 
 from __future__ import annotations
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -156,3 +160,15 @@ def test_text_and_figure_tell_every_kind_of_cell() -> None:
     assert legend == ["ok", "r  ok, after a new start", "t  end time", "N  Newton",
                       "T  time limit", "!  wrong"]  # fmt: skip
     assert "Stiffness (N)" in [axes.get_xlabel() for axes in figure.axes]
+
+
+def test_the_benchmarks_map_is_large_and_its_cells_are_valid() -> None:
+    """Every pair of ends of two axes is a scene."""
+    known = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "stability_map.py"))
+    panels, quick = known["PANELS"], known["QUICK"]
+    assert sum(len(list(panel.cells())) for panel in panels) == 520
+    assert sum(len(list(panel.cells())) for panel in quick) == 12
+    assert len({panel.name for panel in panels}) == len(panels)
+    for panel in (*panels, *quick):
+        for x, y in itertools.product(panel.x.values[:: len(panel.x.values) - 1], panel.y.values):
+            panel.scene.with_values(panel.x.at(x) | panel.y.at(y))
