@@ -9,15 +9,10 @@ from tabulate import DataRow, TableFormat, tabulate
 _ROW = DataRow("|", "|", "|")
 # tabulate's own Markdown pads every cell to its column's width, and one long cell widens all lines.
 _NARROW = TableFormat(
-    lineabove=None,
-    linebelowheader=lambda widths, aligns: "|" + "---|" * len(widths),
-    linebetweenrows=None,
-    linebelow=None,
-    headerrow=_ROW,
-    datarow=_ROW,
-    padding=1,
+    lineabove=None, linebelowheader=lambda widths, aligns: "|" + "---|" * len(widths),
+    linebetweenrows=None, linebelow=None, headerrow=_ROW, datarow=_ROW, padding=1,
     with_header_hide=None,
-)
+)  # fmt: skip
 
 
 def markdown_table(head: Sequence[object], rows: Iterable[Sequence[object]]) -> str:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ringsim.analysis.errors import OUTPUTS, Errors
 from ringsim.analysis.frontier import bounds, cheapest, eligible, frontier, in_favour, typical_cost
 from ringsim.analysis.ladder import PATHS, Rung
-from ringsim.analysis.orders import observed_orders
 
 Array = NDArray[np.float64]
 TARGETS = (1e-2, 1e-3, 1e-4)
@@ -23,9 +22,7 @@ _COUNTS = {
     "newton_iterations": ("iterations of Newton's method", "1"),
     "jacobians": ("Jacobians built and factorised", "1"),
 }
-NEEDED = (
-    *OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "final_time",
-)  # fmt: skip
+NEEDED = (*OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "final_time")
 
 
 class Truth(NamedTuple):
@@ -46,10 +43,8 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     ----------
     results
         ``NEEDED`` variables over the dimension ``rung``, one entry per rung.
-    rungs
-        The settings, those of the reference among them.
-    truths
-        Independent values, if the scene has any.
+    rungs, truths
+        The settings, those of the reference among them, and independent values, if any.
 
     Returns
     -------
@@ -81,7 +76,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     cost = np.where(errors.good, cost, counts["cpu_time"])
     choice = eligible(rungs)
     ranked = np.where(choice[:, None], good, np.nan)
-    graded, orders = observed_orders(errors, rungs)
+    graded, orders = errors.orders()
     ladders = [rung.ladder for rung in rungs]
     pick = cheapest(in_favour(cost, ladders), ranked, TARGETS)
     best = [errors.best.get(name, np.nan) for name in outputs]

@@ -43,12 +43,7 @@ _TRUTHS = (
 def tables(found: xr.Dataset, title: str) -> str:
     """Recommendation, errors and cost, orders, and distance from independent values.
 
-    Parameters
-    ----------
-    found
-        From :func:`ringsim.analysis.accuracy.judge`.
-    title
-        Heading.
+    ``found`` is from :func:`ringsim.analysis.accuracy.judge`; ``title`` is the heading.
     """
     single = [str(name) for name in found.output.values if name not in GROUPS]
     parts = [f"# {title}", _ADVICE, _advice(found), _COSTS, _errors(found, single)]
@@ -57,7 +52,8 @@ def tables(found: xr.Dataset, title: str) -> str:
         parts += [_TRUTHS, _truths(found)]
     failed = [k for k in _distinct(found) if found.status.values[k] != Status.OK]
     if failed and "reason" in found:
-        parts += ["Settings that did not end well:", "\n".join(_failure(found, k) for k in failed)]
+        lines = [f"- {_name(found, k)}: {_end(found, k)}: {found.reason.values[k]}" for k in failed]
+        parts += ["Settings that did not end well:", "\n".join(lines)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -72,47 +68,35 @@ def in_words(found: xr.Dataset, rung: int) -> str:
 
 def _advice(found: xr.Dataset) -> str:
     ideal = np.flatnonzero(found.ladder.values == "fidelity")
-    rows = []
+    targets, rows = found.target.values, []
     for column, name in enumerate(found.output.values):
-        cells = []
-        for row, target in enumerate(found.target.values):
-            picked = [int(found.cheapest.values[row, column])]
-            picked += list(ideal[found.bound.values[ideal, column] <= target])
+        cells = [_NAMES.get(name, name)]
+        for target, cheapest in zip(targets, found.cheapest.values[:, column], strict=True):
+            picked = [int(cheapest), *ideal[found.bound.values[ideal, column] <= target]]
             words = [
                 f"{in_words(found, k)}, {found.cost.values[k]:.3g} s" for k in picked if k >= 0
             ]
             coarse = found.uncertainty.values[column] >= target
             otherwise = "reference too coarse" if coarse else "none tried"
             cells.append("; or ".join(words) or otherwise)
-        rows.append([_NAMES.get(name, name), *cells])
-    return markdown_table(["error of", *(f"{t:g}" for t in found.target.values)], rows)
+        rows.append(cells)
+    return markdown_table(["error of", *(f"{target:g}" for target in targets)], rows)
 
 
 def _errors(found: xr.Dataset, outputs: Sequence[str]) -> str:
     """Errors and cost of every setting; what lies on a frontier is bold."""
+    error, best = (found[name].sel(output=outputs).values for name in ("error", "frontier"))
     rows = []
     for rung in _distinct(found):
-        name = f"{found.ladder.values[rung]}: {found.label.values[rung]}"
-        if found.ladder.values[rung] == found.label.values[rung]:
-            name = str(found.label.values[rung])
-        ended = Status(int(found.status.values[rung]))
-        name += "" if ended == Status.OK else f" ({ended.word})"
-        counts = [
-            f"{found[count].values[rung]:.0f}"
-            for count in ("steps", "residual_evaluations", "jacobians")
-        ]
-        times = [f"{found[t].values[rung]:.3g} s" for t in ("cpu_time", "cost")]
-        best = found.frontier.isel(rung=rung).sel(output=outputs).values
-        errors = found.error.isel(rung=rung).sel(output=outputs).values
-        cells = [
-            "" if not np.isfinite(error) else f"**{error:.1e}**" if bold else f"{error:.1e}"
-            for error, bold in zip(errors, best, strict=True)
-        ]
-        rows.append([name, *counts, *times, *cells])
-    own = [
-        "" if name == "energy" else f"{float(found.uncertainty.sel(output=name)):.1e}"
-        for name in outputs
-    ]
+        row = found.isel(rung=rung)
+        name = _name(found, rung) + (f" ({_end(found, rung)})" if row.status != Status.OK else "")
+        counts = [row[count].item() for count in ("steps", "residual_evaluations", "jacobians")]
+        times = [f"{row[time].item():.3g} s" for time in ("cpu_time", "cost")]
+        errors = [f"{e:.1e}" if np.isfinite(e) else "" for e in error[rung]]
+        errors = [f"**{e}**" if bold else e for e, bold in zip(errors, best[rung], strict=True)]
+        rows.append([name, *(f"{count:.0f}" for count in counts), *times, *errors])
+    own = [f"{e:.1e}" for e in found.uncertainty.sel(output=outputs).values]
+    own = ["" if name == "energy" else e for name, e in zip(outputs, own, strict=True)]
     rows.append(["uncertainty of the reference", *[""] * 5, *own])
     head = ["setting", "steps", "residuals", "Jacobians", "run", "cost"]
     return markdown_table(head + [_NAMES.get(name, name) for name in outputs], rows)
@@ -126,27 +110,32 @@ def _distinct(found: xr.Dataset) -> list[int]:
     return list(seen.values())
 
 
+def _name(found: xr.Dataset, rung: int) -> str:
+    ladder, label = found.ladder.values[rung], found.label.values[rung]
+    return str(label) if ladder == label else f"{ladder}: {label}"
+
+
+def _end(found: xr.Dataset, rung: int) -> str:
+    return Status(int(found.status.values[rung])).word
+
+
 def _orders(found: xr.Dataset, outputs: Sequence[str]) -> str:
-    rows = []
-    for name in found.graded.values:
-        orders = found.order.sel(graded=name, output=outputs).values
-        cells = [f"{order:.1f}" if np.isfinite(order) else "-" for order in orders]
-        rows.append([name, _THEORY.get(str(name), ""), *cells])
+    rows = [
+        [name, _THEORY.get(name, ""), *(f"{o:.1f}" if np.isfinite(o) else "-" for o in orders)]
+        for name, orders in zip(
+            found.graded.values.tolist(), found.order.sel(output=outputs).values, strict=True
+        )
+    ]
     return markdown_table(["ladder", "theory", *(_NAMES.get(name, name) for name in outputs)], rows)
-
-
-def _failure(found: xr.Dataset, rung: int) -> str:
-    ended = Status(int(found.status.values[rung])).word
-    name = f"{found.ladder.values[rung]}: {found.label.values[rung]}"
-    return f"- {name}: {ended}: {found.reason.values[rung]}"
 
 
 def _truths(found: xr.Dataset) -> str:
     rows = []
     standing = found.from_truth.values[_standing(found)]
-    for k, name in enumerate(found.truth.values):
+    for name, *gaps in zip(
+        found.truth.values, found.reference_from_truth.values, standing, strict=True
+    ):
         output, _, source = str(name).partition(": ")
-        gaps = (found.reference_from_truth.values[k], standing[k])
         rows.append([f"{_NAMES.get(output, output)}, {source}", *(f"{gap:.1e}" for gap in gaps)])
     return markdown_table(["value", "reference", STANDING], rows)
 

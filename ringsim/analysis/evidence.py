@@ -155,15 +155,10 @@ def read_evidence(path: Path | Traversable) -> Evidence:
 
 
 def evidence_for(scene: Scene) -> Evidence:
-    """The evidence of the built-in scene that is most like a scene."""
-    folder = resources.files("ringsim") / "scenes" / "evidence"
-    return read_evidence(folder / f"{likest(scene)}.toml")
-
-
-def likest(scene: Scene) -> str:
-    """Name of the built-in scene with the same kind of structure and drive."""
+    """The evidence of the built-in scene with the same kind of structure and drive."""
+    name = "ring18" if scene.cables is None else "ring18-cable"
     if kind_of(scene.structure) == "planar-truss":
-        return "planar-truss"
-    if scene.cables is None:
-        return "ring18"
-    return "ring18-cable" if scene.structure.closed else "truss2"
+        name = "planar-truss"
+    elif scene.cables is not None and not scene.structure.closed:
+        name = "truss2"
+    return read_evidence(resources.files("ringsim") / "scenes" / "evidence" / f"{name}.toml")

@@ -8,7 +8,7 @@ that only the setting they vary has an effect; the others are settings that a us
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,16 +26,8 @@ _HALVINGS = {"x 2": -1, "x 1": 0, "x 1/2": 1, "x 1/4": 2, "x 1/8": 3, "x 1/16": 
 """Rungs of "steps" by the factor on every step, with the exponent of 1/2."""
 _IN_TIME = 1.0 / 4.0
 """Size of the rungs of "steps" from which on the reference is made of them."""
-_FINE, _MIDDLE = 3, 2
-"""Halvings of the steps at which elements and rod formulations are compared."""
 _TIGHT = 1e-6
 """Newton's tolerance, at most, of ladders that are to show an order."""
-_TOLERANCE = (1e-8, 0.1)
-"""Bounds of solver.tolerance."""
-_NEWTON = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-_RADII = (0.5, 0.8, 0.9, 0.95)
-_CONSTANT_STEPS = (0.1, 0.05, 0.025)
-"""Constant steps over solver.step, for scenes whose step follows the motion."""
 _SETTINGS = (
     (10.0, 1.0, 1), (10.0, 0.0, 1), (1.0 / 0.3, 1.0, 1), (1.0 / 0.3, 0.0, 1), (1.0 / 3.0, 1.0, 1),
     (1.0 / 3.0, 0.0, 1), (0.1, 1.0, 1), (0.1, 0.1, 1), (1.0 / 30.0, 0.1, 1), (0.01, 0.1, 1),
@@ -75,21 +67,21 @@ def ladder(scene: Scene) -> list[Rung]:
     add(STANDING, STANDING, 0.0, {})
     for label, halvings in _HALVINGS.items():
         add("steps", label, 0.5**halvings, _halved(scene, halvings))
-    for step in (_rounded(share * solver.step) for share in _CONSTANT_STEPS if follows):
+    for step in (_rounded(share * solver.step) for share in (0.1, 0.05, 0.025) if follows):
         constant = {"solver.step_control": "constant", "solver.newton_tolerance": tight}
         add("constant step", f"{step:g} s", step, constant | {"solver.step": step})
     one, own = scene.rods.elements, kind_of(scene.rods)
     for elements in (one, 2 * one, 4 * one):
-        changes = _halved(scene, _FINE) | {"rods.elements": elements}
+        changes = _halved(scene, 3) | {"rods.elements": elements}
         add("elements", f"{elements}", 1.0 / elements, changes)
     if kind_of(scene.structure) == "pantograph-ring" and scene.cables is None:
         other = "ancf" if own != "ancf" else "geometrically-exact"
         for elements in (one, 2 * one, 4 * one):
-            changes = _halved(scene, _MIDDLE) | {"rods.kind": other, "rods.elements": elements}
+            changes = _halved(scene, 2) | {"rods.kind": other, "rods.elements": elements}
             add("formulation", f"{other}, {elements}", 1.0 / elements, changes)
-    for radius in _RADII:
+    for radius in (0.5, 0.8, 0.9, 0.95):
         add("dissipation", f"{radius:g}", 0.0, {"solver.spectral_radius": radius})
-    for tolerance in _NEWTON:
+    for tolerance in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
         add("newton", f"{tolerance:g}", 0.0, {"solver.newton_tolerance": tolerance})
     for coarser, newtons, more in _SETTINGS:
         newton = _rounded(max(newtons * solver.newton_tolerance, tight))
@@ -120,7 +112,7 @@ def standing(scene: Scene) -> dict[str, Any]:
     return found | {"solver.deviation_tolerance": _deviations(scene)}
 
 
-def references(rungs: list[Rung]) -> tuple[list[int], list[int]]:
+def references(rungs: Sequence[Rung]) -> tuple[list[int], list[int]]:
     """Places of the three rungs with ever finer steps, and of the three with ever more elements.
 
     Steps halve and elements double from one to the next.
@@ -153,8 +145,8 @@ def _deviations(scene: Scene, factor: float = 1.0) -> float:
 
 
 def _within(tolerance: float) -> float:
-    """The nearest tolerance that a scene may have."""
-    return _rounded(min(max(tolerance, _TOLERANCE[0]), _TOLERANCE[1]))
+    """The nearest tolerance that ``solver.tolerance`` may have."""
+    return _rounded(min(max(tolerance, 1e-8), 0.1))
 
 
 def _rounded(value: float) -> float:

@@ -7,16 +7,23 @@ changes that do not shrink, or alternate in sign, are not extrapolated.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
+Array = NDArray[np.float64]
 _SECOND_ORDER = 4.0
 """Ratio of successive changes where steps halve and the order is two; no more is believed."""
 _SHRINKING = 1.5
 """Ratio from which on changes count as shrinking."""
+_CLEAR = 1.5
+"""An error over the limit's uncertainty from which on it counts for a slope."""
+_ABOUT = 0.2
+"""Share by which an error may rise towards finer steps and still count as falling."""
+_MATTERS = 2.0
+"""Ratio of the errors along a ladder from which on it shows an order."""
 
 
 class Limit(NamedTuple):
@@ -43,8 +50,7 @@ def limit(values: xr.DataArray) -> Limit:
     if float((first * last).sum()) < 0.0:  # alternating: the limit lies between the last two
         return Limit(fine, max(now, least))
     ratio = min(before / max(now, 1e-300), _SECOND_ORDER)
-    step = last / (ratio - 1.0)
-    return Limit(fine + step, max(now / (ratio - 1.0), least))
+    return Limit(fine + last / (ratio - 1.0), max(now / (ratio - 1.0), least))
 
 
 def reference(in_time: xr.DataArray, in_space: xr.DataArray) -> Limit:
@@ -54,18 +60,31 @@ def reference(in_time: xr.DataArray, in_space: xr.DataArray) -> Limit:
     return Limit(steps.value + more, steps.uncertainty + elements.uncertainty)
 
 
+def largest(values: xr.DataArray) -> Array:
+    """The largest size of each rung's values, shape (rung,)."""
+    found: Array = abs(values).max([dim for dim in values.dims if dim != "rung"]).to_numpy()
+    return found
+
+
 def order(values: xr.DataArray, noise: float) -> float:
     """Observed order of three levels along ``rung``; NaN unless changes shrink above the noise.
 
     Each level has half the length of elements of the one before; ``noise`` is the largest effect
     of anything else, in the unit of the values.
     """
-    first, last = (float(c) for c in abs(values.diff("rung")).max(inner(values)))
-    if not first > last > noise:
+    first, last = largest(values.diff("rung")).tolist()
+    return float(np.log2(first / last)) if first > last > noise else np.nan
+
+
+def slope(sizes: Array, error: Array, uncertainty: float) -> float:
+    """Slope of log error over log size among all errors above the uncertainty of their limit.
+
+    All of them, because two may agree by chance.  NaN if errors rise somewhere towards finer
+    steps, or hardly change.
+    """
+    clear = np.isfinite(error) & (error > max(_CLEAR * uncertainty, 1e-300))
+    finer = error[clear][np.argsort(-sizes[clear])]
+    falls = len(finer) >= 3 and (np.diff(finer) <= _ABOUT * finer[:-1]).all()
+    if not falls or finer[0] < _MATTERS * finer[-1]:
         return np.nan
-    return float(np.log2(first / last))
-
-
-def inner(values: xr.DataArray) -> list[Hashable]:
-    """All dimensions but ``rung``."""
-    return [dim for dim in values.dims if dim != "rung"]
+    return float(np.polyfit(np.log(sizes[clear]), np.log(error[clear]), 1)[0])

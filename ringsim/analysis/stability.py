@@ -40,9 +40,11 @@ CAUSES = (
 )
 """Word of a cause, and the words by which a reason names it; the first that occurs counts."""
 
-TIME_PROMISE, ANGLE_PROMISE, TENSION_PROMISE = 0.01, 0.5, 0.05
+PROMISES = TIME_PROMISE, ANGLE_PROMISE, TENSION_PROMISE = 0.01, 0.5, 0.05
 """What an ok cell promises: relative error of the deployment time, error in degree of the mean
 angle where a run ended before, and error of the largest tension over itself."""
+DIFFERENCES = ("time_difference", "angle_difference", "tension_difference")
+"""Their errors, as a finer run shows them."""
 MORE_STEPS = 1.5
 """Steps of a finer run over those of the cell, at least; Newton may have cut both to the same."""
 ENERGY_PROMISE = Solver().energy_tolerance
@@ -54,9 +56,9 @@ _SCALARS = (
 )  # fmt: skip
 _MEANING = {name: (VARIABLES[name].units, VARIABLES[name].long_name) for name in _SCALARS} | {
     "status": ("1", VARIABLES["status"].long_name),
-    "x": ("1", "value on the first axis, in the units of the cell's group"),
-    "y": ("1", "value on the second axis, in the units of the cell's group"),
-    "of_group": ("1", "number of the cell's group"),
+    "x": ("1", "value on the first axis, in the units of the cell's panel"),
+    "y": ("1", "value on the second axis, in the units of the cell's panel"),
+    "of_group": ("1", "number of the cell's panel"),
     "reason": ("", "why the run ended so"),
     "cause": ("", "the reason in a word"),
     "verdict": ("", "ok, ended with a cause, or wrong"),
@@ -115,19 +117,11 @@ def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr
         values = campaign[name].values if name in campaign else unknown
         missing = (values.dtype.kind == "i") & (values < 0)  # counts that are missing are -1
         found[name] = np.where(missing, np.nan, values.astype(float))
-    return _described(xr.Dataset({name: ("cell", values) for name, values in found.items()}))
-
-
-def _described(cells: xr.Dataset) -> xr.Dataset:
-    """Add what each variable means, and its unit."""
-    for name, (units, long_name) in _MEANING.items():
-        if name in cells:
-            cells[name].attrs |= {"long_name": long_name} | ({"units": units} if units else {})
-    return cells
+    return xr.Dataset({name: ("cell", values) for name, values in found.items()})
 
 
 def judged(cells: xr.Dataset) -> xr.Dataset:
-    """Add the ``verdict`` of every cell.
+    """Add the ``verdict`` of every cell, and what each variable means.
 
     A cell that ended before its goal is "ended", sound as its motion may be.  One that is ok with
     an energy error over its tolerance, or whose check (see :func:`checked`) failed, is "wrong".
@@ -139,8 +133,11 @@ def judged(cells: xr.Dataset) -> xr.Dataset:
     wrong = (~good & nameless) | crashed | (good & (cells["energy_error"] > ENERGY_PROMISE).values)
     if "check" in cells:
         wrong |= (cells["check"] == "differs").values
-    verdict = np.where(wrong, WRONG, np.where(good, OK, ENDED))
-    return cells.assign(verdict=("cell", verdict))
+    found = cells.assign(verdict=("cell", np.where(wrong, WRONG, np.where(good, OK, ENDED))))
+    for name, (units, long_name) in _MEANING.items():
+        if name in found:
+            found[name].attrs |= {"long_name": long_name} | ({"units": units} if units else {})
+    return found
 
 
 def chosen_for_check(cells: xr.Dataset, share: float, seed: int) -> NDArray[np.int64]:
@@ -179,34 +176,26 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
     angles = abs(mine["final_angle"] - finer["final_angle"]).values
     angles = np.where(np.isfinite(finer["deployment_time"]), np.nan, angles)
     over = np.zeros(len(which), dtype=bool)
-    for name, promise, apart in (
-        ("time", TIME_PROMISE, times),
-        ("angle", ANGLE_PROMISE, angles),
-        ("tension", TENSION_PROMISE, tensions),
-    ):
-        difference = np.full(cells.sizes["cell"], np.nan)
-        difference[which] = apart
-        found[f"{name}_difference"] = ("cell", difference)
+    for name, promise, apart in zip(DIFFERENCES, PROMISES, (times, angles, tensions), strict=True):
+        found[name] = ("cell", np.full(cells.sizes["cell"], np.nan))
+        found[name].values[which] = apart
         over |= apart > promise
     hardly = (finer["steps"].values < MORE_STEPS * mine["steps"].values) & ~over
     unproven = (finer["status"] != Status.OK).values | hardly
     check = np.full(cells.sizes["cell"], "", dtype="U8")
     check[which] = np.where(unproven, "unproven", np.where(over, "differs", "holds"))
     found["check"] = ("cell", check)
-    return judged(_described(found))
+    return judged(found)
 
 
 def joined(groups: Sequence[tuple[dict[str, str], xr.Dataset]]) -> xr.Dataset:
-    """One map of all groups, with the dimensions ``group`` and ``cell``, judged.
+    """One map of all panels, with the dimensions ``group`` (a panel) and ``cell``, judged.
 
-    A group has its words (``name``, ``title``, ``x_label``, ``x_units``, ``y_label``, ``y_units``)
-    and its cells; ``of_group`` is the number of each cell's group.
+    A panel has its words (``name``, ``title``, ``x_label``, ``x_units``, ``y_label``, ``y_units``)
+    and its cells; ``of_group`` is the number of each cell's panel.
     """
-    parts = [
-        cells.assign(of_group=("cell", np.full(cells.sizes["cell"], number)))
-        for number, (_, cells) in enumerate(groups)
-    ]
-    whole = xr.concat(parts, dim="cell")
+    whole = xr.concat([cells for _, cells in groups], dim="cell")
+    whole["of_group"] = ("cell", np.repeat(range(len(groups)), [len(c.x) for _, c in groups]))
     for key in groups[0][0]:
         whole[key] = ("group", np.array([words[key] for words, _ in groups], dtype=object))
-    return _described(judged(whole))
+    return judged(whole)

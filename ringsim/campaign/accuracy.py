@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -34,18 +35,8 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
     A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
     cheapest run of the reference goes first, then the whole reference, then the rest, so that a
     scene which cannot be studied costs little.  The ideal fidelity is a setting too, where it can
-    represent the scene.
-
-    Parameters
-    ----------
-    folder
-        Where the campaigns' folders go; a study that was interrupted goes on.
-    scene
-        Any scene that ends well at fine settings.
-    workers
-        Solver processes.
-    timeout
-        Longest time of one rung, s.
+    represent the scene.  ``folder`` holds the campaigns, and a study that was interrupted goes on;
+    ``timeout`` is the longest time of one rung, s.
 
     Raises
     ------
@@ -67,8 +58,7 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
         _require_ok(own, study.run(stage, own))
     results = study.run("settings", rungs)
     truths = _quadrature(scene)
-    ideal = _ideal(study)
-    if ideal is not None:
+    if (ideal := study.ideal()) is not None:
         results = xr.concat([ideal, results], "rung")
         rungs = [Rung("fidelity", "ideal", 0.0, standing(scene)), *rungs]
         truths += _ideal_truths(ideal.isel(rung=0))
@@ -93,14 +83,14 @@ class _Study:
             if key not in self.known:
                 missing.setdefault(self._campaign(stage, rung), {})[key] = rung
         for (name, stress), own in missing.items():
-            shared = {path for path in self.scene.structure.shaping if path in PATHS}
-            first = next(iter(own.values())).values
-            given = {path: first[path] for path in shared} | {"record.stress": stress}
+            shared = [path for path in self.scene.structure.shaping if path in PATHS]
+            given = {path: next(iter(own.values())).values[path] for path in shared}
             paths = [path for path in PATHS if path not in shared]
-            settings = [{path: rung.values[path] for path in paths} for rung in own.values()]
-            title = f"Settings of {self.scene.name} against each other ({name})"
-            cases = Cases(name, title, self.scene.with_values(given), settings, self.timeout)
-            found = _needed(run_cases(self.folder, cases, self.workers))
+            found = self._needed(
+                name, f"Settings of {self.scene.name} against each other ({name})",
+                self.scene.with_values(given | {"record.stress": stress}),
+                [{path: rung.values[path] for path in paths} for rung in own.values()],
+            )  # fmt: skip
             self.known |= {key: found.isel(rung=[k]) for k, key in enumerate(own)}
         return xr.concat([self.known[key] for key in keys], "rung")
 
@@ -111,40 +101,38 @@ class _Study:
         stressed = rung.values["rods.kind"] != "ancf"  # whose elements report no forces
         return (stage, True) if stressed else (f"{stage}-unstressed", False)
 
+    def ideal(self) -> xr.Dataset | None:
+        """The ideal fidelity's answer as one rung; None if it cannot represent the scene."""
+        plain = self.scene.with_values({"record.stress": False})
+        try:
+            refuse_if_not_ideal(plain)
+        except InputError:
+            return None
+        case, title = {"solver.tolerance": plain.solver.tolerance}, f"{plain.name} with rigid rods"
+        return self._needed("ideal", title, plain, [case], "ideal")
+
+    def _needed(
+        self, name: str, title: str, scene: Scene, cases: list[dict[str, Any]],
+        fidelity: str = "full",
+    ) -> xr.Dataset:  # fmt: skip
+        """What is compared of a campaign's results, missing variables as NaN."""
+        cases_of = Cases(name, title, scene, cases, self.timeout, fidelity)
+        with xr.open_dataset(run_cases(self.folder, cases_of, self.workers)) as dataset:
+            found = dataset.rename(sample="rung").drop_vars("rung")
+            kept = found[[name for name in (*NEEDED, "reason") if name in found]].load()
+        nothing = ("rung", np.full(kept.sizes["rung"], np.nan))
+        return kept.assign({name: nothing for name in NEEDED if name not in kept})
+
 
 def _require_ok(rungs: Sequence[Rung], results: xr.Dataset) -> None:
-    for k, rung in enumerate(rungs):
-        ended = Status(int(results.status[k]))
-        if ended != Status.OK:
-            settings = ", ".join(f"{path} = {rung.values[path]}" for path in PATHS)
+    for rung, code, reason in zip(rungs, results.status.values, results.reason.values, strict=True):
+        if code != Status.OK:
+            settings = ", ".join(f"{path} = {value}" for path, value in rung.values.items())
             raise ReferenceRunError(
-                f"the reference run with {settings} ended as {ended.word}: "
-                f"{str(results.reason[k].item()) or 'no reason given'}: change the scene so that "
-                "it ends well with fine steps, or give it more time (--timeout) in a new folder"
+                f"the reference run with {settings} ended as {Status(code).word}: "
+                f"{reason or 'no reason given'}: change the scene so that it ends well with fine "
+                "steps, or give it more time (--timeout) in a new folder"
             )
-
-
-def _needed(file: Path) -> xr.Dataset:
-    """What is compared, missing variables as NaN."""
-    with xr.open_dataset(file) as dataset:
-        found = dataset.rename(sample="rung").drop_vars("rung")
-        kept = found[[name for name in (*NEEDED, "reason") if name in found]].load()
-    for name in NEEDED:
-        if name not in kept:
-            kept[name] = ("rung", np.full(kept.sizes["rung"], np.nan))
-    return kept
-
-
-def _ideal(study: _Study) -> xr.Dataset | None:
-    """The ideal fidelity's answer as one rung; None if it cannot represent the scene."""
-    plain = study.scene.with_values({"record.stress": False})
-    try:
-        refuse_if_not_ideal(plain)
-    except InputError:
-        return None
-    case, title = {"solver.tolerance": plain.solver.tolerance}, f"{plain.name} with rigid rods"
-    cases = Cases("ideal", title, plain, [case], study.timeout, fidelity="ideal")
-    return _needed(run_cases(study.folder, cases, 1))
 
 
 def _ideal_truths(ideal: xr.Dataset) -> list[Truth]:

@@ -95,7 +95,7 @@ def _pieces(panel: Panel) -> list[_Piece]:
         own: dict[str, float] = {}
         for shapes, sweep, value in zip(shaping, (panel.x, panel.y), (x, y), strict=True):
             (shared if shapes else own).update(sweep.at(value))
-            name += f"-{value:g}".replace("+", "") if shapes else ""
+            name += f"-{value}".replace("+", "") if shapes else ""
         if name not in found:
             found[name] = _Piece(name, panel, panel.scene.with_values(shared), [])
         found[name].cells.append((x, y, own))

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from ringsim.analysis.errors import OUTPUTS
 from ringsim.plots import style
 
 _LOOKS = {
@@ -20,15 +21,6 @@ _LOOKS = {
     "newton": (style.VERMILLION, "P"),
     "setting": (style.GREY, "X"),
 }
-_TITLES = {
-    "deployment_time": "Deployment time",
-    "opening_angle": "Opening angle",
-    "asynchrony": "Asynchrony",
-    "peak_tension": "Peak tension",
-    "peak_rod_stress": "Peak rod stress",
-    "peak_bending_strain": "Peak bending strain",
-    "energy": "Energy balance",
-}
 
 
 @style.styled
@@ -39,14 +31,15 @@ def accuracy(found: xr.Dataset) -> Figure:
     finer one.  The ideal ring is named in words: it is too cheap for the axis.  ``found`` is from
     ``ringsim.analysis.accuracy.judge``.
     """
-    outputs = [name for name in _TITLES if name in found.output.values]
+    titles = {**OUTPUTS, "energy": "energy balance"}
+    outputs = [name for name in titles if name in found.output.values]
     columns = min(3, len(outputs))
     rows = -(-len(outputs) // columns)
     figure = style.new_figure(3.6 * columns, 3.0 * rows + 0.9)
     panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
     for k, (panel, name) in enumerate(zip(panels, outputs, strict=False)):
         _panel(panel, found.sel(output=name))
-        style.name_panel(panel, _TITLES[name])
+        style.name_panel(panel, titles[name].capitalize())
         if k % columns == 0:
             panel.set_ylabel("Relative error")
         if k + columns >= len(outputs):

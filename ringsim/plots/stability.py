@@ -1,4 +1,4 @@
-"""The stability map: one panel per group, one square per cell."""
+"""The stability map: a panel for each pair of axes, a square for each cell."""
 
 from __future__ import annotations
 
@@ -49,49 +49,43 @@ def stability(whole: xr.Dataset) -> Figure:
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     seen: set[str] = set()
     for number, axes in enumerate(panels[:groups]):
-        cells = whole.isel(cell=(whole["of_group"] == number).values)
-        seen |= _panel(axes, cells, whole.isel(group=number))
+        cells = whole.isel(cell=(whole["of_group"] == number).values, group=number)
+        kinds = [_kind(cells.isel(cell=k)) for k in range(cells.sizes["cell"])]
+        _panel(axes, cells, kinds)
+        seen |= set(kinds)
     for axes in panels[groups:]:
         axes.set_axis_off()
-    order = [*_LOOKS, *sorted(seen - set(_LOOKS))]
     handles = [
         Patch(facecolor=colour, edgecolor=style.GREY, label=f"{letter}  {word}".strip())
-        for word in order
-        if word in seen
+        for word in [*_LOOKS, *sorted(seen - set(_LOOKS))]
         for colour, letter in [_LOOKS.get(word, _OTHER)]
+        if word in seen
     ]
-    figure.legend(
-        handles=handles, loc="outside lower center", ncols=min(len(handles), 2 * columns + 1)
-    )
+    most = min(len(handles), 2 * columns + 1)
+    figure.legend(handles=handles, loc="outside lower center", ncols=most)
     figure.suptitle(
         f"Stability map: {whole.sizes['cell']} runs and how they ended", x=0.012, ha="left"
     )
     return figure
 
 
-def _panel(axes: Axes, cells: xr.Dataset, group: xr.Dataset) -> set[str]:
-    """Draw the cells of a group; returns the kinds of cells that occur."""
+def _panel(axes: Axes, cells: xr.Dataset, kinds: list[str]) -> None:
     x, column = np.unique(cells["x"].values, return_inverse=True)
     y, row = np.unique(cells["y"].values, return_inverse=True)
-    seen = set()
-    for k in range(cells.sizes["cell"]):
-        word = _kind(cells.isel(cell=k))
-        seen.add(word)
+    for left, below, word in zip(column.tolist(), row.tolist(), kinds, strict=True):
         colour, letter = _LOOKS.get(word, _OTHER)
-        place = (float(column[k]) - 0.5, float(row[k]) - 0.5)
+        place = (left - 0.5, below - 0.5)
         axes.add_patch(Rectangle(place, 1.0, 1.0, facecolor=colour, edgecolor="white", zorder=2))
-        ink = "white" if _dark(colour) else style.INK
-        axes.text(
-            column[k], row[k], letter, ha="center", va="center", fontsize=8, color=ink, zorder=3
-        )
+        # Dark by the eye's weights of red, green and blue.
+        ink = "white" if np.dot(to_rgb(colour), (0.3, 0.59, 0.11)) < 0.47 else style.INK
+        axes.text(left, below, letter, ha="center", va="center", fontsize=8, color=ink, zorder=3)
     axes.set(xlim=(-0.5, len(x) - 0.5), ylim=(-0.5, len(y) - 0.5))
     axes.set_xticks(range(len(x)), [_short(v) for v in x], fontsize=8)
     axes.set_yticks(range(len(y)), [_short(v) for v in y], fontsize=8)
     axes.grid(visible=False)
-    axes.set_title(str(group["title"].values), color=style.INK, weight="bold")
-    axes.set_xlabel(_label(group, "x", 44), fontsize=9)
-    axes.set_ylabel(_label(group, "y", 32), fontsize=9)
-    return seen
+    axes.set_title(str(cells["title"].values), color=style.INK, weight="bold")
+    axes.set_xlabel(_label(cells, "x", 44), fontsize=9)
+    axes.set_ylabel(_label(cells, "y", 32), fontsize=9)
 
 
 def _kind(cell: xr.Dataset) -> str:
@@ -114,8 +108,3 @@ def _short(value: float) -> str:
         return f"{value:.4g}"
     digits, power = f"{value:.1e}".split("e")
     return f"{digits.removesuffix('.0')}e{int(power)}"
-
-
-def _dark(colour: str) -> bool:
-    red, green, blue = to_rgb(colour)
-    return 0.3 * red + 0.59 * green + 0.11 * blue < 0.47

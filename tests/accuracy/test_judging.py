@@ -9,7 +9,7 @@ import xarray as xr
 
 from ringsim.analysis.accuracy import NEEDED, Truth, judge
 from ringsim.analysis.accuracy_text import in_words, tables
-from ringsim.analysis.evidence import evidence_of, likest, read_evidence
+from ringsim.analysis.evidence import evidence_for, evidence_of, read_evidence
 from ringsim.analysis.ladder import PATHS, ladder, references
 from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
@@ -210,4 +210,4 @@ def test_every_rung_of_every_scene_is_a_scene(name: str) -> None:
     for rung in rungs:
         assert set(rung.values) == set(PATHS)
         scene.with_values(dict(rung.values))
-    assert likest(scene) == name
+    assert evidence_for(scene).scene == name

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -19,8 +23,7 @@ from ringsim.analysis.stability import (
     joined,
     judged,
 )
-from ringsim.analysis.stability_borders import borders
-from ringsim.analysis.stability_text import summary, to_markdown
+from ringsim.analysis.stability_text import borders, summary, to_markdown
 from ringsim.parts.solver import Solver
 from ringsim.plots.stability import stability
 from ringsim.variables import Status
@@ -142,15 +145,14 @@ def test_borders_name_the_ranges_and_what_lies_beyond() -> None:
     group["x"].values[:] = [1, 2, 3, 4, 5] * 2
     group["y"].values[:] = [7] * 5 + [8] * 5
     along, across = borders(joined([(WORDS, group)]))
-    assert (along.sure, along.ok) == ((2.0, 3.0), (1.0, 5.0))
-    assert (along.below, along.above) == ("Newton", "end time")
-    assert across.sure is None
+    assert along == ["group", "stiffness (N)", "2 .. 3", "1 .. 5", "Newton", "end time"]
+    assert across == ["group", "speed (m/s)", "none", "7 .. 8", "-", "-"]
 
 
 def test_text_and_figure_tell_every_kind_of_cell() -> None:
     whole = joined([(WORDS, cells(*ENDS)), (WORDS | {"title": "other"}, cells(GOOD, restarts=[1]))])
     text = to_markdown(whole)
-    assert "7 cells in 2 groups: 3 ended, 2 ok, 2 wrong" in text
+    assert "7 cells in 2 panels: 3 ended, 2 ok, 2 wrong" in text
     assert "1 of the ok ones after a new start" in summary(whole)
     assert NEWTON in text
     figure = stability(whole)
@@ -158,3 +160,15 @@ def test_text_and_figure_tell_every_kind_of_cell() -> None:
     assert legend == ["ok", "r  ok, after a new start", "t  end time", "N  Newton",
                       "T  time limit", "!  wrong"]  # fmt: skip
     assert "Stiffness (N)" in [axes.get_xlabel() for axes in figure.axes]
+
+
+def test_the_benchmarks_map_is_large_and_its_cells_are_valid() -> None:
+    """Every pair of ends of two axes is a scene."""
+    known = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "stability_map.py"))
+    panels, quick = known["PANELS"], known["QUICK"]
+    assert sum(len(list(panel.cells())) for panel in panels) == 520
+    assert sum(len(list(panel.cells())) for panel in quick) == 12
+    assert len({panel.name for panel in panels}) == len(panels)
+    for panel in (*panels, *quick):
+        for x, y in itertools.product(panel.x.values[:: len(panel.x.values) - 1], panel.y.values):
+            panel.scene.with_values(panel.x.at(x) | panel.y.at(y))

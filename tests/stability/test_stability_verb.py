@@ -61,7 +61,7 @@ def test_two_axes_make_a_panel_of_runs_of_the_scene(mapped) -> None:
 def test_text_and_figure_are_written(mapped) -> None:
     out, _, said = mapped
     assert f"panel 1: --over {SPEED}=0.01..1 --over {STOP}=100..200: 4 cells" in said
-    assert re.search(r"4 cells in 1 groups: 2 ended, 2 ok", said)
+    assert re.search(r"4 cells in 1 panel: 2 ended, 2 ok", said)
     text = (out / "stability.md").read_text(encoding="utf-8")
     assert f"| panel 1 | {SPEED} (m/s) | 1 .. 1 | 1 .. 1 | end time | - |" in text
     assert (out / "stability.png").read_bytes().startswith(b"\x89PNG")
