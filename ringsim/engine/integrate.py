@@ -130,7 +130,7 @@ class Integration:
             solver.it.currentStepSize = step
             self._fresh = False
             if self._built.cables is not None and self._chain is not None:
-                self._built.cables.advance(now, step, self._chain, self._path_slopes())
+                self._built.cables.advance(now, self._chain, self._path_slopes())
         else:
             self.history.halvings += 1
             if self._shorter is not None:

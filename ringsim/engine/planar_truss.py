@@ -15,8 +15,9 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.cable.sheaves import FixedSheave
 from ringsim.engine.assembly import Assembly, Frame
-from ringsim.engine.cable_path import CablePath, FixedStop
+from ringsim.engine.cable_path import CablePath
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.rods import beam_section
 from ringsim.engine.rods_geometrically_exact import GeometricallyExact
@@ -82,9 +83,9 @@ def build_truss(scene: Scene) -> TrussModel:
     _add_strut(model, axis)
     _add_rest(model, truss.rest)
     path = [
-        FixedStop(model.axis, np.array([0.0, scene.cables.winch_distance, 0.0])),
-        FixedStop(model.axis, np.zeros(3)),
-        FixedStop(model.bar, np.zeros(3)),
+        FixedSheave(model.axis, np.array([0.0, scene.cables.winch_distance, 0.0])),
+        FixedSheave(model.axis, np.zeros(3)),
+        FixedSheave(model.bar, np.zeros(3)),
     ]
     model.cable = CableDrive(model, scene.cables, CablePath([path]))
     model.assembly.finish()

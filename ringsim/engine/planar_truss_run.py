@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.state import ChainState
-from ringsim.engine import quaternions
 from ringsim.engine.closing import close
 from ringsim.engine.energy import Energies
 from ringsim.engine.guard import Guard
 from ringsim.engine.planar_truss import TrussModel, rest_force
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.rod_dampers import STIFFENING
+from ringsim.engine.rotations import axes_of
 from ringsim.engine.settings import raise_own, solver_settings
 from ringsim.engine.work import StepWork
 from ringsim.variables import Status
@@ -127,8 +127,7 @@ class TrussIntegration:
     def _read(self, time: float) -> bool:
         if self._reader.read(time, self.history):
             chain, slope = self._reader.chain, self._reader.path_slope
-            step = self._model.scene.solver.step
-            self._model.cable.advance(time, step, chain, np.array([slope]))
+            self._model.cable.advance(time, chain, np.array([slope]))
             return not self._guard.stops(self.history)
         self.history.status = Status.DIVERGED
         self.history.reason = f"the state is not finite at {time:.6g} s: reduce solver.step"
@@ -259,7 +258,7 @@ class TrussReader:
     def _gap(self, position: Array) -> float:
         """Largest distance of points that a joint holds together, m."""
         pins = position[self._pins[:, 0]] - position[self._pins[:, 1]]
-        turn = quaternions.axes_of(position[self._bar[3:]][None])[0]
+        turn = axes_of(position[self._bar[3:]][None])[0]
         hanging = position[self._bar[:3]] - self._model.truss.axis_length * turn[:, 1]
         ends = (position[self._lower_end] - hanging)[None]
         fixed = position[self._fixed] - self._fixed_at

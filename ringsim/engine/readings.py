@@ -6,8 +6,8 @@ import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine import quaternions
 from ringsim.engine.pantograph_ring import Joint, RingModel
+from ringsim.engine.rotations import axes_of, spin
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -57,9 +57,8 @@ class JointGroup:
         if self._arms is None:
             return self.turn(state)[1]
         rod = self._read(state.position[self._first], state.velocity[self._first])
-        hinge = quaternions.angular_velocity(
-            state.position[self._second][:, 3:7], state.velocity[self._second][:, 3:7]
-        )
+        place, moving = state.position[self._second], state.velocity[self._second]
+        hinge = spin(place[:, 3:7], moving[:, 3:7])
         return np.asarray(rod.spin - np.sum(hinge * rod.z, axis=1))
 
     def gaps(self, state: State) -> Array:
@@ -68,7 +67,7 @@ class JointGroup:
         second = state.position[self._second]
         place = second[:, :3]
         if self._arms is not None:
-            axes = quaternions.axes_of(second[:, 3:7])
+            axes = axes_of(second[:, 3:7])
             place = place + np.einsum("nij,nj->ni", axes, self._arms)
         return np.asarray(np.linalg.norm(first - place, axis=1))
 

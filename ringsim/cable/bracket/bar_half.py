@@ -33,7 +33,7 @@ class BarHalfBracket(Bracket):
 
     kind: Literal["bar-half"] = "bar-half"
     angle: Annotated[float, Field(ge=90.0, le=270.0), Unit("deg")]
-    """Theta."""
+    """theta."""
     half: Literal["first", "second"] = "first"
     """The half towards the section's first or second corner, seen from the boom."""
 
@@ -49,7 +49,7 @@ class BarHalfBracket(Bracket):
         )
 
     def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
-        """A and b with theta - delta / 2 = theta - 90 deg + phi."""
+        """Return a and b with theta - delta / 2 = theta - 90 deg + phi."""
         turn = np.radians(self.angle - 90.0) + np.asarray(phi, dtype=float)
         return self._sign * distance * np.cos(turn), distance * np.sin(turn)
 
