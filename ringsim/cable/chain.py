@@ -15,7 +15,7 @@ full decay towards the far end while the rope runs to the winch (s_j > 0), inver
 back, uniform tension at rest.  The stretch of span i, T_i L_i M / (S EA), summed over the spans
 must be S - M; hence T_i = q c_i / (sum c_k L_k / S), that is T_0 = EA (S - M) (S / M) /
 sum c_k L_k when taut.  To first order of strain that is paper 000's eqs 22-26 put right (their
-products of lengths and slips of index are errors of print); for c = 1 it is exactly
+products of lengths and shifted indices are misprints); for c = 1 it is exactly
 EA (S - M) / M.  Sums are taken with c relative to its largest value, so that long chains of bad
 pulleys neither overflow nor divide by zero.
 
@@ -73,8 +73,8 @@ class Chain:
 
     Examples
     --------
-    A winch pulls at 5 mm/s, 1 mm beyond the natural length of 2 m, over one pulley at which the
-    rope turns by 90 deg.  The bearing takes 5.5 % of the tension behind the pulley.
+    A rope of 2 m turns by 90 deg over one pulley; 1 mm of it is wound, at 5 mm/s.  The pulley's
+    bearing takes 5.5 % of the tension at the winch.
 
     >>> from ringsim.cable.friction.bearing import BearingFriction
     >>> from ringsim.cable.records import Winch
@@ -169,10 +169,9 @@ class Chain:
         shares = weights / (ropes.along(weights * lengths) / paths)[ropes.of_span]
 
         material = RopeMaterial(*self._material[:, ropes.cable])
-        strain_rate = (path_rates + paths / natural * winding) / natural
-        forces = material.axial_stiffness * (
-            paths / natural - 1.0 + material.damping_time * strain_rate
-        )
+        strains = paths / natural - 1.0
+        strain_rates = (path_rates + paths / natural * winding) / natural
+        forces = material.axial_stiffness * (strains + material.damping_time * strain_rates)
         tension = ropes.alive * slack.tension(forces, material.slack_width)
         return ChainState(
             ropes=ropes,
@@ -192,6 +191,8 @@ class Chain:
             path_rates=path_rates,
             natural=natural,
             wound_rates=winding,
+            strains=strains,
+            strain_rates=strain_rates,
             forces=forces,
             mean_tensions=tension,
             wound=wound,

@@ -59,6 +59,9 @@ class ChainState:
         Path length of each rope (m) and its rate (m/s), shape (ropes,).
     natural, wound_rates
         Natural length of each rope (m) and what its winches take up (m/s), shape (ropes,).
+    strains, strain_rates
+        Mean strain of each rope, (path - natural) / natural as of paper 001's element, and its
+        rate in 1/s, shape (ropes,).
     forces
         Elastic and viscous force of each rope before smoothing (N), shape (ropes,).
     mean_tensions
@@ -85,20 +88,12 @@ class ChainState:
     path_rates: Array
     natural: Array
     wound_rates: Array
+    strains: Array
+    strain_rates: Array
     forces: Array
     mean_tensions: Array
     wound: Array
     wound_rate: Array
-
-    @property
-    def strains(self) -> Array:
-        """Mean strain of each rope, (path - natural) / natural: paper 001's element."""
-        return self.paths / self.natural - 1.0
-
-    @property
-    def strain_rates(self) -> Array:
-        """Rate of the mean strain, in 1/s, shape (ropes,)."""
-        return (self.path_rates + self.paths / self.natural * self.wound_rates) / self.natural
 
     @property
     def is_slack(self) -> NDArray[np.bool_]:

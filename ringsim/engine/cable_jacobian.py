@@ -52,14 +52,10 @@ class JacobianPattern:
         self._path = path
         self._size = path.size
         self._spans = ropes.spans
-        legs: list[tuple[int, int, float]] = []
-        for span in range(ropes.spans):
-            for point, sign in ((ropes.near[span], -1.0), (ropes.far[span], 1.0)):
-                found = np.flatnonzero(path.leg_point == point)
-                legs += [(span, int(leg), sign) for leg in found]
-        self._span = np.array([leg[0] for leg in legs])
-        self._leg = np.array([leg[1] for leg in legs])
-        self._sign = np.array([leg[2] for leg in legs])
+        # Every leg of the two points of every span; the far point adds to the difference.
+        ends = np.stack([ropes.near, ropes.far], axis=1).ravel()
+        end, self._leg = np.nonzero(path.leg_point == ends[:, None])
+        self._span, self._sign = end // 2, 2.0 * (end % 2) - 1.0
         nodes = path.leg_node[self._leg]
         own, width = path.spots[nodes], path.width
         differences = self._difference(self._span)
