@@ -99,8 +99,8 @@ class Integration:
             solver.it.currentStepSize = control.next_step(self._built.faults.next_time)
             self._fresh = False
             if cables is not None and self._chain is not None:
-                now, step = control.now, solver.it.currentStepSize
-                cables.advance(now.time, step, self._chain, self._path_slopes(now.angles))
+                now = control.now
+                cables.advance(now.time, self._chain, self._path_slopes(now.angles))
         else:
             solver.it.currentStepSize = control.retry(solver.it.currentStepSize)
         self._weighed, self._refused = None, False

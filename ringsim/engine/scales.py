@@ -34,12 +34,12 @@ def scales_of(built: Built) -> scales.Scales:
     if scene.stop is not None:
         step = scales.contact_step(_bouncing(layout), scene.stop.stiffness)
         found = replace(found, contact_step=step)
-    if built.cables is not None:
-        cables, lengths = built.cables.chain.cables, np.abs(built.cables.ropes.content)
-        widths = np.array([cable.slack_width for cable in cables])
+    if built.cables is not None and scene.cables is not None:
+        cables, lengths = scene.cables.present(), np.abs(built.cables.ropes.content)
+        widths = np.array([cable.slack_width for _, cable in cables])
         stiffness = sum(
             cable.axial_stiffness / float(length) * structure.path_slope(cable, angles[plane]) ** 2
-            for plane, cable, length in zip(built.cables.planes, cables, lengths, strict=True)
+            for (plane, cable), length in zip(cables, lengths, strict=True)
         )
         found = replace(
             found,

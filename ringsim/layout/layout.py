@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.cable.sheaves import BlockSheave, Sheave
 from ringsim.layout.bodies import Body, InSpace, Mount, OnBody, Rod
 from ringsim.layout.joints import Joint, JointOpening, Opening
 from ringsim.layout.pose import Pose, cross
-from ringsim.layout.sheaves import BlockSheave, Sheave
 from ringsim.layout.springs import BoomBeam, Contact, HubNet, Spring
 
 Array = NDArray[np.float64]
@@ -120,7 +120,7 @@ class Layout:
     def sheave(self, sheave: Sheave) -> tuple[Array, Array]:
         """Place of a sheave in space and its derivative after the coordinate, shape (3,), m."""
         if not isinstance(sheave, BlockSheave):
-            return self.pose(sheave.mount).at(sheave.arm)
+            return self.pose(sheave.node).at(sheave.arm)
         left, right = self.pose(sheave.left), self.pose(sheave.right)
         both = left.axes[:, 1] + right.axes[:, 1]
         both = both + sheave.sense * (right.axes[:, 0] - left.axes[:, 0])

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from ring_runs import Array, ring, run
-from ringsim.engine import quaternions
 from ringsim.engine.build import Built, build
 from ringsim.engine.integrate import Integration
+from ringsim.engine.rotations import turn_rates
 
 
 @pytest.mark.parametrize("base", ["free", "fixed"])
@@ -57,8 +57,7 @@ def momenta(built: Built) -> tuple[Array, Array]:
             shifts[axis, own[:3]] = unit
             turns[axis, own[:3]] = np.cross(unit, places[own[:3]])
             if len(own) == 7:
-                spin = np.concatenate([[0.0], unit])
-                turns[axis, own[3:]] = 0.5 * quaternions.product(spin, places[own[3:]])
+                turns[axis, own[3:]] = turn_rates(places[own[3:]][None], unit[None])[0]
             elif len(own) == 6:
                 turns[axis, own[3:]] = np.cross(unit, places[own[3:]])
     return shifts @ pushed, turns @ pushed
