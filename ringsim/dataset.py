@@ -12,8 +12,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.choice import kind_of
-from ringsim.files import whole, writing
-from ringsim.refusal import InputError
+from ringsim.files import require_place, whole, writing
 from ringsim.scene import Scene
 from ringsim.variables import COORDINATES, RODS, VARIABLES, Fidelity, Outcome, Status, Variable
 
@@ -85,10 +84,7 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
         If the folder does not exist, or if the file cannot be written there.
     """
     path = Path(path)
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}: create it first")
-    if path.is_dir():
-        raise InputError(f"{path}: this is a folder: give the name of a file")
+    require_place(path)
     with writing(path), whole(path) as draft:
         dataset.drop_encoding().to_netcdf(
             draft,

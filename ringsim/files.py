@@ -62,6 +62,22 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         raise InputError(f"{source}: a number cannot be read: {error}") from None
 
 
+def require_place(path: Path) -> None:
+    """Refuse a file that could not be written, before time is spent on its content.
+
+    Raises
+    ------
+    InputError
+        If it is a folder, or if there is no folder to write it to.
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: this is a folder: give the name of a file")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}: create it first")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path}: cannot be written to this folder: choose another one")
+
+
 @contextlib.contextmanager
 def writing(path: Path, cure: str = "make room or choose another folder") -> Iterator[None]:
     """Refuse what goes wrong while a file is written, with the cure.
