@@ -189,7 +189,7 @@ def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tm
         with pytest.raises(InputError, match="not the settings"):
             read_evidence(file)
     file.write_bytes(b"\xff\xfe")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match=r"cannot be read|not a text file"):
         read_evidence(file)
     best = min(setting.errors["motion"] for setting in evidence.settings)
     with pytest.raises(InputError) as told:
