@@ -43,9 +43,8 @@ class OneOf:
 
 
 def kinds_of(family: type[Model]) -> dict[str, type[Model]]:
-    """All kinds of a family by name, in the order of their classes' names."""
-    kinds = sorted(leaves_of(family), key=lambda kind: kind.__name__)
-    return {str(kind.model_fields["kind"].default): kind for kind in kinds}
+    """All kinds of a family by name."""
+    return {str(kind.model_fields["kind"].default): kind for kind in leaves_of(family)}
 
 
 def kind_of(record: Model) -> str:
@@ -54,12 +53,12 @@ def kind_of(record: Model) -> str:
 
 
 def leaves_of(family: type[Model]) -> list[type[Model]]:
-    """The kinds of a family, or the class itself if it is none."""
+    """The kinds of a family in the order of their classes' names; the class itself if none."""
     package, _, file = family.__module__.rpartition(".")
     if file == "family":
         _load(package)
-    below = family.__subclasses__()
-    return [leaf for sub in below for leaf in leaves_of(sub)] if below else [family]
+    below = [leaf for sub in family.__subclasses__() for leaf in leaves_of(sub)]
+    return sorted(below, key=lambda kind: kind.__name__) or [family]
 
 
 @functools.cache
