@@ -43,9 +43,8 @@ class OneOf:
 
 
 def kinds_of(family: type[Model]) -> dict[str, type[Model]]:
-    """All kinds of a family by name, in the order of their classes' names."""
-    kinds = sorted(leaves_of(family), key=lambda kind: kind.__name__)
-    return {str(kind.model_fields["kind"].default): kind for kind in kinds}
+    """All kinds of a family by name."""
+    return {str(kind.model_fields["kind"].default): kind for kind in leaves_of(family)}
 
 
 def kind_of(record: Model) -> str:
@@ -54,12 +53,13 @@ def kind_of(record: Model) -> str:
 
 
 def leaves_of(family: type[Model]) -> list[type[Model]]:
-    """The kinds of a family, each with a ``kind`` of its own; one may extend another."""
+    """The kinds of a family in the order of their classes' names; one may extend another."""
     package, _, file = family.__module__.rpartition(".")
     if file == "family":
         _load(package)
     own = [family] if "kind" in family.__annotations__ else []
-    return own + [kind for below in family.__subclasses__() for kind in leaves_of(below)]
+    below = [kind for sub in family.__subclasses__() for kind in leaves_of(sub)]
+    return sorted(own + below, key=lambda kind: kind.__name__)
 
 
 @functools.cache

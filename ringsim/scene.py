@@ -153,7 +153,7 @@ def _check_faults(scene: Scene) -> None:
             pulleys = scene.pulleys_of(cables[fault.cable - 1][1])
             places |= {"pulley": pulleys, "span": pulleys + 1}
         for name, most in places.items():
-            given = getattr(fault, name, 1)
+            given = getattr(fault, name, 0)
             if isinstance(fault, CableFault) and not cables:
                 raise ValueError(
                     f"faults[{number}] is a fault of a cable, but the scene has none: add "
