@@ -30,7 +30,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from random_scenes import random_scene
@@ -101,12 +101,12 @@ class Checkout:
 
     def solve(self, entry: dict[str, Any]) -> dict[str, Any]:
         stdin, stdout = self.process.stdin, self.process.stdout
-        assert stdin is not None
-        assert stdout is not None
+        assert stdin is not None and stdout is not None  # noqa: PT018
         try:
             stdin.write(json.dumps(entry).encode() + b"\n")
             stdin.flush()
-            return _received(stdout)
+            found: dict[str, Any] = pickle.load(stdout)
+            return found
         except (EOFError, BrokenPipeError):
             code = self.process.wait()
             self.start()
@@ -116,11 +116,6 @@ class Checkout:
 
     def close(self) -> None:
         self.process.communicate()
-
-
-def _received(stream: BinaryIO) -> dict[str, Any]:
-    found: dict[str, Any] = pickle.load(stream)
-    return found
 
 
 def built_in() -> list[dict[str, Any]]:
@@ -209,10 +204,6 @@ def _bar(name: str, run: dict[str, Any], shape: tuple[int, ...]) -> np.ndarray |
         return np.where(values > 0.0, values, np.nan)
 
 
-def is_series(name: str, *runs: dict[str, Any]) -> bool:
-    return any("time" in run["values"].get(name, ((), 0))[0] for run in runs)
-
-
 def compare(asked: argparse.Namespace) -> None:
     before, after = (pickle.loads(f.read_bytes())["found"] for f in (asked.before, asked.after))
     shared = [name for name in before if name in after]
@@ -224,13 +215,14 @@ def compare(asked: argparse.Namespace) -> None:
         found = differences(one, two)
         for output, pair in found.items():
             every.setdefault(output, []).append(pair)
-        series = {n: d for n, (d, _) in found.items() if is_series(n, one, two)}
+        dims = {n: d for run in (one, two) for n, (d, _) in run["values"].items()}
+        series = {n: d for n, (d, _) in found.items() if "time" in dims[n]}
         numbers = {n: d for n, (d, _) in found.items() if n not in series}
-        bars = {n: share for n, (_, share) in found.items()}
+        bars_over = {n: share for n, (_, share) in found.items()}
         steps = [int(r["values"]["steps"][1]) if "steps" in r["values"] else -1 for r in (one, two)]
         status = one["status"] if one["status"] == two["status"] else (
             f"**{one['status']} -> {two['status']}**")  # fmt: skip
-        cells = [name, status, worst(numbers), worst(series), worst(bars),
+        cells = [name, status, worst(numbers), worst(series), worst(bars_over),
                  str(steps[0]) if steps[0] == steps[1] else f"{steps[0]} -> {steps[1]}",
                  f"{two['cpu'] / one['cpu']:.2f}"]  # fmt: skip
         print(f"| {' | '.join(cells)} |")
@@ -245,11 +237,11 @@ def compare(asked: argparse.Namespace) -> None:
     print("|---|---|---|---|---|---|")
     for output, pairs in every.items():
         apart = [pair[0] for pair in pairs]
-        largest = _largest([pair[1] for pair in pairs])
+        bars = _largest([pair[1] for pair in pairs])
         print(f"| {output} | {len(apart)} | {sum(a == 0.0 for a in apart)} | "
-              f"{statistics.median(apart):.1e} | {max(apart):.1e} | {largest:.1e} |")  # fmt: skip
-    alone = sorted(set(before) ^ set(after))
-    print(f"\n{len(shared)} scenes" + (f"; in one file alone: {', '.join(alone)}" if alone else ""))
+              f"{statistics.median(apart):.1e} | {max(apart):.1e} | "
+              f"{'' if np.isnan(bars) else format(bars, '.1e')} |")  # fmt: skip
+    print(f"\n{len(shared)} scenes; {len(set(before) ^ set(after))} are in one file alone")
     report_times([(before[name]["cpu"], after[name]["cpu"]) for name in shared])
 
 
