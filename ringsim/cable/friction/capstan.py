@@ -15,6 +15,10 @@ class CapstanFriction(PulleyFriction):
     """eta = exp(-mu (pi - a)): dry friction along the wrap angle pi - a.
 
     Source: Euler-Eytelwein.  The radius of the sheave plays no part.
+
+    >>> half_turn = np.array([0.0])  # the rope turns back: the angle between its pulls is 0
+    >>> CapstanFriction(coefficient=0.1).decay(half_turn, radius=0.01).round(4).tolist()
+    [0.7304]
     """
 
     kind: Literal["capstan"] = "capstan"

@@ -16,7 +16,12 @@ def _as_tuple(value: Any) -> Any:
 
 
 class Discrete(Distribution):
-    """Each of the values with its probability; all alike if none are given."""
+    """Each of the values with its probability; all alike if none are given.
+
+    >>> rods = Discrete(values=("soft", "stiff"), probabilities=(0.3, 0.7))
+    >>> rods.quantile(np.array([0.2, 0.4])).tolist()
+    ['soft', 'stiff']
+    """
 
     kind: Literal["discrete"] = "discrete"
     values: Annotated[
