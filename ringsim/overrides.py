@@ -22,6 +22,13 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     ------
     InputError
         If there is no ``=``, no path or no value.
+
+    Examples
+    --------
+    >>> parse_assignment("loads.force = 0.02")
+    ('loads.force', 0.02)
+    >>> parse_assignment("rods.kind=ancf")
+    ('rods.kind', 'ancf')
     """
     path, equals, raw = text.partition("=")
     path, raw = path.strip(), raw.strip()

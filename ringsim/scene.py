@@ -114,6 +114,15 @@ class Scene(Model):
         ------
         InputError
             If a path or a value is refused.
+
+        Examples
+        --------
+        >>> scene = load_scene("ring18").with_values({"loads.force": 0.02, "boom": "none"})
+        >>> scene.loads.force, scene.boom
+        (0.02, None)
+        >>> stiff = scene.with_values({"rods.young_modulus[3]": 2e11})  # section 3 alone
+        >>> stiff.rods.young_modulus[1:4]
+        (120000000000.0, 200000000000.0, 120000000000.0)
         """
         table = self.to_table()
         for path, value in values.items():
@@ -231,6 +240,16 @@ def load_scene(name_or_path: str | Path) -> Scene:
     ------
     InputError
         If there is no such scene or file, or if its content is refused.
+
+    Examples
+    --------
+    >>> scene = load_scene("ring18")
+    >>> scene.structure.sections, scene.loads.force
+    (18, 0.015)
+    >>> load_scene("ring19")
+    Traceback (most recent call last):
+    ringsim.refusal.InputError: ring19: no such file, and no built-in scene of that name
+    (did you mean ring18?)
     """
     builtin = builtin_scenes()
     if str(name_or_path) in builtin:

@@ -82,6 +82,18 @@ def simulate(scene: Scene, fidelity: str = "full") -> xr.Dataset:
     ------
     InputError
         If the ideal ring cannot represent the scene.
+
+    Examples
+    --------
+    >>> from ringsim.scene import load_scene
+    >>> scene = load_scene("truss2").with_values({"solver.end_time": 0.5})
+    >>> run = simulate(scene)
+    >>> run.attrs["reason"]
+    'solver.end_time = 0.5 s was reached with 0 of 4 V-joints locked'
+    >>> dict(run["opening_angle"].sizes)
+    {'plane': 2, 'section': 2, 'time': 6}
+    >>> bool(run["energy_error"] < 1e-3)
+    True
     """
     from ringsim.dataset import to_dataset
 

@@ -13,17 +13,6 @@ from ringsim.stepping.locks import Locks, StopContact
 from ringsim.variables import Status
 
 
-def test_an_open_joint_bounces_and_a_latched_one_stays() -> None:
-    loose, held = (
-        run(ring(3, stop__latch=latch, solver__settling_time=0.3)) for latch in (False, True)
-    )
-    first = float(np.max(held.locks))
-    back = [math.pi - r.angles[r.times > first + 0.02].min() for r in (loose, held)]
-    assert back[0] > math.radians(1.0)
-    assert back[1] < 0.2 * back[0]
-    assert held.locks.max() == pytest.approx(loose.locks.max(), rel=1e-3)
-
-
 def test_without_stops_the_run_ends_when_all_have_deployed() -> None:
     dataset = simulate(ring(3, stop="none"))
     assert str(dataset.attrs["reason"]) == "all V-joints have reached 180 deg"
@@ -132,12 +121,19 @@ def test_what_lies_after_the_end_is_nan() -> None:
         pytest.param({"rods__young_modulus": 1e15}, id="stiff-as-nothing"),
     ],
 )
-def test_hard_cases_give_a_dataset(hardship: dict[str, float]) -> None:
-    dataset = simulate(ring(3, solver__end_time=4.0, **hardship))
-    assert int(dataset["status"]) in (0, 1, 2, 3)
-    assert str(dataset.attrs["reason"])
-    if int(dataset["status"]) >= 2:
-        assert "solver." in str(dataset.attrs["reason"])
+def test_hard_cases_end_in_a_sound_number_or_a_cure(hardship: dict[str, float]) -> None:
+    scene = ring(3, solver__end_time=4.0, **hardship)
+    dataset = simulate(scene)
+    reason = str(dataset.attrs["reason"])
+    match Status(int(dataset["status"])):
+        case Status.OK:  # the spread of lock times of the elastic ring
+            assert float(dataset["deployment_time"]) == pytest.approx(ideal_time(scene), rel=2e-3)
+        case Status.UNFINISHED:
+            assert ideal_time(scene) > 4.0
+        case Status.SOLVER_FAILED | Status.DIVERGED:
+            assert "solver." in reason
+        case other:
+            pytest.fail(f"{other.word}: {reason}")
 
 
 def test_a_run_that_creeps_is_given_up_with_the_cure() -> None:

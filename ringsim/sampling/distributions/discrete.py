@@ -13,7 +13,12 @@ from ringsim.units import ListIn
 
 
 class Discrete(Distribution):
-    """Each of the values with its probability; all alike if none are given."""
+    """Each of the values with its probability; all alike if none are given.
+
+    >>> rods = Discrete(values=("soft", "stiff"), probabilities=(0.3, 0.7))
+    >>> rods.quantile(np.array([0.2, 0.4])).tolist()
+    ['soft', 'stiff']
+    """
 
     kind: Literal["discrete"] = "discrete"
     values: Annotated[

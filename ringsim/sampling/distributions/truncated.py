@@ -16,7 +16,13 @@ LEAST_MASS = 1e-6
 
 
 class Truncated(Distribution):
-    """The distribution ``of``, given that its value lies between ``low`` and ``high``."""
+    """The distribution ``of``, given that its value lies between ``low`` and ``high``.
+
+    >>> from ringsim.sampling.distributions.continuous.normal import Normal
+    >>> force = Truncated(of=Normal(mean=0.015, standard_deviation=0.002), low=0.015)
+    >>> force.quantile(np.array([0.0])).tolist()
+    [0.015]
+    """
 
     bounded: ClassVar[bool] = False
 
