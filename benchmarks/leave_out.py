@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ringsim.engine.planar_truss import build_truss
 
 from ringsim.choice import kind_of
 from ringsim.engine.build import build
@@ -82,8 +81,7 @@ def size_of(scene: Scene) -> tuple[int, int, float]:
     seconds = []
     for _ in range(3):
         begin = time.process_time()
-        truss = kind_of(scene.structure) == "planar-truss"
-        assembly = build_truss(scene).assembly if truss else build(scene).ring.assembly
+        assembly = build(scene).model.assembly
         seconds.append(time.process_time() - begin)
     data = assembly.system.systemData
     return data.ODE2Size(), data.AEsize(), min(seconds)
@@ -104,7 +102,7 @@ def standing_of(name: str) -> Standing:
     if kind_of(scene.structure) != "planar-truss":
         scene = scene.with_values({"record.stress": True})
     outcome = run(scene)
-    coarse = run(scene.model_copy(update={"solver": scene.solver.coarsened()}))
+    coarse = run(scene.model_copy(update={"solver": scene.solver.scaled(2.0)}))
     bars = apart(outcome, coarse)
     stated = error_bars(outcome, coarse, scene.rods.elements, scene.solver.tolerance)
     bars |= {

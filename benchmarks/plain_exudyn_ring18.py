@@ -4,7 +4,7 @@ Written the way exudyn is usually used: geometrically exact beams (one element p
 its ready-made joints, a symbolic function for the one-sided net springs, sparse linear solver,
 modified Newton, a constant step of 20 ms, tolerances just above the round-off of the residual,
 and one sensor, at the V-joint of section 1.  Only points and directions come from
-ringsim.geometry.
+ringsim.structures.
 
 Run: python benchmarks/plain_exudyn_ring18.py
 """

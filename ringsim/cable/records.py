@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,11 +11,10 @@ from pydantic import Field, model_validator
 from ringsim.cable import regularisation
 from ringsim.cable.bracket.bisector import BisectorBracket
 from ringsim.cable.bracket.family import Bracket
-from ringsim.cable.faults.family import CableFault
 from ringsim.cable.friction.family import PulleyFriction
 from ringsim.cable.friction.frictionless import Frictionless
 from ringsim.cable.winding.family import PrescribedWinding, WinchState, Winding
-from ringsim.choice import load_package, one_of
+from ringsim.choice import OneOf
 from ringsim.units import (
     AxialStiffness,
     Metre,
@@ -28,20 +27,9 @@ from ringsim.units import (
 )
 
 Array = NDArray[np.float64]
-
-for _package in ("bracket", "friction", "winding", "faults"):
-    load_package(f"ringsim.cable.{_package}")
-
-if TYPE_CHECKING:
-    AnyBracket = Bracket
-    AnyFriction = PulleyFriction
-    AnyWinding = Winding
-    AnyFault = CableFault
-else:
-    AnyBracket = one_of(Bracket)
-    AnyFriction = one_of(PulleyFriction)
-    AnyWinding = one_of(Winding)
-    AnyFault = one_of(CableFault)
+AnyBracket = Annotated[Bracket, OneOf()]
+AnyFriction = Annotated[PulleyFriction, OneOf()]
+AnyWinding = Annotated[Winding, OneOf()]
 
 
 class Winch(Model):

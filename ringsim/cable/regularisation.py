@@ -37,7 +37,11 @@ _MOVES = 1e-3
 
 
 def slip_speed(winding: float, pulleys: int) -> float:
-    """The slip speed (m/s) that suits a winding speed (m/s, of all winches of a cable)."""
+    """The slip speed (m/s) that suits a winding speed (m/s, of all winches of a cable).
+
+    >>> round(slip_speed(winding=6e-4, pulleys=5), 9)
+    5e-05
+    """
     if winding <= 0.0:
         return LARGEST_SLIP_SPEED
     return min(LARGEST_SLIP_SPEED, SHARE * winding / (pulleys + 1))

@@ -21,12 +21,17 @@ Array = NDArray[np.float64]
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
-
 _SLACKEST = -200.0
+"""y / b below which the tension stays as it is: exp(-200) = 1e-87 is nothing beside any force, and
+its square and its inverse are still doubles."""
 
 
 def tension(force: Array, width: Array) -> Array:
-    """q(y) in N."""
+    """q(y) in N.
+
+    >>> tension(np.array([-1.0, 0.0, 1.0]), np.array(0.05)).round(4)
+    array([0.    , 0.0347, 1.    ])
+    """
     return np.asarray(width * np.logaddexp(0.0, np.maximum(force / width, _SLACKEST)))
 
 

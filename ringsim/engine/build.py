@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
 from ringsim.engine.boom import add_boom
-from ringsim.engine.cable_path import BlockStop, CablePath, FixedStop, Stop
+from ringsim.engine.cable_path import CablePath
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.faults import Faults
 from ringsim.engine.joints import add_friction, add_stops
@@ -17,9 +18,7 @@ from ringsim.engine.net import add_net
 from ringsim.engine.rods import Formulation
 from ringsim.engine.rods_ancf import Ancf
 from ringsim.engine.rods_geometrically_exact import GeometricallyExact
-from ringsim.engine.slope_path import SlopePath
 from ringsim.layout.bodies import OnBody
-from ringsim.layout.sheaves import BlockSheave, Sheave
 from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.scene import Scene
@@ -63,8 +62,8 @@ def build(scene: Scene) -> Built:
     stops = add_stops(model)
     cables = None
     if scene.cables is not None:
-        kind = SlopePath if isinstance(model.formulation, Ancf) else CablePath
-        path = kind([[_stop(model, sheave) for sheave in path] for path in model.layout.paths])
+        paths = [[_on_nodes(model, sheave) for sheave in path] for path in model.layout.paths]
+        path = CablePath(paths, slopes=isinstance(model.formulation, Ancf))
         cables = CableDrive(model, scene.cables, path)
     faults = Faults(model, cables)
     model.assembly.finish()
@@ -73,11 +72,11 @@ def build(scene: Scene) -> Built:
     return Built(model, hub, stops, cables, faults)
 
 
-def _stop(model: Model, sheave: Sheave) -> Stop:
+def _on_nodes(model: Model, sheave: Sheave) -> Sheave:
     """A sheave of the layout on the nodes that carry it."""
     if isinstance(sheave, BlockSheave):
         left, right = (side_of(model, mount)[0] for mount in (sheave.left, sheave.right))
-        return BlockStop(left, right, sheave.sense, sheave.offset)
-    node, arm = side_of(model, sheave.mount)
-    axes = sheave.mount.axes if isinstance(sheave.mount, OnBody) else np.eye(3)
-    return FixedStop(node, arm + axes @ sheave.arm)
+        return BlockSheave(left, right, sheave.sense, sheave.offset)
+    node, arm = side_of(model, sheave.node)
+    axes = sheave.node.axes if isinstance(sheave.node, OnBody) else np.eye(3)
+    return FixedSheave(node, arm + axes @ sheave.arm)

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.state import ChainState
-from ringsim.engine.contact import contact_force
 from ringsim.engine.faults import Faults
-from ringsim.engine.joints import friction_torque, stop_torque
 from ringsim.engine.model import Model
-from ringsim.engine.net import net_forces
 from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.work import StepWork
-from ringsim.parts.joints import JointFriction
+from ringsim.parts.joint_friction.family import JointFriction
+from ringsim.parts.persection import at_section
+from ringsim.stepping.instant import Energies
 
 Array = NDArray[np.float64]
 _KINETIC = exu.OutputVariableType.KineticEnergy
@@ -25,19 +24,6 @@ _POTENTIAL = exu.OutputVariableType.PotentialEnergy
 Damping = tuple[Array, Array]
 """Damping forces and the rates that they act against."""
 _NOTHING: Damping = (np.zeros(0), np.zeros(0))
-
-
-class Energies(NamedTuple):
-    """Energies in J: kinetic, elastic and work of the loads at one instant; since the instant
-    before, what was lost in friction, dampers and stops, and what the winches put in less the
-    strain energy that they wind up.
-    """
-
-    kinetic: float
-    elastic: float
-    work: float
-    lost: float
-    driven: float = 0.0
 
 
 class EnergyMeter:
@@ -94,15 +80,16 @@ class EnergyMeter:
         kinetic = sum(self._output(body, _KINETIC) for body in self._model.assembly.bodies)
         elastic = float(sum(self._output(element, _POTENTIAL) for element in self._elements))
         moved = (state.position - state.reference)[self._lifts]
-        damped = [self._stop_damping(angles, rates, latched)]
-        for law, group, sections in self._friction:
+        in_stops, stop_damping = self._stop_energy(angles, rates, latched)
+        damped = [stop_damping]
+        for law, group in self._friction:
             rate = group.rate(state)
-            damped.append((friction_torque(law, group.sections, sections, rate), rate))
+            damped.append((law.torque(rate), rate))
         stored, net_damping = self._net_energy(state)
         stuck, stuck_damping = self._faults.stuck_energy(angles, rates)
         inside, spring_damping = self._spring_energy(state)
         damped += [net_damping, stuck_damping, spring_damping]
-        elastic += inside + stored + stuck + self._stored_in_stops(angles, latched)
+        elastic += inside + stored + stuck + in_stops
         if chain is not None:
             elastic += float(chain.elastic_energy.sum())
         passed = self._since.since(
@@ -143,61 +130,42 @@ class EnergyMeter:
             return math.nan
         return model.assembly.dampers.lost(model.assembly.system, time)
 
-    def _friction_groups(self) -> list[tuple[JointFriction, JointGroup, int]]:
-        laws = self._model.scene.joints
+    def _friction_groups(self) -> list[tuple[JointFriction, JointGroup]]:
         found = []
-        for family, law in (("pivot", laws.pivot), ("hinge", laws.hinge), ("vjoint", laws.vjoint)):
-            if law is not None:
-                joints = [joint for joint in self._model.joints if joint.family == family]
-                group = JointGroup(self._model, joints)
-                found.append((law, group, self._model.scene.structure.sections))
+        for family, law in self._model.scene.joints.present().items():
+            joints = [joint for joint in self._model.joints if joint.family == family]
+            group = JointGroup(self._model, joints)
+            found.append((at_section(law, group.sections), group))
         return found
 
-    def _stored_in_stops(self, angles: Array, latched: Array) -> float:
+    def _stop_energy(self, angles: Array, rates: Array, latched: Array) -> tuple[float, Damping]:
         stop = self._model.scene.stop
         if stop is None:
-            return 0.0
-        folded = np.pi - angles
-        stowed = np.pi - np.radians(stop.stowed_angle)
-        ends = np.maximum(-folded, 0.0) + np.maximum(folded - stowed, 0.0)
-        return 0.5 * stop.stiffness * float(np.sum(np.where(latched, folded, ends) ** 2))
-
-    def _stop_damping(self, angles: Array, rates: Array, latched: Array) -> Damping:
-        stop = self._model.scene.stop
-        if stop is None:
-            return _NOTHING
-        folded, turning = np.pi - angles, -rates
-        spring = stop_torque(stop, folded, np.zeros_like(turning), latched)
-        torque = stop_torque(stop, folded, turning, latched)
-        return (torque - spring).ravel(), turning.ravel()
+            return 0.0, _NOTHING
+        reaction = stop.torque(np.pi - angles, -rates, latched)
+        return float(np.sum(reaction.stored)), (reaction.damping.ravel(), -rates.ravel())
 
     def _spring_energy(self, state: State) -> tuple[float, Damping]:
         """Energy in springs and contacts of the structure, J, and their damping."""
-        stored, forces, rates = 0.0, [], []
+        found, rates = [], []
         for spring, near, far in self._springs:
             arm = (state.position[far] - state.position[near])[:3]
             length = float(np.linalg.norm(arm))
-            rate = float((state.velocity[far] - state.velocity[near])[:3] @ arm) / length
-            stored += 0.5 * spring.stiffness * (length - spring.free_length) ** 2
-            forces.append(spring.damping * rate)
-            rates.append(rate)
+            rates.append(float((state.velocity[far] - state.velocity[near])[:3] @ arm) / length)
+            found.append(spring.law.tension(length, rates[-1]))
         for contact, where in self._contacts:
-            depth, rate = contact.room - float(state.position[where]), float(state.velocity[where])
-            push, held = contact_force(contact.law, depth, rate)
-            stored += 0.5 * contact.law.stiffness * max(depth, 0.0) ** 2
-            forces.append(held - push)
-            rates.append(rate)
-        return stored, (np.array(forces), np.array(rates))
+            rates.append(-float(state.velocity[where]))
+            found.append(contact.law.push(contact.room - float(state.position[where]), rates[-1]))
+        stored = float(sum(one.stored for one in found))
+        return stored, (np.array([one.damping for one in found]), np.array(rates))
 
     def _net_energy(self, state: State) -> tuple[float, Damping]:
-        net, held = self._model.scene.net, self._model.layout.net
-        if net is None or held is None:
+        net = self._model.scene.net
+        if net is None:
             return 0.0, _NOTHING
         arms = state.position[self._corners] - state.position[self._hub]
         moving = state.velocity[self._corners] - state.velocity[self._hub]
         lengths = np.linalg.norm(arms, axis=1)
         stretch, rate = lengths - net.neutral_length, np.sum(arms * moving, axis=1) / lengths
-        spring, damper = net_forces(
-            stretch, rate, held.stiffness, net.damping, two_sided=net.two_sided
-        )
-        return 0.5 * float(np.sum(spring * stretch)), (damper, rate)
+        tension = at_section(net, np.arange(len(arms))).tension(stretch, rate)
+        return float(np.sum(tension.stored)), (tension.damping, rate)

@@ -85,8 +85,9 @@ class Faults:
         for number, stuck in enumerate(self._joints):
             if stuck.angle is not None:
                 turned = float(angles[stuck.place]) - stuck.angle
-                stored += 0.5 * stuck.fault.stiffness * turned**2
-                forces[number] = stuck.fault.damping * turning[number]
+                reaction = stuck.fault.torque(turned, turning[number])
+                stored += reaction.stored
+                forces[number] = reaction.damping
         return stored, (forces, turning)
 
     def _strike(self, fault: Fault, angles: Array, state: ChainState | None) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.energy import Energies
+from ringsim.stepping.instant import Energies
 from ringsim.variables import Status
 
 Array = NDArray[np.float64]

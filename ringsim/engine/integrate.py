@@ -1,4 +1,6 @@
-"""Integrating a built model: generalised-alpha with a step that follows the motion."""
+"""Integrating a built model with exudyn's generalised-alpha; ``ringsim.stepping`` decides on the
+steps and on the end.
+"""
 
 from __future__ import annotations
 
@@ -12,30 +14,23 @@ from numpy.typing import NDArray
 from ringsim.cable.state import ChainState
 from ringsim.engine.build import Built
 from ringsim.engine.closing import close
-from ringsim.engine.deviation_steps import deviation_steps
-from ringsim.engine.energy import Energies, EnergyMeter
-from ringsim.engine.guard import Guard
+from ringsim.engine.energy import EnergyMeter
 from ringsim.engine.history import History
-from ringsim.engine.locks import Locks
-from ringsim.engine.outcome import lock_times
+from ringsim.engine.joints import latch
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import Openings, State, joint_groups
-from ringsim.engine.scales import (
-    contact_step,
-    residual_tolerance,
-    rope_step,
-    usual_energy,
-    usual_rate,
-)
+from ringsim.engine.scales import residual_tolerance, scales_of
 from ringsim.engine.settings import raise_own, solver_settings
-from ringsim.engine.step_judge import Reading, StepJudge
-from ringsim.engine.stepping import StepControl
 from ringsim.engine.stress import BendingMeter, StressMeter
-from ringsim.variables import Status
+from ringsim.stepping.instant import Instant
+from ringsim.stepping.locks import Locks
+from ringsim.stepping.run_control import RunControl
 
 Array = NDArray[np.float64]
 _REFUSE = 10.0
 """Error that makes exudyn repeat a step; its tolerance is 1."""
+_RECOVERY = 10
+"""Steps after which a constant step that was halved grows again where no lock ends the run."""
 
 
 class Integration:
@@ -51,240 +46,149 @@ class Integration:
         self._openings = Openings(model)
         self._energy = EnergyMeter(model, built.hub, built.faults)
         self._stress = StressMeter(model) if scene.record.stress else None
-        gauge = scene.structure.gauge
-        self._bending = BendingMeter(model, gauge) if gauge else None
+        structure = scene.structure
+        self._bending = BendingMeter(model, structure.gauge) if structure.gauge else None
         self._gaps = joint_groups(model)
-        self._state.refresh()
-        self._locks = Locks(built, self._openings.read(self._state)[0])
-        self._settled_at = math.inf
-        self._steps = StepControl(
-            scene.solver, contact_step(built), usual_rate(scene), rope_step(built)
-        )
-        constant = scene.solver.step_control == "constant"
-        self._judge = None if constant else StepJudge(built)
-        self._deviations = deviation_steps(scene)
-        bend = math.inf
-        if constant and built.cables is not None:
-            bend = max(cable.slack_width for cable in built.cables.chain.cables)
-        self._guard = Guard(scene.solver, usual_energy(scene), scene.structure.reach, bend)
-        self._fresh = True
-        self._weighed: Reading | None = None
-        self._shorter: float | None = None
+        self._latched = np.zeros((len(structure.planes), structure.sections), dtype=bool)
+        self._fresh, self._refused = True, False
+        self._weighed: Instant | None = None
         self._chain: ChainState | None = None
         self.history = History()
+        self._state.refresh()
+        start = self._read(self._measure(0.0))
+        stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
+        self._locks = Locks(start.angles, stowed) if structure.locks else None
+        self._control = RunControl(
+            scene.solver,
+            scales_of(built),
+            start,
+            self._locks,
+            follow_deviations=scene.record.stress,
+            recovery=math.inf if structure.locks else _RECOVERY,
+        )
 
     def run(self) -> History:
         """Integrate until all V-joints have locked and settled, or to the end time."""
-        history, solver, model = self.history, self._solver, self._built.model
+        history, solver, control = self.history, self._solver, self._control
+        predictor = Predictor(self._built.model.assembly, solver)
         solver.SetUserFunctionUpdateCurrentTime(self._system, self._update_time)
         self._system.SetPostStepUserFunction(self._after_step)
-        self._system.SetPreNewtonResidualUserFunction(Predictor(model.assembly, solver).apply)
-        if self._judge is not None:
+        self._system.SetPreNewtonResidualUserFunction(predictor.apply)
+        if self._scene.solver.step_control == "motion":
             self._settings.timeIntegration.discontinuous.ignoreMaxIterations = False
             self._system.SetPostNewtonUserFunction(self._weigh)
-        self._read(0.0)
+        cause = "it stopped before the end"  # exudyn may give up without raising
         try:
-            if solver.InitializeSolver(self._system, self._settings):
+            if control.goes_on and solver.InitializeSolver(self._system, self._settings):
                 solver.SolveSteps(self._system, self._settings)
         except exu.ExudynError as error:
             raise_own(error, self._refusal())
-            if math.isfinite(self._settled_at):
-                history.reason += f"; settling was cut short at {history.times[-1]:.6g} s"
-            elif history.status != Status.DIVERGED:
-                history.status = Status.SOLVER_FAILED
-                history.reason = self._explain(error)
-        if history.status == Status.UNFINISHED and not history.reason:
-            history.status = Status.SOLVER_FAILED  # exudyn may give up without raising
-            history.reason = self._explain(RuntimeError("it stopped before the end"))
-        self._guard.conclude(history)
-        history.reason += self._judge.note() if self._judge is not None else ""
-        history.reason += self._energy.note()
+            cause = _detail(str(error))
+        if control.goes_on:
+            control.fail(self._refusal() or cause)
+        control.conclude()
+        history.status, history.reason = control.status, control.reason + self._energy.note()
+        history.halvings = control.repeats
         close(history, self._system, solver)
         return history
 
-    def _path_slopes(self) -> Array:
-        """Derivative of each cable's ideal path length after the opening angle, m/rad."""
-        cables = self._scene.cables
-        if cables is None:
-            return np.zeros(0)
-        structure, angles = self._scene.structure, self.history.angles[-1]
-        return np.array(
-            [structure.path_slope(cable, angles[plane]) for plane, cable in cables.present()]
-        )
-
     def _update_time(self, solver: Any, system: Any, settings: Any) -> None:
-        """Set the step: the one chosen after the last step, or the reduced one of a retry."""
+        """Set the step: the next one, or the reduced one of a retry."""
+        control, cables = self._control, self._built.cables
         if self._fresh:
-            now = self.history.times[-1]
-            if self._judge is not None:
-                self._judge.locked = math.isfinite(self._settled_at)
-                self._steps.step = min(self._steps.step, self._judge.limit)
-            ends = (self._scene.solver.end_time, self._built.faults.next_time, self._settled_at)
-            step = self._steps.towards(min(ends) - now)
-            solver.it.currentStepSize = step
+            solver.it.currentStepSize = control.next_step(self._built.faults.next_time)
             self._fresh = False
-            if self._built.cables is not None and self._chain is not None:
-                self._built.cables.advance(now, step, self._chain, self._path_slopes())
+            if cables is not None and self._chain is not None:
+                now = control.now
+                cables.advance(now.time, self._chain, self._path_slopes(now.angles))
         else:
-            self.history.halvings += 1
-            if self._shorter is not None:
-                solver.it.currentStepSize = self._shorter
-            self._steps.step = solver.it.currentStepSize
-        self._weighed = self._shorter = None
+            solver.it.currentStepSize = control.retry(solver.it.currentStepSize)
+        self._weighed, self._refused = None, False
         solver.it.currentTime = solver.it.currentTime + solver.it.currentStepSize
         system.systemData.SetTime(solver.it.currentTime, exu.ConfigurationType.Current)
 
+    def _weigh(self, system: Any, time: float) -> list[float]:
+        """Have exudyn repeat a step that has converged to a state that is not good enough."""
+        if time > self._control.now.time and self._weighed is None:
+            self._state.refresh()
+            if self._state.finite():
+                self._weighed = self._measure(time)
+                self._refused = self._control.shorter(self._weighed) is not None
+        return [_REFUSE if self._refused else 0.0, -1.0]
+
     def _after_step(self, system: Any, time: float) -> bool:
         """Read the new state; False ends the run."""
-        if time <= self.history.times[-1]:
+        if time <= self._control.now.time:
             return True
         self._fresh = True
-        if not self._read(time):
-            return False
-        angles, rates = self.history.angles[-1], self.history.rates[-1]
-        self._locks.note(angles)
-        self._note_end(time)
-        if time >= self._settled_at or self._finished(time) or self._exhausted(time):
-            return False
-        self._steps.advance(time, float(np.mean(rates)), self._locks.contact(angles, rates))
-        if self._deviations is not None and not self._locks.deployed.any():
-            self._steps.step = min(self._steps.step, self._deviations.limit(time, angles, rates))
-        return True
-
-    def _weigh(self, system: Any, time: float) -> list[float]:
-        """Have exudyn repeat a step that has converged to a state that lacks energy."""
-        before, judge = self.history.times[-1], self._judge
-        if time > before and self._weighed is None and judge is not None:
-            found = self._weighed = self._measure(time)
-            if found is not None:
-                self._shorter = judge.shorter(self.history, found) or self._steps.shorter_first(
-                    time - before, self._locks.contact(found.angles, found.rates)
-                )
-        return [0.0 if self._shorter is None else _REFUSE, -1.0]
-
-    def _measure(self, time: float) -> Reading | None:
-        """The current state; None if it is not finite."""
         self._state.refresh()
         if not self._state.finite():
-            return None
-        angles, rates = self._openings.read(self._state)
-        chain = self._read_cables(time)
-        return Reading(time, angles, rates, self._energies(time, angles, rates, chain), chain)
-
-    def _energies(
-        self, time: float, angles: Array, rates: Array, chain: ChainState | None
-    ) -> Energies:
-        return self._energy.read(time, self._state, angles, rates, self._locks.latched, chain)
-
-    def _read(self, time: float) -> bool:
-        history = self.history
-        found = self._weighed or self._measure(time)
-        if found is None:
-            history.status = Status.DIVERGED
-            history.reason = (
-                f"the state is not finite at {time:.6g} s: reduce solver.step or solver.tolerance"
-            )
+            cure = "reduce solver.step or solver.tolerance"
+            self._control.diverge(f"the state is not finite at {time:.6g} s: {cure}")
             return False
-        _, angles, rates, energies, chain = found
-        if self._judge is not None and history.times:
-            self._judge.accept(history, found)
-        if self._built.faults.strike(time, angles, chain):
-            chain = self._read_cables(time)
-            after = self._energies(time, angles, rates, chain)
+        found = self._weighed or self._measure(time)
+        goes_on = self._control.accept(found, self._read(found))
+        stop = self._scene.stop
+        if self._locks is not None and stop is not None and stop.latch:
+            for plane, section in np.argwhere(self._locks.deployed & ~self._latched):
+                latch(self._built.model, self._built.stops[plane][section])
+            self._latched = self._locks.deployed.copy()
+        return goes_on
+
+    def _read(self, now: Instant) -> Instant:
+        """Note a state that the run goes on from; returns it as faults that strike there leave it.
+
+        ``self._chain`` holds the cables at the state that was measured last, which is this one.
+        """
+        history = self.history
+        if self._built.faults.strike(now.time, now.angles, self._chain):
+            after = self._measure(now.time)
             # What a fault lets go is lost; nothing moves while it strikes.
-            released = energies.elastic - after.elastic
-            energies = after._replace(lost=energies.lost + released, driven=energies.driven)
+            lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
+            energies = after.energies._replace(lost=lost, driven=now.energies.driven)
+            now = after._replace(energies=energies)
         self._energy.keep()
-        history.times.append(time)
-        history.angles.append(angles)
-        history.rates.append(rates)
-        history.energies.append(energies)
-        if chain is not None:
-            history.tensions.append(chain.tensions)
-            history.slack.append(chain.is_slack[chain.ropes.first].astype(float))
-            history.wound.append(chain.wound.sum(axis=1))
-            history.lengths.append(chain.lengths)
-            self._chain = chain
-        history.gaps.append(max(float(group.gaps(self._state).max()) for group in self._gaps))
+        history.times.append(now.time)
+        history.angles.append(now.angles)
+        history.rates.append(now.rates)
+        history.energies.append(now.energies)
+        history.gaps.append(now.gap)
+        if self._chain is not None:
+            history.tensions.append(self._chain.tensions)
+            history.slack.append(self._chain.is_slack[self._chain.ropes.first].astype(float))
+            history.wound.append(self._chain.wound.sum(axis=1))
+            history.lengths.append(self._chain.lengths)
         if self._stress is not None:
             history.stresses.append(self._stress.read())
         if self._bending is not None:
             history.strains.append(self._bending.read())
-        return not self._guard.stops(history, self._locks.overrun(angles), float(angles.max()))
+        return now
 
-    def _read_cables(self, time: float) -> ChainState | None:
-        cables = self._built.cables
-        if cables is None:
-            return None
-        return cables.current(self._state.position, self._state.velocity, time)
+    def _measure(self, time: float) -> Instant:
+        """The state that was refreshed last."""
+        angles, rates = self._openings.read(self._state)
+        cables, state = self._built.cables, self._state
+        if cables is not None:
+            self._chain = cables.current(state.position, state.velocity, time)
+        energies = self._energy.read(time, state, angles, rates, self._latched, self._chain)
+        gap = max(float(group.gaps(state).max()) for group in self._gaps)
+        tensions = None if self._chain is None else self._chain.tensions
+        return Instant(time, angles, rates, energies, gap, tensions)
 
-    def _note_end(self, time: float) -> None:
-        """Let the run end once all V-joints have reached the same stop."""
-        if math.isfinite(self._settled_at) or not self._scene.structure.locks:
-            return
-        for reached, where in (
-            (self._locks.deployed, "180 deg"),
-            (self._locks.stowed, "the stowed stop"),
-        ):
-            if reached.all():
-                self.history.status = Status.OK
-                self.history.reason = f"all V-joints have reached {where}"
-                settling = self._scene.solver.settling_time
-                last = self._last_lock(time) + (0.0 if self._scene.stop is None else settling)
-                self._settled_at = last if last > time * (1.0 + 1e-12) else time
-                return
-
-    def _last_lock(self, time: float) -> float:
-        """When the last V-joint reached 180 deg within the step that ends at ``time``, s.
-
-        Settling counts from there: what happens after it must not depend on where steps end.
-        """
-        history = self.history
-        two = (np.array(part[-2:]) for part in (history.times, history.angles, history.rates))
-        locks = lock_times(*two)
-        return float(np.nanmax(locks)) if np.isfinite(locks).any() else time
-
-    def _finished(self, time: float) -> bool:
-        end = self._scene.solver.end_time
-        if time < end * (1.0 - 1e-12):
-            return False
-        if not self._scene.structure.locks:
-            self.history.status = Status.OK
-            self.history.reason = f"the cable was wound until solver.end_time = {end:g} s"
-        elif self.history.status == Status.UNFINISHED:
-            locked = int(self._locks.deployed.sum())
-            self.history.reason = (
-                f"solver.end_time = {end:g} s was reached with {locked} of "
-                f"{self._locks.deployed.size} V-joints locked"
-            )
-        return True
-
-    def _exhausted(self, time: float) -> bool:
-        """Give up a run whose steps have become too small to end."""
-        most = self._scene.solver.step_limit
-        if len(self.history.times) <= most:
-            return False
-        if math.isfinite(self._settled_at):
-            self.history.reason += f"; settling was cut short at {time:.6g} s"
-            return True
-        self.history.status = Status.SOLVER_FAILED
-        self.history.reason = (
-            f"solver.step_limit = {most} steps took the run to {time:.6g} s only, the last of "
-            f"{time - self.history.times[-2]:.1e} s: raise solver.tolerance or solver.step_limit"
-        )
-        return True
-
-    def _explain(self, error: Exception) -> str:
-        time = self.history.times[-1]
-        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-        detail = next((line for line in lines if "step" in line.lower()), lines[0] if lines else "")
-        return (
-            f"the solver gave up at {time:.6g} s after {self.history.halvings} reductions of the "
-            f"step: reduce solver.step or solver.tolerance, or raise solver.newton_tolerance "
-            f"({self._refusal() or detail[:200]})"
-        )
+    def _path_slopes(self, angles: Array) -> Array:
+        """Derivative of each cable's ideal path length after the opening angle, m/rad."""
+        cables, structure = self._scene.cables, self._scene.structure
+        present = [] if cables is None else cables.present()
+        return np.array([structure.path_slope(cable, angles[plane]) for plane, cable in present])
 
     def _refusal(self) -> str:
         """What the cables could not answer, if that is why a step failed."""
         cables = self._built.cables
         return "" if cables is None else cables.refusal
+
+
+def _detail(message: str) -> str:
+    """The line of exudyn's message that names the step that failed, or its first."""
+    lines = [line.strip() for line in message.splitlines() if line.strip()]
+    detail = next((line for line in lines if "step" in line.lower()), lines[0] if lines else "")
+    return detail[:200]

@@ -154,9 +154,9 @@ def _add_springs(model: Model) -> None:
         assembly.system.AddObject(
             item.ObjectConnectorSpringDamper(
                 markerNumbers=[assembly.body_marker(body, here) for body in ends],
-                referenceLength=spring.free_length,
-                stiffness=spring.stiffness,
-                damping=spring.damping,
+                referenceLength=spring.law.free_length,
+                stiffness=spring.law.stiffness,
+                damping=spring.law.damping,
             )
         )
     for contact in model.layout.contacts:

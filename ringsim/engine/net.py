@@ -8,16 +8,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
-from numpy.typing import NDArray
 
+from ringsim.engine.assembly import Assembly
+from ringsim.engine.laws import SYMBOLIC, symbolic_law
 from ringsim.engine.model import Model
-
-Array = NDArray[np.float64]
-_ONSET = 1e-4
-"""Stretch in m over which the damping of a spring comes in."""
+from ringsim.parts.net import Net
+from ringsim.parts.persection import at_section
 
 
 def add_net(model: Model) -> Any:
@@ -33,40 +31,25 @@ def add_net(model: Model) -> Any:
     body = assembly.system.AddObject(item.ObjectMassPoint(nodeNumber=hub, mass=held.mass))
     assembly.bodies.append(body)
     middle = assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=hub))
-    for rate, node in zip(held.stiffness, nodes, strict=True):
-        settings: dict[str, Any] = {"stiffness": float(rate), "damping": net.damping}
-        if not net.two_sided:
-            settings["springForceUserFunction"] = assembly.symbolic(
-                "net",
-                _one_sided,
-                "ObjectConnectorSpringDamper",
-                "springForceUserFunction",
-            )
-        end = assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=node))
+    for corner, node in enumerate(nodes):
+        far = assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=node))
         assembly.system.AddObject(
             item.ObjectConnectorSpringDamper(
-                markerNumbers=[middle, end], referenceLength=net.neutral_length, **settings
+                markerNumbers=[middle, far],
+                referenceLength=net.neutral_length,
+                **_string(assembly, at_section(net, corner)),
             )
         )
     return hub
 
 
-def _one_sided(
-    mbs: Any, t: Any, itemNumber: Any, deltaL: Any, deltaL_t: Any,  # noqa: N803
-    stiffness: Any, damping: Any, force: Any,
-) -> Any:  # fmt: skip
-    least, most = exu.symbolic.min, exu.symbolic.max
-    stretch = most(deltaL, 0.0)
-    return most(stiffness * stretch + damping * deltaL_t * least(stretch / _ONSET, 1.0), 0.0)
-
-
-def net_forces(
-    stretch: Array, rate: Array, stiffness: Array, damping: float, *, two_sided: bool
-) -> tuple[Array, Array]:
-    """Spring and damper parts of the tensions, N; the same law in numpy."""
-    if two_sided:
-        return stiffness * stretch, damping * rate
-    taut = np.maximum(stretch, 0.0)
-    spring = stiffness * taut
-    damper = damping * rate * np.minimum(taut / _ONSET, 1.0)
-    return spring, np.maximum(damper, -spring)
+def _string(assembly: Assembly, net: Net) -> dict[str, Any]:
+    linear = {"stiffness": net.stiffness, "damping": net.damping}
+    if net.two_sided:
+        return linear
+    return linear | symbolic_law(
+        assembly,
+        "ObjectConnectorSpringDamper",
+        net,
+        lambda stretch, rate, _: net.tension(stretch, rate, SYMBOLIC).total,
+    )

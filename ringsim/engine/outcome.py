@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from ringsim.engine.energy import Energies
 from ringsim.engine.history import History
 from ringsim.layout.halves import halves
 from ringsim.layout.layout import Layout
 from ringsim.scene import Scene
+from ringsim.stepping.instant import Energies
+from ringsim.stepping.locks import lock_times
 from ringsim.variables import Outcome
 
 Array = NDArray[np.float64]
@@ -25,30 +26,6 @@ def output_times(scene: Scene) -> Array:
     """The scene's output grid in s: multiples of ``record.interval`` up to the end time."""
     count = math.floor(scene.solver.end_time / scene.record.interval * (1.0 + 1e-12))
     return np.asarray(np.arange(count + 1) * scene.record.interval, dtype=float)
-
-
-def lock_times(times: Array, angles: Array, rates: Array) -> Array:
-    """First time at which each V-joint reaches 180 deg, shape (2, sections), s; NaN if never.
-
-    The crossing is the root of the cubic that fits angles and rates at both ends of the step.
-
-    Parameters
-    ----------
-    times, angles, rates
-        Shapes (n,), (n, 2, sections) and the same; s, rad, rad/s.
-    """
-    found = np.full(angles.shape[1:], np.nan)
-    for place in np.ndindex(*found.shape):
-        past = angles[(slice(None), *place)] - math.pi
-        crossing = np.flatnonzero(past >= 0.0)
-        if len(crossing) == 0 or crossing[0] == 0:
-            continue
-        ends = slice(crossing[0] - 1, crossing[0] + 1)
-        cubic = CubicHermiteSpline(times[ends], past[ends], rates[(ends, *place)])
-        roots = cubic.roots(extrapolate=False)
-        inside = roots[(roots >= times[ends][0]) & (roots <= times[ends][1])]
-        found[place] = inside.min() if len(inside) else times[crossing[0]]
-    return found
 
 
 def largest_spread(times: Array, angles: Array, rates: Array, until: float) -> float:

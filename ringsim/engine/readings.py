@@ -8,10 +8,10 @@ import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine import quaternions
 from ringsim.engine.model import Joint, Model
 from ringsim.engine.rods import NodeFrames
 from ringsim.engine.rods_geometrically_exact import GeometricallyExact
+from ringsim.engine.rotations import axes_of, spin
 from ringsim.layout.joints import ChordOpening
 
 Array = NDArray[np.float64]
@@ -54,17 +54,15 @@ class Side:
     def spin_about(self, state: State, axes: Array) -> Array:
         """Angular rate about given axes, shape (n, 3), rad/s; of nodes with Euler parameters."""
         place, rates = state.position[self._where], state.velocity[self._where]
-        spin = quaternions.angular_velocity(place[:, 3:7], rates[:, 3:7])
-        return np.asarray(np.sum(spin * axes, axis=1))
+        return np.asarray(np.sum(spin(place[:, 3:7], rates[:, 3:7]) * axes, axis=1))
 
     def points(self, state: State) -> Array:
         """Places, shape (n, 3), m."""
         nodes = state.position[self._where]
         if self._arms is None:
-            return np.asarray(nodes[:, :3])
-        return nodes[:, :3] + np.einsum(
-            "nij,nj->ni", quaternions.axes_of(nodes[:, 3:7]), self._arms
-        )
+            return np.array(nodes[:, :3])
+        turned = np.einsum("nij,nj->ni", axes_of(nodes[:, 3:7]), self._arms)
+        return np.asarray(nodes[:, :3] + turned)
 
 
 class JointGroup:

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.cable.cables import Cables
 from ringsim.cable.records import Cable
+from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
 from ringsim.layout.bodies import Body, InSpace, Lump, Mount, OnBody, OnRod, Rod
 from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.joints import ChordOpening, Joint, JointOpening, Opening
 from ringsim.layout.layout import Layout
 from ringsim.layout.pose import Pose, axes_along, rate_of, real_of
-from ringsim.layout.sheaves import BlockSheave, FixedSheave, Sheave
 from ringsim.layout.springs import BoomBeam, Contact, HubNet, Spring
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.boom.rigid import RigidBoom
@@ -253,16 +253,16 @@ class Draft:
         if boom.base == "fixed":
             space = InSpace(upper.place, np.eye(3))
             self.joints.append(Joint("weld", "", 0, space, OnBody(top.number, *_HERE)))
-        if not isinstance(boom, RigidBoom):
-            return BoomBeam(OnBody(top.number, *_HERE), OnBody(low.number, *_HERE), boom)
         tube = boom.tube
         across = 0.125 * boom.mass * (tube.outer_diameter**2 + tube.inner_diameter**2)
         along = boom.mass * boom.length**2 / 3.0 + 0.5 * across
         centre = np.array([0.0, 0.0, -0.5 * boom.length])
         lump = Lump("boom", boom.mass, centre, np.diag([along, along, across]))
+        ends = OnBody(top.number, *_HERE), OnBody(low.number, *_HERE)
+        if not isinstance(boom, RigidBoom):
+            return BoomBeam(*ends, boom, lump)
         body = self.bodies[top.number]
         self.bodies[top.number] = replace(body, lumps=(*body.lumps, lump))
-        ends = OnBody(top.number, *_HERE), OnBody(low.number, *_HERE)
         self.joints.append(Joint("sleeve", "", 0, *ends))
         return None
 
@@ -331,9 +331,9 @@ class Draft:
     def _winch(self, nearest: Sheave, away: Array) -> FixedSheave:
         """The winch of a sheave at an end of the path."""
         assert isinstance(nearest, FixedSheave)
-        assert isinstance(nearest.mount, OnBody)
-        axes = self.bodies[nearest.mount.body].pose.axes @ nearest.mount.axes
-        return FixedSheave(nearest.mount, nearest.arm + axes.T @ away)
+        assert isinstance(nearest.node, OnBody)
+        axes = self.bodies[nearest.node.body].pose.axes @ nearest.node.axes
+        return FixedSheave(nearest.node, nearest.arm + axes.T @ away)
 
 
 _HERE = (np.zeros(3), np.eye(3))

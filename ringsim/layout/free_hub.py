@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.parts.net import Net
-from ringsim.parts.persection import spread
+from ringsim.parts.persection import at_section, spread
+from ringsim.parts.springs import Reaction
 
 Array = NDArray[np.float64]
 
-_ONSET = 1e-4
-"""Stretch in m over which the damping of a string comes in."""
 _MOST = 60
+"""Newton steps to the hub, each a tenth of the net's size long at most."""
 _BALANCED = 1e-14
 """Pull on the hub over the largest string's, or its movement over the net's size, taken as zero."""
 
@@ -37,7 +37,8 @@ class FreeHub:
     """Springs from so many corners to a free hub."""
 
     def __init__(self, net: Net, corners: int) -> None:
-        self._net, self._stiffness = net, spread(net.stiffness, corners)
+        self._net = at_section(net, np.arange(corners))
+        self._stiffness = spread(net.stiffness, corners)
 
     def hub(self, corners: Array) -> Array:
         """Where the hub lies, shape (3,), m: in the middle while all strings are slack.
@@ -47,26 +48,7 @@ class FreeHub:
         corners
             Upper corners, shape (corners, 3), m.
         """
-        hub = corners.mean(axis=0)
-        size = float(np.ptp(corners))
-        for _ in range(_MOST):
-            stretch, units, spring = self._strings(corners - hub)
-            pull = spring @ units
-            if np.abs(pull).max() <= _BALANCED * np.abs(spring).max():
-                break
-            step = np.linalg.lstsq(self._rates(stretch, units).sum(axis=0), pull, rcond=1e-9)[0]
-            longest = float(np.abs(step).max())
-            if longest > 0.1 * size:
-                step *= 0.1 * size / longest
-            hub = hub + step
-            if longest < _BALANCED * size:
-                break
-        return np.asarray(hub)
-
-    def energy(self, corners: Array) -> float:
-        """Energy stored in the springs, J."""
-        stretch, _, spring = self._strings(corners - self.hub(corners))
-        return 0.5 * float(spring @ stretch)
+        return self._balance(corners)[0]
 
     def forces(self, corners: Array, slopes: Array, rates: Array) -> NetForces:
         """Generalised forces on some coordinates.
@@ -79,20 +61,15 @@ class FreeHub:
         rates
             Of the coordinates, rad/s.
         """
-        stretch, units, spring = self._strings(corners - self.hub(corners))
-        energy = 0.5 * float(spring @ stretch)
+        _, lengths, units, string = self._balance(corners)
         longer = np.einsum("ia,iaj->ij", units, slopes)
-        if self._net.damping == 0.0:
-            return NetForces(-spring @ longer, energy, 0.0)
-        matrices = self._rates(stretch, units)
-        carried = np.einsum("iab,ibj->aj", matrices, slopes)
-        hub = np.linalg.lstsq(matrices.sum(axis=0), carried, rcond=1e-9)[0]
-        longer -= units @ hub
-        damper = self._net.damping * (longer @ rates)
-        if not self._net.two_sided:
-            damper = np.maximum(damper * np.minimum(stretch / _ONSET, 1.0), -spring)
-        loss = float(damper @ (longer @ rates))
-        return NetForces(-(spring + damper) @ longer, energy, loss)
+        if self._net.damping > 0.0:
+            matrices = self._rates(lengths, units, string)
+            carried = np.einsum("iab,ibj->aj", matrices, slopes)
+            longer -= units @ np.linalg.lstsq(matrices.sum(axis=0), carried, rcond=1e-9)[0]
+            string = self._net.tension(lengths - self._net.neutral_length, longer @ rates)
+        loss = float(np.sum(string.damping * (longer @ rates)))
+        return NetForces(-string.total @ longer, float(np.sum(string.stored)), loss)
 
     def imbalance(self, corners: Array) -> float:
         """Pull on a hub in the middle over the sum of the strings' pulls."""
@@ -100,18 +77,27 @@ class FreeHub:
         units = arms / np.linalg.norm(arms, axis=1)[:, None]
         return float(np.linalg.norm(self._stiffness @ units) / self._stiffness.sum())
 
-    def _strings(self, arms: Array) -> tuple[Array, Array, Array]:
-        lengths = np.linalg.norm(arms, axis=1)
-        stretch = lengths - self._net.neutral_length
-        if not self._net.two_sided:
-            stretch = np.maximum(stretch, 0.0)
-        units = arms / np.maximum(lengths, 1e-300)[:, None]
-        return np.asarray(stretch), units, self._stiffness * stretch
+    def _balance(self, corners: Array) -> tuple[Array, Array, Array, Reaction]:
+        """The hub, and the strings' lengths, directions and reaction at rest there."""
+        hub, size, moved = corners.mean(axis=0), float(np.ptp(corners)), np.inf
+        for _ in range(_MOST):
+            arms = corners - hub
+            lengths = np.maximum(np.linalg.norm(arms, axis=1), 1e-300)
+            units = arms / lengths[:, None]
+            still = self._net.tension(lengths - self._net.neutral_length, 0.0)
+            pull = still.elastic @ units
+            balanced = np.abs(pull).max() <= _BALANCED * np.abs(still.elastic).max()
+            if balanced or moved < _BALANCED * size:
+                break
+            matrix = self._rates(lengths, units, still).sum(axis=0)
+            step = np.linalg.lstsq(matrix, pull, rcond=1e-9)[0]
+            moved = float(np.abs(step).max())
+            hub = hub + (step if moved <= 0.1 * size else step * (0.1 * size / moved))
+        return hub, lengths, units, still
 
-    def _rates(self, stretch: Array, units: Array) -> Array:
+    def _rates(self, lengths: Array, units: Array, still: Reaction) -> Array:
         """The matrices A_i, shape (corners, 3, 3), N/m."""
-        acting = self._stiffness * ((stretch > 0.0) | self._net.two_sided)
+        acting = self._stiffness * ((still.elastic > 0.0) | self._net.two_sided)
         along = units[:, :, None] * units[:, None, :]
-        lengths = np.maximum(stretch + self._net.neutral_length, 1e-300)
-        across = (self._stiffness * stretch / lengths)[:, None, None]
+        across = (still.elastic / lengths)[:, None, None]
         return np.asarray(acting[:, None, None] * along + across * (np.eye(3) - along))

@@ -4,17 +4,35 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.cable.sheaves import BlockSheave, Sheave
 from ringsim.layout.bodies import Body, InSpace, Mount, OnBody, Rod
 from ringsim.layout.joints import Joint, JointOpening, Opening
 from ringsim.layout.pose import Pose, cross
-from ringsim.layout.sheaves import BlockSheave, Sheave
 from ringsim.layout.springs import BoomBeam, Contact, HubNet, Spring
 
 Array = NDArray[np.float64]
+
+
+class PointMasses(NamedTuple):
+    """Point masses of a layout.
+
+    Attributes
+    ----------
+    masses, bodies
+        Mass of each, kg, and number of its body, -1 for rods; shape (n,).
+    places, rates
+        Where they are and the derivatives of that after the coordinate, m, shape (n, 3).
+    """
+
+    masses: Array
+    bodies: NDArray[np.int_]
+    places: Array
+    rates: Array
 
 
 @dataclass(frozen=True)
@@ -71,52 +89,44 @@ class Layout:
         ]:
             found[group] = found.get(group, 0.0) + mass
         if self.boom is not None:
-            found["boom"] = found.get("boom", 0.0) + self.boom.record.mass
+            found["boom"] = self.boom.lump.mass
         if self.net is not None:
             found["hub"] = self.net.mass
         return found
 
-    def point_masses(self) -> tuple[Array, Array, Array]:
+    def point_masses(self) -> PointMasses:
         """Point masses that move as the rigid parts do, with the same inertia.
 
         A part of mass m is six of m / 6 at c +- r_k n_k about its centre of mass c, where
         r_k^2 = 3 e_k / m with e_k, n_k the principal values and directions of its second moments
-        tr(J) / 2 - J about c.  A rod so has two at its ends.  The net's hub and a flexible boom are
-        left out.
-
-        Returns
-        -------
-        tuple
-            Masses, kg, their places and the derivatives of these after the coordinate, m; shapes
-            (n,), (n, 3) and (n, 3).  Bodies come first in their order, then rods, then the masses
-            on rods' nodes.
+        tr(J) / 2 - J about c; a rod so has two at its ends.  A flexible boom counts as rigid; the
+        net's hub is left out.
         """
-        found: list[tuple[float, Array, Array]] = []
-        for body in self.bodies:
+        found: list[tuple[float, int, Array, Array]] = []
+        bodies = list(enumerate(self.bodies))
+        if self.boom is not None:
+            top = self.boom.top.body
+            bodies.append((top, Body(self.bodies[top].pose, (self.boom.lump,))))
+        for number, body in bodies:
             mass, centre = body.mass, body.centre
             seconds = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
             values, axes = np.linalg.eigh(seconds - mass * np.outer(centre, centre))
-            arms = axes * np.sqrt(3.0 * np.maximum(values, 0.0) / mass)
-            for arm in (*arms.T, *-arms.T):
-                found.append((mass / 6.0, *body.pose.at(centre + arm)))
+            arms = (axes * np.sqrt(3.0 * np.maximum(values, 0.0) / mass)).T
+            found += [(mass / 6.0, number, *body.pose.at(centre + r)) for r in (*arms, *-arms)]
         for rod in self.rods:
-            middle, across = (
-                rod.station(0.5),
-                math.sqrt(3.0 * rod.tube.second_moment / rod.tube.area),
-            )
+            middle, tube = rod.station(0.5), rod.tube
+            across = math.sqrt(3.0 * tube.second_moment / tube.area)
             arms = np.diag([0.5 * rod.length, across, across])
-            found += [(rod.mass / 6.0, *middle.at(arm)) for arm in (*arms, *-arms)]
-        for rod in self.rods:
+            found += [(rod.mass / 6.0, -1, *middle.at(r)) for r in (*arms, *-arms)]
             for station, mass in rod.masses:
                 pose = rod.station(rod.stations[station])
-                found.append((mass, pose.place, pose.rate))
-        masses, places, rates = zip(*found, strict=True)
-        return np.array(masses), np.array(places), np.array(rates)
+                found.append((mass, -1, pose.place, pose.rate))
+        return PointMasses(*map(np.array, zip(*found, strict=True)))
 
     def sheave(self, sheave: Sheave) -> tuple[Array, Array]:
         """Place of a sheave in space and its derivative after the coordinate, shape (3,), m."""
         if not isinstance(sheave, BlockSheave):
-            return self.pose(sheave.mount).at(sheave.arm)
+            return self.pose(sheave.node).at(sheave.arm)
         left, right = self.pose(sheave.left), self.pose(sheave.right)
         both = left.axes[:, 1] + right.axes[:, 1]
         both = both + sheave.sense * (right.axes[:, 0] - left.axes[:, 0])

@@ -8,27 +8,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.layout.bodies import OnBody
+from ringsim.layout.bodies import Lump, OnBody
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Spring:
-    """A spring with a damper between the origins of two bodies."""
+    """A linear spring with a damper between the origins of two bodies.
+
+    ``law`` is its record (ringsim.parts): ``stiffness``, ``damping``, ``free_length``, and
+    ``tension(length, rate)`` as a ``ringsim.parts.springs.Reaction``.
+    """
 
     first: int
     second: int
-    stiffness: float
-    damping: float
-    free_length: float
+    law: Any
 
 
 @dataclass(frozen=True)
 class Contact:
     """A body's origin that may not come closer than ``room`` to the plane x_axis = 0.
 
-    ``law`` is the record that holds its force (ringsim.parts).
+    ``law`` is its record, with ``push(depth, rate, xp)`` as a ``Reaction``.
     """
 
     body: int
@@ -61,8 +63,12 @@ class HubNet:
 
 @dataclass(frozen=True)
 class BoomBeam:
-    """A flexible boom: clamped at ``top``, while ``low`` slides along it."""
+    """A flexible boom: clamped at ``top``, while ``low`` slides along it.
+
+    ``record`` is the scene's, ``lump`` what it would be as a rigid part of the body at its top.
+    """
 
     top: OnBody
     low: OnBody
     record: Any
+    lump: Lump

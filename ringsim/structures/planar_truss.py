@@ -15,12 +15,16 @@ from ringsim.layout.draft import Draft, Track
 from ringsim.layout.layout import Layout
 from ringsim.layout.pose import axes_along
 from ringsim.layout.springs import Contact, Spring
+from ringsim.parts.springs import Reaction, one_sided, two_sided
 from ringsim.parts.tube import Tube
 from ringsim.structures.family import Structure
 from ringsim.structures.truss_geometry import TrussGeometry
 from ringsim.units import DampingRate, Metre, Model, SpringRate
 
 RING_PARTS = ("stop", "boom", "net", "loads")
+REST_ONSET = 1e-5
+"""Depth over which the rest's damper comes in, m: 1 N on the default spring, less than the 1.5 N
+that the cable holds where the rest is met."""
 
 
 class DeployingSpring(Model):
@@ -30,6 +34,10 @@ class DeployingSpring(Model):
     free_length: Metre = 0.316
     """Length of the strut at which the spring is without force."""
     damping: DampingRate = 5.0
+
+    def tension(self, length: Any, rate: Any = 0.0) -> Reaction:
+        """Of a strut of some length (m), at its rate (m/s); the spring pushes: negative."""
+        return two_sided(length - self.free_length, rate, self.stiffness, self.damping)
 
 
 class Rest(Model):
@@ -43,6 +51,10 @@ class Rest(Model):
     """Between the fixed axis and the synchronising beam at the end of contraction."""
     stiffness: SpringRate = 1e5
     damping: DampingRate = 100.0
+
+    def push(self, depth: Any, rate: Any, xp: Any = np) -> Reaction:
+        """Against a depth (m) and its rate (m/s), none where it is negative."""
+        return one_sided(depth, rate, self.stiffness, self.damping, REST_ONSET, xp)
 
 
 class PlanarTruss(Structure):
@@ -272,10 +284,7 @@ class PlanarTruss(Structure):
         draft.joint("revolute", "", 0, (axis, outer), points.foot, np.eye(3))
         draft.joint("revolute", "", 0, (upper, inner), points.head)
         draft.slide(outer, inner, along)
-        spring = self.spring
-        draft.springs.append(
-            Spring(outer.number, inner.number, spring.stiffness, spring.damping, spring.free_length)
-        )
+        draft.springs.append(Spring(outer.number, inner.number, self.spring))
         draft.contacts.append(Contact(bar.number, 0, self.rest_distance, self.rest))
         draft.chord_opening(0, bar, points.upper)
         ends = [draft.on(axis, points.lower), draft.on(bar, points.upper_end)]

@@ -36,8 +36,8 @@ SAFETY = {
 }
 """Bar over the difference of the two runs."""
 BETWEEN_READINGS = {"peak_tension": 2.0 * TENSION_BEND / 8.0}
-"""Share of a value over ``solver.tolerance``: an eighth of the largest bend that is accepted
-(``ringsim.engine.tension_control``), which both runs may miss alike."""
+"""Share of a value over ``solver.tolerance``: an eighth of the largest bend that no step is refused
+for (``ringsim.stepping.tension_bend``), which both runs may miss alike."""
 OF_ONE_ELEMENT = {
     "asynchrony": 0.014,
     "asynchrony_max": 0.014,
@@ -45,8 +45,6 @@ OF_ONE_ELEMENT = {
     "peak_rod_stress": 0.03,
 }
 """Share of a value that one element per rod half makes uncertain."""
-OF_FINER = 4.0
-"""Factor on differences to a run with half of the steps: (4 - 1) / (1 - 1/4)."""
 
 
 def error_bars(
@@ -65,7 +63,7 @@ def error_bars(
     tolerance
         ``solver.tolerance`` of the run that counts.
     scale
-        Factor on the differences: 1 for longer steps, ``OF_FINER`` for shorter ones.
+        Factor on the differences: 1 for longer steps, 4 for shorter ones.
 
     Returns
     -------

@@ -140,7 +140,10 @@ class IdealCables:
             np.tensordot(of_points, slopes, 2),
             self._commands(time, now, state),
             float(on_rope[ropes.of_pulley] @ state.friction_loss + on_rope @ state.damping_loss),
-            float(copies @ state.winch_power.sum(axis=1) - on_rope @ state.drum_power),
+            float(
+                copies @ state.winch_power.sum(axis=1)
+                - on_rope @ (state.energy_density * state.wound_rates)
+            ),
             float(on_rope @ state.elastic_energy),
         )
 

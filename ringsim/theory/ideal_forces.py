@@ -18,16 +18,13 @@ from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.joints import Joint
 from ringsim.layout.layout import Layout
 from ringsim.layout.pose import cross
-from ringsim.parts.joints import JointFriction, Stop
-from ringsim.parts.persection import spread
+from ringsim.parts.joint_friction.family import JointFriction
+from ringsim.parts.persection import at_section
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
 from ringsim.theory.ideal_points import Points, body_of
 
 Array = NDArray[np.float64]
-
-_ONSET = 1e-3
-"""Depth in rad over which the damping of a stop comes in."""
 
 
 class Acting(NamedTuple):
@@ -57,12 +54,9 @@ class Acting(NamedTuple):
 class _FrictionJoints:
     """Joints of one family and their law."""
 
-    def __init__(self, points: Points, family: str, law: JointFriction, sections: int) -> None:
+    def __init__(self, points: Points, family: str, law: JointFriction) -> None:
         joints = [joint for joint in points.layout.joints if joint.family == family]
-        where = [joint.section for joint in joints]
-        self._viscous = spread(law.viscous, sections)[where]
-        self._coulomb = spread(law.coulomb, sections)[where]
-        self._rate = law.rate
+        self._law = at_section(law, np.array([joint.section for joint in joints]))
         axes = np.array([points.layout.pose(joint.first).axes[:, 2] for joint in joints])
         self._turning = _turning(points, joints, axes)
         # Relative rates per rate of each swing: 1, -1 or 0.
@@ -83,7 +77,7 @@ class _FrictionJoints:
         s, by_q = now.values[:count], now.by_place[:count, 0]
         slopes = np.column_stack([self._turning @ by_q @ s, self._swings])
         speed = slopes @ now.rate
-        torque = self._viscous * speed + self._coulomb * np.tanh(speed / self._rate)
+        torque = self._law.torque(speed)
         return -torque @ slopes, float(torque @ speed)
 
 
@@ -95,22 +89,20 @@ class Forces:
     loaded
         Whether loads act.
     slowest
-        Smallest rate at which friction turns, rad/s; infinite without Coulomb friction.
+        Smallest characteristic rate of the joints' friction, rad/s; infinite without one.
     """
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
         self._mechanism, self._stop = mechanism, scene.stop
-        points, sections = mechanism.points, scene.structure.sections
+        points = mechanism.points
         loads, places = points.forces()
         self.loaded = bool(loads.any())
         self._lift = np.tensordot(loads[:, 2], places, 1)
         self._net = None if scene.net is None else FreeHub(scene.net, len(mechanism.upper_corners))
-        named: dict[str, JointFriction] = dict(scene.joints)
-        laws = {family: law for family, law in named.items() if law is not None}
-        self._joints = [_FrictionJoints(points, *item, sections) for item in laws.items()]
-        self.slowest = min(
-            (law.rate for law in laws.values() if np.any(law.coulomb)), default=math.inf
-        )
+        laws = scene.joints.present()
+        self._joints = [_FrictionJoints(points, *item) for item in laws.items()]
+        rates = [law.characteristic_rate() for law in laws.values()]
+        self.slowest = min(rates, default=math.inf)
         self._stops = sum(map(len, points.layout.openings))
 
     def act(self, now: Configuration, up: Array, latched: bool) -> Acting:
@@ -132,12 +124,12 @@ class Forces:
             corners = self._mechanism.upper_corners
             net = self._net.forces(corners @ now.values, corners @ now.by_place, now.rate)
             force, elastic, loss = force + net.force, net.energy, loss + net.loss
-        if self._stop is not None:
-            folded, rate = 2.0 * float(now.place[0]), 2.0 * float(now.rate[0])
-            spring, damper, stored = _stop(self._stop, folded, rate, latched)
-            force[0] += 2.0 * self._stops * (spring + damper)
-            elastic += self._stops * stored
-            loss -= self._stops * damper * rate
+        stop, folded, rate = self._stop, 2.0 * float(now.place[0]), 2.0 * float(now.rate[0])
+        if stop is not None and (latched or not 0.0 <= folded <= stop.most_folded):
+            reaction = stop.torque(folded, rate, latched)
+            force[0] -= 2.0 * self._stops * float(reaction.total)
+            elastic += self._stops * float(reaction.stored)
+            loss += self._stops * float(reaction.damping) * rate
         return Acting(force, cross(lifted, up), elastic, float(up @ lifted), loss)
 
 
@@ -159,16 +151,3 @@ def _turning(points: Points, joints: list[Joint], axes: Array) -> Array:
     across = np.cross(axes[:, None, :, None], directions, axis=2)
     first, second = np.moveaxis(np.einsum("jmap,jmaq->jmpq", across, directions), 1, 0)
     return np.asarray(second - first)
-
-
-def _stop(stop: Stop, folded: float, rate: float, latched: bool) -> tuple[float, float, float]:
-    """Spring and damper torque (N m) against folding of one V-joint's stop, and its energy (J)."""
-    k, d = stop.stiffness, stop.damping
-    if latched:
-        return -k * folded, -d * rate, 0.5 * k * folded**2
-    deep = max(-folded, 0.0)
-    high = max(folded - (math.pi - math.radians(stop.stowed_angle)), 0.0)
-    below = max(k * deep - d * rate * min(deep / _ONSET, 1.0), 0.0)
-    above = max(k * high + d * rate * min(high / _ONSET, 1.0), 0.0)
-    spring = k * (deep - high)
-    return spring, below - above - spring, 0.5 * k * (deep**2 + high**2)

@@ -141,8 +141,7 @@ class Mechanism:
         self._sums = MassSums(*points.masses())
         self.upper_corners = points.upper_corners()
         swings = len(points.swinging)
-        sleeves = [joint for joint in points.layout.joints if joint.kind == "sleeve"]
-        self._on_boom = bool(swings and sleeves)
+        self._on_boom = swings > 0 and scene.boom is not None
         self.freedom = 1 + swings - self._on_boom
         if self._on_boom:
             pins = points.pins

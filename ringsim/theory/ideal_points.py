@@ -20,11 +20,10 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ringsim.cable.sheaves import FixedSheave
 from ringsim.layout.bodies import Mount, OnBody
 from ringsim.layout.layout import Layout
 from ringsim.layout.of_scene import layout_of
-from ringsim.layout.sheaves import FixedSheave
-from ringsim.parts.boom.rigid import RigidBoom
 from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
@@ -39,7 +38,7 @@ _CLOSE = 1e-10
 
 
 class Points:
-    """Coefficients P of the points of a scene; a flexible boom counts as rigid.
+    """Coefficients P of the points of a scene.
 
     Attributes
     ----------
@@ -56,11 +55,6 @@ class Points:
     """
 
     def __init__(self, scene: Scene, at: float | None = None) -> None:
-        if scene.boom is not None:
-            boom = {
-                name: getattr(scene.boom, name) for name in RigidBoom.model_fields if name != "kind"
-            }
-            scene = scene.model_copy(update={"boom": RigidBoom(**boom)})
         self.basis = scene.structure.basis if at is None else _alone
         nodes = NODES if at is None else (at,)
         self._layouts = [layout_of(scene, q) for q in nodes]
@@ -151,10 +145,8 @@ class Points:
 
     def masses(self) -> tuple[Array, Array]:
         """All point masses, kg, and their coefficients; shapes (n,) and (n, 3, functions)."""
-        masses = self.layout.point_masses()[0]
-        bodies = np.full(len(masses), -1)
-        bodies[: 6 * len(self.layout.bodies)] = np.repeat(np.arange(len(self.layout.bodies)), 6)
-        return masses, self.swung(lambda layout: layout.point_masses()[1:], bodies)
+        known = self.layout.point_masses()
+        return known.masses, self.swung(lambda layout: layout.point_masses()[2:], known.bodies)
 
     def upper_corners(self) -> Array:
         """Coefficients of the upper hinge assemblies' centres, shape (corners, 3, functions), m."""
@@ -177,7 +169,7 @@ class Points:
     def path(self, number: int) -> Array:
         """Coefficients of a cable's sheaves, shape (sheaves, 3, functions), m."""
         path = self.layout.paths[number]
-        bodies = [body_of(s.mount) if isinstance(s, FixedSheave) else -1 for s in path]
+        bodies = [body_of(s.node) if isinstance(s, FixedSheave) else -1 for s in path]
         return self.swung(lambda layout: _stacked(map(layout.sheave, layout.paths[number])), bodies)
 
 

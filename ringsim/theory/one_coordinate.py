@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.layout.free_hub import FreeHub
+from ringsim.layout.free_hub import FreeHub, NetForces
 from ringsim.layout.layout import Layout
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import MassSums
@@ -69,19 +69,12 @@ class OneCoordinate:
     def work(self, q: float) -> float:
         """Work function W(q) in J, up to a constant."""
         parts, functions = self._at(q)
-        done = float(parts.lift @ functions[:, 0])
-        if parts.net is None:
-            return done
-        return done - parts.net.energy(parts.corners @ functions[:, 0])
+        return float(parts.lift @ functions[:, 0]) - parts.net_forces(functions).energy
 
     def work_rate(self, q: float) -> float:
         """Generalised force dW/dq, J/rad."""
         parts, functions = self._at(q)
-        force = float(parts.lift @ functions[:, 1])
-        if parts.net is None:
-            return force
-        places, slopes = parts.corners @ functions[:, 0], parts.corners @ functions[:, 1:2]
-        return force + float(parts.net.forces(places, slopes, np.zeros(1)).force[0])
+        return float(parts.lift @ functions[:, 1] + parts.net_forces(functions).force[0])
 
     def acceleration_from_rest(self, q: float) -> float:
         """Q'' in rad/s^2 when released at rest."""
@@ -101,14 +94,21 @@ class _Parts:
         self.points = points = Points(scene, at)
         self.sums = MassSums(*points.masses())
         self.lift = np.tensordot(*points.forces(), 2)
-        self.net, self.corners = None, np.zeros(0)
+        self._net, self._corners = None, np.zeros(0)
         if scene.net is not None:
-            self.corners = points.upper_corners()
-            self.net = FreeHub(scene.net, len(self.corners))
+            self._corners = points.upper_corners()
+            self._net = FreeHub(scene.net, len(self._corners))
         self.held = np.zeros(0)
         held = [body_of(support.second) for support in points.layout.supports]
         if held and held[0] >= 0:
             self.held = points.swung(lambda layout: _frame(layout, held[0]), [-1] * 4)
+
+    def net_forces(self, functions: Array) -> NetForces:
+        """What the net does, nothing where there is none."""
+        if self._net is None:
+            return NetForces(np.zeros(1), 0.0, 0.0)
+        places, slopes = self._corners @ functions[:, 0], self._corners @ functions[:, 1:2]
+        return self._net.forces(places, slopes, np.zeros(1))
 
 
 def _frame(layout: Layout, body: int) -> Pairs:

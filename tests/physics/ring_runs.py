@@ -14,8 +14,8 @@ from scipy.interpolate import CubicHermiteSpline
 from ringsim.engine.build import build
 from ringsim.engine.history import History
 from ringsim.engine.integrate import Integration
-from ringsim.engine.outcome import lock_times
 from ringsim.scene import Scene, load_scene
+from ringsim.stepping.locks import lock_times
 from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.one_coordinate import OneCoordinate
 

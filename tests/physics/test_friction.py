@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ring_runs import Array, ideal_time, ring, run
-from ringsim.parts.joints import JointFriction
+from ringsim.parts.joint_friction.viscous_coulomb import ViscousCoulombFriction
 from ringsim.scene import Scene
 from ringsim.theory.one_coordinate import OneCoordinate
 
@@ -47,7 +47,7 @@ def friction(scene: Scene, phi: float, speed: float) -> float:
     """Generalised friction force on phi, J/rad."""
     total = 0.0
     for family, joints in joint_rates(scene, phi).items():
-        law: JointFriction | None = getattr(scene.joints, family)
+        law: ViscousCoulombFriction | None = getattr(scene.joints, family)
         if law is None:
             continue
         viscous, coulomb = float(law.viscous), float(law.coulomb)  # type: ignore[arg-type]

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
 from ringsim.scene import Scene, load_scene
-from ringsim.structures.ring_geometry import Fold, RingGeometry
 
 
 def six(**values: Any) -> Scene:
@@ -43,9 +41,3 @@ def pulled(sections: int = 18, **values: Any) -> Scene:
         "solver.newton_tolerance": 1e-5,
     }
     return load_scene("ring18").with_values(plain | chosen)
-
-
-def fold_rate(geometry: RingGeometry, phi: float) -> Fold:
-    """Derivatives of all points after phi, m/rad, by the complex step."""
-    ahead = geometry.fold(phi + 1e-30j)
-    return Fold(*(getattr(ahead, point.name).imag / 1e-30 for point in fields(Fold)))

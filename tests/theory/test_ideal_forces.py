@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from fold_rates import fold_rate
 
-from ideal_cases import fold_rate, pulled, six
+from ideal_cases import pulled, six
 from ringsim.cable.chain import Chain
-from ringsim.engine.joints import friction_torque, stop_torque
-from ringsim.engine.net import net_forces
 from ringsim.layout.free_hub import FreeHub
+from ringsim.parts.persection import at_section
 from ringsim.theory.ideal_cables import IdealCables
 from ringsim.theory.ideal_forces import Forces
 from ringsim.theory.ideal_mechanism import Mechanism
@@ -43,7 +43,7 @@ def test_joint_friction_takes_the_power_of_all_its_joints(family):
         "vjoint": [2.0 * rate] * 2,
     }[family]
     exact = sum(
-        float(friction_torque(getattr(scene.joints, family), section, 6, speed) * speed)
+        float(at_section(getattr(scene.joints, family), section).torque(speed) * speed)
         for section in range(6)
         for speed in speeds
     )
@@ -65,26 +65,25 @@ def test_hinges_of_swinging_ends_turn_against_their_assemblies():
             swing = rates[1 + k] if swings else 0.0
             for slope in (1.0, turn):
                 speed = sense * slope * rates[0] - swing
-                exact += float(friction_torque(scene.joints.hinge, section, 3, speed)) * speed
+                exact += float(at_section(scene.joints.hinge, section).torque(speed)) * speed
     found = acting(scene, [phi, 0.1, 0.2, 0.3, 0.4], rates)
     assert -found.force @ rates == pytest.approx(exact, rel=1e-12)
     assert found.loss == pytest.approx(exact, rel=1e-12)
 
 
 @pytest.mark.parametrize("latched", [False, True])
-def test_stops_are_the_engine_s(latched):
+def test_stops_of_all_joints_act_on_the_ring(latched):
     stop = {"stiffness": 150.0, "damping": 0.3, "stowed_angle": 10.0, "latch": True}
     scene = pulled(sections=6, stop=stop, net="none", loads__force=0.0)
     for phi in (-0.01, -2e-4, 0.3, 1.484, 1.55):
         for rate in (-2.0, 0.0, 2.0):
-            folded, turning = np.array(2.0 * phi), np.array(2.0 * rate)
-            opening = stop_torque(scene.stop, folded, turning, np.array(latched))
+            opening = scene.stop.torque(2.0 * phi, 2.0 * rate, latched).total
             # 12 joints; opening them is a negative change of phi, twice as fast.
             found = acting(scene, [phi], [rate], latched=latched)
             assert found.force[0] == pytest.approx(-24.0 * float(opening), rel=1e-12, abs=1e-12)
 
 
-def test_damped_net_has_the_engine_s_law():
+def test_a_damped_net_acts_by_its_corners():
     net = {"stiffness": 0.5, "damping": 0.2, "neutral_length": 0.3}
     scene = pulled(sections=6, net=net, stop="none", loads__force=0.0)
     geometry = scene.structure.geometry()
@@ -93,11 +92,11 @@ def test_damped_net_has_the_engine_s_law():
         arms, moving = fold - fold.mean(axis=0), by_phi - by_phi.mean(axis=0)
         lengths = np.linalg.norm(arms, axis=1)
         slope = np.sum(arms * moving, axis=1) / lengths
-        parts = net_forces(lengths - 0.3, slope * rate, np.full(6, 0.5), 0.2, two_sided=False)
+        tension = scene.net.tension(lengths - 0.3, slope * rate)
         found = acting(scene, [phi], [rate])
-        exact = -float(np.sum(sum(parts) * slope))
+        exact = -float(np.sum(tension.total * slope))
         assert found.force[0] == pytest.approx(exact, rel=1e-12, abs=1e-15)
-        assert found.loss == pytest.approx(rate * float(parts[1] @ slope), rel=1e-12)
+        assert found.loss == pytest.approx(rate * float(tension.damping @ slope), rel=1e-12)
 
 
 @pytest.mark.parametrize("stiffness", [0.5, [0.5, 0.1, 0.5, 0.9, 0.2]])
@@ -114,7 +113,10 @@ def test_hub_of_an_odd_net_lies_where_its_strings_balance(stiffness):
     assert np.abs((pulls / lengths) @ arms).max() < 1e-13
     # By virtual work: the energy's slope is the generalised force, though the hub moves along.
     step = 1e-5
-    energy = [hub_net.energy(geometry.fold(0.9 + e).corners[0]) for e in (-step, step)]
+    energy = []
+    for phi in (0.9 - step, 0.9 + step):
+        corners = geometry.fold(phi).corners[0]
+        energy.append(hub_net.forces(corners, np.zeros((5, 3, 1)), np.zeros(1)).energy)
     force = acting(scene.with_values({"loads.force": 0.0}), [0.9], [0.0])
     # Central differences: second order of the step.
     assert force.force[0] == pytest.approx(-(energy[1] - energy[0]) / (2.0 * step), rel=1e-8)

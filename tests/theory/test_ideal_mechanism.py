@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fold_rates import fold_rate
 
-from ideal_cases import fold_rate, pulled
+from ideal_cases import pulled
 from ringsim.scene import Scene
 from ringsim.theory.one_coordinate import OneCoordinate
 

@@ -28,8 +28,6 @@ class WinchReading:
 
     Attributes
     ----------
-    axial_stiffness, damping_time, slack_width
-        EA (N), Kelvin-Voigt time (s) and smoothing width (N) of the rope.
     tension_ratio
         Tension at the winch over the mean tension of the rope as a function of the winch's
         speed (m/s), not falling; 1 without friction.
@@ -42,9 +40,6 @@ class WinchReading:
 
     """
 
-    axial_stiffness: float
-    damping_time: float
-    slack_width: float
     tension_ratio: Callable[[float], float]
     path_rate: float = 0.0
     path_slope: float = 0.0

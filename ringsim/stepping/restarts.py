@@ -1,0 +1,94 @@
+"""Runs that start anew with smaller steps, and the second run that error bars need."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ringsim.parts.solver import Solver
+from ringsim.stepping.instant import Array
+from ringsim.variables import COUNTS, TIMINGS, Outcome, Status
+
+
+def run_with_restarts(
+    solve: Callable[[Solver], Outcome],
+    solver: Solver,
+    error_bars: Callable[..., dict[str, Array]],
+) -> Outcome:
+    """A run that starts anew with smaller steps while that may help.
+
+    Parameters
+    ----------
+    solve
+        Runs the scene with these settings; it never raises.
+    solver
+        The scene's settings: ``restarts`` new starts at most, ``error_bars`` if wanted.
+    error_bars
+        As ``ringsim.theory.error_bars``: those of a run from another with steps half or twice as
+        long, its ``tolerance`` and the ``scale`` of their differences.
+
+    Returns
+    -------
+    Outcome
+        That of the last start.  ``restarts`` says how many there were, ``step_used`` and
+        ``tolerance_used`` with which settings the last one ran (NaN where steps are constant);
+        ``total_steps``, ... count those of all starts.
+    """
+    used, outcome, restarts = solver, solve(solver), 0
+    first, totals = outcome.reason, _counts(outcome)
+    while restarts < solver.restarts and _curable(outcome, solver):
+        restarts += 1
+        used = solver.refined(restarts)
+        outcome = solve(used)
+        totals = {name: totals[name] + count for name, count in _counts(outcome).items()}
+        how = f"start {restarts + 1} with solver.step = {used.step:.3g} s"
+        if used.step_control != "constant":
+            how += f" and solver.tolerance = {used.tolerance:.2g}"
+        outcome = replace(outcome, reason=f"{outcome.reason} ({how}; start 1: {first})")
+    if solver.error_bars and outcome.status == Status.OK:
+        outcome = _with_bars(outcome, solve, used, error_bars)
+    found = {
+        "restarts": restarts,
+        "step_used": used.step,
+        "tolerance_used": used.tolerance if used.step_control == "motion" else np.nan,
+        **{f"total_{name}": count for name, count in totals.items()},
+    }
+    outcome.values.update({name: np.array(value) for name, value in found.items()})
+    return outcome
+
+
+def _with_bars(
+    outcome: Outcome,
+    solve: Callable[[Solver], Outcome],
+    solver: Solver,
+    error_bars: Callable[..., dict[str, Array]],
+) -> Outcome:
+    """The outcome of a run at these settings with its error bars, or why it has none."""
+    reasons = []
+    # Runs of second order with steps twice as long are apart by (4 - 1) of the error, with steps
+    # half as long by (1 - 1/4) of it: a difference that counts four times.
+    for words, factor, scale in (("twice as long", 2.0, 1.0), ("half as long", 0.5, 4.0)):
+        found = solve(solver.scaled(factor))
+        # Times count from the beginning: those of the last run hold for all.
+        spent = {name: found.values[name] for name in TIMINGS if name in found.values}
+        outcome.values.update(spent)
+        added = error_bars(outcome, found, tolerance=solver.tolerance, scale=scale)
+        if added:
+            outcome.values.update(added)
+            return outcome
+        reasons.append(f"with steps {words} it ended as {found.status.word}: {found.reason}")
+    return replace(outcome, reason=f"{outcome.reason}; no error bars, since {'; '.join(reasons)}")
+
+
+def _counts(outcome: Outcome) -> dict[str, int]:
+    """What one start of a run took; 0 where it ended too early to tell."""
+    return {name: int(outcome.values.get(name, np.array(0))) for name in COUNTS}
+
+
+def _curable(outcome: Outcome, solver: Solver) -> bool:
+    """Whether smaller steps may help: not where there were too many of them already."""
+    if outcome.status not in (Status.SOLVER_FAILED, Status.DIVERGED):
+        return False
+    return int(outcome.values.get("steps", np.array(0))) < solver.step_limit
