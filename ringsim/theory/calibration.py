@@ -10,7 +10,7 @@ from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.structures.pantograph_ring import PantographRing
-from ringsim.theory.ideal_course import Integration
+from ringsim.theory.ideal_course import Course
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 
 _WIDEST, _LEAST = 179.0, 1.0
@@ -47,7 +47,7 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         least = max(least, scene.stop.stowed_angle + _CLOSE)
 
     def excess(angle: float) -> float:
-        course = Integration(plain.with_values({"structure.opening_angle": angle})).run()
+        course = Course(plain.with_values({"structure.opening_angle": angle})).run()
         if course.status.failed:
             raise InputError(f"from {angle:.4g} deg the ideal ring fails: {course.reason}")
         found = course.lock_time - time

@@ -19,7 +19,7 @@ from ringsim.parts.net import Net
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.faded_friction import with_remark
-from ringsim.theory.ideal_course import Integration
+from ringsim.theory.ideal_course import Course
 from ringsim.theory.ideal_outcome import to_outcome
 from ringsim.variables import Outcome, Status
 
@@ -95,7 +95,7 @@ def run_ideal(scene: Scene) -> Outcome:
     wall, cpu = time.perf_counter(), time.process_time()
     with np.errstate(all="ignore"):
         try:
-            outcome = to_outcome(Integration(scene).run(), scene, wall_time=0.0, cpu_time=0.0)
+            outcome = to_outcome(Course(scene).run(), scene, wall_time=0.0, cpu_time=0.0)
         except ValueError as error:  # the cables have no answer at the very start
             outcome = Outcome(Status.SOLVER_FAILED, f"the ideal ring has no answer: {error}")
     outcome.values["wall_time"] = np.array(time.perf_counter() - wall)
