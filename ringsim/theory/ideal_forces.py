@@ -95,7 +95,7 @@ class Forces:
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
         self._mechanism, self._stop = mechanism, scene.stop
         points = mechanism.points
-        loads, places = points.forces()
+        loads, places = points.forces
         self.loaded = bool(loads.any())
         self._lift = np.tensordot(loads[:, 2], places, 1)
         self._net = None if scene.net is None else FreeHub(scene.net, len(mechanism.upper_corners))

@@ -16,6 +16,7 @@ linear in two more functions for each of them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -150,11 +151,21 @@ class Points:
 
     def upper_corners(self) -> Array:
         """Coefficients of the upper hinge assemblies' centres, shape (corners, 3, functions), m."""
-        bodies = self.layout.corners[0]
+        bodies = self.layout.corners[0] if self.layout.corners else ()
         return self.swung(
             lambda layout: _stacked(layout.bodies[b].pose.at(UP * 0.0) for b in bodies), bodies
         )
 
+    def frame(self, body: int) -> Array:
+        """Coefficients of a body's origin, m, and of its axes; shape (4, 3, functions)."""
+        arms = np.vstack([np.zeros(3), np.eye(3)])
+        found = self.swung(
+            lambda layout: _stacked(layout.bodies[body].pose.at(arm) for arm in arms), [body] * 4
+        )
+        found[1:] -= found[0]
+        return found
+
+    @cached_property
     def forces(self) -> tuple[Array, Array]:
         """The loads, N, and where they act; shapes (forces, 3) and (forces, 3, functions)."""
         mounts = [self.layout.joints[joint].first for joint, _ in self.layout.forces]
@@ -165,6 +176,11 @@ class Points:
             return _stacked((pose.place, pose.rate) for pose in poses)
 
         return vectors, self.swung(read, map(body_of, mounts))
+
+    @cached_property
+    def load_work(self) -> Array:
+        """Coefficients of the work of loads that turn with the structure, shape (functions,), J."""
+        return np.tensordot(*self.forces, 2)
 
     def path(self, number: int) -> Array:
         """Coefficients of a cable's sheaves, shape (sheaves, 3, functions), m."""
@@ -191,14 +207,13 @@ def _stacked(pairs: Iterable[Sequence[Array]]) -> Pairs:
 def _end_hinges(layout: Layout) -> list[OnBody]:
     """A mount on each hinge assembly at an end of an arc, all of whose hinges share one axis."""
     found = []
-    for end in (0, -1):
-        for plane in layout.corners[:2]:
-            hinges = [
-                mount
-                for joint in layout.joints
-                for mount in (joint.first, joint.second)
-                if joint.kind == "revolute" and body_of(mount) == plane[end]
-            ]
-            if np.ptp([hinge.axes[:, 2] for hinge in hinges], axis=0).max() < _CLOSE:
-                found.append(hinges[0])
-    return [mount for mount in found if isinstance(mount, OnBody)]
+    for body in [plane[end] for end in (0, -1) for plane in layout.corners]:
+        hinges = [
+            mount
+            for joint in layout.joints
+            for mount in (joint.first, joint.second)
+            if joint.kind == "revolute" and isinstance(mount, OnBody) and mount.body == body
+        ]
+        if np.ptp([hinge.axes[:, 2] for hinge in hinges], axis=0).max() < _CLOSE:
+            found.append(hinges[0])
+    return found
