@@ -66,7 +66,7 @@ class Points:
         self.pins, self.normals = np.zeros((0, 3, 0)), np.zeros((0, 3))
         if hinges:
             self.pins = self.fit(
-                lambda layout: _stacked(layout.bodies[h.body].pose.at(h.arm) for h in hinges)
+                lambda layout: _stacked(layout.pose(h).at(0.0 * UP) for h in hinges)
             )
             self.normals = np.array([self.layout.pose(hinge).axes[:, 2] for hinge in hinges])
 
@@ -152,30 +152,34 @@ class Points:
     def upper_corners(self) -> Array:
         """Coefficients of the upper hinge assemblies' centres, shape (corners, 3, functions), m."""
         bodies = self.layout.corners[0] if self.layout.corners else ()
-        return self.swung(
-            lambda layout: _stacked(layout.bodies[b].pose.at(UP * 0.0) for b in bodies), bodies
-        )
+        return self.places([OnBody(body, np.zeros(3), np.eye(3)) for body in bodies])
 
     def frame(self, body: int) -> Array:
         """Coefficients of a body's origin, m, and of its axes; shape (4, 3, functions)."""
-        arms = np.vstack([np.zeros(3), np.eye(3)])
-        found = self.swung(
-            lambda layout: _stacked(layout.bodies[body].pose.at(arm) for arm in arms), [body] * 4
+        axes = [OnBody(body, np.zeros(3), np.roll(np.eye(3), -k, axis=1)) for k in range(3)]
+        return np.concatenate([self.places(axes[:1]), self.directions(axes)])
+
+    def places(self, mounts: Sequence[Mount], *, ahead: float = 0.0) -> Array:
+        """Coefficients of mounts, or of points ahead of them along their x axes (m).
+
+        The mounts are those of ``layout``; shape (mounts, 3, functions), m.
+        """
+        arm = np.array([ahead, 0.0, 0.0])
+        return self.swung(
+            lambda layout: _stacked(layout.pose(mount).at(arm) for mount in mounts),
+            map(body_of, mounts),
         )
-        found[1:] -= found[0]
-        return found
+
+    def directions(self, mounts: Sequence[Mount]) -> Array:
+        """Coefficients of the mounts' x axes, shape (mounts, 3, functions)."""
+        return self.places(mounts, ahead=1.0) - self.places(mounts)
 
     @cached_property
     def forces(self) -> tuple[Array, Array]:
         """The loads, N, and where they act; shapes (forces, 3) and (forces, 3, functions)."""
         mounts = [self.layout.joints[joint].first for joint, _ in self.layout.forces]
         vectors = np.array([force for _, force in self.layout.forces]).reshape(-1, 3)
-
-        def read(layout: Layout) -> Pairs:
-            poses = [layout.pose(mount) for mount in mounts]
-            return _stacked((pose.place, pose.rate) for pose in poses)
-
-        return vectors, self.swung(read, map(body_of, mounts))
+        return vectors, self.places(mounts)
 
     @cached_property
     def load_work(self) -> Array:
