@@ -7,7 +7,7 @@ times how that point moves with the coordinates.
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -127,7 +127,8 @@ class IdealCables:
         wound, speed = np.zeros((2, len(copies), 2))
         for place, winch in self._winches.items():
             if not winch.feedback:
-                _, wound[place], speed[place] = astuple(winch.at(time, WinchState()))
+                law = winch.at(time, WinchState())
+                wound[place], speed[place] = law.wound, law.speed
         for place, *motor in zip(self.answering, *motors, strict=True):
             wound[place], speed[place] = motor
         state = self._chain.state(ropes, points, slopes @ now.rate, wound, speed)

@@ -29,16 +29,17 @@ from ringsim.theory.ideal_points import UP, Points, body_of
 Array = NDArray[np.float64]
 
 
+_LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3))
+
+
 def skew(r: Array) -> Array:
     """The matrix [r]x."""
-    return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+    return np.asarray(-_LEVI_CIVITA @ r)
 
 
 def _axial(w: Array) -> Array:
     """Sums of a x b from sums of a b^T, shape (..., 3, 3)."""
-    return np.stack(
-        [w[..., 1, 2] - w[..., 2, 1], w[..., 2, 0] - w[..., 0, 2], w[..., 0, 1] - w[..., 1, 0]], -1
-    )
+    return np.asarray(np.einsum("abc,...bc->...a", _LEVI_CIVITA, w))
 
 
 class Configuration(NamedTuple):
@@ -135,7 +136,7 @@ class Mechanism:
         matrix[3:6, 3:6] = np.trace(second[0, 0]) * np.eye(3) - second[0, 0]
         matrix[:3, 6:] = first[:, 1 : n + 1]
         matrix[3:6, 6:] = _axial(second[0, 1 : n + 1]).T
-        matrix[6:, 6:] = np.trace(second[1:, 1 : n + 1], axis1=2, axis2=3)
+        matrix[6:, 6:] = np.einsum("jkaa->jk", second[1:, 1 : n + 1])
         matrix[3:6, :3] = matrix[:3, 3:6].T
         matrix[6:, :6] = matrix[:6, 6:].T
         return Configuration(place, rate, slopes, bias, s, first, second, matrix)
@@ -177,7 +178,7 @@ class Mechanism:
         # Accelerations of the masses at zero (V' + W x V, W', p'') are linear in s, s' and s''.
         about = second[:, 0] @ whirl.T + 2.0 * second[:, -2] @ turn.T + second[:, -1]
         inertial = whirl @ first[:, 0] + 2.0 * turn @ first[:, -2] + first[:, -1]
-        along = np.trace(about[1:], axis1=1, axis2=2)
+        along = np.einsum("jaa->j", about[1:])
         load = np.concatenate([-inertial, torque - _axial(about[0]), forces - along])
         reach = np.zeros((len(matrix), rigid + self.freedom))
         reach[:rigid, :rigid] = np.eye(rigid)
@@ -193,8 +194,9 @@ class Mechanism:
 
     def _holding(self, now: Configuration) -> Array:
         """(V, W) that stop the held body while it moves with each column of s, shape (6, n + 2)."""
-        origin, *axes = self._held @ now.functions
-        turn = -0.5 * sum(np.cross(axis[:, 0], axis[:, 1:], axisb=0, axisc=0) for axis in axes)
+        frame = self._held @ now.functions
+        origin, axes = frame[0], frame[1:]
+        turn = -0.5 * np.einsum("abc,kb,kcj->aj", _LEVI_CIVITA, axes[:, :, 0], axes[:, :, 1:])
         return np.vstack([skew(origin[:, 0]) @ turn - origin[:, 1:], turn])
 
     def _along_the_boom(self, free: Array, rates: Array) -> tuple[Array, Array, Array]:
