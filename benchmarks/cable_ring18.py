@@ -22,8 +22,8 @@ from ringsim.cable.tangent import tangents
 from ringsim.engine.build import build
 from ringsim.engine.cable_path import WIDTH
 from ringsim.engine.cables import CableDrive
-from ringsim.engine.history import History
 from ringsim.engine.integrate import Integration
+from ringsim.outputs.recorder import History
 from ringsim.scene import Scene, load_scene
 
 

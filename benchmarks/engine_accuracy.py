@@ -18,7 +18,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from ringsim.engine.build import build
 from ringsim.engine.integrate import Integration
-from ringsim.engine.outcome import lock_times
+from ringsim.outputs.series import lock_times
 from ringsim.scene import Scene, load_scene
 from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.ideal_ring import IdealRing

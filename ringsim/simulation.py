@@ -15,12 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ringsim.engine.solve import SOLVERS
+from ringsim.outputs.effort import TIMINGS, counts_of, note_starts
+from ringsim.outputs.error_bars import OF_FINER, error_bars
 from ringsim.parts.solver import Solver
+from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.theory.error_bars import OF_FINER, error_bars
 from ringsim.theory.faded_friction import with_remark
 from ringsim.theory.ideal_fidelity import run_ideal
-from ringsim.variables import COUNTS, TIMINGS, Fidelity, Outcome, Status
+from ringsim.variables import Cause, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,28 +50,22 @@ def run(scene: Scene) -> Outcome:
         counts) of both runs.
     """
     begin = (time.perf_counter(), time.process_time())
-    outcome, first, restarts = _attempt(scene, begin), "", 0
-    counts = [_counts(outcome)]
-    while restarts < scene.solver.restarts and _curable(outcome, scene):
-        restarts += 1
-        first = first or outcome.reason
-        finer = scene.solver.refined(restarts)
-        outcome = _attempt(scene.model_copy(update={"solver": finer}), begin)
-        counts.append(_counts(outcome))
-        how = f"start {restarts + 1} with solver.step = {finer.step:.3g} s"
-        if finer.step_control != "constant":
-            how += f" and solver.tolerance = {finer.tolerance:.2g}"
-        outcome = replace(outcome, reason=f"{outcome.reason} ({how}; start 1: {first})")
+    used, first = scene.solver, _attempt(scene, begin)
+    outcome, starts = first, [counts_of(first)]
+    while len(starts) <= scene.solver.restarts and _curable(outcome, scene):
+        used = scene.solver.refined(len(starts))
+        outcome = _attempt(scene.model_copy(update={"solver": used}), begin)
+        starts.append(counts_of(outcome))
+        how = f"start {len(starts)} with solver.step = {used.step:.3g} s"
+        if used.step_control != "constant":
+            how += f" and solver.tolerance = {used.tolerance:.2g}"
+        # A start that only ran out of its smaller steps does not say what is wrong.
+        cause = first.cause if outcome.cause is Cause.STEP_LIMIT else outcome.cause
+        reason = f"{outcome.reason} ({how}; start 1: {first.reason})"
+        outcome = replace(outcome, reason=reason, cause=cause)
     if scene.solver.error_bars and outcome.status == Status.OK:
-        outcome = _with_bars(outcome, scene, scene.solver.refined(restarts), begin)
-    outcome.values["fidelity"] = np.array(int(Fidelity.FULL))
-    outcome.values["restarts"] = np.array(restarts)
-    used = scene.solver.refined(restarts)
-    outcome.values["step_used"] = np.array(used.step)
-    follows = used.step_control == "motion"
-    outcome.values["tolerance_used"] = np.array(used.tolerance if follows else np.nan)
-    for name in COUNTS:
-        outcome.values[f"total_{name}"] = np.array(sum(each[name] for each in counts))
+        outcome = _with_bars(outcome, scene, used, begin)
+    note_starts(outcome, Fidelity.FULL, used, starts)
     return with_remark(outcome, scene)
 
 
@@ -94,20 +90,18 @@ def _with_bars(
     return replace(outcome, reason=f"{outcome.reason}; no error bars, since {'; '.join(reasons)}")
 
 
-def _counts(outcome: Outcome) -> dict[str, int]:
-    """What one start of a run took; 0 where it ended too early to tell."""
-    return {name: int(outcome.values.get(name, np.array(0))) for name in COUNTS}
-
-
 def _attempt(scene: Scene, begin: tuple[float, float]) -> Outcome:
     """One start of a run; times count from ``begin`` (s, elapsed and of the processor)."""
-    wall, cpu = begin
     try:
-        finish = SOLVERS[type(scene.structure)](scene)
-        return finish(wall_time=time.perf_counter() - wall, cpu_time=time.process_time() - cpu)
+        outcome = SOLVERS[type(scene.structure)](scene)
     except Exception as error:  # whatever broke, a campaign goes on and the user learns of it
         traceback.print_exc()  # a campaign keeps it in the sample's log
-        return Outcome(Status.ERROR, f"{type(error).__name__}: {error}")
+        cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
+        return Outcome(Status.ERROR, f"{type(error).__name__}: {error}", cause=cause)
+    now = (time.perf_counter(), time.process_time())
+    passed = {name: np.array(t - t0) for name, t, t0 in zip(TIMINGS, now, begin, strict=True)}
+    outcome.values.update(passed)
+    return outcome
 
 
 def _curable(outcome: Outcome, scene: Scene) -> bool:

@@ -14,8 +14,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
-from ringsim.variables import VARIABLES, Status
+from ringsim.variables import Status
 
 Array = NDArray[np.float64]
 

@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from ringsim.campaign.folder import Folder
 from ringsim.execution.solve import load_solver, solve
 from ringsim.execution.work import Task
+from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.outputs.effort import TIMINGS
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.storage.record import Result
 from ringsim.storage.shards import latest, rows_of
 from ringsim.storage.store import survey
-from ringsim.variables import COORDINATES, TIMINGS, VARIABLES, Outcome, Status
+from ringsim.variables import Outcome, Status
 
 
 @dataclass(frozen=True)
@@ -105,10 +107,10 @@ def differences(result: Result, before: Stored) -> list[str]:
 def outcome_of(result: Result) -> Outcome:
     """The result as the outcome of a single run."""
     arrays = result.unpack()
-    axes = {v.name for v in COORDINATES}
     return Outcome(
         result.status,
         result.reason,
-        {name: values for name, values in arrays.items() if name in axes},
-        {name: values for name, values in arrays.items() if name not in axes},
+        {name: values for name, values in arrays.items() if name in COORDINATES},
+        {name: values for name, values in arrays.items() if name not in COORDINATES},
+        result.cause,
     )

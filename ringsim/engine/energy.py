@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import exudyn as exu
 import numpy as np
@@ -16,6 +15,7 @@ from ringsim.engine.net import HubNet, net_forces
 from ringsim.engine.pantograph_ring import RingModel
 from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.work import StepWork
+from ringsim.outputs.instant import Energies
 from ringsim.parts.joints import JointFriction
 
 Array = NDArray[np.float64]
@@ -24,19 +24,6 @@ _POTENTIAL = exu.OutputVariableType.PotentialEnergy
 Damping = tuple[Array, Array]
 """Damping forces and the rates that they act against."""
 _NOTHING: Damping = (np.zeros(0), np.zeros(0))
-
-
-class Energies(NamedTuple):
-    """Energies in J: kinetic, elastic and work of the loads at one instant; since the instant
-    before, what was lost in friction, dampers and stops, and what the winches put in less the
-    strain energy that they wind up.
-    """
-
-    kinetic: float
-    elastic: float
-    work: float
-    lost: float
-    driven: float = 0.0
 
 
 class EnergyMeter:

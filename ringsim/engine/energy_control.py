@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 
-from ringsim.engine.energy import Energies
+from ringsim.outputs.instant import Energies
 from ringsim.parts.solver import Solver
 
 _SHARE = 0.3

@@ -27,9 +27,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.energy import Energies
+from ringsim.outputs.instant import Energies
 from ringsim.parts.solver import Solver
-from ringsim.variables import Status
+from ringsim.variables import Cause, Reason, Status
 
 GROWTH, LOSS = 2.0, 5.0
 """B / X at which a run is stopped, over ``solver.energy_tolerance``.  Larger than at the end,
@@ -64,7 +64,9 @@ class Watched(Protocol):
     gaps: list[float]
     tensions: list[Array]
     status: Status
-    reason: str
+
+    def end(self, status: Status, reason: Reason) -> None:
+        """Note how the run ended and why."""
 
 
 class Guard:
@@ -115,16 +117,16 @@ class Guard:
             self._until_lock = len(history.times) - 1
         reason = self.judge(history.times[-1], history.energies[-1], history.gaps[-1], overrun)
         if reason:
-            history.status, history.reason = Status.DIVERGED, reason
+            history.end(Status.DIVERGED, reason)
         return bool(reason)
 
     def conclude(self, history: Watched) -> None:
         """Note in the history of a run that ended by itself if it is not sound after all."""
         reason = self.verdict() or self._hasty(history) or self._bent(history)
         if reason and history.status in (Status.OK, Status.UNFINISHED):
-            history.status, history.reason = Status.DIVERGED, reason
+            history.end(Status.DIVERGED, reason)
 
-    def judge(self, time: float, now: Energies, gap: float, overrun: float = 0.0) -> str:
+    def judge(self, time: float, now: Energies, gap: float, overrun: float = 0.0) -> Reason:
         """Why the run must stop here: cause, measured value, bound and cure; empty if it may go on.
 
         Parameters
@@ -151,51 +153,55 @@ class Guard:
 
         available = max(abs(work), self._least) + start.kinetic + start.elastic
         if stored > BLOW_UP * available:
-            return (
+            return Reason(
+                Cause.BLOW_UP,
                 f"the motion blew up at {time:.6g} s: {now.kinetic:.3g} J of kinetic and "
                 f"{now.elastic:.3g} J of elastic energy, more than {BLOW_UP:g} times the "
-                f"{available:.3g} J that start, loads and winches have given: {_CURE}"
+                f"{available:.3g} J that start, loads and winches have given: {_CURE}",
             )
         if gap > GAP * self._bar:
-            return (
+            return Reason(
+                Cause.JOINT_GAP,
                 f"the joints came apart by {gap:.2g} m at {time:.6g} s, more than "
-                f"{GAP * self._bar:.2g} m: {_CURE}"
+                f"{GAP * self._bar:.2g} m: {_CURE}",
             )
         if overrun > OVERRUN:
-            return (
+            return Reason(
+                Cause.STOP_PASSED,
                 f"a V-joint swung {math.degrees(overrun):.3g} deg past its stop at {time:.6g} s, "
                 f"more than {math.degrees(OVERRUN):.0f} deg: raise stop.stiffness, or lower what "
-                "drives it"
+                "drives it",
             )
         factor = GROWTH if balance > 0.0 else LOSS
         exchanged = self._exchanged(self._least)
         if abs(balance) > factor * self._tolerance * exchanged:
             bound = f"{factor:g} times solver.energy_tolerance"
             return self._unbalanced(time, balance, exchanged, bound)
-        return ""
+        return Reason()
 
-    def verdict(self) -> str:
+    def verdict(self) -> Reason:
         """Why a run that ended by itself is not sound after all; empty if it is."""
         time, balance = self._worst
         exchanged = self._exchanged(SLIGHT * self._least)
         if abs(balance) <= self._tolerance * exchanged:
-            return ""
+            return Reason()
         return self._unbalanced(time, balance, exchanged, "solver.energy_tolerance")
 
-    def _hasty(self, history: Watched) -> str:
+    def _hasty(self, history: Watched) -> Reason:
         """Why constant steps have not resolved the motion; empty if they have."""
         if not 0 < self._until_lock < self._least_steps:
-            return ""
-        return (
+            return Reason()
+        return Reason(
+            Cause.FEW_STEPS,
             f"the first V-joint locked within {self._until_lock} steps, at "
             f"{history.times[self._until_lock]:.3g} s, fewer than {STEPS} of constant length: "
-            'reduce solver.step, or let it follow the motion (solver.step_control = "motion")'
+            'reduce solver.step, or let it follow the motion (solver.step_control = "motion")',
         )
 
-    def _bent(self, history: Watched) -> str:
+    def _bent(self, history: Watched) -> Reason:
         """Why constant steps have not resolved the tensions; empty if they have."""
         if len(history.tensions) < 3 or math.isinf(self._least_bend):
-            return ""
+            return Reason()
         tensions, steps = np.array(history.tensions), np.diff(history.times)[:, None]
         bends = np.abs(np.diff(np.diff(tensions, axis=0) / steps, axis=0))
         bends = (bends * np.minimum(steps[1:], steps[:-1])).max(axis=1)
@@ -207,23 +213,25 @@ class Guard:
             (there, PEAK_BEND, f"at {history.times[peak]:.6g} s, where it is largest"),
         ):
             if bend > max(share * largest, self._least_bend):
-                return (
+                return Reason(
+                    Cause.TENSION_BENDS,
                     f"a tension bends by {bend:.3g} N within a step {where}, "
                     f"{100.0 * bend / largest:.3g} % of its largest value and more than "
                     f"{100.0 * share:g} %: the steps do not resolve how the rope swings: "
-                    "reduce solver.step"
+                    "reduce solver.step",
                 )
-        return ""
+        return Reason()
 
     def _exchanged(self, least: float) -> float:
         """X, J."""
         work = max(self._high[2], -self._low[2])
         return float(max(least, work, *(self._high - self._low)[:2]))
 
-    def _unbalanced(self, time: float, balance: float, exchanged: float, bound: str) -> str:
+    def _unbalanced(self, time: float, balance: float, exchanged: float, bound: str) -> Reason:
         what = "came as energy from nothing" if balance > 0.0 else "is energy got lost in the steps"
-        return (
+        return Reason(
+            Cause.ENERGY_GREW if balance > 0.0 else Cause.ENERGY_LOST,
             f"{abs(balance):.3g} J, {100.0 * abs(balance) / exchanged:.3g} % of the energy "
             f"exchanged, {what} until {time:.6g} s, more than {bound} "
-            f"({100.0 * self._tolerance:g} %): {_CURE}"
+            f"({100.0 * self._tolerance:g} %): {_CURE}",
         )

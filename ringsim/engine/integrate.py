@@ -13,11 +13,9 @@ from ringsim.cable.state import ChainState
 from ringsim.engine.build import Built
 from ringsim.engine.closing import close
 from ringsim.engine.deviation_steps import deviation_steps
-from ringsim.engine.energy import Energies, EnergyMeter
+from ringsim.engine.energy import EnergyMeter
 from ringsim.engine.guard import Guard
-from ringsim.engine.history import History
 from ringsim.engine.locks import Locks
-from ringsim.engine.outcome import lock_times
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import JointGroup, Openings, State
 from ringsim.engine.scales import (
@@ -31,7 +29,10 @@ from ringsim.engine.settings import raise_own, solver_settings
 from ringsim.engine.step_judge import Reading, StepJudge
 from ringsim.engine.stepping import StepControl
 from ringsim.engine.stress import StressMeter
-from ringsim.variables import Status
+from ringsim.outputs.instant import Energies, Instant
+from ringsim.outputs.recorder import History, Recorder
+from ringsim.outputs.series import lock_times
+from ringsim.variables import Cause, Reason, Status
 
 Array = NDArray[np.float64]
 _REFUSE = 10.0
@@ -73,7 +74,8 @@ class Integration:
         self._weighed: Reading | None = None
         self._shorter: float | None = None
         self._chain: ChainState | None = None
-        self.history = History()
+        self.recorder = Recorder(scene)
+        self.history = self.recorder.history
 
     def run(self) -> History:
         """Integrate until all V-joints have locked and settled, or to the end time."""
@@ -93,11 +95,11 @@ class Integration:
             if math.isfinite(self._settled_at):
                 history.reason += f"; settling was cut short at {history.times[-1]:.6g} s"
             elif history.status != Status.DIVERGED:
-                history.status = Status.SOLVER_FAILED
-                history.reason = self._explain(error)
+                history.end(Status.SOLVER_FAILED, self._explain(error))
         if history.status == Status.UNFINISHED and not history.reason:
-            history.status = Status.SOLVER_FAILED  # exudyn may give up without raising
-            history.reason = self._explain(RuntimeError("it stopped before the end"))
+            # exudyn may give up without raising
+            stopped = RuntimeError("it stopped before the end")
+            history.end(Status.SOLVER_FAILED, self._explain(stopped))
         self._guard.conclude(history)
         history.reason += self._judge.note() if self._judge is not None else ""
         history.reason += self._energy.note()
@@ -186,10 +188,10 @@ class Integration:
         history = self.history
         found = self._weighed or self._measure(time)
         if found is None:
-            history.status = Status.DIVERGED
-            history.reason = (
+            reason = (
                 f"the state is not finite at {time:.6g} s: reduce solver.step or solver.tolerance"
             )
+            history.end(Status.DIVERGED, Reason(Cause.NOT_FINITE, reason))
             return False
         _, angles, rates, energies, chain = found
         if self._judge is not None and history.times:
@@ -201,18 +203,20 @@ class Integration:
             released = energies.elastic - after.elastic
             energies = after._replace(lost=energies.lost + released, driven=energies.driven)
         self._energy.keep()
-        history.times.append(time)
-        history.angles.append(angles)
-        history.rates.append(rates)
-        history.energies.append(energies)
-        if chain is not None:
-            history.tensions.append(chain.tensions)
-            history.slack.append(chain.is_slack[chain.ropes.first].astype(float))
-            history.wound.append(chain.wound.sum(axis=1))
-            self._chain = chain
-        history.gaps.append(max(float(group.gaps(self._state).max()) for group in self._gaps))
-        if self._stress is not None:
-            history.stresses.append(self._stress.read())
+        self._chain, cables = chain, self._built.cables
+        self.recorder.note(
+            Instant(
+                time,
+                angles,
+                rates,
+                energies,
+                gap=max(float(group.gaps(self._state).max()) for group in self._gaps),
+                latched=self._locks.latched.copy(),
+                chain=chain,
+                planes=() if cables is None else tuple((plane,) for plane in cables.planes),
+                stress=None if self._stress is None else self._stress.read(),
+            )
+        )
         return not self._guard.stops(history, self._locks.overrun(angles), float(angles.max()))
 
     def _read_cables(self, time: float) -> ChainState | None:
@@ -253,9 +257,13 @@ class Integration:
             return False
         if self.history.status == Status.UNFINISHED:
             locked = int(self._locks.deployed.sum())
-            self.history.reason = (
-                f"solver.end_time = {end:g} s was reached with {locked} of "
-                f"{self._locks.deployed.size} V-joints locked"
+            self.history.end(
+                Status.UNFINISHED,
+                Reason(
+                    Cause.END_TIME,
+                    f"solver.end_time = {end:g} s was reached with {locked} of "
+                    f"{self._locks.deployed.size} V-joints locked",
+                ),
             )
         return True
 
@@ -267,21 +275,22 @@ class Integration:
         if math.isfinite(self._settled_at):
             self.history.reason += f"; settling was cut short at {time:.6g} s"
             return True
-        self.history.status = Status.SOLVER_FAILED
-        self.history.reason = (
+        reason = (
             f"solver.step_limit = {most} steps took the run to {time:.6g} s only, the last of "
             f"{time - self.history.times[-2]:.1e} s: raise solver.tolerance or solver.step_limit"
         )
+        self.history.end(Status.SOLVER_FAILED, Reason(Cause.STEP_LIMIT, reason))
         return True
 
-    def _explain(self, error: Exception) -> str:
+    def _explain(self, error: Exception) -> Reason:
         time = self.history.times[-1]
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
         detail = next((line for line in lines if "step" in line.lower()), lines[0] if lines else "")
-        return (
+        return Reason(
+            Cause.NEWTON,
             f"the solver gave up at {time:.6g} s after {self.history.halvings} reductions of the "
             f"step: reduce solver.step or solver.tolerance, or raise solver.newton_tolerance "
-            f"({self._refusal() or detail[:200]})"
+            f"({self._refusal() or detail[:200]})",
         )
 
     def _refusal(self) -> str:

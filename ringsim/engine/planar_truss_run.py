@@ -7,7 +7,6 @@ watched (``solver.end_time``), in constant steps that exudyn halves only where N
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import Any
 
 import exudyn as exu
@@ -17,14 +16,15 @@ from numpy.typing import NDArray
 from ringsim.cable.state import ChainState
 from ringsim.engine import quaternions
 from ringsim.engine.closing import close
-from ringsim.engine.energy import Energies
 from ringsim.engine.guard import Guard
 from ringsim.engine.planar_truss import TrussModel, rest_force
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.engine.settings import raise_own, solver_settings
 from ringsim.engine.work import StepWork
-from ringsim.variables import Status
+from ringsim.outputs.instant import Energies, Instant
+from ringsim.outputs.recorder import History, Recorder
+from ringsim.variables import Cause, Reason, Status
 
 Array = NDArray[np.float64]
 _KINETIC = exu.OutputVariableType.KineticEnergy
@@ -35,38 +35,6 @@ _RECOVERY = 10
 """Steps after which a halved step may grow again."""
 _SLIGHT = 1e-3
 """Energy that does not matter, over the spring's largest force along a beam."""
-
-
-@dataclass
-class TrussHistory:
-    """What was read at every step; lists of equal length.
-
-    Attributes
-    ----------
-    angles, rates
-        Angle of the upper beam's chord from the axis and its rate, rad and rad/s.
-    cable_lengths
-        From the lower joint to the upper outer joint, m.
-    strains
-        Bending strain at each node of the upper beam.
-    tensions, slack, wound
-        Of each span (N), whether the cable is slack, and the rope wound (m).
-    """
-
-    times: list[float] = field(default_factory=list)
-    angles: list[float] = field(default_factory=list)
-    rates: list[float] = field(default_factory=list)
-    cable_lengths: list[float] = field(default_factory=list)
-    strains: list[Array] = field(default_factory=list)
-    energies: list[Energies] = field(default_factory=list)
-    gaps: list[float] = field(default_factory=list)
-    tensions: list[Array] = field(default_factory=list)
-    slack: list[bool] = field(default_factory=list)
-    wound: list[float] = field(default_factory=list)
-    status: Status = Status.UNFINISHED
-    reason: str = ""
-    newton_iterations: int = 0
-    jacobians: int = 0
 
 
 class TrussIntegration:
@@ -84,9 +52,10 @@ class TrussIntegration:
         slight = _SLIGHT * self._push() * model.truss.beam_length
         slack = max(cable.slack_width for cable in model.cable.chain.cables)
         self._guard = Guard(solver, slight, model.truss.beam_length, slack)
-        self.history = TrussHistory()
+        self.recorder = Recorder(model.scene, {"station": model.upper.places})
+        self.history = self.recorder.history
 
-    def run(self) -> TrussHistory:
+    def run(self) -> History:
         """Integrate to the end time."""
         history, solver = self.history, self._solver
         self._system.SetPostStepUserFunction(self._after_step)
@@ -113,11 +82,11 @@ class TrussIntegration:
         """Note why the solver gave up, unless the reader knows better."""
         history = self.history
         if history.status == Status.UNFINISHED:
-            history.status = Status.SOLVER_FAILED
-            history.reason = (
+            reason = (
                 f"the solver gave up at {history.times[-1]:.6g} s: reduce solver.step, or raise "
                 f"solver.newton_tolerance ({self._model.cable.refusal or detail})"
             )
+            history.end(Status.SOLVER_FAILED, Reason(Cause.NEWTON, reason))
 
     def _after_step(self, system: Any, time: float) -> bool:
         """Read the new state; False ends the run."""
@@ -125,13 +94,15 @@ class TrussIntegration:
         return time <= self.history.times[-1] or self._read(time)
 
     def _read(self, time: float) -> bool:
-        if self._reader.read(time, self.history):
+        now = self._reader.read(time)
+        if now is not None:
+            self.recorder.note(now)
             chain, slope = self._reader.chain, self._reader.path_slope
             step = self._model.scene.solver.step
             self._model.cable.advance(time, step, chain, np.array([slope]))
             return not self._guard.stops(self.history)
-        self.history.status = Status.DIVERGED
-        self.history.reason = f"the state is not finite at {time:.6g} s: reduce solver.step"
+        reason = f"the state is not finite at {time:.6g} s: reduce solver.step"
+        self.history.end(Status.DIVERGED, Reason(Cause.NOT_FINITE, reason))
         return False
 
     def _residual_tolerance(self) -> float:
@@ -191,29 +162,28 @@ class TrussReader:
         self._per_moment = 0.5 * rods.bar.outer_diameter / (np.max(rods.young_modulus) * second)
         self._since = StepWork()
 
-    def read(self, time: float, history: TrussHistory) -> bool:
-        """Append the current state to a history; False if it is not finite."""
+    def read(self, time: float) -> Instant | None:
+        """The current state; None if it is not finite."""
         position = np.asarray(self._data.GetODE2Coordinates()) + self._reference
         velocity = np.asarray(self._data.GetODE2Coordinates_t())
         if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
-            return False
+            return None
         arm = position[self._bar[:3]] - self._model.points.upper
         moving = velocity[self._bar[:3]]
         angle = math.atan2(arm[0], -arm[1])
         rate = float(arm[0] * moving[1] - arm[1] * moving[0]) / float(arm[:2] @ arm[:2])
         self.chain = self._model.cable.current(position, velocity, time)
         self.path_slope = float(self._model.truss.geometry().cable_rate(angle))
-        history.times.append(time)
-        history.angles.append(angle)
-        history.rates.append(rate)
-        history.cable_lengths.append(float(self.chain.lengths[1]))
-        history.strains.append(self._strains())
-        history.energies.append(self._energies(time, position, velocity))
-        history.gaps.append(self._gap(position))
-        history.tensions.append(self.chain.tensions)
-        history.slack.append(bool(self.chain.is_slack[0]))
-        history.wound.append(float(self.chain.wound.sum()))
-        return True
+        return Instant(
+            time,
+            np.array([[angle]]),
+            np.array([[rate]]),
+            self._energies(time, position, velocity),
+            gap=self._gap(position),
+            chain=self.chain,
+            planes=((0,),),
+            strain=self._strains(),
+        )
 
     def _strains(self) -> Array:
         """Strain of the fibre on the side away from the strut, at the nodes of the beam.

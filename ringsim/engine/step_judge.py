@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ringsim.cable.state import ChainState
 from ringsim.engine.build import Built
-from ringsim.engine.energy import Energies
 from ringsim.engine.energy_control import EnergyControl
 from ringsim.engine.scales import slight_energy, usual_energy
 from ringsim.engine.tension_control import TensionControl
+from ringsim.outputs.instant import Energies
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from ringsim.execution.solve import LOG_CHARACTERS, retold
 from ringsim.execution.work import Limits, Retry, Task
 from ringsim.refusal import InputError
 from ringsim.storage.record import Result
-from ringsim.variables import Status
+from ringsim.variables import Cause, Status
 
 TICK = 0.2
 """Seconds between two looks at a process that says nothing."""
@@ -33,6 +33,9 @@ _END_SECONDS = 10.0
 _PAUSE_SECONDS = 1.0
 """Nobody looked for so long: a batch system suspended the job, or the machine is overloaded."""
 _MOST_DEATHS_FROM_OUTSIDE = 2
+_CAUSES = {
+    Status.CRASHED: Cause.CRASH, Status.TIMEOUT: Cause.TIME_LIMIT, Status.MEMORY: Cause.MEMORY,
+}  # fmt: skip
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _FROM_OUTSIDE = (
     -signal.SIGKILL, -signal.SIGTERM, -signal.SIGHUP, -signal.SIGINT, -signal.SIGUSR1,
@@ -251,6 +254,7 @@ class Slot:
             sample=self._task.sample,
             status=status,
             reason=reason,
+            cause=_CAUSES[status],
             log=self._printed(),
             attempts=self._attempts,
             seconds=time.monotonic() - self._begin,

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from ringsim.execution.work import Task
+from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.storage.record import Result, pack, plain
-from ringsim.variables import VARIABLES, Outcome, Status
+from ringsim.variables import Cause, Outcome, Status
 
 Solver = Callable[[Scene], Outcome]
 LOG_CHARACTERS = 4000
@@ -63,19 +64,22 @@ def solve(solver: Solver, base: Scene, task: Task) -> Result:
         outcome = solver(scene)
         arrays, body = pack(outcome.coordinates | outcome.values)
         status, reason, log = Status(outcome.status), str(outcome.reason), ""
+        cause = outcome.cause
         fault = not_finite(outcome) if not status.failed else ""
         if fault:
-            status, reason = Status.DIVERGED, fault
+            status, reason, cause = Status.DIVERGED, fault, Cause.NOT_FINITE
     except MemoryError:
         status, reason, log = Status.MEMORY, "the run needed more memory than allowed", _trace()
-        arrays, body = (), b""
+        arrays, body, cause = (), b"", Cause.MEMORY
     except (Exception, SystemExit) as error:
         status, log, arrays, body = Status.ERROR, _trace(), (), b""
         reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
     return Result(
         sample=task.sample,
         status=status,
         reason=plain(" ".join(reason.split())[:1000]),
+        cause=cause,
         log=plain(log),
         step=step,
         seconds=time.monotonic() - begin,

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.choice import load_package, one_of
+from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import InputError
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Axis, Design
 from ringsim.sampling.distributions.family import Distribution
 from ringsim.sampling.paths import each_of, field_at, refuse_fixed, unit_at
 from ringsim.scene import Scene, place_of
-from ringsim.variables import COORDINATES, VARIABLES
 
 for _package in ("distributions", "distributions.continuous", "designs"):
     load_package(f"ringsim.sampling.{_package}")
@@ -139,7 +139,7 @@ def draw(
     drawn = design.table(axes, correlations, seed=seed, folder=folder)
     samples = len(next(iter(drawn.values()))) if drawn else getattr(design, "samples", 1)
     columns: list[Column] = []
-    taken = set(VARIABLES) | {c.name for c in COORDINATES}
+    taken = VARIABLES.keys() | COORDINATES.keys()
     for path in dict.fromkeys([*inputs, *(p for p in drawn if not axes)]):
         refuse_fixed(base, path)
         grouped = path in inputs and inputs[path].each_section

@@ -10,22 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import known_or_nearest
 from ringsim.storage.record import MISSING_COUNT
 from ringsim.units import Model
-from ringsim.variables import COORDINATES, VARIABLES, Status, Variable
+from ringsim.variables import Variable, flags_of
 
 NOT_RUN = -1
 """Value of ``status`` for samples that have not been run."""
 
 CHUNK_BYTES = 1 << 20
 
-COORDINATE = {variable.name: variable for variable in COORDINATES}
-
 PER_SAMPLE = {
     v.name: v
     for v in (
         VARIABLES["status"],
+        VARIABLES["cause"],
         Variable("reason", (), "1", "why the run ended so", "str"),
         Variable("log", (), "1", "end of what a failed run printed", "str"),
         Variable("attempts", (), "1", "runs that were made of the sample", "i4"),
@@ -66,7 +66,7 @@ def add_dimension(file: Any, name: str, size: int) -> None:
 
 def add_coordinate(file: Any, name: str, values: NDArray[Any]) -> None:
     """Create a dimension with its coordinate variable."""
-    definition = COORDINATE[name]
+    definition = COORDINATES[name]
     file.createDimension(name, len(values))
     kind: Any = str if definition.dtype == "str" else definition.dtype
     variable = file.createVariable(name, kind, (name,))
@@ -137,10 +137,11 @@ def add_variable(
     variable.long_name = definition.long_name
     if kind is not str:
         variable.units = definition.units
+    flags = {} if definition.flags is None else flags_of(definition.flags)
     if definition.name == "status":
-        variable.flag_values = np.array([NOT_RUN, *Status], dtype="i1")
-        variable.flag_meanings = " ".join(["not_run", *(s.word for s in Status)])
-    for name, value in (attributes or {}).items():
+        flags["flag_values"] = np.append(np.int8(NOT_RUN), flags["flag_values"])
+        flags["flag_meanings"] = f"not_run {flags['flag_meanings']}"
+    for name, value in (flags | dict(attributes or {})).items():
         variable.setncattr(name, value)
     return variable
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.outputs import VARIABLES
 from ringsim.sampling.table import Table
 from ringsim.storage.design_file import add_inputs
 from ringsim.storage.files import whole
@@ -23,7 +24,7 @@ from ringsim.storage.layout import (
     open_new,
 )
 from ringsim.storage.shards import Shard, latest, rows_of, shapes_in
-from ringsim.variables import VARIABLES, Status, Variable
+from ringsim.variables import Cause, Status, Variable
 
 NAME = "campaign.nc"
 BLOCK_BYTES = 64 << 20
@@ -138,5 +139,6 @@ def _copy(
                 blocks[name][here] = values
             if not fits[number]:
                 blocks["status"][here], blocks["reason"][here] = Status.ERROR, UNFIT
+                blocks["cause"][here] = Cause.UNFIT
         for name, values in blocks.items():
             file[name][start:stop] = values

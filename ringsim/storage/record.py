@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.variables import COORDINATES, VARIABLES, Status
+from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.variables import Cause, Status
 
-_DEFINED = {v.name: v for v in COORDINATES} | VARIABLES
-_COORDINATES = {v.name for v in COORDINATES}
 _DIGITS = 12
 """Coordinates are rounded to so many digits: the last bits would differ between samples."""
 
@@ -34,6 +33,8 @@ class Result:
         How the run ended.
     reason
         One sentence: why it ended so.
+    cause
+        The same as a code.
     log
         The end of what a failed run printed.
     attempts
@@ -53,6 +54,7 @@ class Result:
     sample: int
     status: Status
     reason: str
+    cause: Cause = Cause.NONE
     log: str = ""
     attempts: int = 1
     step: float = float("nan")
@@ -75,12 +77,13 @@ class Result:
     def header(self) -> bytes:
         """Everything but the arrays' bytes."""
         table = {name: getattr(self, name) for name in _FIELDS}
-        table["status"] = int(self.status)
+        table["status"], table["cause"] = int(self.status), int(self.cause)
         return json.dumps(table, separators=(",", ":")).encode()
 
 
 _FIELDS = (
-    "sample", "status", "reason", "log", "attempts", "step", "seconds", "finished", "arrays",
+    "sample", "status", "reason", "cause", "log", "attempts", "step", "seconds", "finished",
+    "arrays",
 )  # fmt: skip
 
 
@@ -106,7 +109,7 @@ def plain(text: str) -> str:
 def from_header(header: bytes, body: bytes) -> Result:
     """The result whose :meth:`Result.header` is given."""
     table = json.loads(header)
-    table["status"] = Status(table["status"])
+    table["status"], table["cause"] = Status(table["status"]), Cause(table.get("cause", 0))
     table["arrays"] = tuple((name, dtype, tuple(shape)) for name, dtype, shape in table["arrays"])
     return Result(**table, body=body)
 
@@ -121,13 +124,14 @@ def pack(
     ValueError
         If a name has no definition, or an array does not span its coordinates.
     """
-    sizes = {name: np.shape(values) for name, values in arrays.items() if name in _COORDINATES}
+    defined = COORDINATES | VARIABLES
+    sizes = {name: np.shape(values) for name, values in arrays.items() if name in COORDINATES}
     described: list[tuple[str, str, tuple[int, ...]]] = []
     parts: list[bytes] = []
     for name, values in arrays.items():
-        if name not in _DEFINED:
+        if name not in defined:
             raise ValueError(f"there is no variable {name}")
-        wanted = _DEFINED[name]
+        wanted = defined[name]
         array = np.asarray(values)
         if array.ndim != len(wanted.dims):
             raise ValueError(
@@ -145,7 +149,7 @@ def pack(
             array = np.where(np.isfinite(array), array, MISSING_COUNT).astype(wanted.dtype)
         else:
             array = array.astype(wanted.dtype)
-            if name in _COORDINATES and array.dtype.kind == "f":
+            if name in COORDINATES and array.dtype.kind == "f":
                 array = _rounded(array)
         described.append((name, array.dtype.str, array.shape))
         parts.append(np.ascontiguousarray(array).tobytes())

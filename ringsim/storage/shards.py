@@ -14,9 +14,9 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.storage.files import DRAFT, digest, sync
 from ringsim.storage.layout import (
-    COORDINATE,
     PER_SAMPLE,
     add_coordinate,
     add_samples,
@@ -25,7 +25,7 @@ from ringsim.storage.layout import (
     open_new,
 )
 from ringsim.storage.record import Result, plain, precedence
-from ringsim.variables import VARIABLES, Variable
+from ringsim.variables import Variable
 
 FOLDER = "shards"
 ASIDE = "set-aside"
@@ -82,7 +82,7 @@ def write_shards(folder: Path, results: Iterable[Result], campaign: str) -> list
 
 def _axes_key(result: Result) -> Any:
     arrays = result.unpack()
-    return tuple((n, arrays[n].shape, arrays[n].tobytes()) for n in COORDINATE if n in arrays)
+    return tuple((n, arrays[n].shape, arrays[n].tobytes()) for n in COORDINATES if n in arrays)
 
 
 def _write(shards: Path, ordered: list[Result], campaign: str) -> Path:
@@ -105,7 +105,7 @@ def _fill(path: Path, ordered: list[Result], campaign: str) -> None:
     with open_new(path) as file:
         file.campaign = campaign
         add_samples(file, np.array([result.sample for result in ordered], dtype=np.int64))
-        for name in COORDINATE:
+        for name in COORDINATES:
             if name in arrays[0]:
                 add_coordinate(file, name, arrays[0][name])
         for name, definition in (PER_SAMPLE | _TIMES).items():
@@ -223,5 +223,5 @@ def shapes_in(path: Path) -> tuple[dict[str, NDArray[Any]], set[str]]:
     """Coordinates and names of the outputs of a shard."""
     with netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
-        axes = {name: np.asarray(file[name][:]) for name in COORDINATE if name in file.variables}
+        axes = {name: np.asarray(file[name][:]) for name in COORDINATES if name in file.variables}
         return axes, {name for name in VARIABLES if name in file.variables}

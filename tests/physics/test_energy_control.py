@@ -3,8 +3,8 @@
 import pytest
 
 from ringsim.engine import energy_control
-from ringsim.engine.energy import Energies
 from ringsim.engine.energy_control import EnergyControl
+from ringsim.outputs.instant import Energies
 from ringsim.parts.solver import Solver
 from ringsim.scene import load_scene
 from ringsim.simulation import run

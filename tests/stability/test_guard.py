@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from ringsim.analysis.stability import cause_of
-from ringsim.engine.energy import Energies
 from ringsim.engine.guard import (
     BLOW_UP,
     GAP,
@@ -20,7 +19,8 @@ from ringsim.engine.guard import (
     STEPS,
     Guard,
 )
-from ringsim.engine.history import History
+from ringsim.outputs.instant import Energies
+from ringsim.outputs.recorder import History
 from ringsim.parts.solver import Solver
 from ringsim.variables import Status
 

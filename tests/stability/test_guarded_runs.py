@@ -6,9 +6,9 @@ import pytest
 
 from ringsim.analysis.stability import cause_of
 from ringsim.engine.build import build
-from ringsim.engine.energy import Energies
 from ringsim.engine.energy_control import EnergyControl
 from ringsim.engine.integrate import Integration
+from ringsim.outputs.instant import Energies
 from ringsim.parts.solver import Solver
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run

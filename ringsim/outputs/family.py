@@ -1,0 +1,121 @@
+"""The family of outputs, and what all of them together declare."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.choice import kind_of
+from ringsim.outputs.instant import Array, Instant
+from ringsim.outputs.series import Run, Series, output_times
+from ringsim.scene import Scene
+from ringsim.variables import RODS, ErrorBar, Variable
+
+__all__ = ["Array", "ErrorBar", "Instant", "Output", "Run", "Series", "Values", "Variable"]
+
+Values = dict[str, Any]
+"""Arrays and numbers by the names of their variables."""
+
+OUTPUTS: list[type[Output]] = []
+"""All outputs, those of the smallest rank first."""
+
+VARIABLES: dict[str, Variable] = {}
+"""What all outputs declare, with the error bars of those that have one."""
+
+COORDINATES = {
+    variable.name: variable
+    for variable in (
+        Variable("plane", ("plane",), "1", "plane of the ring", "str"),
+        Variable("section", ("section",), "1", "section number, counted from the boom", "i4"),
+        Variable("time", ("time",), "s", "time since the start of the run"),
+        Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
+        Variable("rod", ("rod",), "1", "rod half of a section", "str"),
+    )
+}
+"""Dimensions of the variables; an output may declare more."""
+
+
+class Output:
+    """An output, or a few that are computed together; every run that needs it has its own.
+
+    Attributes
+    ----------
+    variables
+        What it gives.
+    coordinates
+        Dimensions that no other output has; an engine gives their values to its ``Recorder``.
+    needs
+        What a scene must hold for it, see ``Variable``.
+    rank
+        Place among the outputs in files and summaries; the smaller the earlier.
+    """
+
+    variables: ClassVar[tuple[Variable, ...]]
+    coordinates: ClassVar[tuple[Variable, ...]] = ()
+    needs: ClassVar[tuple[str, ...]] = ()
+    rank: ClassVar[int] = 50
+
+    def __init_subclass__(cls) -> None:
+        """Make it known to all that handle results."""
+        twice = sorted(_declared(cls).keys() & (VARIABLES.keys() | COORDINATES.keys()))
+        if twice:
+            raise ValueError(f"{cls.__module__}: there is an output {twice[0]} already: rename it")
+        COORDINATES.update({variable.name: variable for variable in cls.coordinates})
+        OUTPUTS.append(cls)
+        OUTPUTS.sort(key=lambda output: output.rank)
+        VARIABLES.clear()
+        for output in OUTPUTS:
+            VARIABLES.update(_declared(output))
+
+    def read(self, now: Instant) -> Array | float | None:
+        """What to keep of the state after an accepted step; None if this run does not tell it."""
+        return np.empty(0)
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Values of its variables, from what ``read`` gave at all instants of a run.
+
+        Unless said otherwise the first variable is the reading, interpolated in time.
+        """
+        return {self.variables[0].name: series.on_grid()}
+
+
+def _declared(output: type[Output]) -> dict[str, Variable]:
+    """Variables of an output and their error bars, with what these need."""
+    found = {v.name: replace(v, needs=output.needs) for v in output.variables}
+    for name, variable in list(found.items()):
+        if variable.error_bar is not None:
+            found[f"{name}_error"] = _bar_of(variable, variable.error_bar.words)
+    return found
+
+
+def _bar_of(variable: Variable, words: str) -> Variable:
+    """The declaration of ``NAME_error``: a number, or of a function of time alone one of these."""
+    over_time = variable.dims == ("time",)
+    return Variable(
+        f"{variable.name}_error",
+        variable.dims if over_time else (),
+        variable.units,
+        f"what the {words} may be wrong by" + " at any time up to then" * over_time,
+        needs=("error bars", *variable.needs),
+    )
+
+
+def holds(scene: Scene) -> set[str]:
+    """Everything that a variable may need and the scene has."""
+    parts = {name for name in type(scene).parts() if getattr(scene, name) is not None}
+    asked = {"stress": scene.record.stress, "error bars": scene.solver.error_bars}
+    return parts | {kind_of(scene.structure)} | {name for name, wanted in asked.items() if wanted}
+
+
+def axes(scene: Scene) -> dict[str, NDArray[Any]]:
+    """Values of the dimensions that a scene tells before it runs."""
+    return {
+        "plane": np.array(scene.structure.planes),
+        "section": np.arange(1, scene.structure.sections + 1),
+        "time": output_times(scene),
+        "span": np.arange(1, scene.spans + 1),
+        "rod": np.array(RODS),
+    }

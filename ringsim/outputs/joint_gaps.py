@@ -1,0 +1,26 @@
+"""How well the joints hold together."""
+
+from __future__ import annotations
+
+from ringsim.outputs.family import Instant, Output, Run, Series, Values, Variable
+
+
+class JointGaps(Output):
+    """Largest distance of points that a joint should hold together."""
+
+    rank = 61
+    variables = (
+        Variable("constraint_violation", ("time",), "m", "largest gap in any joint"),
+        Variable(
+            "constraint_error", (), "m", "largest gap in any joint at any step",
+            summary=("constraint error", "10.1e"),
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Instant) -> float:
+        """The gap, m."""
+        return now.gap
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Interpolated, and the largest reading."""
+        return super().reduce(run, series) | {"constraint_error": series.values.max()}

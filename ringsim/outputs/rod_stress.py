@@ -1,0 +1,31 @@
+"""Stress of the rods."""
+
+from __future__ import annotations
+
+from ringsim.outputs.family import Array, ErrorBar, Instant, Output, Run, Series, Values, Variable
+
+
+class RodStress(Output):
+    """Axial + bending stress at the ends of every rod half, and the largest at any step."""
+
+    rank = 30
+    needs = ("stress",)
+    variables = (
+        Variable(
+            "rod_stress", ("rod", "section", "time"), "Pa",
+            "axial + bending stress of a rod, elastic + viscous",
+        ),
+        Variable(
+            "peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod",
+            error_bar=ErrorBar("largest stress", safety=1.1, of_one_element=0.03),
+            summary=("largest rod stress", "10.3e"),
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Instant) -> Array | None:
+        """Shape (8, sections), Pa."""
+        return now.stress
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Interpolated, and the largest reading."""
+        return super().reduce(run, series) | {"peak_rod_stress": series.values.max()}

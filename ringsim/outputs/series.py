@@ -1,0 +1,123 @@
+"""Readings over time, and a run that has ended: what outputs are reduced from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
+from ringsim.scene import Scene
+
+Array = NDArray[np.float64]
+_SAME = 1.0 + 1e-12
+"""Times that differ by round-off alone are the same."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """Readings of one thing at all instants of a run.
+
+    Attributes
+    ----------
+    times, values
+        Shapes (n,) and (n, ...); s, and the reading's unit.
+    grid
+        The scene's output times, s.
+    """
+
+    times: Array
+    values: Array
+    grid: Array
+
+    def on_grid(self, rates: Array | None = None) -> Array:
+        """Values at the output times, which are the last axis; see :meth:`at`."""
+        return np.moveaxis(self.at(self.grid, rates), 0, -1)
+
+    def at(self, where: Array, rates: Array | None = None) -> Array:
+        """Values at increasing times (s), which are the first axis; NaN after the end of the run.
+
+        What is not known throughout, as a plane without a cable, is NaN.  With ``rates``, the
+        values' derivatives, it is the cubic Hermite interpolation, else the shape-preserving one.
+        """
+        found = np.full((len(where), *self.values.shape[1:]), np.nan)
+        inside = where <= self.times[-1] * _SAME
+        found[inside] = self._within(np.minimum(where[inside], self.times[-1]), rates)
+        found[:, ~np.isfinite(self.values).all(axis=0)] = np.nan
+        return found
+
+    def _within(self, where: Array, rates: Array | None) -> Array:
+        values = np.nan_to_num(self.values, posinf=0.0, neginf=0.0)
+        if len(self.times) == 1:
+            return np.repeat(values, len(where), axis=0)
+        if rates is not None:
+            return np.asarray(CubicHermiteSpline(self.times, values, rates, axis=0)(where))
+        return np.asarray(PchipInterpolator(self.times, values, axis=0)(where))
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that has ended.
+
+    Attributes
+    ----------
+    angles, rates
+        Opening angles and their rates, shape (n, planes, sections) each, rad and rad/s.
+    locks
+        When each V-joint reached 180 deg, shape (planes, sections), s; NaN if it did not.
+    counts
+        What the solver has counted, by variable.
+    coordinates
+        Values of dimensions that the scene alone does not tell.
+    """
+
+    scene: Scene
+    angles: Series
+    rates: Series
+    locks: Array
+    counts: Mapping[str, int]
+    coordinates: Mapping[str, NDArray[Any]]
+
+    @property
+    def deployed(self) -> float:
+        """When the last V-joint reached 180 deg, s; NaN if one did not."""
+        return float(self.locks.max())
+
+    @property
+    def until(self) -> float:
+        """The deployment time, s; infinite if there is none."""
+        return self.deployed if math.isfinite(self.deployed) else math.inf
+
+
+def output_times(scene: Scene) -> Array:
+    """The scene's output grid in s: multiples of ``record.interval`` up to the end time."""
+    count = math.floor(scene.solver.end_time / scene.record.interval * _SAME)
+    return np.asarray(np.arange(count + 1) * scene.record.interval, dtype=float)
+
+
+def lock_times(times: Array, angles: Array, rates: Array) -> Array:
+    """First time at which each V-joint reaches 180 deg, shape (planes, sections), s; NaN if never.
+
+    The crossing is the root of the cubic that fits angles and rates at both ends of the step.
+
+    Parameters
+    ----------
+    times, angles, rates
+        Shapes (n,), (n, planes, sections) and the same; s, rad, rad/s.
+    """
+    found = np.full(angles.shape[1:], np.nan)
+    for place in np.ndindex(*found.shape):
+        past = angles[(slice(None), *place)] - math.pi
+        crossing = np.flatnonzero(past >= 0.0)
+        if len(crossing) == 0 or crossing[0] == 0:
+            continue
+        ends = slice(crossing[0] - 1, crossing[0] + 1)
+        cubic = CubicHermiteSpline(times[ends], past[ends], rates[(ends, *place)])
+        roots = cubic.roots(extrapolate=False)
+        inside = roots[(roots >= times[ends][0]) & (roots <= times[ends][1])]
+        found[place] = inside.min() if len(inside) else times[crossing[0]]
+    return found

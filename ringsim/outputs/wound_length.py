@@ -1,0 +1,19 @@
+"""Rope that the winches have wound up."""
+
+from __future__ import annotations
+
+from ringsim.outputs.family import Array, Instant, Output, Variable
+
+
+class WoundLength(Output):
+    """Rope wound by all winches of each cable."""
+
+    rank = 42
+    needs = ("cables",)
+    variables = (
+        Variable("wound_length", ("plane", "time"), "m", "rope wound up by the cable's winches"),
+    )
+
+    def read(self, now: Instant) -> Array | None:
+        """Shape (planes,), m; NaN where a plane has no cable."""
+        return None if now.chain is None else now.by_plane(now.chain.wound.sum(axis=1))
