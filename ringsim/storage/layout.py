@@ -17,7 +17,7 @@ from ringsim.units import Model
 from ringsim.variables import Variable, flags_of
 
 NOT_RUN = -1
-"""Value of ``status`` for samples that have not been run."""
+"""Value of ``status`` for samples that have not been run, and of codes that are missing."""
 
 CHUNK_BYTES = 1 << 20
 
@@ -130,17 +130,19 @@ def add_variable(
             options["fill_value"] = np.nan
             if digits is not None:
                 options |= {"significant_digits": digits, "quantize_mode": "GranularBitRound"}
-        elif definition.name in VARIABLES and definition.name != "status":
+        elif definition.name in VARIABLES and definition.flags is None:
             options["fill_value"] = MISSING_COUNT
     variable = file.createVariable(definition.name, kind, dims, **options)
     variable.set_auto_maskandscale(False)
     variable.long_name = definition.long_name
     if kind is not str:
         variable.units = definition.units
-    flags = {} if definition.flags is None else flags_of(definition.flags)
-    if definition.name == "status":
+    flags: dict[str, Any] = {}
+    if definition.flags is not None:  # a missing code has a word of its own: it stays a number
+        flags = flags_of(definition.flags)
         flags["flag_values"] = np.append(np.int8(NOT_RUN), flags["flag_values"])
-        flags["flag_meanings"] = f"not_run {flags['flag_meanings']}"
+        missing = "not_run" if definition.name == "status" else "unknown"
+        flags["flag_meanings"] = f"{missing} {flags['flag_meanings']}"
     for name, value in (flags | dict(attributes or {})).items():
         variable.setncattr(name, value)
     return variable
@@ -150,8 +152,6 @@ def blank(definition: Variable, shape: tuple[int, ...]) -> NDArray[Any]:
     """An array of missing values."""
     if definition.dtype == "str":
         return np.full(shape, "", dtype=object)
-    if definition.name == "status":
-        return np.full(shape, NOT_RUN, dtype="i1")
     kind = np.dtype(definition.dtype)
     return np.full(shape, np.nan if kind.kind == "f" else MISSING_COUNT, dtype=kind)
 

@@ -15,9 +15,9 @@ from ringsim.dataset import to_dataset
 from ringsim.outputs import OUTPUTS, VARIABLES, Output
 from ringsim.scene import load_scene
 from ringsim.simulation import FIDELITIES, simulate
-from ringsim.variables import Outcome, Status, Variable
+from ringsim.variables import Cause, Outcome, Status, Variable
 
-SHORT = {"structure.opening_angle": 160.0, "solver.end_time": 8.0}
+SHORT = {"structure.opening_angle": 160.0, "solver.end_time": 2.0}
 SCENE = load_scene("truss2").with_values(SHORT)
 CAMPAIGN = """
 name = "two"
@@ -26,7 +26,7 @@ design = { kind = "random", samples = 2 }
 
 [set]
 "structure.opening_angle" = 160.0
-"solver.end_time" = 8.0
+"solver.end_time" = 2.0
 
 [inputs]
 "cables.upper.winch.winding.speed" = { kind = "uniform", low = 0.009, high = 0.011 }
@@ -91,7 +91,11 @@ def test_a_campaign_has_it(opening_rate, tmp_path, monkeypatch) -> None:
         assert found.opening_rate.attrs["long_name"] == "mean rate of all opening angles"
         assert found.opening_rate_max.dims == ("sample",)
         assert (found.opening_rate_max > 0.0).all()
-        assert found.cause.values.tolist() == [0, 0]
+        assert found.cause.dtype == np.int8
+        assert found.cause.values.tolist() == [Cause.END_TIME, Cause.END_TIME]
+        words = found.cause.attrs["flag_meanings"].split()
+        assert words[:3] == ["unknown", "none", "end_time"]
+        assert found.cause.attrs["flag_values"].tolist() == [-1, *Cause]
 
 
 def test_explain_tells_it(opening_rate) -> None:
