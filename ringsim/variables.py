@@ -97,82 +97,50 @@ class Fidelity(IntEnum):
 
 @dataclass(frozen=True)
 class ErrorBar:
-    """How the error bar of a variable is made of the difference of two runs.
-
-    See ``ringsim.outputs.error_bars``.
-
-    Attributes
-    ----------
-    words
-        What may be wrong, for the bar's ``long_name``.
-    safety
-        Bar over the difference of the two runs.
-    of_one_element
-        Share of the value that one element per rod half makes uncertain.
-    between_readings
-        Share of the value over ``solver.tolerance`` that both runs may miss alike.
-    judged_by
-        Variable whose largest difference counts; the variable itself if empty.
-    """
+    """How a variable's error bar follows from a second run; see ``ringsim.outputs.error_bars``."""
 
     words: str
+    """What may be wrong, for the bar's ``long_name``."""
     safety: float
+    """Bar over the difference of the two runs."""
     of_one_element: float = 0.0
+    """Share of the value that one element per rod half makes uncertain."""
     between_readings: float = 0.0
+    """Share of the value over ``solver.tolerance`` that both runs may miss alike."""
     judged_by: str = ""
+    """Variable whose largest difference counts; the variable itself if empty."""
 
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable of a result: all that files, summaries, figures and messages say of it.
-
-    Attributes
-    ----------
-    name, dims, units, long_name, dtype
-        As in netCDF files; SI units, or degree where said.
-    needs
-        What a scene must hold for it: names of parts ("cables", "net", ...), "stress" output,
-        "error bars", a kind of structure; all of them.
-    flags
-        Meaning of the values, where they are codes.
-    error_bar
-        How its error bar ``NAME_error`` is made, if it has one.
-    summary
-        Label and number format in the summary that ``ringsim run`` prints, if it is there.
-    """
+    """One variable of a result: all that files, summaries, figures and messages say of it."""
 
     name: str
     dims: tuple[str, ...]
     units: str
+    """SI, or degree."""
     long_name: str
     dtype: str = "f8"
     needs: tuple[str, ...] = ()
+    """What a scene must hold for it, all of: names of parts ("cables", "net", ...), "stress"
+    output, "error bars", a kind of structure."""
     flags: type[Code] | None = None
+    """What the values mean where they are codes."""
     error_bar: ErrorBar | None = None
     summary: tuple[str, str] | None = None
+    """Label and number format in what ``ringsim run`` prints, if it stands there."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of one run, as plain arrays.
-
-    Attributes
-    ----------
-    status
-        How the run ended.
-    reason
-        One sentence: why it ended, and for a failure what to change.
-    coordinates
-        Values of the dimensions that occur in ``values``.
-    values
-        Arrays by variable name; shapes follow ``ringsim.outputs.VARIABLES`` and ``coordinates``.
-        A failed run has what was recorded until then, NaN elsewhere.
-    cause
-        The reason as a code.
-    """
+    """The result of one run, as plain arrays."""
 
     status: Status
     reason: str
+    """One sentence: why it ended, and for a failure what to change."""
     coordinates: dict[str, np.ndarray[Any, Any]] = field(default_factory=dict)
+    """Values of the dimensions that occur in ``values``."""
     values: dict[str, np.ndarray[Any, Any]] = field(default_factory=dict)
+    """Arrays by name; shapes follow ``ringsim.outputs.VARIABLES`` and ``coordinates``.  A failed
+    run has what was recorded until then, NaN elsewhere."""
     cause: Cause = Cause.NONE

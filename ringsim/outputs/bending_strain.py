@@ -1,7 +1,5 @@
 """Bending strain of a planar truss's upper beam."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ringsim.outputs.family import Array, Instant, Output, Run, Series, Values, Variable

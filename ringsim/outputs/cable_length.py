@@ -1,7 +1,5 @@
 """Length of a planar truss's driving cable."""
 
-from __future__ import annotations
-
 from ringsim.outputs.family import Array, Instant, Output, Variable
 
 

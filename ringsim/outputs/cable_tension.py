@@ -1,7 +1,5 @@
 """Tensions of the cables' spans."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -49,10 +47,10 @@ class CableTension(Output):
     def reduce(self, run: Run, series: Series) -> Values:
         """Interpolated, and the largest reading or value at the deployment time."""
         times, largest = series.times, np.nanmax(series.values, axis=(1, 2))
-        if math.isfinite(run.deployed):
-            before = times <= run.deployed
-            times = np.append(times[before], run.deployed)
-            last = series.at(np.array([run.deployed]))
+        if math.isfinite(run.until):
+            before = times <= run.until
+            times = np.append(times[before], run.until)
+            last = series.at(np.array([run.until]))
             largest = np.append(largest[before], np.nanmax(last))
         peak = {"peak_tension": largest.max(), "peak_tension_time": times[np.argmax(largest)]}
         return super().reduce(run, series) | peak

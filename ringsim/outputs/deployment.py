@@ -20,4 +20,4 @@ class Deployment(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """As the run knows them; see ``ringsim.outputs.series.lock_times``."""
-        return {"lock_time": run.locks, "deployment_time": run.deployed}
+        return {"lock_time": run.locks, "deployment_time": run.locks.max()}

@@ -1,7 +1,5 @@
 """Energies over time, and what their balance lacks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ringsim.outputs.family import Array, Instant, Output, Run, Series, Values, Variable

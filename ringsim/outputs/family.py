@@ -83,24 +83,20 @@ class Output:
 
 
 def _declared(output: type[Output]) -> dict[str, Variable]:
-    """Variables of an output and their error bars, with what these need."""
+    """Variables of an output and their error bars ``NAME_error``, with what these need.
+
+    The bar of a function of time alone is one, too; any other is a number.
+    """
     found = {v.name: replace(v, needs=output.needs) for v in output.variables}
     for name, variable in list(found.items()):
         if variable.error_bar is not None:
-            found[f"{name}_error"] = _bar_of(variable, variable.error_bar.words)
+            words = f"what the {variable.error_bar.words} may be wrong by"
+            dims = variable.dims if variable.dims == ("time",) else ()
+            words += " at any time up to then" if dims else ""
+            needs = ("error bars", *output.needs)
+            name += "_error"
+            found[name] = Variable(name, dims, variable.units, words, needs=needs)
     return found
-
-
-def _bar_of(variable: Variable, words: str) -> Variable:
-    """The declaration of ``NAME_error``: a number, or of a function of time alone one of these."""
-    over_time = variable.dims == ("time",)
-    return Variable(
-        f"{variable.name}_error",
-        variable.dims if over_time else (),
-        variable.units,
-        f"what the {words} may be wrong by" + " at any time up to then" * over_time,
-        needs=("error bars", *variable.needs),
-    )
 
 
 def holds(scene: Scene) -> set[str]:

@@ -1,7 +1,5 @@
 """How well the joints hold together."""
 
-from __future__ import annotations
-
 from ringsim.outputs.family import Instant, Output, Run, Series, Values, Variable
 
 

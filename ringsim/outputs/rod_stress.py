@@ -1,7 +1,5 @@
 """Stress of the rods."""
 
-from __future__ import annotations
-
 from ringsim.outputs.family import Array, ErrorBar, Instant, Output, Run, Series, Values, Variable
 
 

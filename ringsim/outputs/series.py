@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -51,12 +52,21 @@ class Series:
         return found
 
     def _within(self, where: Array, rates: Array | None) -> Array:
+        found = np.empty((len(where), *self.values.shape[1:]))
         values = np.nan_to_num(self.values, posinf=0.0, neginf=0.0)
-        if len(self.times) == 1:
-            return np.repeat(values, len(where), axis=0)
-        if rates is not None:
-            return np.asarray(CubicHermiteSpline(self.times, values, rates, axis=0)(where))
-        return np.asarray(PchipInterpolator(self.times, values, axis=0)(where))
+        # Two readings of one time are a jump, which no curve goes through.
+        jumps = np.flatnonzero(np.diff(self.times) <= 0.0) + 1
+        for begin, end in pairwise([0, *jumps, len(self.times)]):
+            times, known = self.times[begin:end], values[begin:end]
+            own = (where >= times[0]) & (where <= times[-1])
+            if len(times) == 1:
+                found[own] = known
+            elif rates is not None:
+                curve = CubicHermiteSpline(times, known, rates[begin:end], axis=0)
+                found[own] = curve(where[own])
+            else:
+                found[own] = PchipInterpolator(times, known, axis=0)(where[own])
+        return found
 
 
 @dataclass(frozen=True)
@@ -83,14 +93,9 @@ class Run:
     coordinates: Mapping[str, NDArray[Any]]
 
     @property
-    def deployed(self) -> float:
-        """When the last V-joint reached 180 deg, s; NaN if one did not."""
-        return float(self.locks.max())
-
-    @property
     def until(self) -> float:
-        """The deployment time, s; infinite if there is none."""
-        return self.deployed if math.isfinite(self.deployed) else math.inf
+        """When the last V-joint reached 180 deg, s; infinite if one did not."""
+        return float(np.nan_to_num(self.locks, nan=math.inf).max())
 
 
 def output_times(scene: Scene) -> Array:

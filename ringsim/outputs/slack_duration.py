@@ -1,7 +1,5 @@
 """How long cables were slack."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ringsim.outputs.family import Array, Instant, Output, Run, Series, Values, Variable

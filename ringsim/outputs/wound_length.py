@@ -1,7 +1,5 @@
 """Rope that the winches have wound up."""
 
-from __future__ import annotations
-
 from ringsim.outputs.family import Array, Instant, Output, Variable
 
 

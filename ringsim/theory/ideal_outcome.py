@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,20 +35,6 @@ class _Evaluated(Series):
         return self.evaluate(where)
 
 
-@dataclass(frozen=True)
-class _Jumping(Series):
-    """Readings that may jump where two of them have the same time."""
-
-    def _within(self, where: Array, rates: Array | None) -> Array:
-        found = np.empty((len(where), *self.values.shape[1:]))
-        jumps = np.flatnonzero(np.diff(self.times) <= 0.0) + 1
-        for begin, end in pairwise([0, *jumps, len(self.times)]):
-            part = Series(self.times[begin:end], self.values[begin:end], self.grid)
-            own = (where >= part.times[0]) & (where <= part.times[-1])
-            found[own] = part._within(where[own], rates)
-        return found
-
-
 def to_outcome(course: Course, scene: Scene) -> Outcome:
     """Put a run on the scene's output grid; what lies after its end is NaN.
 
@@ -67,32 +52,23 @@ def to_outcome(course: Course, scene: Scene) -> Outcome:
 
 
 class _IdealRun:
-    """A course as a run with its readings.
-
-    Attributes
-    ----------
-    run
-        What outputs reduce.
-    steps, balanced
-        Instants at the ends of all steps, and with the collocation points between them.
-    """
+    """A course as the ``run`` that outputs reduce."""
 
     def __init__(self, course: Course, scene: Scene) -> None:
         self._course, self._shape = course, (2, scene.structure.sections)
-        self._grid = output_times(scene)
+        self._grid, self._lifted = output_times(scene), 0.0
         self._known: dict[bytes, list[Instant]] = {}
+        self._steps: list[Instant] = []
+        self._balanced: list[Instant] = []  # ends of steps, collocation points between them
         first = course.pieces[0]
-        self._lifted = 0.0
         self._lifted = self._at(first, np.array(first.times[:1]))[0].energies.work
-        self.steps: list[Instant] = []
-        self.balanced: list[Instant] = []
         for piece in course.pieces:
             ends = self._at(piece, np.array(piece.times))
             inner = [self._told(time, state) for time, state in piece.inner]
-            self.steps += ends
-            self.balanced += sorted([*ends, *inner], key=lambda now: now.time)
+            self._steps += ends
+            self._balanced += sorted([*ends, *inner], key=lambda now: now.time)
         counts = {
-            "steps": len(self.steps) - len(course.pieces),
+            "steps": len(self._steps) - len(course.pieces),
             "newton_iterations": course.evaluations,
             "jacobians": course.jacobians,
         }
@@ -102,35 +78,27 @@ class _IdealRun:
 
     def series_of(self, output: Output) -> Series | None:
         """Readings at the ends of steps; of tensions at all points that are in balance."""
-        if output.read(self.steps[0]) is None:
+        if output.read(self._steps[0]) is None:
             return None
         if isinstance(output, CableTension):
-            return _Jumping(*self._readings(output.read, self.balanced), self._grid)
+            return Series(*_readings(output.read, self._balanced), self._grid)
         return self._series(output.read)
 
     def cables(self) -> Values:
         """The largest tension, and how long ropes were slack, between readings as well."""
-        times, tensions = self._readings(CableTension().read, self.balanced)
+        times, tensions = _readings(CableTension().read, self._balanced)
         counts = times <= self.run.until
-        peak = _top(times[counts], np.nanmax(tensions[counts], axis=(1, 2)))
-        stretch = np.array([_stretches(now.chain) for now in self.balanced if now.chain])
+        peak, moment = _top(times[counts], np.nanmax(tensions[counts], axis=(1, 2)))
+        stretch = np.array([_stretches(now.chain) for now in self._balanced if now.chain])
         slack = np.array([_time_below_zero(times, each) for each in stretch.T])
-        return {
-            "peak_tension": peak[0],
-            "peak_tension_time": peak[1],
-            "slack_duration": self.balanced[0].by_plane(slack),
-        }
+        slack = self._balanced[0].by_plane(slack)
+        return {"peak_tension": peak, "peak_tension_time": moment, "slack_duration": slack}
 
     def _series(self, read: _Reader) -> Series:
         def evaluate(where: Array) -> Array:
-            return self._readings(read, self._instants(where))[1]
+            return _readings(read, self._instants(where))[1]
 
-        return _Evaluated(*self._readings(read, self.steps), self._grid, evaluate)
-
-    def _readings(self, read: _Reader, instants: list[Instant]) -> tuple[Array, Array]:
-        return np.array([now.time for now in instants]), np.array(
-            [read(now) for now in instants], dtype=float
-        )
+        return _Evaluated(*_readings(read, self._steps), self._grid, evaluate)
 
     def _instants(self, where: Array) -> list[Instant]:
         """The run at some times; the later piece where two meet."""
@@ -174,6 +142,11 @@ class _IdealRun:
             chain=None if now.pull is None else now.pull.chain,
             planes=() if motion.cables is None else tuple(motion.cables.planes),
         )
+
+
+def _readings(read: _Reader, instants: list[Instant]) -> tuple[Array, Array]:
+    values = np.array([read(now) for now in instants], dtype=float)
+    return np.array([now.time for now in instants]), values
 
 
 def _stretches(chain: ChainState) -> Array:
