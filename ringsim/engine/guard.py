@@ -22,12 +22,12 @@ than four steps make a period.  Such a run is judged at its end.
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.outputs.instant import Energies
+from ringsim.outputs.recorder import History
 from ringsim.parts.solver import Solver
 from ringsim.variables import Cause, Reason, Status
 
@@ -54,19 +54,6 @@ start small."""
 _CURE = "reduce solver.step or solver.tolerance"
 
 Array = NDArray[np.float64]
-
-
-class Watched(Protocol):
-    """What a guard reads and writes of a run's history."""
-
-    times: list[float]
-    energies: list[Energies]
-    gaps: list[float]
-    tensions: list[Array]
-    status: Status
-
-    def end(self, status: Status, reason: Reason) -> None:
-        """Note how the run ended and why."""
 
 
 class Guard:
@@ -101,7 +88,7 @@ class Guard:
         self._worst = (0.0, 0.0)
         self._until_lock = 0
 
-    def stops(self, history: Watched, overrun: float = 0.0, opening: float = 0.0) -> bool:
+    def stops(self, history: History, overrun: float = 0.0, opening: float = 0.0) -> bool:
         """Judge the last reading of a run; note in its history why it must stop there, if so.
 
         Parameters
@@ -120,7 +107,7 @@ class Guard:
             history.end(Status.DIVERGED, reason)
         return bool(reason)
 
-    def conclude(self, history: Watched) -> None:
+    def conclude(self, history: History) -> None:
         """Note in the history of a run that ended by itself if it is not sound after all."""
         reason = self.verdict() or self._hasty(history) or self._bent(history)
         if reason and history.status in (Status.OK, Status.UNFINISHED):
@@ -187,7 +174,7 @@ class Guard:
             return Reason()
         return self._unbalanced(time, balance, exchanged, "solver.energy_tolerance")
 
-    def _hasty(self, history: Watched) -> Reason:
+    def _hasty(self, history: History) -> Reason:
         """Why constant steps have not resolved the motion; empty if they have."""
         if not 0 < self._until_lock < self._least_steps:
             return Reason()
@@ -198,7 +185,7 @@ class Guard:
             'reduce solver.step, or let it follow the motion (solver.step_control = "motion")',
         )
 
-    def _bent(self, history: Watched) -> Reason:
+    def _bent(self, history: History) -> Reason:
         """Why constant steps have not resolved the tensions; empty if they have."""
         if len(history.tensions) < 3 or math.isinf(self._least_bend):
             return Reason()

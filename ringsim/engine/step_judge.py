@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from ringsim.engine.energy_control import EnergyControl
 from ringsim.engine.scales import slight_energy, usual_energy
 from ringsim.engine.tension_control import TensionControl
 from ringsim.outputs.instant import Energies
+from ringsim.outputs.recorder import History
 
 Array = NDArray[np.float64]
 
@@ -26,14 +27,6 @@ class Reading(NamedTuple):
     rates: Array
     energies: Energies
     chain: ChainState | None
-
-
-class Steps(Protocol):
-    """The readings at the ends of all steps taken."""
-
-    times: list[float]
-    energies: list[Energies]
-    tensions: list[Array]
 
 
 class StepJudge:
@@ -64,7 +57,7 @@ class StepJudge:
         tension = math.inf if self._tension is None or self.locked else self._tension.limit
         return min(self._energy.limit, tension)
 
-    def shorter(self, taken: Steps, found: Reading) -> float | None:
+    def shorter(self, taken: History, found: Reading) -> float | None:
         """A smaller step in s to repeat the one to ``found`` with; None if it is good enough."""
         step = found.time - taken.times[-1]
         wanted = [self._energy.shorter(step, taken.energies[-1], found.energies)]
@@ -72,7 +65,7 @@ class StepJudge:
             wanted.append(self._tension.shorter(step, taken.tensions[-1], found.chain.tensions))
         return min((one for one in wanted if one is not None), default=None)
 
-    def accept(self, taken: Steps, found: Reading) -> None:
+    def accept(self, taken: History, found: Reading) -> None:
         """Learn from a step that is taken, before it is noted among them."""
         step = found.time - taken.times[-1]
         self._energy.accept(step, taken.energies[-1], found.energies)

@@ -87,14 +87,16 @@ class Recorder:
             "jacobians": history.jacobians,
         }
         locks = lock_times(times, angles.values, rates)
-        run = Run(self._scene, angles, Series(times, rates, grid), locks, counts, self._coordinates)
+        ending = (history.status, history.cause)
+        run = Run(self._scene, angles, Series(times, rates, grid), locks, counts, *ending)
 
         def series_of(output: Output) -> Series | None:
             readings = self._readings[output]
             unknown = any(reading is None for reading in readings)
             return None if unknown else Series(times, np.array(readings, dtype=float), grid)
 
-        coordinates, values = reduced(run, self._readings, series_of)
+        values = reduced(run, self._readings, series_of)
+        coordinates = spanned(values, axes(self._scene) | dict(self._coordinates))
         return Outcome(history.status, history.reason, coordinates, values, history.cause)
 
 
@@ -105,14 +107,16 @@ def outputs_of(scene: Scene) -> list[Output]:
 
 def reduced(
     run: Run, outputs: Iterable[Output], series_of: Callable[[Output], Series | None]
-) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
-    """Coordinates and values of the outputs of a run; ``series_of`` gives what one has read."""
-    values: dict[str, NDArray[Any]] = {}
+) -> dict[str, NDArray[Any]]:
+    """Values of the outputs of a run; ``series_of`` gives what one has read, if this run can."""
+    values: dict[str, Any] = {}
     for output in outputs:
         series = series_of(output)
-        if series is not None:
-            found = output.reduce(run, series)
-            values |= {name: np.asarray(value) for name, value in found.items()}
+        values |= {} if series is None else output.reduce(run, series)
+    return {name: np.asarray(value) for name, value in values.items()}
+
+
+def spanned(values: Iterable[str], known: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Those of the known coordinates that the named variables have."""
     dims = {dim for name in values for dim in VARIABLES[name].dims}
-    known = axes(run.scene) | dict(run.coordinates)
-    return {dim: known[dim] for dim in COORDINATES if dim in dims}, values
+    return {dim: known[dim] for dim in COORDINATES if dim in dims}

@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ringsim.scene import Scene
+from ringsim.variables import Cause, Status
 
 Array = NDArray[np.float64]
 _SAME = 1.0 + 1e-12
@@ -81,8 +81,8 @@ class Run:
         When each V-joint reached 180 deg, shape (planes, sections), s; NaN if it did not.
     counts
         What the solver has counted, by variable.
-    coordinates
-        Values of dimensions that the scene alone does not tell.
+    status, cause
+        How it ended and why.
     """
 
     scene: Scene
@@ -90,7 +90,8 @@ class Run:
     rates: Series
     locks: Array
     counts: Mapping[str, int]
-    coordinates: Mapping[str, NDArray[Any]]
+    status: Status
+    cause: Cause
 
     @property
     def until(self) -> float:

@@ -13,9 +13,9 @@ from scipy.interpolate import CubicHermiteSpline
 from ringsim.cable.state import ChainState
 from ringsim.outputs.cable_tension import CableTension
 from ringsim.outputs.effort import counts_of, note_starts
-from ringsim.outputs.family import Output, Values
+from ringsim.outputs.family import Output, Values, axes
 from ringsim.outputs.instant import Energies, Instant
-from ringsim.outputs.recorder import outputs_of, reduced
+from ringsim.outputs.recorder import outputs_of, reduced, spanned
 from ringsim.outputs.series import Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.theory.ideal_course import Course, Piece, quintic
@@ -43,9 +43,10 @@ def to_outcome(course: Course, scene: Scene) -> Outcome:
     through all points at which the steps are in balance; all else follows from the state.
     """
     ideal = _IdealRun(course, scene)
-    coordinates, values = reduced(ideal.run, outputs_of(scene), ideal.series_of)
+    values = reduced(ideal.run, outputs_of(scene), ideal.series_of)
     if course.motion.cables is not None:
         values |= {name: np.asarray(value) for name, value in ideal.cables().items()}
+    coordinates = spanned(values, axes(scene))
     outcome = Outcome(course.status, course.reason, coordinates, values, course.cause)
     note_starts(outcome, Fidelity.IDEAL, scene.solver, [counts_of(outcome)])
     return outcome
@@ -74,7 +75,7 @@ class _IdealRun:
         }
         angles, rates = self._series(lambda now: now.angles), self._series(lambda now: now.rates)
         locks = np.full(self._shape, course.lock_time)
-        self.run = Run(scene, angles, rates, locks, counts, {})
+        self.run = Run(scene, angles, rates, locks, counts, course.status, course.cause)
 
     def series_of(self, output: Output) -> Series | None:
         """Readings at the ends of steps; of tensions at all points that are in balance."""
