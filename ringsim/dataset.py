@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import platform
-import secrets
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -15,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.choice import kind_of
+from ringsim.files import whole, writing
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.variables import COORDINATES, RODS, VARIABLES, Fidelity, Outcome, Status, Variable
@@ -91,8 +89,7 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
         raise InputError(f"{path}: there is no folder {path.parent}: create it first")
     if path.is_dir():
         raise InputError(f"{path}: this is a folder: give the name of a file")
-    draft = path.with_name(f".{path.name}.{secrets.token_hex(6)}.tmp")
-    try:
+    with writing(path), whole(path) as draft:
         dataset.drop_encoding().to_netcdf(
             draft,
             engine="netcdf4",
@@ -100,15 +97,6 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
             encoding=_encoding(dataset),
             unlimited_dims=[],
         )
-        _sync(draft)
-        os.replace(draft, path)
-        _sync(path.parent)
-    except (OSError, RuntimeError) as error:
-        text = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{path}: cannot be written: {text}") from error
-    finally:
-        with contextlib.suppress(OSError):
-            draft.unlink(missing_ok=True)
 
 
 def _wanted(variable: Variable, scene: Scene) -> bool:
@@ -199,11 +187,3 @@ def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
             chosen |= {"zlib": True, "complevel": 4, "shuffle": True}
         encoding[str(name)] = chosen
     return encoding
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

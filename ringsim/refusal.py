@@ -11,8 +11,9 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from ringsim.choice import leaves_of
 from ringsim.parts.persection import EACH, ONE
-from ringsim.units import Unit
+from ringsim.units import Model, Unit
 
 MOST_NAMED = 3
 """So many further faults are named beside the one that is described."""
@@ -174,8 +175,8 @@ _NESTING = (typing.Union, types.UnionType, typing.Annotated, tuple, list, dict)
 
 
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
+    if isinstance(annotation, type) and issubclass(annotation, Model):
+        return [*leaves_of(annotation)]
     if typing.get_origin(annotation) in _NESTING:
         return [m for part in typing.get_args(annotation) for m in _models_in(part)]
     return []
@@ -203,7 +204,10 @@ def _suffix(value: Any, unit: str) -> str:
 
 
 def _hint(key: str, owner: type[BaseModel] | None) -> str:
-    return known_or_nearest(key, owner.model_fields) if owner is not None else "it has no keys"
+    """What to write instead of an unknown key: a model may tell of those that it once had."""
+    if owner is None:
+        return "it has no keys"
+    return getattr(owner, "gone", {}).get(key) or known_or_nearest(key, owner.model_fields)
 
 
 def _toml(value: Any) -> str:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
@@ -19,6 +20,10 @@ from pydantic import (
 
 LEFT_OUT = "none"
 """The word that leaves out a part which would be there by default: ``stop = "none"``."""
+
+
+ListIn = BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
+"""TOML arrays arrive as lists; a frozen record keeps tuples."""
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,13 @@
-"""What runs with ever finer steps and elements tend to, and how uncertain that is.
+"""The limit of runs with ever finer steps and elements, how uncertain it is, and its order.
 
-Three levels tell whether halving pays as it should.  Changes that shrink by r from one level to
+Three levels tell whether refining pays as it should.  Changes that shrink by r from one level to
 the next (4 at second order) leave d / (r - 1) of the last change d to go, Richardson (1911);
-those that do not shrink, or go back and forth, say nothing of where they lead, and nothing is
-extrapolated.
+changes that do not shrink, or alternate in sign, are not extrapolated.
 """
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ _SHRINKING = 1.5
 
 
 class Limit(NamedTuple):
-    """A value (of any shape), and how far it may be off anywhere, in its own unit."""
+    """A value (of any shape), and its largest uncertainty anywhere, in its own unit."""
 
     value: xr.DataArray
     uncertainty: float
@@ -40,7 +40,7 @@ def limit(values: xr.DataArray) -> Limit:
     if now * _SHRINKING > before:
         return Limit(fine, max(before, now))
     least = before / _SECOND_ORDER / (_SECOND_ORDER - 1.0)
-    if float((first * last).sum()) < 0.0:  # back and forth: the limit lies between the two last
+    if float((first * last).sum()) < 0.0:  # alternating: the limit lies between the last two
         return Limit(fine, max(now, least))
     ratio = min(before / max(now, 1e-300), _SECOND_ORDER)
     step = last / (ratio - 1.0)
@@ -48,13 +48,7 @@ def limit(values: xr.DataArray) -> Limit:
 
 
 def reference(in_time: xr.DataArray, in_space: xr.DataArray) -> Limit:
-    """Limit of steps and elements: that of the steps, and what more elements change.
-
-    Parameters
-    ----------
-    in_time, in_space
-        Three levels each along ``rung``.
-    """
+    """Limit of three levels of steps, and what three levels of elements change, along ``rung``."""
     steps, elements = limit(in_time), limit(in_space)
     more = elements.value - in_space.isel(rung=0, drop=True)
     return Limit(steps.value + more, steps.uncertainty + elements.uncertainty)
@@ -63,15 +57,15 @@ def reference(in_time: xr.DataArray, in_space: xr.DataArray) -> Limit:
 def order(values: xr.DataArray, noise: float) -> float:
     """Observed order of three levels along ``rung``; NaN unless changes shrink above the noise.
 
-    Parameters
-    ----------
-    values
-        Of any shape; each level has half the length of elements of the one before.
-    noise
-        What else may change them, in their unit.
+    Each level has half the length of elements of the one before; ``noise`` is the largest effect
+    of anything else, in the unit of the values.
     """
-    changes = abs(values.diff("rung")).max([dim for dim in values.dims if dim != "rung"])
-    first, last = (float(change) for change in changes)
+    first, last = (float(c) for c in abs(values.diff("rung")).max(inner(values)))
     if not first > last > noise:
         return np.nan
     return float(np.log2(first / last))
+
+
+def inner(values: xr.DataArray) -> list[Hashable]:
+    """All dimensions but ``rung``."""
+    return [dim for dim in values.dims if dim != "rung"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -13,63 +14,48 @@ from ringsim.analysis.stability import OK, WRONG
 Array = NDArray[np.float64]
 
 
-def share_ok(cells: xr.Dataset, axis: str) -> tuple[Array, Array, list[str]]:
-    """For every value of an axis of one group: share of ok cells, and the commonest other cause.
+class Border(NamedTuple):
+    """Between which values of one axis of a group runs are ok, and what lies beyond."""
 
-    Parameters
-    ----------
-    cells
-        The cells of one group.
-    axis
-        "x" or "y".
-    """
-    values, place = np.unique(cells[axis].values, return_inverse=True)
-    fine = (cells["verdict"] == OK).values
-    shares = np.array([fine[place == k].mean() for k in range(len(values))])
-    causes = []
-    for k in range(len(values)):
-        others = cells["cause"].values[(place == k) & ~fine]
-        words, counts = np.unique(others.astype(str), return_counts=True)
-        causes.append(str(words[counts.argmax()] or WRONG) if len(words) else "")
-    return values, shares, causes
+    group: int
+    axis: str
+    ok: tuple[float, float] | None
+    """First and last value at which any cell is ok."""
+    sure: tuple[float, float] | None
+    """The longest range of values at which all cells are ok."""
+    below: str
+    """The commonest cause just below ``sure``; empty at the axis' end."""
+    above: str
 
 
-def borders(whole: xr.Dataset) -> xr.Dataset:
-    """Between which values of each axis runs are ok, and what lies beyond.
-
-    Returns
-    -------
-    xr.Dataset
-        Over ``border``, one for each axis of each group: ``of_group``, ``axis``, ``lowest_ok`` and
-        ``highest_ok`` (end values at which any cell is ok), ``lowest_sure`` and ``highest_sure``
-        (the longest range in which all cells are; NaN if there is none), ``below`` and ``above``
-        (the commonest cause just beyond that range; empty at the axis' end).
-    """
-    rows = []
+def borders(whole: xr.Dataset) -> list[Border]:
+    """One border for each axis of each group of a judged map."""
+    found = []
     for number in range(whole.sizes["group"]):
         cells = whole.isel(cell=(whole["of_group"] == number).values)
+        good, causes = (cells["verdict"] == OK).values, cells["cause"].values.astype(str)
         for axis in ("x", "y"):
-            values, shares, causes = share_ok(cells, axis)
-            some = np.flatnonzero(shares > 0.0)
+            values, place = np.unique(cells[axis].values, return_inverse=True)
+            shares = np.array([good[place == k].mean() for k in range(len(values))])
             sure = _longest(shares == 1.0)
-            low, high = (some[0], some[-1]) if len(some) else (len(values), -1)
-            rows.append(
-                {
-                    "of_group": number,
-                    "axis": axis,
-                    "lowest_ok": values[low] if len(some) else np.nan,
-                    "highest_ok": values[high] if len(some) else np.nan,
-                    "lowest_sure": values[sure[0]] if sure else np.nan,
-                    "highest_sure": values[sure[-1]] if sure else np.nan,
-                    "below": _beyond(causes, sure[0] - 1) if sure else "",
-                    "above": _beyond(causes, sure[-1] + 1) if sure else "",
-                }
-            )
-    return xr.Dataset({key: ("border", [row[key] for row in rows]) for key in rows[0]})
+            below, above = "", ""
+            if sure:
+                below, above = (
+                    _commonest(causes[(place == k) & ~good]) for k in (sure[0] - 1, sure[-1] + 1)
+                )
+            ranges = (_ends(values, np.flatnonzero(shares > 0.0)), _ends(values, sure))
+            found.append(Border(number, axis, *ranges, below, above))
+    return found
 
 
-def _beyond(causes: Sequence[str], place: int) -> str:
-    return causes[place] if 0 <= place < len(causes) else ""
+def _ends(values: Array, places: Sequence[int] | NDArray[np.int64]) -> tuple[float, float] | None:
+    return (float(values[places[0]]), float(values[places[-1]])) if len(places) else None
+
+
+def _commonest(causes: NDArray[np.str_]) -> str:
+    """The commonest of some causes; empty if there is none."""
+    words, counts = np.unique(causes, return_counts=True)
+    return str(words[counts.argmax()] or WRONG) if len(words) else ""
 
 
 def _longest(held: NDArray[np.bool_]) -> list[int]:

@@ -1,4 +1,4 @@
-r"""The tension chain of all cables, from where their pulleys are and how they move.
+r"""The tension chain of all cables, from positions and velocities of their pulleys.
 
 Spans i = 0 .. n-1 run from the winch to the far end, pulley j = 1 .. n-1 stands between spans
 j-1 and j.  For each rope (metre, newton, second):
@@ -14,10 +14,10 @@ Friction.  T_i = c_i T_0, c_i = product over j <= i of eta_j^p_j, p_j = tanh(s_j
 full decay towards the far end while the rope runs to the winch (s_j > 0), inverted where it runs
 back, uniform tension at rest.  The stretch of span i, T_i L_i M / (S EA), summed over the spans
 must be S - M; hence T_i = q c_i / (sum c_k L_k / S), that is T_0 = EA (S - M) (S / M) /
-sum c_k L_k when taut.  To first order of strain that is paper 000's eqs 22-26 put right (their
-products of lengths and slips of index are errors of print); for c = 1 it is exactly
-EA (S - M) / M.  Sums are taken with c relative to its largest value, so that long chains of bad
-pulleys neither overflow nor divide by zero.
+sum c_k L_k when taut.  To first order of strain these are paper 000's eqs 22-26 corrected (their
+products of lengths and shifted indices are misprints); for c = 1 it is exactly
+EA (S - M) / M.  Sums are taken with c relative to its largest value, so that long chains with high
+friction neither overflow nor divide by zero.
 
 Speed of the rope over the pulleys.  Span i holds the natural length m_i.  Rope enters it over
 pulley i+1 and leaves it over pulley i, so dm_i/dt = s_i+1 - s_i with s_0 = winding at the winch
@@ -64,7 +64,7 @@ class Chain:
     Parameters
     ----------
     cables
-        What the scene says of each cable.
+        The record of each cable.
     points_per_cable
         Points of each cable's path: winch, pulleys, far end.
 

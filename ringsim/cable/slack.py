@@ -8,7 +8,7 @@ With width b (N) the elastic force y (N, negative when the rope is longer than i
 
 Above y = 10 b the tension exceeds y by less than 5e-5 b, below y = -10 b it is less than that.
 No exponential can overflow, and below y = -200 b the tension stays at 1e-87 b: numbers near
-the smallest double would overflow when somebody divides by them.
+the smallest double would overflow in a division.
 """
 
 from __future__ import annotations

@@ -214,7 +214,7 @@ class ChainState:
         return self.winch_forces * self.wound_rate
 
     def reading(self, cable: int, end: int = 0, path_slope: float = 0.0) -> WinchReading:
-        """What the winch at an end (0 first, 1 far) of a cable (from 0) knows of its rope."""
+        """Readings of the winch at an end (0 first, 1 far) of a cable (from 0)."""
         rope = int((self.ropes.last if end else self.ropes.first)[cable])
         present = float(self.wound_rate[cable, end])
         return WinchReading(

@@ -1,6 +1,6 @@
 """The winches of all cables, turning within every Newton iteration.
 
-A prescribed law knows its rope at any time.  A law with feedback answers to the tension at the
+A prescribed law gives the length wound at any time.  A feedback law depends on the tension at the
 end of the step, which depends on the rope wound during the step and on where the structure gets
 to: with V the speed of all such winches of a rope, h the time into the step, S its path and M its
 natural length without V,
@@ -11,7 +11,7 @@ r_i(V) the ratio of the tension at a winch to the rope's mean tension, were the 
 rope to turn at V / n each while the structure moves as at the beginning of the step: a motor that
 comes to rest takes the friction of its pulleys with it.  Commands fall with the tension and y
 grows with V, so there is one solution for any EA and step.
-A law that follows the structure knows the path taken up so far in the step, S_0 - S, not the rate
+A law that follows the structure uses the path taken up so far in the step, S_0 - S, not the rate
 at its start: its tension then answers to its own correction alone, whatever the structure does.
 """
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +17,9 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 from ringsim.variables import Status
 
-TIMEOUT = 1800.0
-"""Longest time of one rung, s, unless another is given."""
 _STEP_LIMIT = 1_000_000
 """Steps of one rung: its time is limited instead."""
 
@@ -30,12 +28,13 @@ class ReferenceRunError(Exception):
     """A scene has no reference to compare with: its message names setting, reason and cure."""
 
 
-def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float = TIMEOUT) -> xr.Dataset:
-    """Errors and cost of all settings of a scene's ladder.
+def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.Dataset:
+    """Errors and cost of all settings of a scene's ladder (``judge``).
 
     A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
     cheapest run of the reference goes first, then the whole reference, then the rest, so that a
-    scene which cannot be studied costs little.
+    scene which cannot be studied costs little.  The ideal fidelity is a setting too, where it can
+    represent the scene.
 
     Parameters
     ----------
@@ -47,12 +46,6 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float = TIMEOU
         Solver processes.
     timeout
         Longest time of one rung, s.
-
-    Returns
-    -------
-    xr.Dataset
-        See :func:`ringsim.analysis.accuracy.judge`.  The ideal fidelity is a setting too, where
-        it can represent the scene.
 
     Raises
     ------
@@ -69,8 +62,7 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float = TIMEOU
     for rung in rungs:
         scene.with_values(dict(rung.values))  # refused before anything has run
     in_time, in_space = references(rungs)
-    needed = [*in_time, *in_space]
-    for stage, places in (("first", in_time[:1]), ("reference", needed)):
+    for stage, places in (("first", in_time[:1]), ("reference", in_time + in_space)):
         own = [rungs[k] for k in places]
         _require_ok(own, study.run(stage, own))
     results = study.run("settings", rungs)
@@ -79,7 +71,7 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float = TIMEOU
     if ideal is not None:
         results = xr.concat([ideal, results], "rung")
         rungs = [Rung("fidelity", "ideal", 0.0, standing(scene)), *rungs]
-        truths += _truths(ideal)
+        truths += _ideal_truths(ideal.isel(rung=0))
     return judge(results, rungs, truths)
 
 
@@ -91,44 +83,33 @@ class _Study:
     scene: Scene
     workers: int
     timeout: float
-
-    def __post_init__(self) -> None:
-        self._truss = kind_of(self.scene.structure) == "planar-truss"
-        self._known: dict[tuple[object, ...], xr.Dataset] = {}
+    known: dict[tuple[object, ...], xr.Dataset] = field(default_factory=dict)
 
     def run(self, stage: str, rungs: Sequence[Rung]) -> xr.Dataset:
         """Results over the rungs, those that earlier stages ran among them."""
-        keys = [self._key(rung) for rung in rungs]
-        missing = {
-            key: rung for key, rung in zip(keys, rungs, strict=True) if key not in self._known
-        }
-        # What gives a result its shape is the same within a campaign.
-        shapes = {key: self._shape(rung) for key, rung in missing.items()}
-        for shape in dict.fromkeys(shapes.values()):
-            own = [key for key in missing if shapes[key] == shape]
-            found = self._campaign(stage, shape, [missing[key] for key in own])
-            self._known.update({key: found.isel(rung=[k]) for k, key in enumerate(own)})
-        return xr.concat([self._known[key] for key in keys], "rung")
+        keys = [tuple(rung.values[path] for path in PATHS) for rung in rungs]
+        missing: dict[tuple[str, bool], dict[tuple[object, ...], Rung]] = {}
+        for key, rung in zip(keys, rungs, strict=True):
+            if key not in self.known:
+                missing.setdefault(self._campaign(stage, rung), {})[key] = rung
+        for (name, stress), own in missing.items():
+            shared = {path for path in self.scene.structure.shaping if path in PATHS}
+            first = next(iter(own.values())).values
+            given = {path: first[path] for path in shared} | {"record.stress": stress}
+            paths = [path for path in PATHS if path not in shared]
+            settings = [{path: rung.values[path] for path in paths} for rung in own.values()]
+            title = f"Settings of {self.scene.name} against each other ({name})"
+            cases = Cases(name, title, self.scene.with_values(given), settings, self.timeout)
+            found = _needed(run_cases(self.folder, cases, self.workers))
+            self.known |= {key: found.isel(rung=[k]) for k, key in enumerate(own)}
+        return xr.concat([self.known[key] for key in keys], "rung")
 
-    @staticmethod
-    def _key(rung: Rung) -> tuple[object, ...]:
-        return tuple(rung.values[path] for path in PATHS)
-
-    def _shape(self, rung: Rung) -> tuple[bool, int]:
-        """Whether there are stresses; of a truss the number of elements, each with a strain."""
-        return rung.stressed, rung.values["rods.elements"] if self._truss else 0
-
-    def _campaign(self, stage: str, shape: tuple[bool, int], rungs: Sequence[Rung]) -> xr.Dataset:
-        stressed, elements = shape
-        given: dict[str, object] = {"record.stress": stressed and not self._truss}
-        name = stage if stressed else f"{stage}-unstressed"
-        if self._truss:
-            name, given["rods.elements"] = f"{stage}-elements-{elements}", elements
-        paths = [path for path in PATHS if path not in given]
-        settings = [{path: rung.values[path] for path in paths} for rung in rungs]
-        title = f"Settings of {self.scene.name} against each other ({name})"
-        cases = Cases(name, title, self.scene.with_values(given), settings, self.timeout)
-        return _needed(run_cases(self.folder, cases, self.workers))
+    def _campaign(self, stage: str, rung: Rung) -> tuple[str, bool]:
+        """Name and ``record.stress`` of a rung's campaign: all in one have results of one shape."""
+        if kind_of(self.scene.structure) == "planar-truss":  # a strain for each of its elements
+            return f"{stage}-elements-{rung.values['rods.elements']}", False
+        stressed = rung.values["rods.kind"] != "ancf"  # whose elements report no forces
+        return (stage, True) if stressed else (f"{stage}-unstressed", False)
 
 
 def _require_ok(rungs: Sequence[Rung], results: xr.Dataset) -> None:
@@ -156,17 +137,25 @@ def _needed(file: Path) -> xr.Dataset:
 
 def _ideal(study: _Study) -> xr.Dataset | None:
     """The ideal fidelity's answer as one rung; None if it cannot represent the scene."""
-    scene = study.scene
-    plain = scene.with_values({"record.stress": False})
+    plain = study.scene.with_values({"record.stress": False})
     try:
         refuse_if_not_ideal(plain)
     except InputError:
         return None
-    case = {"solver.tolerance": scene.solver.tolerance}
-    cases = Cases(
-        "ideal", f"{scene.name} with rigid rods", plain, [case], study.timeout, fidelity="ideal"
-    )
+    case, title = {"solver.tolerance": plain.solver.tolerance}, f"{plain.name} with rigid rods"
+    cases = Cases("ideal", title, plain, [case], study.timeout, fidelity="ideal")
     return _needed(run_cases(study.folder, cases, 1))
+
+
+def _ideal_truths(ideal: xr.Dataset) -> list[Truth]:
+    if not np.isfinite(ideal.deployment_time):
+        return []
+    source = "one-coordinate equation of the ideal ring"
+    mean = ideal.opening_angle.mean(("plane", "section")).to_numpy()
+    return [
+        Truth("deployment_time", source, float(ideal.deployment_time)),
+        Truth("opening_angle", f"{source}, mean angle", mean),
+    ]
 
 
 def _quadrature(scene: Scene) -> list[Truth]:
@@ -175,25 +164,12 @@ def _quadrature(scene: Scene) -> list[Truth]:
         return []
     if not scene.structure.closed:
         return []  # the quadrature keeps an arc's end assemblies upright, but they swing
-    joints = scene.joints
-    losses = (joints.pivot, joints.hinge, joints.vjoint)
     if scene.net is not None and scene.net.damping > 0.0:
         return []
-    if any(law is not None for law in losses) or scene.faults or scene.loads is None:
+    if scene.joints.present() or scene.faults or scene.loads is None:
         return []
     try:
-        found = opening_time(IdealRing.of(scene), scene.structure.initial_phi)
-    except ValueError:
+        found = opening_time(OneCoordinate(scene), scene.structure.coordinate)
+    except ValueError:  # the loads do not open it
         return []
     return [Truth("deployment_time", "energy quadrature of the ideal ring", found.time)]
-
-
-def _truths(ideal: xr.Dataset) -> list[Truth]:
-    one = ideal.isel(rung=0)
-    found = []
-    if np.isfinite(one.deployment_time):
-        source = "one-coordinate equation of the ideal ring"
-        found.append(Truth("deployment_time", source, float(one.deployment_time)))
-        mean = one.opening_angle.mean(("plane", "section")).to_numpy()
-        found.append(Truth("opening_angle", f"{source}, mean angle", mean))
-    return found

@@ -16,12 +16,13 @@ from typing import Any
 import tomli_w
 
 from ringsim.campaign.folder import prepare_folder
-from ringsim.campaign.run import INTERRUPTED, Choices, run_campaign
+from ringsim.campaign.run import Choices, run_campaign
 from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.execution.local import Local
+from ringsim.exit_codes import EXIT_INTERRUPTED
+from ringsim.files import write_text, writing
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.storage.files import unwritable
 from ringsim.storage.merge import NAME as MERGED
 
 
@@ -79,13 +80,8 @@ def run_cases(folder: Path, cases: Cases, workers: int) -> Path:
     campaign = load_campaign(file)
     home = folder / cases.name
     prepare_folder(campaign, home, solver=SOLVERS[cases.fidelity])
-    choices = Choices(
-        scheduler=Local(workers),
-        workers=workers,
-        limits=campaign.specification.limits,
-        description=f"{workers} local workers",
-    )
-    if run_campaign(home, choices) == INTERRUPTED:
+    choices = Choices(Local(workers), campaign.specification.limits)
+    if run_campaign(home, choices) == EXIT_INTERRUPTED:
         raise KeyboardInterrupt
     return home / MERGED
 
@@ -101,13 +97,11 @@ def write_cases(folder: Path, cases: Cases) -> Path:
         "design": {"kind": "list", "file": rows.name},
         "limits": {"timeout": cases.timeout},
     }
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        scene.write_text(cases.scene.to_toml(), encoding="utf-8")
-        rows.write_text(_csv(cases.cases), encoding="utf-8")
-        file.write_text(tomli_w.dumps(table), encoding="utf-8")
-    except OSError as error:
-        raise unwritable(file, error) from error
+    write_text(scene, cases.scene.to_toml())
+    write_text(rows, _csv(cases.cases))
+    write_text(file, tomli_w.dumps(table))
     return file
 
 

@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from ringsim.campaign.specification import Campaign
-from ringsim.execution.work import Retry
+from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError
-from ringsim.sampling.table import Table
+from ringsim.sampling.columns import Table
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.design_file import NAME, read_design, write_design
-from ringsim.storage.files import DRAFT, busy, locked, tries, unwritable
-from ringsim.storage.layout import Output
+from ringsim.storage.journal import FOLDER
+from ringsim.storage.locks import GO_ON, busy, locked, tries
+from ringsim.storage.netcdf import Output
 from ringsim.storage.provenance import provenance
-from ringsim.storage.shards import ASIDE, FOLDER
-from ringsim.storage.store import JOURNALS, create_folders
+from ringsim.storage.survey import Survey, survey
 
 
 @dataclass(frozen=True)
@@ -50,15 +50,14 @@ class Folder:
     solver: str
     attributes: dict[str, Any]
 
+    def survey(self) -> Survey:
+        """What it holds of every sample."""
+        return survey(self.path, self.identity, self.table.samples)
+
     @property
     def output(self) -> Output:
         """How the merged file is stored."""
         return Output.model_validate_json(self.attributes["output"])
-
-    @property
-    def retry(self) -> Retry:
-        """What is done about runs that the solver could not finish."""
-        return Retry.model_validate_json(self.attributes["retry"])
 
 
 def open_folder(path: Path) -> Folder:
@@ -101,18 +100,16 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> Folder:
             f"{path}: its name is not UTF-8: choose another folder with --out"
         ) from None
     table = campaign.draw()
-    try:
+    with writing(path / NAME, GO_ON):
         for _ in tries():
             found = _as_it_is(campaign, path, table, solver)
             if found is not None:
                 return found
-            create_folders(path)
+            (path / FOLDER).mkdir(parents=True, exist_ok=True)
             with locked(path / "lock") as alone:
                 if alone:
                     found = _as_it_is(campaign, path, table, solver)
                     return found or _write(campaign, path, table, solver)
-    except OSError as error:
-        raise unwritable(path / NAME, error) from error
     raise busy(path)
 
 
@@ -133,13 +130,12 @@ def _refuse_strangers(path: Path) -> None:
         raise InputError(
             f"{path}: this folder holds {strangers[0]} and no campaign: choose a new one with --out"
         )
-    for inside, results in ((FOLDER, "shard-*.nc"), (JOURNALS, "*.journal")):
-        if any((path / inside).glob(results)):
-            raise InputError(
-                f"{path}: this folder holds results in {inside}, but its {NAME} is gone, so nobody "
-                f"knows which campaign they belong to: bring {NAME} back, or choose a new folder "
-                "with --out"
-            )
+    if any((path / FOLDER).glob("*.journal")):
+        raise InputError(
+            f"{path}: this folder holds results in {FOLDER}, but its {NAME} is gone, so nobody "
+            f"knows which campaign they belong to: bring {NAME} back, or choose a new folder "
+            "with --out"
+        )
 
 
 def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder:
@@ -152,7 +148,6 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder:
         "campaign_name": wanted.name,
         "scene": campaign.scene.to_toml(),
         "output": wanted.output.model_dump_json(),
-        "retry": wanted.retry.model_dump_json(),
     }
     for draft in path.glob(f".{NAME}.*{DRAFT}"):
         draft.unlink(missing_ok=True)
@@ -168,7 +163,7 @@ def _entries(path: Path) -> list[Path]:
 
 
 def _ours(name: str) -> bool:
-    return name in (FOLDER, JOURNALS, ASIDE) or name.startswith((".design", "lock", "progress"))
+    return name.startswith((FOLDER, "lock", "progress", ".design", ".progress"))
 
 
 def _identity(campaign: Campaign, table: Table, solver: str) -> str:
@@ -176,7 +171,6 @@ def _identity(campaign: Campaign, table: Table, solver: str) -> str:
         "scene": campaign.scene.to_toml(),
         "inputs": [column.path for column in table.columns],
         "seed": campaign.specification.seed,
-        "retry": campaign.specification.retry.model_dump(),
         "solver": solver,
         "version": version("ringsim"),
     }
@@ -197,7 +191,6 @@ def refuse_another(campaign: Campaign, old: Folder, table: Table, solver: str) -
         suspects = {
             "its scene": campaign.scene.to_toml() != old.attributes["scene"],
             "its seed": campaign.specification.seed != int(old.attributes["seed"]),
-            "its retry": campaign.specification.retry != old.retry,
             "the version of ringsim": old.attributes["ringsim_version"] != version("ringsim"),
             "its inputs": paths != [column.path for column in old.table.columns],
             "its solver": solver != old.solver,

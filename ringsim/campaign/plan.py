@@ -7,20 +7,20 @@ from pathlib import Path
 import numpy as np
 
 from ringsim.campaign.folder import open_folder, refuse_another
-from ringsim.campaign.run import Part
+from ringsim.campaign.share import Share
 from ringsim.campaign.specification import Campaign
 from ringsim.campaign.status import in_words
 from ringsim.execution.cost import relative_cost
 from ringsim.execution.slot import TICK, Slot
 from ringsim.execution.work import Task
-from ringsim.sampling.table import Table
+from ringsim.sampling.columns import Table
 from ringsim.storage.design_file import NAME
-from ringsim.storage.layout import NOT_RUN
-from ringsim.storage.record import Result
-from ringsim.storage.store import survey
+from ringsim.storage.netcdf import NOT_RUN
+from ringsim.storage.result import Result
+from ringsim.storage.survey import survey
 
 
-def plan(campaign: Campaign, folder: Path, *, workers: int, part: Part, solver: str) -> list[str]:
+def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver: str) -> list[str]:
     """The plan as text.
 
     The cost is predicted from samples that are done; if there are none, one sample of middling
@@ -34,8 +34,8 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, part: Part, solver: 
         Where; it need not exist and is not written to.
     workers
         Samples that run at the same time.
-    part
-        The share of this process.
+    share
+        The samples of this process.
     solver
         ``module:function`` that runs one sample.
 
@@ -50,9 +50,9 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, part: Part, solver: 
     if (folder / NAME).exists():
         old = open_folder(folder)
         refuse_another(campaign, old, table, solver)
-        found = survey(folder, old.identity, table.samples, set_aside=False)
+        found = survey(folder, old.identity, table.samples)
         status, seconds = found.status, found.seconds
-    mine = part.holds(np.arange(table.samples))
+    mine = share.holds(np.arange(table.samples))
     todo = np.flatnonzero(mine & (status == NOT_RUN))
     cost = relative_cost(table, campaign.scene)
     kind = campaign.specification.design.model_dump()["kind"]
@@ -87,7 +87,7 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, part: Part, solver: 
 def run_once(campaign: Campaign, table: Table, sample: int, solver: str) -> Result:
     """Run one sample in a solver process and keep nothing."""
     wanted = campaign.specification
-    slot = Slot(solver, campaign.scene.to_table(), wanted.limits, wanted.retry)
+    slot = Slot(solver, campaign.scene.to_table(), wanted.limits)
     try:
         slot.submit(Task(sample, table.values_of(sample)))
         while True:

@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.campaign.folder import Folder
 from ringsim.execution.solve import load_solver, solve
 from ringsim.execution.work import Task
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.storage.record import Result
-from ringsim.storage.shards import latest, rows_of
-from ringsim.storage.store import survey
-from ringsim.variables import COORDINATES, TIMINGS, VARIABLES, Outcome, Status
-
-
-@dataclass(frozen=True)
-class Stored:
-    """What a folder holds of one sample."""
-
-    status: Status
-    reason: str
-    step: float
-    values: dict[str, NDArray[Any]]
+from ringsim.storage.result import COORDINATE, Result
+from ringsim.variables import TIMINGS, Outcome
 
 
 def sample_scene(campaign: Folder, sample: int) -> Scene:
@@ -45,70 +29,32 @@ def sample_scene(campaign: Folder, sample: int) -> Scene:
     return campaign.scene.with_values(campaign.table.values_of(sample))
 
 
-def stored(campaign: Folder, sample: int) -> Stored | None:
-    """The stored result of one sample, if it is in a shard."""
-    found = survey(campaign.path, campaign.identity, campaign.table.samples, set_aside=False)
-    owner, row = latest(found.shards, campaign.table.samples)
-    if owner[sample] < 0:
-        return None
-    names = ["status", "reason", "largest_step", *VARIABLES]
-    values = rows_of(found.shards[owner[sample]].path, names, row[sample : sample + 1])
-    first = {name: each[0] for name, each in values.items()}
-    return Stored(
-        Status(int(first.pop("status"))),
-        str(first.pop("reason")),
-        float(first.pop("largest_step")),
-        first,
-    )
+def stored(campaign: Folder, sample: int) -> Result | None:
+    """The stored result of one sample, if there is one."""
+    return next(campaign.survey().results([sample]), None)
 
 
-def replay(campaign: Folder, sample: int, *, step: float | None = None) -> Result:
-    """Run one sample in this process; what the solver prints goes to the terminal.
-
-    Parameters
-    ----------
-    campaign
-        The folder.
-    sample
-        Which sample.
-    step
-        Largest time step, if a repeated attempt is to be replayed.
-
-    Raises
-    ------
-    InputError
-        If there is no such sample.
-    """
-    scene = sample_scene(campaign, sample)
-    shrink = 1.0
-    if step is not None and np.isfinite(step):
-        shrink = step / scene.solver.step
-    values, own = campaign.table.values_of(sample), campaign.retry.times == 0
-    task = Task(sample, values, shrink, restarts=own)
+def replay(campaign: Folder, sample: int) -> Result:
+    """Run one sample in this process; what the solver prints goes to the terminal."""
+    task = Task(sample, campaign.table.values_of(sample))
     return solve(load_solver(campaign.solver), campaign.scene, task)
 
 
-def differences(result: Result, before: Stored) -> list[str]:
+def differences(result: Result, before: Result) -> list[str]:
     """Names of what a replay gave differently, timings aside."""
-    found = result.unpack()
-    names = [n for n in VARIABLES if n in found and n in before.values and n not in TIMINGS]
+    new, old = result.arrays(), before.arrays()
     differing = [
-        name
-        for name in names
-        if not np.array_equal(found[name], before.values[name], equal_nan=True)
+        name for name in new.keys() & old.keys() - set(TIMINGS) if not _same(new[name], old[name])
     ]
-    if result.status != before.status:
-        differing.insert(0, "status")
-    return differing
+    return ["status"] * (result.status != before.status) + sorted(differing)
+
+
+def _same(one: np.ndarray, other: np.ndarray) -> bool:
+    return np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
 
 
 def outcome_of(result: Result) -> Outcome:
     """The result as the outcome of a single run."""
-    arrays = result.unpack()
-    axes = {v.name for v in COORDINATES}
-    return Outcome(
-        result.status,
-        result.reason,
-        {name: values for name, values in arrays.items() if name in axes},
-        {name: values for name, values in arrays.items() if name not in axes},
-    )
+    arrays = result.arrays()
+    coordinates = {name: arrays.pop(name) for name in COORDINATE if name in arrays}
+    return Outcome(result.status, result.reason, coordinates, arrays)

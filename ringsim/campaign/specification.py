@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError
 
-from ringsim.execution.work import Limits, Retry
+from ringsim.execution.work import Limits
+from ringsim.files import parse_toml, read_text
 from ringsim.refusal import InputError, explain, known_or_nearest
+from ringsim.sampling.columns import Table
 from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.table import AnyDesign, AnyDistribution, Table, draw, with_error_bars
+from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import Scene, builtin_scenes, load_scene
-from ringsim.storage.layout import Output
+from ringsim.storage.netcdf import Output
 from ringsim.units import Model
 
 SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_ideal"}
@@ -42,6 +43,10 @@ def _flat(inner: Callable[[Any], bool]) -> Callable[[Any], Any]:
 class Specification(Model):
     """Content of a campaign file."""
 
+    gone: ClassVar[dict[str, str]] = {
+        "retry": "runs that fail start anew by themselves, see solver.restarts; leave it out",
+    }
+
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
     title: Annotated[str, Field(max_length=300)] = ""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
@@ -58,7 +63,6 @@ class Specification(Model):
     correlations: list[Correlation] = Field(default_factory=list)
     design: AnyDesign
     limits: Limits = Limits()
-    retry: Retry = Retry()
     fidelity: Literal["full", "ideal"] = "full"
     """full: the flexible multibody model; ideal: rigid rods."""
     error_bars_every: Annotated[int, Field(ge=0)] = 0
@@ -99,15 +103,15 @@ class Campaign:
         """
         wanted = self.specification
         try:
-            table = draw(
+            return draw(
                 self.scene,
                 wanted.inputs,
                 wanted.correlations,
                 wanted.design,
                 seed=wanted.seed,
                 folder=self.file.parent,
+                error_bars_every=wanted.error_bars_every,
             )
-            return with_error_bars(table, wanted.error_bars_every)
         except InputError as error:
             raise InputError(f"{self.file.name}: {error}") from None
 
@@ -120,22 +124,9 @@ def load_campaign(path: Path) -> Campaign:
     InputError
         If it cannot be read, or if its content or its scene is refused.
     """
+    text = read_text(path)
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path.name}: not a text file: byte {error.start + 1} is not UTF-8; save it as UTF-8"
-        ) from None
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path.name}: not valid TOML: {error}; correct that line") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path.name}: not a campaign: {error}") from None
-    try:
-        specification = Specification.model_validate(table)
+        specification = Specification.model_validate(parse_toml(text, path.name))
     except ValidationError as error:
         raise InputError(explain(error, Specification, path.name)) from None
     name, builtin = specification.scene, builtin_scenes()

@@ -16,7 +16,8 @@ from typing import Any
 
 from tqdm import tqdm
 
-from ringsim.storage.record import Result
+from ringsim.files import whole
+from ringsim.storage.result import Result
 
 STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 _PLAIN_SECONDS = 30.0
@@ -24,7 +25,7 @@ _FILE_SECONDS = 1.0
 
 
 @dataclass
-class Stop:
+class StopRequest:
     """Whether the campaign is to stop, and why; falsy text means go on.
 
     Attributes
@@ -41,10 +42,6 @@ class Stop:
     signalled: bool = False
     at_once: bool = False
 
-    def asked(self) -> str:
-        """The reason to stop, or an empty string."""
-        return self.reason
-
     def note(self, reason: str, *, signalled: bool) -> None:
         """Wish for a stop; the first reason counts."""
         if not self.reason:
@@ -52,9 +49,9 @@ class Stop:
 
 
 @contextlib.contextmanager
-def stopping_on_signals() -> Iterator[Stop]:
+def stopping_on_signals() -> Iterator[StopRequest]:
     """Turn the first stop signal into a wish; a second one ends the process as usual."""
-    stop = Stop()
+    stop = StopRequest()
 
     def note(number: int, _frame: Any) -> None:
         stop.note(f"stopped by {signal.Signals(number).name}", signalled=True)
@@ -162,7 +159,5 @@ class Progress:
             "failed": self.failed,
             "running": {sample: now - begin for sample, begin in self.running.items()},
         }
-        draft = self.path.with_name(f"{self.path.name}.{os.getpid()}")
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError), whole(self.path, lasting=False) as draft:
             draft.write_text(json.dumps(content), encoding="utf-8")
-            os.replace(draft, self.path)

@@ -9,7 +9,7 @@ import click
 
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.replay import differences, outcome_of, replay, sample_scene, stored
-from ringsim.cli import EXIT_DONE, EXIT_FAILED
+from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 
 
 @click.command()
@@ -32,7 +32,7 @@ def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
     before = stored(campaign, sample)
     for path, value in campaign.table.values_of(sample).items():
         click.echo(f"{path} = {value}")
-    result = replay(campaign, sample, step=before.step if before is not None else None)
+    result = replay(campaign, sample)
     if result.log:
         click.echo(result.log)
     click.echo(f"sample {sample}: {result.status.word}: {result.reason} ({result.seconds:.2f} s)")

@@ -11,12 +11,11 @@ import click
 import numpy as np
 
 from ringsim.choice import kind_of
+from ringsim.exit_codes import EXIT_FAILED
 from ringsim.overrides import parse_assignment
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
-
-EXIT_FAILED = 3
 
 
 @click.command("run")

@@ -143,6 +143,10 @@ class Assembly:
             )
         )
 
+    def prismatic(self, first: Any, second: Any) -> Any:
+        """A joint that slides along the common x axis of two markers."""
+        return self.system.AddObject(item.ObjectJointPrismaticX(markerNumbers=[first, second]))
+
     def torsion_spring(self, first: Any, second: Any, **settings: Any) -> Any:
         """A torsion spring-damper about the common z axis of two markers."""
         return self.system.AddObject(

@@ -40,6 +40,8 @@ class History:
     tensions: list[Array] = field(default_factory=list)
     slack: list[Array] = field(default_factory=list)
     wound: list[Array] = field(default_factory=list)
+    lengths: list[Array] = field(default_factory=list)
+    strains: list[Array] = field(default_factory=list)
     status: Status = Status.UNFINISHED
     reason: str = ""
     newton_iterations: int = 0

@@ -18,10 +18,10 @@ from ringsim.engine.energy import EnergyMeter
 from ringsim.engine.history import History
 from ringsim.engine.joints import latch
 from ringsim.engine.predictor import Predictor
-from ringsim.engine.readings import JointGroup, Openings, State
-from ringsim.engine.scales import residual_tolerance, ring_scales
+from ringsim.engine.readings import Openings, State, joint_groups
+from ringsim.engine.scales import residual_tolerance, scales_of
 from ringsim.engine.settings import raise_own, solver_settings
-from ringsim.engine.stress import StressMeter
+from ringsim.engine.stress import BendingMeter, StressMeter
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
@@ -35,33 +35,31 @@ class Integration:
     """One run of a built model."""
 
     def __init__(self, built: Built) -> None:
-        ring, scene = built.ring, built.ring.scene
+        model, scene = built.model, built.model.scene
         self._built, self._scene = built, scene
-        self._system = ring.assembly.system
+        self._system = model.assembly.system
         self._solver = exu.MainSolverImplicitSecondOrder()
         self._settings = solver_settings(scene, residual_tolerance(built))
-        self._state = State(ring)
-        self._openings = Openings(ring)
-        self._energy = EnergyMeter(ring, built.net, built.forces, built.faults)
-        self._stress = StressMeter(ring) if scene.record.stress else None
-        families = {joint.family for joint in ring.joints}
-        self._gaps = [
-            JointGroup(ring, [j for j in ring.joints if j.family == family])
-            for family in sorted(families)
-        ]
-        self._latched = np.zeros((2, scene.structure.sections), dtype=bool)
+        self._state = State(model)
+        self._openings = Openings(model)
+        self._energy = EnergyMeter(model, built.hub, built.faults)
+        self._stress = StressMeter(model) if scene.record.stress else None
+        gauge = scene.structure.gauge
+        self._bending = BendingMeter(model, gauge) if gauge else None
+        self._gaps = joint_groups(model)
+        self._state.refresh()
+        angles = self._openings.read(self._state)[0]
+        stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
+        self._locks = Locks(angles, stowed) if scene.structure.locks else None
+        self._latched = np.zeros(angles.shape, dtype=bool)
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
         self.history = History()
-        self._state.refresh()
-        start = self._read(self._measure(0.0))
-        stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
-        self._locks = Locks(start.angles, stowed)
         self._control = RunControl(
             scene.solver,
-            ring_scales(built),
-            start,
+            scales_of(built),
+            self._read(self._measure(0.0)),
             self._locks,
             follow_deviations=scene.record.stress,
         )
@@ -69,7 +67,7 @@ class Integration:
     def run(self) -> History:
         """Integrate until all V-joints have locked and settled, or to the end time."""
         history, solver, control = self.history, self._solver, self._control
-        predictor = Predictor(self._built.ring.assembly, solver)
+        predictor = Predictor(self._built.model.assembly, solver)
         solver.SetUserFunctionUpdateCurrentTime(self._system, self._update_time)
         self._system.SetPostStepUserFunction(self._after_step)
         self._system.SetPreNewtonResidualUserFunction(predictor.apply)
@@ -127,10 +125,11 @@ class Integration:
             return False
         found = self._weighed or self._measure(time)
         goes_on = self._control.accept(found, self._read(found))
-        if self._scene.stop is not None and self._scene.stop.latch:
-            for plane, section in np.argwhere(self._locks.deployed & ~self._latched):
-                latch(self._built.ring, self._built.stops[plane][section])
-            self._latched = self._locks.deployed.copy()
+        stop, locks = self._scene.stop, self._locks
+        if locks is not None and stop is not None and stop.latch:
+            for plane, section in np.argwhere(locks.deployed & ~self._latched):
+                latch(self._built.model, self._built.stops[plane][section])
+            self._latched = locks.deployed.copy()
         return goes_on
 
     def _read(self, now: Instant) -> Instant:
@@ -155,8 +154,11 @@ class Integration:
             history.tensions.append(self._chain.tensions)
             history.slack.append(self._chain.is_slack[self._chain.ropes.first].astype(float))
             history.wound.append(self._chain.wound.sum(axis=1))
+            history.lengths.append(self._chain.lengths)
         if self._stress is not None:
             history.stresses.append(self._stress.read())
+        if self._bending is not None:
+            history.strains.append(self._bending.read())
         return now
 
     def _measure(self, time: float) -> Instant:
@@ -172,10 +174,9 @@ class Integration:
 
     def _path_slopes(self, angles: Array) -> Array:
         """Derivative of each cable's ideal path length after the opening angle, m/rad."""
-        cables, half_bar = self._scene.cables, self._scene.structure.half_bar
+        cables, structure = self._scene.cables, self._scene.structure
         present = [] if cables is None else cables.present()
-        slopes = (cable.path_slope(half_bar, angles[plane]) for plane, cable in present)
-        return np.array([float(np.sum(slope)) for slope in slopes])
+        return np.array([structure.path_slope(cable, angles[plane]) for plane, cable in present])
 
     def _refusal(self) -> str:
         """What the cables could not answer, if that is why a step failed."""

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ringsim.engine.history import History
+from ringsim.layout.halves import halves
+from ringsim.layout.layout import Layout
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
 from ringsim.stepping.locks import lock_times
-from ringsim.variables import PLANES, RODS, Outcome
+from ringsim.variables import Outcome
 
 Array = NDArray[np.float64]
 _POINTS = 8
@@ -55,7 +57,7 @@ def largest_spread(times: Array, angles: Array, rates: Array, until: float) -> f
     return largest
 
 
-def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: float) -> Outcome:
+def to_outcome(history: History, scene: Scene, layout: Layout) -> Outcome:
     """Put a run on the output grid; what lies after its end is NaN."""
     sections = scene.structure.sections
     grid = output_times(scene)
@@ -63,20 +65,23 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
     angles, rates = np.array(history.angles), np.array(history.rates)
     values: dict[str, Array] = {}
 
-    locks = lock_times(times, angles, rates)
-    deployed = float(locks.max()) if np.isfinite(locks).all() else math.nan
-    values["lock_time"] = locks
-    values["deployment_time"] = np.array(deployed)
+    deployed = math.nan
+    if scene.structure.locks:
+        locks = lock_times(times, angles, rates)
+        deployed = float(locks.max()) if np.isfinite(locks).all() else math.nan
+        values["lock_time"] = locks
+        values["deployment_time"] = np.array(deployed)
 
     opening = on_grid(grid, times, angles, rates)
     values["opening_angle"] = np.degrees(np.moveaxis(opening, 0, -1))
-    flat = values["opening_angle"].reshape(-1, len(grid))
-    values["asynchrony"] = flat.max(axis=0) - flat.min(axis=0)
-    until = deployed if math.isfinite(deployed) else math.inf
-    joints = angles.reshape(len(times), -1), rates.reshape(len(times), -1)
-    largest = math.degrees(largest_spread(times, *joints, until))
-    on_time = values["asynchrony"][grid <= until]
-    values["asynchrony_max"] = np.array(np.fmax.reduce(on_time, initial=largest))
+    if scene.structure.locks:
+        flat = values["opening_angle"].reshape(-1, len(grid))
+        values["asynchrony"] = flat.max(axis=0) - flat.min(axis=0)
+        until = deployed if math.isfinite(deployed) else math.inf
+        joints = angles.reshape(len(times), -1), rates.reshape(len(times), -1)
+        largest = math.degrees(largest_spread(times, *joints, until))
+        on_time = values["asynchrony"][grid <= until]
+        values["asynchrony_max"] = np.array(np.fmax.reduce(on_time, initial=largest))
 
     add_energies(values, grid, times, history.energies, history.gaps)
     if history.stresses:
@@ -92,14 +97,21 @@ def to_outcome(history: History, scene: Scene, *, wall_time: float, cpu_time: fl
     }
     values.update({name: np.array(count) for name, count in counts.items()})
     values["final_time"] = np.array(times[-1])
-    values["wall_time"], values["cpu_time"] = np.array(wall_time), np.array(cpu_time)
     coordinates = {
-        "plane": np.array(PLANES),
+        "plane": np.array(scene.structure.planes),
         "section": np.arange(1, sections + 1),
         "time": grid,
     }
     if "rod_stress" in values:
-        coordinates["rod"] = np.array(RODS)
+        coordinates["rod"] = np.array(list(halves(layout)))
+    if history.strains:
+        strains = np.array(history.strains)
+        values["bending_strain"] = on_grid(grid, times, strains).T
+        values["peak_bending_strain"] = np.array(np.abs(strains).max())
+        number = next(k for k, r in enumerate(layout.rods) if r.name == scene.structure.gauge)
+        gauge = layout.rods[number]
+        coordinates["station"] = np.array(gauge.stations) * gauge.length
+        values["cable_length"] = on_grid(grid, times, np.array(history.lengths)[:, -1])[None]
     if "cable_tension" in values:
         coordinates["span"] = np.arange(1, values["cable_tension"].shape[1] + 1)
     return Outcome(history.status, history.reason, coordinates, values)
@@ -144,9 +156,10 @@ def _add_cables(
     times = np.array(history.times)
     tensions = np.array(history.tensions)
     slack = np.array(history.slack)
-    by_plane = np.full((2, scene.spans, len(grid)), np.nan)
-    loose = np.full(2, np.nan)
-    wound = np.full((2, len(grid)), np.nan)
+    planes = len(scene.structure.planes)
+    by_plane = np.full((planes, scene.spans, len(grid)), np.nan)
+    loose = np.full(planes, np.nan)
+    wound = np.full((planes, len(grid)), np.nan)
     begin = 0
     for number, (plane, cable) in enumerate(scene.cables.present()):
         end = begin + scene.pulleys_of(cable) + 1

@@ -1,4 +1,4 @@
-"""Reference numbers of a ring, as its run's control needs them."""
+"""Reference numbers of a scene's structure, as its run's control needs them."""
 
 from __future__ import annotations
 
@@ -8,60 +8,68 @@ from dataclasses import replace
 import numpy as np
 
 from ringsim.engine.build import Built
+from ringsim.engine.model import Model
 from ringsim.engine.rod_dampers import STIFFENING
+from ringsim.layout.bodies import OnRod
+from ringsim.layout.joints import JointOpening
 from ringsim.stepping import scales
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
+
+_SLIGHT = 1e-3
+"""Energy that does not matter, over the largest force of a structure's springs along a rod."""
 
 
-def ring_scales(built: Built) -> scales.Scales:
-    """What the ideal ring, as stowed, the stops and the cables of a model say before its run."""
-    scene = built.ring.scene
-    ring, rods, ideal = scene.structure, scene.rods, IdealRing.of(scene)
-    travel = math.pi - math.radians(ring.opening_angle)
-    # The opening angle is pi - 2 phi: twice the rates of the ideal ring, a quarter of its inertia.
-    acceleration = 2.0 * ideal.acceleration_from_rest(ring.initial_phi)
-    inertia = 0.25 * ideal.motion(ring.initial_phi).inertia
+def scales_of(built: Built) -> scales.Scales:
+    """What the ideal structure, as stowed, the stops and the cables say before a run."""
+    model, scene, structure = built.model, built.model.scene, built.model.scene.structure
+    angles, rates = model.layout.opening_angles()
+    travel, per_angle = math.pi - float(angles.mean()), float(rates.mean())
+    ideal = OneCoordinate(scene)
+    acceleration = per_angle * ideal.acceleration_from_rest(structure.coordinate)
+    inertia = ideal.motion(structure.coordinate).inertia / per_angle**2
     rate = scales.reference_rate(acceleration, travel, scene.solver.end_time)
-    found = scales.Scales(rate, 0.5 * inertia * rate**2, travel, ring.half_bar)
-    if scene.stop is not None:
-        half = rods.density * rods.bar.area * ring.half_bar**3 / 3.0
-        bouncing = 2.0 * half + ring.vjoint_mass * ring.half_bar**2
-        step = scales.contact_step(bouncing, scene.stop.stiffness)
-        found = replace(found, contact_step=step)
-    if built.cables is not None:
-        cables, lengths = built.cables.chain.cables, np.abs(built.cables.ropes.content)
-        widths = np.array([cable.slack_width for cable in cables])
-        opening = math.pi - 2.0 * ring.initial_phi
-        stiffness = sum(
-            cable.axial_stiffness
-            / float(length)
-            * (ring.sections * float(cable.path_slope(ring.half_bar, opening))) ** 2
-            for cable, length in zip(cables, lengths, strict=True)
-        )
-        found = replace(
-            found,
-            first_step=scales.rope_step(inertia, stiffness),
-            slack_tension=float(widths.max()),
-            slack_energy=0.1 * float(np.sum(widths * lengths)),  # a tenth of it along every path
-        )
-    return found
+    # Springs of its own set their own scale: what they would do along a rod.
+    pushed = _SLIGHT * structure.push * structure.reach
+    energy = pushed or 0.5 * inertia * rate**2
+    found = scales.Scales(rate, energy, travel, structure.reach, contact_step=_contact_step(model))
+    if built.cables is None:
+        return found
+    cables, lengths = built.cables.chain.cables, np.abs(built.cables.ropes.content)
+    widths = np.array([cable.slack_width for cable in cables])
+    stiffness = sum(
+        cable.axial_stiffness / float(length) * structure.path_slope(cable, angles[plane]) ** 2
+        for plane, cable, length in zip(built.cables.planes, cables, lengths, strict=True)
+    )
+    return replace(
+        found,
+        first_step=scales.swing_step(inertia, stiffness, 50),
+        slack_tension=float(widths.max()),
+        slack_energy=0.1 * float(np.sum(widths * lengths)),
+    )
+
+
+def _contact_step(model: Model) -> float:
+    """Of the first V-joint with its two rods; infinite without stops or V-joints."""
+    opening, stop = model.layout.openings[0][0], model.scene.stop
+    if stop is None or not isinstance(opening, JointOpening):
+        return math.inf
+    joint, inertia = model.layout.joints[opening.joint], 0.0
+    for mount in (joint.first, joint.second):
+        if isinstance(mount, OnRod):
+            rod = model.layout.rods[mount.rod]
+            ends = sum(mass for _, mass in rod.masses)
+            inertia += (rod.mass / 3.0 + ends) * rod.length**2
+    return scales.swing_step(inertia, stop.stiffness, 20)
 
 
 def residual_tolerance(built: Built) -> float:
-    """Residual norm in N at which Newton stops, from loads, net and the stiffest element."""
-    scene = built.ring.scene
-    drive = float(np.linalg.norm(built.forces))
-    if scene.net is not None and built.net is not None:
-        drive += float(np.linalg.norm(built.net.stiffness)) * scene.net.neutral_length
-    stiffest = max(
-        np.max(scene.rods.young_modulus) * tube.area * scene.rods.elements / length
-        for tube, length in (
-            (scene.rods.diagonal, scene.structure.half_diagonal),
-            (scene.rods.bar, scene.structure.half_bar),
-        )
-    )
+    """Residual norm in N at which Newton stops, from loads, springs and the stiffest element."""
+    scene, layout = built.model.scene, built.model.layout
+    drive = float(np.linalg.norm([force for _, force in layout.forces])) + scene.structure.push
+    if scene.net is not None and layout.net is not None:
+        drive += float(np.linalg.norm(layout.net.stiffness)) * scene.net.neutral_length
+    stiffest = max(rod.young_modulus * rod.tube.area / rod.shortest for rod in layout.rods)
     if scene.rods.damping > 0.0:
         stiffest *= STIFFENING
-    size = built.ring.assembly.system.systemData.ODE2Size()
-    share = scene.solver.newton_tolerance
-    return scales.residual_tolerance(share, drive, float(stiffest), size)
+    size = built.model.assembly.system.systemData.ODE2Size()
+    return scales.residual_tolerance(scene.solver.newton_tolerance, drive, float(stiffest), size)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.overrides import section_of
-from ringsim.sampling.table import Column, Table
+from ringsim.sampling.columns import Column, Table
 from ringsim.scene import Scene
 
 Array = NDArray[np.float64]

@@ -6,7 +6,6 @@ import contextlib
 import os
 import subprocess
 import sys
-import time
 import traceback
 from collections.abc import Iterator
 from typing import Any
@@ -24,7 +23,6 @@ mpi4py.rc.initialize = False
 from mpi4py import MPI
 print(MPI.Get_library_version())
 """
-_POLITE = 5e-3
 
 
 def launched_size() -> int:
@@ -80,21 +78,6 @@ def _stranger(expected: int, library: str) -> InputError:
         f"launcher belongs to another MPI than the one loaded ({name}); use that one's mpiexec "
         "(under Slurm: srun --mpi=pmi2)"
     )
-
-
-def describe(communicator: Any) -> str:
-    """Size and library of an MPI world, in words."""
-    from mpi4py import MPI
-
-    library = " ".join(MPI.Get_library_version().split("\n")[0].split())
-    return f"MPI, {communicator.Get_size()} ranks, {library}"
-
-
-def polite_barrier(communicator: Any) -> None:
-    """Wait for all ranks without spinning."""
-    request = communicator.Ibarrier()
-    while not request.Test():
-        time.sleep(_POLITE)
 
 
 @contextlib.contextmanager

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import replace
 from multiprocessing.connection import wait
 
 from ringsim.execution.slot import TICK, Slot
-from ringsim.execution.work import Work
+from ringsim.execution.work import Scheduler, Work
 
 
-class Local:
+class Local(Scheduler):
     """A number of solver processes, supervised by one event loop.
 
     Parameters
@@ -21,13 +20,13 @@ class Local:
     """
 
     def __init__(self, workers: int) -> None:
-        self.workers = workers
+        self.workers, self.description = workers, f"{workers} local workers"
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """Run samples; see :class:`Scheduler`."""
         queue = deque(samples)
         count = min(self.workers, len(queue))
-        slots = [Slot(work.solver, work.scene, work.limits, work.retry) for _ in range(count)]
+        slots = [Slot(work.solver, work.scene, work.limits) for _ in range(count)]
         try:
             while True:
                 reason = work.stop()
@@ -46,7 +45,7 @@ class Local:
                     result = slot.poll()
                     if result is not None:
                         work.keep(result)
-                        work.finished(replace(result, arrays=(), body=b""))
+                        work.finished(result)
         finally:
             for slot in slots:
                 slot.close()

@@ -10,19 +10,21 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from ringsim.execution.slot import Slot
-from ringsim.execution.work import Work
+from ringsim.execution.work import Scheduler, Work
 from ringsim.refusal import InputError
-from ringsim.storage.record import Result
+from ringsim.storage.result import Result
 
 _TO_WORKER, _TO_RANK_0 = 11, 12
 _SHORTEST, _LONGEST = 1e-4, 2e-2
 _AHEAD_SECONDS, _MOST_AHEAD = 0.02, 32
+_POLITE = 5e-3
+_T = TypeVar("_T")
 
 
-class Mpi:
+class Mpi(Scheduler):
     """All ranks of a communicator; each must call :meth:`run` with its own work.
 
     Parameters
@@ -32,13 +34,34 @@ class Mpi:
     """
 
     def __init__(self, communicator: Any) -> None:
+        from mpi4py import MPI
+
         self.communicator = communicator
         self.rank: int = communicator.Get_rank()
-        self.size: int = communicator.Get_size()
+        self.workers: int = communicator.Get_size()
+        library = " ".join(MPI.Get_library_version().split("\n")[0].split())
+        self.description = f"MPI, {self.workers} ranks, {library}"
+
+    def from_first(self, value: _T) -> _T:
+        """See :meth:`Scheduler.from_first`."""
+        found: _T = self.communicator.bcast(value)
+        return found
+
+    def from_all(self, value: _T) -> list[_T]:
+        """See :meth:`Scheduler.from_all`."""
+        self.wait()
+        found: list[_T] = self.communicator.allgather(value)
+        return found
+
+    def wait(self) -> None:
+        """Wait for all ranks without spinning."""
+        request = self.communicator.Ibarrier()
+        while not request.Test():
+            time.sleep(_POLITE)
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """Run samples; see :class:`Scheduler`.  Only rank 0's samples are looked at."""
-        slot = Slot(work.solver, work.scene, work.limits, work.retry)
+        slot = Slot(work.solver, work.scene, work.limits)
         try:
             return (
                 self._schedule(deque(samples), slot, work)
@@ -49,7 +72,7 @@ class Mpi:
             slot.close()
 
     def _schedule(self, queue: deque[int], slot: Slot, work: Work) -> str:
-        held: dict[int, deque[int]] = {rank: deque() for rank in range(1, self.size)}
+        held: dict[int, deque[int]] = {rank: deque() for rank in range(1, self.workers)}
         silent, mean, reason, fault, delay = set(held), 0.0, "", "", _SHORTEST
         while True:
             moved = False
@@ -90,14 +113,14 @@ class Mpi:
                 if result is not None:
                     moved = True
                     work.keep(result)
-                    work.finished(replace(result, arrays=(), body=b""))
+                    work.finished(result)
             except InputError as error:
                 fault = str(error)
             delay = _SHORTEST if moved else min(1.5 * delay, _LONGEST)
             if not moved:
                 _rest(slot, delay)
         slot.close()
-        for rank in range(1, self.size):
+        for rank in range(1, self.workers):
             self.communicator.send(None, dest=rank, tag=_TO_WORKER)
         self._drain(work, set(held))
         if fault:
@@ -107,7 +130,7 @@ class Mpi:
     def _ahead(self, mean: float, left: int) -> int:
         """Samples that a rank may hold: two, more if they are short, one towards the end."""
         wanted = max(2, min(int(_AHEAD_SECONDS / max(mean, 1e-4)), _MOST_AHEAD))
-        return max(1, min(wanted, left // (2 * self.size)))
+        return max(1, min(wanted, left // (2 * self.workers)))
 
     def _drain(self, work: Work, there: set[int]) -> None:
         """Take what the others sent before they heard of the end."""
@@ -135,7 +158,7 @@ class Mpi:
                 result = slot.poll() if slot.busy else None
                 if result is not None:
                     work.keep(result)
-                    self._tell(replace(result, arrays=(), body=b""))
+                    self._tell(replace(result, body=b""))
                 if queue and not slot.busy:
                     slot.submit(work.task(queue.popleft()))
                     delay = _SHORTEST

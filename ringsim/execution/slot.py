@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from ringsim.execution.launch import OF_MPI
-from ringsim.execution.solve import LOG_CHARACTERS, retold
-from ringsim.execution.work import Limits, Retry, Task
+from ringsim.execution.solve import LOG_CHARACTERS
+from ringsim.execution.work import Limits, Task
 from ringsim.refusal import InputError
-from ringsim.storage.record import Result
+from ringsim.storage.result import Result
 from ringsim.variables import Status
 
 TICK = 0.2
@@ -48,18 +48,17 @@ class Slot:
     that somebody else killed is no fault of the sample: the run is repeated.
     """
 
-    def __init__(self, solver: str, scene: dict[str, Any], limits: Limits, retry: Retry) -> None:
+    def __init__(self, solver: str, scene: dict[str, Any], limits: Limits) -> None:
         self._setup = {"solver": solver, "scene": scene, "memory": limits.memory}
         self._setup["backstop"] = 2.0 * limits.timeout + 60.0
-        self._limits, self._retry = limits, retry
+        self._limits = limits
         self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
         self._scratch: Path | None = None
         self._task: Task | None = None
         self._ready = False
-        self._runs = self._attempts = self._deaths = 0
+        self._runs = self._deaths = 0
         self._begin = self._deadline = self._look = 0.0
-        self._first_failure = ""
 
     @property
     def busy(self) -> bool:
@@ -81,8 +80,7 @@ class Slot:
         InputError
             If the solver process cannot be started.
         """
-        self._begin, self._attempts, self._deaths = time.monotonic(), 1, 0
-        self._first_failure = ""
+        self._begin, self._deaths = time.monotonic(), 0
         self._send(task)
 
     def poll(self) -> Result | None:
@@ -99,9 +97,7 @@ class Slot:
             except (EOFError, OSError):
                 return self._died()
             if isinstance(message, Result):
-                result = self._repeat_or_accept(message)
-                if result is not None:
-                    return result
+                return self._accepted(message)
             elif message:
                 raise InputError(str(message))
             else:
@@ -172,18 +168,8 @@ class Slot:
         with contextlib.suppress(BrokenPipeError):
             self._pipe.send(self._setup)
 
-    def _repeat_or_accept(self, result: Result) -> Result | None:
-        task = self._task
-        if task is None:
-            raise RuntimeError("a result without a task")
-        curable = result.status in (Status.SOLVER_FAILED, Status.DIVERGED)
-        if curable and self._attempts <= self._retry.times:
-            self._attempts += 1
-            self._first_failure = self._first_failure or result.reason
-            self._send(replace(task, shrink=task.shrink * self._retry.step_factor))
-            return None
-        told = self._too_much() if result.status is Status.MEMORY else result.reason
-        reason = retold(told, self._attempts, self._first_failure)
+    def _accepted(self, result: Result) -> Result:
+        reason = self._too_much() if result.status is Status.MEMORY else result.reason
         log = result.log
         if result.status.failed:
             log = (self._printed() + log)[-LOG_CHARACTERS:]
@@ -192,7 +178,6 @@ class Slot:
             result,
             reason=reason,
             log=log,
-            attempts=self._attempts,
             seconds=time.monotonic() - self._begin,
         )
 
@@ -252,7 +237,6 @@ class Slot:
             status=status,
             reason=reason,
             log=self._printed(),
-            attempts=self._attempts,
             seconds=time.monotonic() - self._begin,
             finished=time.time(),
         )

@@ -13,7 +13,7 @@ import numpy as np
 from ringsim.execution.work import Task
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.storage.record import Result, pack, plain
+from ringsim.storage.result import Result, pack, plain
 from ringsim.variables import VARIABLES, Outcome, Status
 
 Solver = Callable[[Scene], Outcome]
@@ -52,35 +52,28 @@ def solve(solver: Solver, base: Scene, task: Task) -> Result:
     task
         Which sample.
     """
-    step, begin = float("nan"), time.monotonic()
+    begin = time.monotonic()
     try:
-        scene = base.with_values(task.values)
-        if task.shrink != 1.0:
-            scene = scene.with_values({"solver.step": scene.solver.step * task.shrink})
-        if not task.restarts:
-            scene = scene.with_values({"solver.restarts": 0})
-        step = scene.solver.step
-        outcome = solver(scene)
-        arrays, body = pack(outcome.coordinates | outcome.values)
+        outcome = solver(base.with_values(task.values))
+        form, body = pack(outcome.coordinates | outcome.values)
         status, reason, log = Status(outcome.status), str(outcome.reason), ""
         fault = not_finite(outcome) if not status.failed else ""
         if fault:
             status, reason = Status.DIVERGED, fault
     except MemoryError:
         status, reason, log = Status.MEMORY, "the run needed more memory than allowed", _trace()
-        arrays, body = (), b""
+        form, body = "", b""
     except (Exception, SystemExit) as error:
-        status, log, arrays, body = Status.ERROR, _trace(), (), b""
+        status, log, form, body = Status.ERROR, _trace(), "", b""
         reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     return Result(
         sample=task.sample,
         status=status,
         reason=plain(" ".join(reason.split())[:1000]),
         log=plain(log),
-        step=step,
         seconds=time.monotonic() - begin,
         finished=time.time(),
-        arrays=arrays,
+        form=form,
         body=body,
     )
 
@@ -127,10 +120,3 @@ def _trace() -> str:
 def fresh_scene(table: dict[str, Any]) -> Scene:
     """The scene of nested tables that have been checked before."""
     return Scene.model_validate(table)
-
-
-def retold(reason: str, attempts: int, first: str) -> str:
-    """The reason of a run, with what became of the attempts before it."""
-    return (
-        f"{reason} (attempt {attempts}, with a smaller step; first: {first})" if first else reason
-    )

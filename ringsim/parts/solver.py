@@ -18,6 +18,8 @@ At 3e-3, the tolerance of ``ring18-cable``, that is 0.045, and the peaks found a
 (rings of 4 and 5 sections that lock slowly) or better, for at most a third more steps."""
 _LEAST_STEP, _LEAST_TOLERANCE, _LARGEST_TOLERANCE = 1e-9, 1e-8, 0.1
 _LEAST_DEVIATION = 1e-6
+MOST_STEPS = 10_000_000
+"""Upper bound of ``step_limit``."""
 
 
 class Solver(Model):
@@ -45,7 +47,7 @@ class Solver(Model):
     steps resolve the ring's own vibrations where ``record.stress`` asks for them; 1e6: not
     followed."""
 
-    step_limit: Annotated[int, Field(ge=1, le=10_000_000)] = 20_000
+    step_limit: Annotated[int, Field(ge=1, le=MOST_STEPS)] = 20_000
     """A run that has not ended after so many steps is given up."""
 
     energy_tolerance: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.1

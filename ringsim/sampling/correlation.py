@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 from scipy.special import ndtr, ndtri
 
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.sampling.distributions.family import Array, inside
-from ringsim.units import Model
-
-
-def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+from ringsim.units import ListIn, Model
 
 
 class Correlation(Model):
@@ -25,7 +21,7 @@ class Correlation(Model):
     (Gaussian copula); between two normal inputs it is their own correlation.
     """
 
-    between: Annotated[tuple[str, str], BeforeValidator(_as_tuple)]
+    between: Annotated[tuple[str, str], ListIn]
     coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]
 
 

@@ -1,19 +1,19 @@
-"""What a run may be wrong by, from a second run with steps twice as long.
+"""Numerical error of a run, estimated from a second run with steps twice as long.
 
 The integrator is of second order, so that doubling the steps multiplies an error by four and the
 two runs differ by three times the error of the finer one.  That holds on average; a single number
 (the largest of an oscillating quantity, the time of one event) may agree by chance.  The bars
 therefore take about the whole difference, and of times and angles the largest of all joints.
 The asynchrony as a function of time oscillates with the ring's own vibrations, which long steps do
-not follow: its bar at any time is made of the largest difference up to then, and an asynchrony
-below its bar says nothing.  What few elements leave out does not depend on the steps and is added:
+not resolve: its bar at any time follows from the largest difference up to then; an asynchrony
+below its bar is not significant.  The error of few elements, independent of the steps, is added:
 the rods' own inertia between two nodes, as a share that falls with the square of their number.
 So is the part of a peak tension that may lie between two readings, as the step control allows it.
 
-Where the second run does not end well with longer steps, one with steps of half the length takes
+Where the run with longer steps does not end as ok, one with steps of half the length takes
 its place; it differs by three quarters of the error, so that its differences count four times.
 
-The factors are those that cover 9 errors of 10 over random scenes and are not much larger:
+The factors are the smallest that cover about 9 of 10 errors over random scenes:
 benchmarks/error_bars.py, docs/accuracy.md.
 """
 
@@ -36,8 +36,8 @@ SAFETY = {
 }
 """Bar over the difference of the two runs."""
 BETWEEN_READINGS = {"peak_tension": 2.0 * TENSION_BEND / 8.0}
-"""Share of a value over ``solver.tolerance``: an eighth of the largest bend that no step is refused
-for (``ringsim.stepping.tension_bend``), which both runs may miss alike."""
+"""Share of a value over ``solver.tolerance``: an eighth of the largest bend that is accepted
+(``ringsim.stepping.repeats``), which both runs may miss alike."""
 OF_ONE_ELEMENT = {
     "asynchrony": 0.014,
     "asynchrony_max": 0.014,
@@ -50,7 +50,7 @@ OF_ONE_ELEMENT = {
 def error_bars(
     run: Outcome, other: Outcome, elements: int, tolerance: float, scale: float = 1.0
 ) -> dict[str, Array]:
-    """Error bars of a run's main numbers.
+    """Error bars of the main results of a run.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def error_bars(
 
 
 def differences(one: Outcome, other: Outcome) -> dict[str, Array]:
-    """How far two runs of a scene are apart in their main numbers, as far as they have them.
+    """Differences of the main results of two runs of a scene, as far as both have them.
 
     Of times and angles it is the largest of all joints, of angles also of all output times; of the
     asynchrony the largest up to each output time, shape (time,).
@@ -104,7 +104,7 @@ def differences(one: Outcome, other: Outcome) -> dict[str, Array]:
 
 
 def largest(outcome: Outcome, name: str) -> Array:
-    """Value of a run's number, or the largest of its series; of the asynchrony up to each time."""
+    """Value of a result, or the largest of its series; of the asynchrony up to each time."""
     if name == "asynchrony":
         return np.asarray(np.fmax.accumulate(outcome.values[name]))
     return np.asarray(np.fmax.reduce(outcome.values[name], axis=None))
@@ -113,7 +113,7 @@ def largest(outcome: Outcome, name: str) -> Array:
 def bar(
     name: str, apart: Array | float, value: Array | float, elements: int, tolerance: float
 ) -> Array:
-    """Error bar of a number from the difference of two runs, in its unit."""
+    """Error bar of a result from the difference of two runs, in its unit."""
     share = OF_ONE_ELEMENT.get(name, 0.0) / elements**2
     share += BETWEEN_READINGS.get(name, 0.0) * tolerance
     return np.asarray(SAFETY[name] * apart + share * value)

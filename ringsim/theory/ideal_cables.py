@@ -37,7 +37,7 @@ class Pull(NamedTuple):
     force
         Generalised force on phi, N m.
     commands
-        Speeds that the laws of the winches with feedback ask for, m/s.
+        Speeds commanded by the laws of the winches with feedback, m/s.
     loss, power, elastic
         Power lost (W), power put in by the winches less the energy wound up with the rope (W),
         elastic energy (J).
@@ -65,7 +65,7 @@ class IdealCables:
     Attributes
     ----------
     planes
-        Planes of each cable: two where both planes have cables that pull alike all the time.
+        Planes of each cable: two where the cables of both planes are identical.
     ropes
         Which spans form one rope; ``strike`` changes them.
     spans
@@ -109,7 +109,7 @@ class IdealCables:
 
     @property
     def nudges(self) -> tuple[float, float]:
-        """Increments of a length (m) and a rate (1/s) over which tensions are as good as linear.
+        """Increments of a length (m) and a rate (1/s) over which tensions are nearly linear.
 
         A slack rope becomes taut within slack_width / EA of strain; friction turns within the
         slip speed.
@@ -177,9 +177,9 @@ class IdealCables:
         return self._chain.state(self.ropes, points, velocities, wound, speed)
 
     def _commands(self, time: float, pose: Pose, state: ChainState) -> Array:
-        """Speeds that the laws with feedback ask for, m/s, shape (winches,).
+        """Speeds commanded by the laws with feedback, m/s, shape (winches,).
 
-        Winches on one rope share what the structure gives free.
+        Winches on one rope share the length that the structure releases.
         """
         ring, opening = self._mechanism.geometry, math.pi - 2.0 * float(pose.place[0])
         on = [place for place in self.answering if place.winch.turns(time)]
@@ -250,7 +250,7 @@ class IdealCables:
 
 
 def _initial(scene: Scene, mechanism: Mechanism) -> Array:
-    return np.append(scene.structure.initial_phi, np.zeros(mechanism.freedom - 1))
+    return np.append(scene.structure.coordinate, np.zeros(mechanism.freedom - 1))
 
 
 def _in_basis(cable: Cable) -> tuple[Array, Array]:

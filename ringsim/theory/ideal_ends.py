@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.geometry.ring import RingGeometry
 from ringsim.scene import Scene
+from ringsim.structures.ring_geometry import RingGeometry
 from ringsim.theory.ideal_points import SIGN, UP, Points
 
 Array = NDArray[np.float64]
@@ -123,7 +123,7 @@ def on_the_boom(
     """p, its derivatives after (phi, b, psi_3, psi_4), and p'' at zero accelerations of these.
 
     The second derivatives come from sin(psi_1) h = a (1 - cos b), differentiated twice.  NaN
-    where the boom would not let the lower assembly pass.
+    where the boom blocks the lower assembly.
     """
     offset, b, b_rate, phi_rate = geometry.hinge_offset, free[1], rates[1], rates[0]
     h, h_slope, h_bend = 2.0 * geometry.half_diagonal * basis[:, 3]

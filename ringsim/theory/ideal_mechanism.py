@@ -115,7 +115,7 @@ class Mechanism:
         self._second = np.einsum("i,iap,ibq->apbq", masses, places, places)
 
     def pose(self, free: Array, rates: Array) -> Pose:
-        """Where everything is at free coordinates (rad) and their rates (rad/s)."""
+        """Pose of the mechanism at free coordinates (rad) and their rates (rad/s)."""
         s = basis(self.geometry, float(free[0]))
         if self.ends is None:
             found = Pose(s, free, rates, np.ones((1, 1)), np.zeros(1))

@@ -26,17 +26,17 @@ from ringsim.theory.ideal_points import UP
 Array = NDArray[np.float64]
 
 MOTOR_LAG = 1e-6
-"""Time in s within which a motor takes up the speed that its law asks for.
+"""Time constant in s with which a motor follows the speed that its law commands.
 
-A law answers to a tension that answers to the speed: a motor without inertia would need the two
-solved together.  Ropes swing in milliseconds.
+The law depends on the tension, which depends on the speed: without this lag both would have to be
+solved together.  Cables oscillate within milliseconds.
 """
 _ANGLE, _RATE = 1e-6, 1e-4
 """Largest increments of angles (rad) and rates (rad/s) for derivatives of the equations."""
 
 
 class Instant(NamedTuple):
-    """Everything about one instant.
+    """Accelerations and energies at one instant.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class IdealMotion:
         Time at which something is switched on or off next, s: laws of winches are taken from
         before it.
     refusal
-        Why the cables last had no answer; empty if they always had.
+        Why the cables could last not be evaluated; empty if they always could.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -82,7 +82,7 @@ class IdealMotion:
         self.forces = Forces(scene, self.mechanism)
         self.cables = None if scene.cables is None else IdealCables(scene, self.mechanism)
         self.latched, self.until, self.refusal = False, math.inf, ""
-        self._initial = scene.structure.initial_phi
+        self._initial = scene.structure.coordinate
         n = self.mechanism.freedom
         self._tilts = not self.mechanism.fixed and self.forces.load != 0.0
         tilt = 3 if self._tilts else 0

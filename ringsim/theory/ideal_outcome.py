@@ -121,7 +121,7 @@ def _energies(seen: _Seen, start: Instant) -> dict[str, Array]:
 
 
 def _imbalance(steps: list[_Seen], start: Instant) -> float:
-    """Largest energy that is missing at any step over the largest exchanged."""
+    """Largest energy imbalance at any step over the largest energy exchanged."""
     wrong, exchanged = 0.0, 1e-300
     for seen in steps:
         parts = _energies(seen, start)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.geometry.ring import RingGeometry
+from ringsim.structures.ring_geometry import RingGeometry
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Points:
 def basis(geometry: RingGeometry, phi: float) -> Array:
     """The functions s and their first and second derivatives after phi, shape (3, 4).
 
-    NaN where the diagonals could not reach.
+    NaN where the diagonals are too short.
     """
     ratio = (geometry.half_bar / geometry.half_diagonal) ** 2
     c, s = math.cos(phi), math.sin(phi)
@@ -86,10 +86,10 @@ def point_masses(
     bar: tuple[float, float],
     vjoint: float,
 ) -> tuple[Array, Array]:
-    """Point masses that move as rods and V-joints do, shape (n,) and (n, 3, 4).
+    """Point masses equivalent to rods and V-joints, shape (n,) and (n, 3, 4).
 
     A rod of mass m is m / 6 at its ends and 2 m / 3 in its middle (Simpson's rule, exact for what
-    is quadratic along it), the latter spread over four points across the rod so that its
+    quadratics along it), the latter spread over four points across the rod so that its
     cross-sections' own rotation counts.
 
     Parameters

@@ -38,7 +38,7 @@ def test_points_of_the_model_are_those_of_the_bracket(half: str, end: str, openi
     _, placed = drive.evaluate(drive._reference, 0.0 * drive._reference, 0.0)
     mechanism = Mechanism(given)
     swings = np.zeros(mechanism.freedom - 1)
-    pose = mechanism.pose(np.append(given.structure.initial_phi, swings), np.append(0.0, swings))
+    pose = mechanism.pose(np.append(given.structure.coordinate, swings), np.append(0.0, swings))
     expected = IdealCables(given, mechanism).points(pose)
     assert placed.points == pytest.approx(expected, abs=1e-14)
 

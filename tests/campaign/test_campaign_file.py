@@ -80,7 +80,7 @@ def test_example_in_the_readme_can_be_drawn(tmp_path):
         ("[set]", "[set", "not valid TOML"),
         ("[inputs]", "[limits]\ntimeout = 0\n[inputs]", r"limits\.timeout = 0 s must be at least"),
         ("[inputs]", "[limits]\nmemory = 1\n[inputs]", r"limits\.memory"),
-        ("[inputs]", "[retry]\nstep_factor = 2\n[inputs]", "step_factor = 2"),
+        ("[inputs]", "[retry]\ntimes = 2\n[inputs]", "retry is not a known key .*solver.restarts"),
         ("[inputs]", "[output]\ncompression = 10\n[inputs]", "compression = 10"),
         ("seed = 3", "seed = 3\nmax_failed = -1", "max_failed = -1"),
         (

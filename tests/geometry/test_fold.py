@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from ringsim.geometry.ring import Fold, RingGeometry
 from ringsim.scene import load_scene
+from ringsim.structures.ring_geometry import Fold, RingGeometry
 
 Array = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ringsim.geometry.mobility import internal_mobility, kutzbach_count
-from ringsim.geometry.ring import RingGeometry
+from ringsim.layout.mobility import internal_mobility, kutzbach_count
+from ringsim.structures.ring_geometry import RingGeometry
 
 Array = NDArray[np.float64]
 

@@ -28,7 +28,7 @@ def test_the_lower_hinge_slides_from_element_to_element() -> None:
     element, place = built.ring.assembly.system.systemData.GetDataCoordinates()
     height = scene.structure.geometry().height(0.5 * (np.pi - float(history.angles[-1].mean())))
     length = scene.boom.length / 8  # type: ignore[union-attr]
-    start = scene.structure.geometry().height(scene.structure.initial_phi)
+    start = scene.structure.geometry().height(scene.structure.coordinate)
     assert int(element) == int(height / length) < int(start / length)
     # The first corner's height, against that of the mean angle: sections differ by elasticity.
     assert place == pytest.approx(height, rel=2e-4)

@@ -6,11 +6,11 @@ import gc
 import weakref
 
 import pytest
+from ringsim.engine.planar_truss import build_truss
+from ringsim.engine.planar_truss_run import TrussIntegration
 
 from ringsim.engine.build import build
 from ringsim.engine.integrate import Integration
-from ringsim.engine.planar_truss import build_truss
-from ringsim.engine.planar_truss_run import TrussIntegration
 from ringsim.scene import load_scene
 
 

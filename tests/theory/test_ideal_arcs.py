@@ -84,7 +84,7 @@ def one_section_time(scene: Scene) -> float:
         return y[0]
 
     deployed.terminal = True
-    start = [shape.initial_phi, 0.0, 0.0, 0.0]
+    start = [shape.coordinate, 0.0, 0.0, 0.0]
     found = solve_ivp(
         rates, (0.0, 20.0), start, method="DOP853", rtol=1e-10, atol=1e-12, events=deployed
     )

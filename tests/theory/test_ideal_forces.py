@@ -9,10 +9,10 @@ from ideal_cases import pulled, six
 from ringsim.cable.chain import Chain
 from ringsim.engine.joints import friction_torque, stop_torque
 from ringsim.engine.net import net_forces
+from ringsim.layout.free_hub import FreeHub
 from ringsim.theory.ideal_cables import IdealCables
 from ringsim.theory.ideal_forces import Forces
 from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.theory.ideal_net import FreeHub
 from ringsim.theory.ideal_points import UP
 
 ARC = {"structure__closed": False, "boom": "none", "net": "none", "structure__hinge_offset": 0.05}

@@ -27,11 +27,11 @@ class BearingFriction(PulleyFriction):
 
     @property
     def coefficients(self) -> Array:
-        """F in metre, shape () or (pulleys,)."""
+        """Coefficient f in metre, shape () or (pulleys,)."""
         return np.asarray(self.coefficient, dtype=float)
 
     def refusal(self, radius: float) -> str | None:
-        """F must be below R, or a rope that turns back could not be pulled over the pulley."""
+        """Bound f < R: otherwise a rope that turns back could not be pulled over the pulley."""
         worst = float(np.max(self.coefficients))
         if worst < radius:
             return None

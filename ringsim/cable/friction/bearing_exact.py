@@ -31,11 +31,11 @@ class ExactBearingFriction(PulleyFriction):
 
     @property
     def coefficients(self) -> Array:
-        """F in metre, shape () or (pulleys,)."""
+        """Coefficient f in metre, shape () or (pulleys,)."""
         return np.asarray(self.coefficient, dtype=float)
 
     def refusal(self, radius: float) -> str | None:
-        """F must be below R, as for the closed form."""
+        """Bound f < R, as for the closed form."""
         return BearingFriction(coefficient=self.coefficient).refusal(radius)
 
     def log_decay(self, angle: Array, radius: float) -> Array:

@@ -14,7 +14,7 @@ from ringsim.units import FrictionCoefficient
 class CapstanFriction(PulleyFriction):
     """eta = exp(-mu (pi - a)): dry friction along the wrap angle pi - a.
 
-    Source: Euler-Eytelwein.  The radius of the sheave plays no part.
+    Source: Euler-Eytelwein.  Independent of the radius of the sheave.
     """
 
     kind: Literal["capstan"] = "capstan"

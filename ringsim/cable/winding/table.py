@@ -7,16 +7,12 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from ringsim.cable.winding.family import PrescribedWinding
-from ringsim.units import SecondOrZero, SignedMetre
+from ringsim.units import ListIn, SecondOrZero, SignedMetre
 
 Array = NDArray[np.float64]
-
-
-def _as_tuple(value: object) -> object:
-    return tuple(value) if isinstance(value, list) else value
 
 
 class TableWinding(PrescribedWinding):
@@ -29,9 +25,9 @@ class TableWinding(PrescribedWinding):
     """
 
     kind: Literal["table"] = "table"
-    times: Annotated[tuple[SecondOrZero, ...], BeforeValidator(_as_tuple), Field(min_length=2)]
+    times: Annotated[tuple[SecondOrZero, ...], ListIn, Field(min_length=2)]
     """Increasing, in s after the start of the winch."""
-    lengths: Annotated[tuple[SignedMetre, ...], BeforeValidator(_as_tuple)]
+    lengths: Annotated[tuple[SignedMetre, ...], ListIn]
     """Rope wound at those times, in metre; the first is 0."""
 
     @model_validator(mode="after")
@@ -47,7 +43,7 @@ class TableWinding(PrescribedWinding):
         if self.lengths[0] != 0.0:
             raise ValueError(
                 f"lengths = {self.lengths[0]:g} m, ... must start at 0: the rope wound before "
-                "the start belongs into the cable's initial slack"
+                "the start belongs to the cable's initial slack"
             )
         return self
 

@@ -6,13 +6,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from ringsim.sampling.distributions.family import Array, Distribution
-
-
-def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+from ringsim.units import ListIn
 
 
 class Discrete(Distribution):
@@ -20,12 +17,9 @@ class Discrete(Distribution):
 
     kind: Literal["discrete"] = "discrete"
     values: Annotated[
-        tuple[bool, ...] | tuple[int, ...] | tuple[float, ...] | tuple[str, ...],
-        BeforeValidator(_as_tuple),
+        tuple[bool, ...] | tuple[int, ...] | tuple[float, ...] | tuple[str, ...], ListIn
     ]
-    probabilities: Annotated[
-        tuple[Annotated[float, Field(gt=0.0)], ...] | None, BeforeValidator(_as_tuple)
-    ] = None
+    probabilities: Annotated[tuple[Annotated[float, Field(gt=0.0)], ...] | None, ListIn] = None
 
     @model_validator(mode="after")
     def _fitting(self) -> Discrete:

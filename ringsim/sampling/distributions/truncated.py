@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from ringsim.choice import load_package, one_of
+from ringsim.choice import OneOf
 from ringsim.sampling.distributions.family import Array, Continuous, Distribution
-
-load_package("ringsim.sampling.distributions.continuous")
-
-if TYPE_CHECKING:
-    AnyContinuous = Continuous
-else:
-    AnyContinuous = one_of(Continuous)
 
 LEAST_MASS = 1e-6
 """Probability between the bounds, at least: less is a mistake in the bounds."""
@@ -28,7 +21,7 @@ class Truncated(Distribution):
     bounded: ClassVar[bool] = False
 
     kind: Literal["truncated"] = "truncated"
-    of: AnyContinuous
+    of: Annotated[Continuous, OneOf()]
     low: float | None = None
     high: float | None = None
 
