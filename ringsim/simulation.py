@@ -49,11 +49,11 @@ def run(scene: Scene) -> Outcome:
     """
     begin = (time.perf_counter(), time.process_time())
 
-    def solve(solver: Solver) -> Outcome:
+    def start(solver: Solver) -> Outcome:
         return _attempt(scene.model_copy(update={"solver": solver}), begin)
 
     bars = partial(error_bars, elements=scene.rods.elements)
-    outcome = run_with_restarts(solve, scene.solver, bars)
+    outcome = run_with_restarts(start, scene.solver, bars)
     outcome.values["fidelity"] = np.array(int(Fidelity.FULL))
     return with_remark(outcome, scene)
 

@@ -24,8 +24,8 @@ OK, ENDED, WRONG = "ok", "ended", "wrong"
 OUT_OF_STEPS = "step limit"
 CAUSES = (
     (OUT_OF_STEPS, "solver.step_limit = "),
-    ("energy grew", "energy from nothing"),
-    ("energy lost", "energy got lost"),
+    ("energy grew", "time integration added"),
+    ("energy lost", "time integration lost"),
     ("blow-up", "blew up"),
     ("blow-up", "not finite"),
     ("stop passed", "past its stop"),

@@ -29,8 +29,6 @@ from ringsim.stepping.run_control import RunControl
 Array = NDArray[np.float64]
 _REFUSE = 10.0
 """Error that makes exudyn repeat a step; its tolerance is 1."""
-_RECOVERY = 10
-"""Steps after which a constant step that was halved grows again where no lock ends the run."""
 
 
 class Integration:
@@ -49,22 +47,21 @@ class Integration:
         structure = scene.structure
         self._bending = BendingMeter(model, structure.gauge) if structure.gauge else None
         self._gaps = joint_groups(model)
-        self._latched = np.zeros((len(structure.planes), structure.sections), dtype=bool)
+        self._state.refresh()
+        angles = self._openings.read(self._state)[0]
+        stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
+        self._locks = Locks(angles, stowed) if scene.structure.locks else None
+        self._latched = np.zeros(angles.shape, dtype=bool)
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
         self.history = History()
-        self._state.refresh()
-        start = self._read(self._measure(0.0))
-        stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
-        self._locks = Locks(start.angles, stowed) if structure.locks else None
         self._control = RunControl(
             scene.solver,
             scales_of(built),
-            start,
+            self._read(self._measure(0.0)),
             self._locks,
             follow_deviations=scene.record.stress,
-            recovery=math.inf if structure.locks else _RECOVERY,
         )
 
     def run(self) -> History:
@@ -128,11 +125,11 @@ class Integration:
             return False
         found = self._weighed or self._measure(time)
         goes_on = self._control.accept(found, self._read(found))
-        stop = self._scene.stop
-        if self._locks is not None and stop is not None and stop.latch:
-            for plane, section in np.argwhere(self._locks.deployed & ~self._latched):
+        stop, locks = self._scene.stop, self._locks
+        if locks is not None and stop is not None and stop.latch:
+            for plane, section in np.argwhere(locks.deployed & ~self._latched):
                 latch(self._built.model, self._built.stops[plane][section])
-            self._latched = self._locks.deployed.copy()
+            self._latched = locks.deployed.copy()
         return goes_on
 
     def _read(self, now: Instant) -> Instant:

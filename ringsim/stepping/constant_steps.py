@@ -18,6 +18,10 @@ STEPS = 50
 """Constant steps until the first V-joint locks, at least.  The integrator starts from rest without
 an acceleration, which delays the motion by a third of the first step: by 2/3 % of so many."""
 
+_RECOVERY = 10
+"""Steps after which one that Newton had to shorten doubles, where no stop is ahead: enough for what
+has made Newton fail to pass.  Before stops it stays as it is, or it would fail at the next."""
+
 
 class ConstantSteps:
     """Steps of one length, shortened only where Newton fails.
@@ -28,10 +32,10 @@ class ConstantSteps:
         Wanted next, s.
     """
 
-    def __init__(self, step: float, recovery: float) -> None:
-        """Steps of this length (s); one that was shortened doubles after ``recovery`` steps."""
+    def __init__(self, step: float, recover: bool) -> None:
+        """Steps of this length (s), which may recover it after they were shortened."""
         self.step = self._full = self._last = step
-        self._recovery, self._since = recovery, 0
+        self._since, self._recovery = 0, _RECOVERY if recover else math.inf
 
     def advance(self, now: Instant, stops: StopContact) -> None:
         """Let a shortened step grow again."""

@@ -103,9 +103,9 @@ class Guard:
         # Not <=: an unknown balance (NaN) stops nothing.
         if not abs(balance) > factor * self._tolerance * exchanged:
             return ""
-        what = "came as energy from nothing" if balance > 0.0 else "is energy got lost in the steps"
+        share, limit = 100.0 * abs(balance) / exchanged, 100.0 * self._tolerance
         return (
-            f"{abs(balance):.3g} J, {100.0 * abs(balance) / exchanged:.3g} % of the energy "
-            f"exchanged, {what} until {time:.6g} s, more than {bound} "
-            f"({100.0 * self._tolerance:g} %): {_CURE}"
+            f"time integration {'added' if balance > 0.0 else 'lost'} {abs(balance):.3g} J, "
+            f"{share:.3g} % of the energy exchanged, up to {time:.6g} s, more than {bound} "
+            f"({limit:g} %): {_CURE}"
         )

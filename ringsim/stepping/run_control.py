@@ -30,10 +30,8 @@ class RunControl:
 
     Attributes
     ----------
-    now
-        The last accepted state, from which the next step starts.
-    goes_on
-        Whether there is a next step.
+    now, goes_on
+        The last accepted state, and whether there is a step from there.
     status, reason
         How the run has ended, or must end.
     repeats
@@ -48,7 +46,6 @@ class RunControl:
         locks: Locks | None = None,
         *,
         follow_deviations: bool = False,
-        recovery: float = math.inf,
     ) -> None:
         """Begin a run.
 
@@ -61,11 +58,9 @@ class RunControl:
             ends at ``solver.end_time``.
         follow_deviations
             Whether steps resolve how the joints deviate from their mean angle.
-        recovery
-            Number of steps after which a constant step that was shortened doubles again.
         """
         self.now, self._solver, self._locks = start, solver, locks
-        self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, recovery)
+        self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, locks is None)
         self._indicators: list[Indicator] = []
         self._deviations: DeviationSteps | None = None
         if solver.step_control == "motion":

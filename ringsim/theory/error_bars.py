@@ -36,8 +36,8 @@ SAFETY = {
 }
 """Bar over the difference of the two runs."""
 BETWEEN_READINGS = {"peak_tension": 2.0 * TENSION_BEND / 8.0}
-"""Share of a value over ``solver.tolerance``: an eighth of the largest bend that no step is refused
-for (``ringsim.stepping.tension_bend``), which both runs may miss alike."""
+"""Share of a value over ``solver.tolerance``: an eighth of the largest bend that is accepted
+(``ringsim.stepping.repeats``), which both runs may miss alike."""
 OF_ONE_ELEMENT = {
     "asynchrony": 0.014,
     "asynchrony_max": 0.014,

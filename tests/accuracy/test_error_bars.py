@@ -67,7 +67,7 @@ def steps_of(solver: Solver, rates: list[float], stops: StopContact) -> list[flo
     """Steps chosen while the mean rate goes through these values."""
     scales = Scales(0.1, 1.0, travel=3.0, length=1.0, contact_step=2e-3)
     constant = solver.step_control == "constant"
-    control = ConstantSteps(solver.step, np.inf) if constant else MotionSteps(solver, scales)
+    control = ConstantSteps(solver.step, recover=False) if constant else MotionSteps(solver, scales)
     time, steps = 0.0, []
     for rate in rates:
         time += control.step
