@@ -27,23 +27,18 @@ from ringsim.scene import Scene, load_scene
     "--out", metavar="FILE", type=click.Path(path_type=Path), help="netCDF file to write."
 )
 @click.option(
-    "--fidelity",
-    type=click.Choice(["full", "ideal"]),
-    default="full",
-    show_default=True,
+    "--fidelity", type=click.Choice(["full", "ideal"]), default="full", show_default=True,
     help="Full model, or the ideal ring of rigid rods (in seconds; no asynchrony, no stress).",
-)
+)  # fmt: skip
 @click.option(
-    "--accuracy",
-    type=click.FloatRange(1e-8, 1.0),
+    "--accuracy", type=click.FloatRange(1e-8, 1.0),
     help="Relative error of deployment time and opening angle to aim at: picks the cheapest "
     "settings measured to give it.",
-)
+)  # fmt: skip
 @click.option(
-    "--of",
-    metavar="OUTPUT",
+    "--of", metavar="OUTPUT",
     help="Aim --accuracy at another output: loads, asynchrony, peak_tension, ...",
-)
+)  # fmt: skip
 @click.option(
     "--evidence", metavar="FILE", type=click.Path(path_type=Path),
     help="settings.toml of ringsim accuracy (default: that of the built-in scene most alike).",

@@ -57,24 +57,12 @@ class Slot:
         return self._running()[0].pipe
 
     def submit(self, task: Task) -> None:
-        """Start a sample; the slot must not be busy.
-
-        Raises
-        ------
-        InputError
-            If the solver process cannot be started.
-        """
+        """Start a sample, or refuse if that cannot be done; the slot must not be busy."""
         self._begin, self._deaths = time.monotonic(), 0
         self._send(task)
 
     def poll(self) -> Result | None:
-        """The result, once there is one; call it when the pipe is ready or after a tick.
-
-        Raises
-        ------
-        InputError
-            If the solver process cannot be started.
-        """
+        """The result, once there is one; call it when the pipe is ready or after a tick."""
         while self._task is not None and self.pipe.poll():
             process, _ = self._running()
             try:

@@ -63,58 +63,53 @@ class Output(Model):
 
 def add_coordinate(file: Any, name: str, values: NDArray[Any]) -> None:
     """Create a dimension with its coordinate variable in an open netCDF4 dataset."""
-    definition = COORDINATE[name]
     file.createDimension(name, len(values))
-    text = definition.dtype == "str"
-    variable = file.createVariable(name, str if text else definition.dtype, (name,))
-    variable.long_name = definition.long_name
-    if not text:
-        variable.units = definition.units
+    variable = _create(file, COORDINATE[name], (name,))
     if name == "sample":
         variable.standard_name = "realization"
-    variable[:] = values.astype(object) if text else values
+    variable[:] = values.astype(object) if values.dtype.kind == "U" else values
 
 
 def add_variable(
     file: Any, definition: Variable, *, compression: int, digits: int | None = None
 ) -> None:
-    """Create a variable over ``sample`` and its own dimensions.
+    """Create a variable over ``sample`` and its own dimensions, which the file has.
 
     Parameters
     ----------
-    file
-        An open netCDF4 dataset that has the dimensions.
-    definition
-        Name, dimensions, units and meaning.
     compression
         Level of zlib (with shuffle); 0 for none.
     digits
         Significant decimal digits to keep.
     """
     dims = ("sample", *definition.dims)
-    shape = tuple(file.dimensions[dim].size for dim in dims)
-    text = definition.dtype == "str"
     options: dict[str, Any] = {}
-    if not text:
-        row = math.prod(shape[1:]) * np.dtype(definition.dtype).itemsize
-        rows = max(1, min(shape[0], CHUNK_BYTES // max(1, row)))
-        options["chunksizes"] = (rows, *(max(1, n) for n in shape[1:]))
+    if definition.dtype != "str":
+        samples, *shape = (file.dimensions[dim].size for dim in dims)
+        row = max(1, math.prod(shape) * np.dtype(definition.dtype).itemsize)
+        rows = max(1, min(samples, CHUNK_BYTES // row))
+        options["chunksizes"] = (rows, *(max(1, n) for n in shape))
         if definition.name != "status":  # whose "not_run" is a value like others
             options["fill_value"] = blank(definition, ())[()]
         if compression:
             options |= {"compression": "zlib", "complevel": compression, "shuffle": True}
         if definition.dtype.startswith("f") and digits is not None:
             options |= {"significant_digits": digits, "quantize_mode": "GranularBitRound"}
-    variable = file.createVariable(
-        definition.name, str if text else definition.dtype, dims, **options
-    )
+    variable = _create(file, definition, dims, **options)
     variable.set_auto_maskandscale(False)
-    variable.long_name = definition.long_name
-    if not text:
-        variable.units = definition.units
     if definition.name == "status":
         variable.flag_values = np.array([NOT_RUN, *Status], dtype="i1")
         variable.flag_meanings = " ".join(["not_run", *(s.word for s in Status)])
+
+
+def _create(file: Any, definition: Variable, dims: tuple[str, ...], **options: Any) -> Any:
+    text = definition.dtype == "str"
+    kind = str if text else definition.dtype
+    variable = file.createVariable(definition.name, kind, dims, **options)
+    variable.long_name = definition.long_name
+    if not text:
+        variable.units = definition.units
+    return variable
 
 
 def blank(definition: Variable, shape: tuple[int, ...]) -> NDArray[Any]:
