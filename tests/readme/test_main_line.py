@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.lines import Line2D
 
@@ -68,30 +68,30 @@ def test_every_figure_is_drawn_and_not_blank(ran: Path) -> None:
         assert len(np.unique((pixels * 7.0).astype(int).reshape(-1, 3), axis=0)) > 5, path.name
 
 
-def curves(axes: Axes) -> list[np.ndarray]:
+def curves(figure: Figure) -> list[np.ndarray]:
     """All that is drawn as a curve: points of shape (number, 2)."""
-    lines = [line.get_xydata() for line in axes.findobj(Line2D)]
-    bundles = [bundle.get_segments() for bundle in axes.findobj(LineCollection)]
+    lines = [line.get_xydata() for line in figure.findobj(Line2D)]
+    bundles = [bundle.get_segments() for bundle in figure.findobj(LineCollection)]
     found = [np.asarray(curve) for curve in [*lines, *(c for bundle in bundles for c in bundle)]]
     return [curve for curve in found if len(curve) > 9]
 
 
-def shows(axes: Axes, series: xr.DataArray) -> bool:
+def shows(figure: Figure, series: xr.DataArray) -> bool:
     """Whether one of the curves is the series, as far as it is drawn: to the deployment."""
     points = np.stack([series["time"].values, series.values], axis=-1)
     return any(
         len(curve) > 0.9 * np.isfinite(series).sum()
         and np.allclose(curve, points[: len(curve)], equal_nan=True)
-        for curve in curves(axes)
+        for curve in curves(figure)
     )
 
 
 def test_figures_show_the_curves_of_the_run(dataset: xr.Dataset) -> None:
-    angles = opening_angles(dataset).axes[0]
+    angles = opening_angles(dataset)
     for plane in dataset["plane"].values:
         for section in dataset["section"].values:
             assert shows(angles, dataset["opening_angle"].sel(plane=plane, section=section))
-    assert shows(asynchrony(dataset).axes[0], dataset["asynchrony"])
+    assert shows(asynchrony(dataset), dataset["asynchrony"])
 
 
 def test_the_campaign_of_the_main_line_runs(tmp_path: Path) -> None:
