@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,23 @@ from ringsim.layout.pose import Pose, cross
 from ringsim.layout.springs import BoomBeam, Contact, HubNet, Spring
 
 Array = NDArray[np.float64]
+
+
+class PointMasses(NamedTuple):
+    """Point masses of a layout.
+
+    Attributes
+    ----------
+    masses, bodies
+        Mass of each, kg, and number of its body, -1 for rods; shape (n,).
+    places, rates
+        Where they are and the derivatives of that after the coordinate, m, shape (n, 3).
+    """
+
+    masses: Array
+    bodies: NDArray[np.int_]
+    places: Array
+    rates: Array
 
 
 @dataclass(frozen=True)
@@ -75,47 +94,34 @@ class Layout:
             found["hub"] = self.net.mass
         return found
 
-    def inertia(self) -> Array:
-        """Mass matrix of (V, W, q'), shape (7, 7): rigid motion about the origin, and the fold.
+    def point_masses(self) -> PointMasses:
+        """Point masses that move as the rigid parts do, with the same inertia.
 
-        A rod of mass m is m / 6 at its ends and 2 m / 3 in its middle (Simpson's rule, exact for
-        what is quadratic along it), and its cross-sections turn with it.  A flexible boom counts as
-        rigid; the net's hub is left out.
+        A part of mass m is six of m / 6 at c +- r_k n_k about its centre of mass c, where
+        r_k^2 = 3 e_k / m with e_k, n_k the principal values and directions of its second moments
+        tr(J) / 2 - J about c; a rod so has two at its ends.  A flexible boom counts as rigid; the
+        net's hub is left out.
         """
-        points, spins = [], []
-        bodies = list(self.bodies)
+        found: list[tuple[float, int, Array, Array]] = []
+        bodies = list(enumerate(self.bodies))
         if self.boom is not None:
-            bodies.append(Body(self.bodies[self.boom.top.body].pose, (self.boom.lump,)))
-        for body in bodies:
-            axes, arm = body.pose.axes, body.centre
-            shift = body.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-            points.append((body.mass, *body.pose.at(arm)))
-            spins.append((axes @ (body.inertia - shift) @ axes.T, body.pose.turn))
+            top = self.boom.top.body
+            bodies.append((top, Body(self.bodies[top].pose, (self.boom.lump,))))
+        for number, body in bodies:
+            mass, centre = body.mass, body.centre
+            seconds = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
+            values, axes = np.linalg.eigh(seconds - mass * np.outer(centre, centre))
+            arms = (axes * np.sqrt(3.0 * np.maximum(values, 0.0) / mass)).T
+            found += [(mass / 6.0, number, *body.pose.at(centre + r)) for r in (*arms, *-arms)]
         for rod in self.rods:
-            for share, part in ((0.0, 1.0), (0.5, 4.0), (1.0, 1.0)):
-                pose = rod.station(share)
-                points.append((part / 6.0 * rod.mass, pose.place, pose.rate))
-            second = rod.density * rod.length * rod.tube.second_moment
-            axes = rod.start.axes
-            spins.append((axes @ np.diag([2 * second, second, second]) @ axes.T, rod.start.turn))
+            middle, tube = rod.station(0.5), rod.tube
+            across = math.sqrt(3.0 * tube.second_moment / tube.area)
+            arms = np.diag([0.5 * rod.length, across, across])
+            found += [(rod.mass / 6.0, -1, *middle.at(r)) for r in (*arms, *-arms)]
             for station, mass in rod.masses:
                 pose = rod.station(rod.stations[station])
-                points.append((mass, pose.place, pose.rate))
-        matrix = np.zeros((7, 7))
-        weights = np.array([p[0] for p in points])
-        places, rates = np.array([p[1] for p in points]), np.array([p[2] for p in points])
-        reach = np.zeros((len(points), 3, 7))
-        reach[:, range(3), range(3)] = 1.0
-        x, y, z = places.T
-        reach[:, 0, 4], reach[:, 0, 5], reach[:, 1, 5] = z, -y, x
-        reach[:, 1, 3], reach[:, 2, 3], reach[:, 2, 4] = -z, y, -x
-        reach[:, :, 6] = rates
-        matrix += np.einsum("i,iaj,iak->jk", weights, reach, reach)
-        for tensor, turn in spins:
-            turning = np.zeros((3, 7))
-            turning[:, 3:6], turning[:, 6] = np.eye(3), turn
-            matrix += turning.T @ tensor @ turning
-        return matrix
+                found.append((mass, -1, pose.place, pose.rate))
+        return PointMasses(*map(np.array, zip(*found, strict=True)))
 
     def sheave(self, sheave: Sheave) -> tuple[Array, Array]:
         """Place of a sheave in space and its derivative after the coordinate, shape (3,), m."""

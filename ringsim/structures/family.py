@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ringsim.layout.layout import Layout
 from ringsim.units import Model
 
@@ -68,6 +71,21 @@ class Structure(Model):
             compute places with functions that take complex numbers, without ``float`` and ``abs``.
         """
         raise NotImplementedError
+
+    def basis(self, coordinate: float) -> NDArray[np.float64] | None:
+        """Functions of the coordinate in which all points are linear, if there are a few.
+
+        Every place of the layout is then P s with constant P, so that theory need not build a
+        layout at each coordinate.
+
+        Returns
+        -------
+        Array or None
+            The functions s, the first of them 1, and their first and second derivatives, shape
+            (3, functions).
+        """
+        del coordinate
+        return None
 
     def describe(self) -> dict[str, str]:
         """Its shape and size in words, by label, for ``ringsim check``."""

@@ -6,6 +6,7 @@ import math
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ringsim.choice import kind_of
@@ -178,6 +179,23 @@ class PantographRing(Structure):
     def path_slope(self, cable: Any, angles: Any) -> float:
         """See ``Structure``."""
         return float(np.sum(cable.path_slope(self.half_bar, angles)))
+
+    def basis(self, coordinate: float) -> NDArray[np.float64]:
+        """See ``Structure``: 1, cos(phi), sin(phi) and sin(theta), d cos(theta) = l cos(phi).
+
+        The distance of two corners 2 (l cos(phi) + a), half the height d sin(theta) and the
+        directions of all rods are linear in them.  NaN where the diagonals are too short.
+        """
+        ratio, c, s = (
+            (self.half_bar / self.half_diagonal) ** 2,
+            math.cos(coordinate),
+            math.sin(coordinate),
+        )
+        rest = 1.0 - ratio * c * c
+        h = math.sqrt(rest) if rest > 0.0 else math.nan
+        slope = ratio * c * s / h
+        bend = (ratio * (c * c - s * s) - slope * slope) / h
+        return np.array([[1.0, c, s, h], [0.0, -s, c, slope], [0.0, -c, -s, bend]])
 
     def layout(self, scene: Any, coordinate: Any) -> Layout:
         """See ``Structure``; the coordinate is phi, and every point that of ``RingGeometry``."""

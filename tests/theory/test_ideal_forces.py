@@ -20,8 +20,8 @@ ARC = {"structure__closed": False, "boom": "none", "net": "none", "structure__hi
 
 def acting(scene, free, rates, *, latched=False):
     mechanism = Mechanism(scene)
-    pose = mechanism.pose(np.array(free), np.array(rates))
-    return Forces(scene, mechanism).act(pose, UP, latched), pose
+    now = mechanism.configuration(np.array(free), np.array(rates))
+    return Forces(scene, mechanism).act(now, UP, latched)
 
 
 def diagonal_rate(shape, phi: float) -> float:
@@ -47,7 +47,7 @@ def test_joint_friction_takes_the_power_of_all_its_joints(family):
         for section in range(6)
         for speed in speeds
     )
-    found, _ = acting(scene, [phi], [rate])
+    found = acting(scene, [phi], [rate])
     assert -found.force[0] * rate == pytest.approx(exact, rel=1e-12)
     assert found.loss == pytest.approx(exact, rel=1e-12)
 
@@ -66,7 +66,7 @@ def test_hinges_of_swinging_ends_turn_against_their_assemblies():
             for slope in (1.0, turn):
                 speed = sense * slope * rates[0] - swing
                 exact += float(at_section(scene.joints.hinge, section).torque(speed)) * speed
-    found, _ = acting(scene, [phi, 0.1, 0.2, 0.3, 0.4], rates)
+    found = acting(scene, [phi, 0.1, 0.2, 0.3, 0.4], rates)
     assert -found.force @ rates == pytest.approx(exact, rel=1e-12)
     assert found.loss == pytest.approx(exact, rel=1e-12)
 
@@ -79,7 +79,7 @@ def test_stops_of_all_joints_act_on_the_ring(latched):
         for rate in (-2.0, 0.0, 2.0):
             opening = scene.stop.torque(2.0 * phi, 2.0 * rate, latched).total
             # 12 joints; opening them is a negative change of phi, twice as fast.
-            found, _ = acting(scene, [phi], [rate], latched=latched)
+            found = acting(scene, [phi], [rate], latched=latched)
             assert found.force[0] == pytest.approx(-24.0 * float(opening), rel=1e-12, abs=1e-12)
 
 
@@ -93,7 +93,7 @@ def test_a_damped_net_acts_by_its_corners():
         lengths = np.linalg.norm(arms, axis=1)
         slope = np.sum(arms * moving, axis=1) / lengths
         tension = scene.net.tension(lengths - 0.3, slope * rate)
-        found, _ = acting(scene, [phi], [rate])
+        found = acting(scene, [phi], [rate])
         exact = -float(np.sum(tension.total * slope))
         assert found.force[0] == pytest.approx(exact, rel=1e-12, abs=1e-15)
         assert found.loss == pytest.approx(rate * float(tension.damping @ slope), rel=1e-12)
@@ -117,7 +117,7 @@ def test_hub_of_an_odd_net_lies_where_its_strings_balance(stiffness):
     for phi in (0.9 - step, 0.9 + step):
         corners = geometry.fold(phi).corners[0]
         energy.append(hub_net.forces(corners, np.zeros((5, 3, 1)), np.zeros(1)).energy)
-    force, _ = acting(scene.with_values({"loads.force": 0.0}), [0.9], [0.0])
+    force = acting(scene.with_values({"loads.force": 0.0}), [0.9], [0.0])
     # Central differences: second order of the step.
     assert force.force[0] == pytest.approx(-(energy[1] - energy[0]) / (2.0 * step), rel=1e-8)
 
@@ -131,11 +131,11 @@ def test_cables_are_the_chain_on_the_fold_s_points(end):
     cables = IdealCables(scene, mechanism)
     geometry, cable = scene.structure.geometry(), scene.cables.upper
     for phi, rate, time in ((1.35, -0.3, 0.9), (0.8, -0.4, 8.0), (0.8, 0.4, 8.0)):
-        pose = mechanism.pose(np.array([phi]), np.array([rate]))
-        found = cables.pull(time, pose, np.zeros((2, 0)))
+        now = mechanism.configuration(np.array([phi]), np.array([rate]))
+        found = cables.pull(time, now, np.zeros((2, 0)))
         moved = float(found.chain.tensions @ found.chain.rates)
         # Both planes are alike, so one cable stands for two.
-        assert found.force * rate == pytest.approx(-2.0 * moved, rel=1e-12)
+        assert found.force[0] * rate == pytest.approx(-2.0 * moved, rel=1e-12)
         fold, by_phi = geometry.fold(phi), fold_rate(geometry, phi)
         down = np.array([0.0, 0.0, -1.0])
         bar, h = geometry.half_bar, cable.block_offset
