@@ -24,15 +24,13 @@ from ringsim.storage.survey import Survey, survey
 
 @dataclass(frozen=True)
 class Folder:
-    """A prepared campaign folder."""
+    """A prepared campaign folder: the inputs of all samples, and the scene that they vary."""
 
     path: Path
     identity: str
     """Digest of everything that decides about the results."""
     table: Table
-    """Inputs of all samples."""
     scene: Scene
-    """Scene that they vary."""
     solver: str
     """``module:function`` that runs one sample."""
     attributes: dict[str, Any]

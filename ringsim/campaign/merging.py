@@ -28,12 +28,7 @@ class Merged(NamedTuple):
 def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
     """Write ``campaign.nc``, one process at a time, so that it never loses samples it had.
 
-    Parameters
-    ----------
-    execution
-        Who computed it, in words.
-    partly
-        Write the file also if samples are left.
+    It says in words who computed it, and is written ``partly`` if samples are left.
 
     Raises
     ------

@@ -138,8 +138,7 @@ class Slot:
             return self._died()
         if now > self._deadline:
             self._require_started(process)
-            process.signal(signal.SIGUSR2)  # it prints where it is
-            time.sleep(0.05)
+            process.tell_where_it_is()
             return self._give_up(
                 Status.TIMEOUT,
                 f"still running after limits.timeout = {self._limits.timeout:g} s: raise it, or "

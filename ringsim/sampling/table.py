@@ -79,8 +79,12 @@ def draw(
             raise InputError(f"inputs: {path} would be named {column.name}, which is taken")
         taken.add(column.name)
         columns.append(column)
-    if error_bars_every:
-        columns.append(_error_bars(columns, samples, error_bars_every))
+    if every := error_bars_every:
+        path = "solver.error_bars"
+        if any(column.path == path for column in columns):
+            raise InputError(f"error_bars_every = {every}: {path} is an input, too: leave out one")
+        chosen = np.arange(samples) % every == 0
+        columns.append(Column("solver_error_bars", path, "", "1", f"one sample in {every}", chosen))
     table = Table(tuple(columns), _seeds(seed, samples))
     _check_extremes(base, table)
     return table
@@ -98,15 +102,6 @@ def _column(base: Scene, path: str, values: NDArray[Any], origin: Distribution |
     if values.dtype.kind in "iu" and isinstance(field_at(scene, path), float):
         values = values.astype(float)
     return Column(name, path, dim, unit_at(scene, path), words, values)
-
-
-def _error_bars(columns: Sequence[Column], samples: int, every: int) -> Column:
-    """The input that has one sample in ``every`` state its error bars."""
-    path = "solver.error_bars"
-    if any(column.path == path for column in columns):
-        raise InputError(f"error_bars_every = {every}: {path} is an input already: leave out one")
-    chosen = np.arange(samples) % every == 0
-    return Column(path.replace(".", "_"), path, "", "1", f"one sample in {every}", chosen)
 
 
 def _seeds(seed: int, samples: int) -> NDArray[np.int64]:

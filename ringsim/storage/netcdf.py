@@ -35,8 +35,6 @@ PER_SAMPLE = {
 }
 """What is known of every sample beside its outputs."""
 
-Digits = Annotated[int, Field(ge=1, le=15)]
-
 
 class Output(Model):
     """How ``campaign.nc`` stores the results."""
@@ -47,7 +45,7 @@ class Output(Model):
 
     compression: Annotated[int, Field(ge=0, le=9)] = 4
     """Level of zlib; 0 stores plain numbers."""
-    significant_digits: dict[str, Digits] = Field(default_factory=dict)
+    significant_digits: dict[str, Annotated[int, Field(ge=1, le=15)]] = Field(default_factory=dict)
     """Decimal digits that are kept, by variable; the rest is rounded away before compression."""
     leave_out: list[str] = Field(default_factory=list)
     """Output variables that the merged file does not hold."""
@@ -75,12 +73,7 @@ def add_variable(
 ) -> None:
     """Create a variable over ``sample`` and its own dimensions, which the file has.
 
-    Parameters
-    ----------
-    compression
-        Level of zlib (with shuffle); 0 for none.
-    digits
-        Significant decimal digits to keep.
+    Compression is a level of zlib, 0 for none; digits are the significant decimal ones to keep.
     """
     dims = ("sample", *definition.dims)
     options: dict[str, Any] = {}

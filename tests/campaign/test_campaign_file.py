@@ -82,6 +82,7 @@ def test_example_in_the_readme_can_be_drawn(tmp_path):
         ("[inputs]", "[limits]\nmemory = 1\n[inputs]", r"limits\.memory"),
         ("[inputs]", "[retry]\ntimes = 2\n[inputs]", "retry is not a known key .*solver.restarts"),
         ("[inputs]", "[output]\ncompression = 10\n[inputs]", "compression = 10"),
+        ("[inputs]", "[output]\nshard_samples = 8\n[inputs]", "shard_samples is not.*journals"),
         ("seed = 3", "seed = 3\nmax_failed = -1", "max_failed = -1"),
         (
             "[inputs]",
