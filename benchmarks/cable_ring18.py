@@ -16,14 +16,11 @@ from typing import Any
 
 import exudyn as exu
 import numpy as np
-from scipy.sparse import csr_array
 
-from ringsim.cable.tangent import tangents
 from ringsim.engine.build import build
-from ringsim.engine.cable_path import WIDTH
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.integrate import Integration
-from ringsim.outputs.recorder import History
+from ringsim.outputs.recorder import Recorder
 from ringsim.scene import Scene, load_scene
 
 
@@ -34,25 +31,16 @@ class DenseDrive:
     def jacobian(
         drive: CableDrive, mbs: Any, t: float, number: int, q: Any, q_t: Any, f: float, g: float
     ) -> Any:
-        state, placed = drive.evaluate(*drive._split(q, q_t), t)
-        path, pattern = drive.path, drive.pattern
-        own, size = drive._size, drive._size + drive.auxiliary
-        maps = path.leg_maps(placed)
-        row = np.broadcast_to(3 * path.leg_point[:, None, None] + np.arange(3)[:, None], maps.shape)
-        column = np.broadcast_to(
-            path.leg_node[:, None, None] * WIDTH + np.arange(WIDTH), maps.shape
+        state, placed = drive._answer(q, q_t, t)
+        drive.pattern.steady, drive.pattern.negligible = np.inf, 0.0
+        entries = drive.pattern.triplets(state, placed, f, g)
+        own = drive.path.size
+        size = own + drive.auxiliary
+        whole = np.zeros((size, size))
+        np.add.at(whole, (entries[:, 0].astype(int), entries[:, 1].astype(int)), entries[:, 2])
+        inner = whole[:own, :own] - whole[:own, own:] @ np.linalg.solve(
+            whole[own:, own:], whole[own:, :own]
         )
-        shape = (3 * path.count, own)
-        points = csr_array((maps.ravel(), (row.ravel(), column.ravel())), shape=shape)
-        inner = np.zeros((own, own))
-        for tangent in tangents(state, placed.velocities):
-            part = points[3 * tangent.points.start : 3 * tangent.points.stop]
-            inner -= part.T @ ((f * tangent.stiffness + g * tangent.damping) @ part)
-        turns = path.leg_node[:, None] * WIDTH + np.arange(3, WIDTH)
-        first, second = path.turning_pairs()
-        pairs, single = pattern._turning(state, placed)
-        np.add.at(inner, (turns[first][:, :, None], turns[second][:, None]), f * pairs)
-        np.add.at(inner, (turns[:, :, None], turns[:, None]), f * single)
         row, column = np.nonzero(inner)
         rest = np.arange(own, size)
         filled = np.stack([row, column, inner[row, column]], axis=1)
@@ -76,7 +64,7 @@ class Clock:
             self.spent += time.thread_time_ns() - start
 
 
-def timed(scene: Scene, *, dense: bool) -> tuple[float, float, History]:
+def timed(scene: Scene, *, dense: bool) -> tuple[float, float, Recorder]:
     """Processor time per second of motion, share of the cable's Python part, and the run."""
     force, jacobian = Clock(CableDrive._force), Clock(CableDrive._jacobian)
     if dense:
@@ -93,7 +81,7 @@ def timed(scene: Scene, *, dense: bool) -> tuple[float, float, History]:
     return spent / history.times[-1], (force.spent + jacobian.spent) * 1e-9 / spent, history
 
 
-def mean_angle(history: History) -> float:
+def mean_angle(history: Recorder) -> float:
     """Mean opening angle at the end, deg."""
     return float(np.degrees(np.mean(history.angles[-1])))
 
@@ -101,7 +89,7 @@ def mean_angle(history: History) -> float:
 def main(seconds: float, repetitions: int = 2) -> None:
     scene = load_scene("ring18-cable").with_values({"solver.end_time": seconds})
     plain = scene.with_values({"solver.step_control": "constant", "solver.step": 0.04})
-    runs: dict[str, list[tuple[float, float, History]]] = {"ours": [], "plain": []}
+    runs: dict[str, list[tuple[float, float, Recorder]]] = {"ours": [], "plain": []}
     for _ in range(repetitions):
         runs["ours"].append(timed(scene, dense=False))
         runs["plain"].append(timed(plain, dense=True))

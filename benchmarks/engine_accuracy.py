@@ -18,10 +18,10 @@ from scipy.interpolate import CubicHermiteSpline
 
 from ringsim.engine.build import build
 from ringsim.engine.integrate import Integration
-from ringsim.outputs.series import lock_times
 from ringsim.scene import Scene, load_scene
+from ringsim.stepping.locks import lock_times
 from ringsim.theory.energy_quadrature import opening_time
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def compare(scene: Scene) -> Difference:
     history = Integration(build(scene)).run()
     if history.status:
         raise RuntimeError(history.reason)
-    ideal, start = IdealRing.of(scene), scene.structure.initial_phi
+    ideal, start = OneCoordinate(scene), scene.structure.coordinate
     times, angles, rates = (np.array(x) for x in (history.times, history.angles, history.rates))
     mean = CubicHermiteSpline(
         times, angles.mean(axis=(1, 2)) - math.radians(175.0), rates.mean(axis=(1, 2))

@@ -140,7 +140,7 @@ def compare(seed: int) -> dict[str, Any]:
         "tolerance": scene.solver.tolerance,
     }
     if fine.status == Status.OK:
-        solver = scene.solver.refined(int(fine.values["restarts"])).coarsened()
+        solver = scene.solver.refined(int(fine.values["restarts"])).scaled(2.0)
         coarse = run(scene.model_copy(update={"solver": solver.model_copy(update={"restarts": 0})}))
         finest = truth_of(scene, fine)
         truth = run(finest)

@@ -4,7 +4,7 @@ Written the way exudyn is usually used: geometrically exact beams (one element p
 its ready-made joints, a symbolic function for the one-sided net springs, sparse linear solver,
 modified Newton, a constant step of 20 ms, tolerances just above the round-off of the residual,
 and one sensor, at the V-joint of section 1.  Only points and directions come from
-ringsim.geometry.
+ringsim.structures.
 
 Run: python benchmarks/plain_exudyn_ring18.py
 """
@@ -21,7 +21,7 @@ import numpy as np
 from exudyn.advancedUtilities import CreateSymbolicUserFunction
 from scipy.spatial.transform import Rotation
 
-from ringsim.geometry.ring import RingGeometry
+from ringsim.structures.ring_geometry import RingGeometry
 
 SECTIONS, HALF_BAR, HALF_DIAGONAL, OFFSET = 18, 0.2889, 0.4275, 0.006554
 OPENING, FORCE = math.radians(47.578), 0.015

@@ -15,7 +15,7 @@ import sys
 
 from ringsim.scene import load_scene
 from ringsim.theory.energy_quadrature import opening_time
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 
 OURS = """
 import ringsim, time
@@ -34,10 +34,10 @@ print(*run(), STEPS)
 
 
 SETTINGS = {
-    "ringsim, as it stands": {},
-    "ringsim, for 5e-4": {"solver.tolerance": 3e-4, "solver.newton_tolerance": 1e-4},
+    "ringsim, default settings": {},
+    "ringsim, `solver.tolerance = 1e-3`": {"solver.tolerance": 1e-3},
 }
-"""Names of our runs, and what they change of the scene."""
+"""Names of ringsim's runs, and the values that they change in the scene."""
 
 
 def once(code: str) -> tuple[float, float, int]:
@@ -51,7 +51,7 @@ def once(code: str) -> tuple[float, float, int]:
 
 def main(rounds: int) -> None:
     scene = load_scene("ring18")
-    truth = opening_time(IdealRing.of(scene), scene.structure.initial_phi).time
+    truth = opening_time(OneCoordinate(scene), scene.structure.coordinate).time
     codes = {name: OURS.replace("{values}", repr(values)) for name, values in SETTINGS.items()}
     codes["plain exudyn"] = PLAIN
     runs: dict[str, list[tuple[float, float, int]]] = {name: [] for name in codes}

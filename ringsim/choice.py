@@ -2,33 +2,49 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import pkgutil
+from dataclasses import dataclass
 from typing import Annotated, Any, Union
 
-from pydantic import Field
+from pydantic import Field, GetCoreSchemaHandler, TypeAdapter
+from pydantic_core import CoreSchema, core_schema
 
 from ringsim.units import Model
 
 
-def load_package(name: str) -> None:
-    """Import every module of a package, so that all kinds that it holds are known."""
-    package = importlib.import_module(name)
-    for module in pkgutil.iter_modules(package.__path__, f"{name}."):
-        importlib.import_module(module.name)
+@dataclass(frozen=True)
+class OneOf:
+    """Marks a field that holds any kind of its family: ``rods: Annotated[Rods, OneOf()]``.
 
+    Kinds are looked up when a value is read: one that a script defines is a choice from then on.
 
-def one_of(family: type[Model]) -> Any:
-    """The type "any leaf subclass of ``family``", told apart by its field ``kind``."""
-    kinds = tuple(_leaves(family))
-    if len(kinds) == 1:
-        return kinds[0]
-    return Annotated[Union[kinds], Field(discriminator="kind")]  # noqa: UP007
+    Attributes
+    ----------
+    default
+        Kind of a table that does not name one; without it the table must.
+    """
+
+    default: str | None = None
+
+    def __get_pydantic_core_schema__(
+        self, family: type[Model], handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        del handler
+
+        def read(value: Any) -> Any:
+            if self.default is not None and isinstance(value, dict):
+                value = {"kind": self.default, **value}
+            # pydantic passes the errors of this inner reader on with their places and values.
+            return _reader(tuple(kinds_of(family).values())).validate_python(value)
+
+        return core_schema.no_info_plain_validator_function(read)
 
 
 def kinds_of(family: type[Model]) -> dict[str, type[Model]]:
     """All kinds of a family by name."""
-    return {str(leaf.model_fields["kind"].default): leaf for leaf in _leaves(family)}
+    return {str(kind.model_fields["kind"].default): kind for kind in leaves_of(family)}
 
 
 def kind_of(record: Model) -> str:
@@ -36,8 +52,27 @@ def kind_of(record: Model) -> str:
     return str(type(record).model_fields["kind"].default)
 
 
-def _leaves(family: type[Model]) -> list[type[Model]]:
-    below = family.__subclasses__()
-    if not below:
-        return [family]
-    return sorted((leaf for sub in below for leaf in _leaves(sub)), key=lambda c: c.__name__)
+def leaves_of(family: type[Model]) -> list[type[Model]]:
+    """The kinds of a family in the order of their classes' names; one may extend another."""
+    package, _, file = family.__module__.rpartition(".")
+    if file == "family":
+        load_package(package)
+    own = [family] if "kind" in family.__annotations__ else []
+    below = [kind for sub in family.__subclasses__() for kind in leaves_of(sub)]
+    return sorted(own + below, key=lambda kind: kind.__name__)
+
+
+@functools.cache
+def load_package(package: str) -> None:
+    """Import every module of a package, so that all kinds that it holds are known."""
+    inside = importlib.import_module(package).__path__
+    for module in pkgutil.walk_packages(inside, f"{package}."):
+        importlib.import_module(module.name)
+
+
+@functools.cache
+def _reader(kinds: tuple[type[Model], ...]) -> TypeAdapter[Any]:
+    if len(kinds) == 1:
+        return TypeAdapter(kinds[0])
+    either: Any = Union[kinds]  # noqa: UP007
+    return TypeAdapter(Annotated[either, Field(discriminator="kind")])

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import platform
-import secrets
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -14,9 +11,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ringsim.files import require_place, whole, writing
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import axes, holds
-from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.variables import Fidelity, Outcome, Variable, flags_of
 
@@ -89,12 +86,8 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
         If the folder does not exist, or if the file cannot be written there.
     """
     path = Path(path)
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: there is no folder {path.parent}: create it first")
-    if path.is_dir():
-        raise InputError(f"{path}: this is a folder: give the name of a file")
-    draft = path.with_name(f".{path.name}.{secrets.token_hex(6)}.tmp")
-    try:
+    require_place(path)
+    with writing(path), whole(path) as draft:
         dataset.drop_encoding().to_netcdf(
             draft,
             engine="netcdf4",
@@ -102,15 +95,6 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
             encoding=_encoding(dataset),
             unlimited_dims=[],
         )
-        _sync(draft)
-        os.replace(draft, path)
-        _sync(path.parent)
-    except (OSError, RuntimeError) as error:
-        text = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{path}: cannot be written: {text}") from error
-    finally:
-        with contextlib.suppress(OSError):
-            draft.unlink(missing_ok=True)
 
 
 def _array(variable: Variable, values: np.ndarray[Any, Any]) -> xr.DataArray:
@@ -169,11 +153,3 @@ def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
             chosen |= {"zlib": True, "complevel": 4, "shuffle": True}
         encoding[str(name)] = chosen
     return encoding
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -15,10 +15,20 @@ _STEP = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[([0-9]{1,6})\])?")
 def parse_assignment(text: str) -> tuple[str, Any]:
     """Split ``PATH=VALUE``; the value is TOML, or a bare word taken as a string.
 
+    >>> parse_assignment("loads.force = 0.02"), parse_assignment("net=none")
+    (('loads.force', 0.02), ('net', 'none'))
+
     Raises
     ------
     InputError
         If there is no ``=``, no path or no value.
+
+    Examples
+    --------
+    >>> parse_assignment("loads.force = 0.02")
+    ('loads.force', 0.02)
+    >>> parse_assignment("rods.kind=ancf")
+    ('rods.kind', 'ancf')
     """
     path, equals, raw = text.partition("=")
     path, raw = path.strip(), raw.strip()
@@ -32,7 +42,11 @@ def parse_assignment(text: str) -> tuple[str, Any]:
 
 
 def section_of(path: str) -> tuple[str, int | None]:
-    """Split ``a.b[k]`` into ``a.b`` and k; without ``[k]`` the second is None."""
+    """Split ``a.b[k]`` into ``a.b`` and k; without ``[k]`` the second is None.
+
+    >>> section_of("rods.young_modulus[3]"), section_of("loads.force")
+    (('rods.young_modulus', 3), ('loads.force', None))
+    """
     inner, dot, last = path.rpartition(".")
     matched = _STEP.fullmatch(last)
     if matched is None or matched[2] is None:
@@ -50,12 +64,6 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
 
     Parameters
     ----------
-    table
-        Nested tables of a scene.
-    path
-        Names joined by dots.
-    value
-        Any value that TOML can hold.
     length
         Number of values in a list at this path.
 
@@ -77,9 +85,21 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
     if not _is_name(name):
         raise InputError(f"{path}: {last!r} is not a field name, or one with its section: name[1]")
     if section is not None:
-        _set_section(table, name, section, value, length, path)
+        if name not in table:
+            raise InputError(f"{path}: there is no {name} yet: give one value for all first")
+        old = table[name]
+        values = list(old) if isinstance(old, (list, tuple)) else [old] * length
+        if not 1 <= section <= len(values):
+            raise InputError(
+                f"{path}: there is no value {section}: choose one from 1 to {len(values)}"
+            )
+        values[section - 1] = value
+        table[name] = values
     elif value is None or (value == LEFT_OUT and name != "kind"):
-        _remove(table, name)
+        if isinstance(table.get(name, {}), dict):
+            table[name] = LEFT_OUT
+        else:
+            del table[name]
     else:
         table[name] = value
 
@@ -87,23 +107,3 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
 def _is_name(step: str) -> bool:
     matched = _STEP.fullmatch(step)
     return matched is not None and matched[2] is None
-
-
-def _remove(table: dict[str, Any], name: str) -> None:
-    if isinstance(table.get(name, {}), dict):
-        table[name] = LEFT_OUT
-    else:
-        del table[name]
-
-
-def _set_section(
-    table: dict[str, Any], name: str, section: int, value: Any, length: int, path: str
-) -> None:
-    if name not in table:
-        raise InputError(f"{path}: there is no {name} yet: give one value for all sections first")
-    old = table[name]
-    values = list(old) if isinstance(old, (list, tuple)) else [old] * length
-    if not 1 <= section <= len(values):
-        raise InputError(f"{path}: there is no value {section}: choose one from 1 to {len(values)}")
-    values[section - 1] = value
-    table[name] = values

@@ -11,8 +11,9 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from ringsim.choice import leaves_of
 from ringsim.parts.persection import EACH, ONE
-from ringsim.units import Unit
+from ringsim.units import Model, unit_of
 
 MOST_NAMED = 3
 """So many further faults are named beside the one that is described."""
@@ -52,8 +53,14 @@ def explain(error: ValidationError, model: type[BaseModel], source: str) -> str:
 
 
 def known_or_nearest(key: str, known: Iterable[str]) -> str:
-    """The hint behind a refused name: the nearest known one, or all of them."""
+    """The hint behind a refused name: the nearest known one, or all of them.
+
+    >>> known_or_nearest("densty", ["density", "damping"])
+    'did you mean density?'
+    """
     names = list(known)
+    if not names:
+        return "it has no keys"
     close = difflib.get_close_matches(key.lower(), names, n=1, cutoff=0.6)
     return f"did you mean {close[0]}?" if close else f"known: {', '.join(names)}"
 
@@ -75,12 +82,17 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     path, owner, field = _walk(fault["loc"], model)
     where = ".".join(path)
     kind, value = fault["type"], fault["input"]
-    unit = _unit(field)
-    shown = f"{where} = {show(value)}{_suffix(value, unit)}"
+    symbol = unit_of(field) if field is not None else "1"
+    unit = f" {symbol}" if symbol != "1" else ""
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    shown = f"{where} = {show(value)}{unit if number else ''}"
     limits = fault.get("ctx", {})
     match kind:
         case "extra_forbidden":
-            return f"{where} is not a known key ({_hint(path[-1], owner)})"
+            # A model may tell of the keys that it once had.
+            hint = getattr(owner, "gone", {}).get(path[-1])
+            hint = hint or known_or_nearest(path[-1], owner.model_fields if owner else ())
+            return f"{where} is not a known key ({hint})"
         case "missing":
             return f"{where} is missing: give it a value{unit and f' in{unit}'}"
         case "greater_than":
@@ -150,7 +162,7 @@ def _walk(
             continue
         else:
             owner = inside[0] if inside else None
-            field = field if field is not None and _is_table(field) else None
+            field = field if field and typing.get_origin(field.annotation) is dict else None
             path.append(str(step))
     return path, owner, field
 
@@ -158,11 +170,6 @@ def _walk(
 def _kinds(field: FieldInfo | None) -> list[str]:
     models = _models_in(field.annotation) if field is not None else []
     return [str(_tag(model)) for model in models if _tag(model) is not None]
-
-
-def _is_table(field: FieldInfo) -> bool:
-    """Whether the field holds values by free names."""
-    return typing.get_origin(field.annotation) is dict
 
 
 def _tag(model: type[BaseModel]) -> Any:
@@ -174,36 +181,11 @@ _NESTING = (typing.Union, types.UnionType, typing.Annotated, tuple, list, dict)
 
 
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
+    if isinstance(annotation, type) and issubclass(annotation, Model):
+        return [*leaves_of(annotation)]
     if typing.get_origin(annotation) in _NESTING:
         return [m for part in typing.get_args(annotation) for m in _models_in(part)]
     return []
-
-
-def _unit(field: FieldInfo | None) -> str:
-    if field is None:
-        return ""
-    found = [m.symbol for m in field.metadata if isinstance(m, Unit)]
-    found += _units_in(field.annotation)
-    return f" {found[0]}" if found and found[0] != "1" else ""
-
-
-def _units_in(annotation: Any) -> list[str]:
-    found = [m.symbol for m in getattr(annotation, "__metadata__", ()) if isinstance(m, Unit)]
-    for part in typing.get_args(annotation):
-        if not isinstance(part, Unit):
-            found += _units_in(part)
-    return found
-
-
-def _suffix(value: Any, unit: str) -> str:
-    """The unit, behind a number only."""
-    return unit if isinstance(value, (int, float)) and not isinstance(value, bool) else ""
-
-
-def _hint(key: str, owner: type[BaseModel] | None) -> str:
-    return known_or_nearest(key, owner.model_fields) if owner is not None else "it has no keys"
 
 
 def _toml(value: Any) -> str:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
+import os
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
@@ -13,37 +13,26 @@ from pydantic import Field, ValidationError, model_validator
 from ringsim.cable.cables import Cables, pulleys_of
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.records import Cable
-from ringsim.choice import kind_of, load_package, one_of
+from ringsim.choice import OneOf
+from ringsim.files import parse_toml, read_text
 from ringsim.overrides import section_of, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.faults.family import Fault
-from ringsim.parts.joints import Joints, Stop
+from ringsim.parts.joints import Joints
 from ringsim.parts.loads import Loads
 from ringsim.parts.net import Net
-from ringsim.parts.persection import ListIn
 from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.solver import Record, Solver
-from ringsim.parts.structure.family import Structure
-from ringsim.parts.structure.pantograph_ring import PantographRing
+from ringsim.parts.stop.family import Stop
+from ringsim.parts.stop.spring_damper import SpringDamperStop
 from ringsim.refusal import InputError, explain, known_or_nearest
-from ringsim.units import Model
+from ringsim.structures.family import Structure
+from ringsim.structures.pantograph_ring import PantographRing
+from ringsim.units import ListIn, Model
 
-for _package in ("structure", "rods", "boom", "faults"):
-    load_package(f"ringsim.parts.{_package}")
-
-if TYPE_CHECKING:
-    AnyStructure = PantographRing
-    AnyRods = Rods
-    AnyBoom = Boom
-    AnyFault = Fault
-else:
-    AnyStructure = one_of(Structure)
-    AnyRods = one_of(Rods)
-    AnyBoom = one_of(Boom)
-    AnyFault = one_of(Fault)
-
+AnyStructure = Annotated[Structure, OneOf(default="pantograph-ring")]
 
 MOST_RECORDS = 1_000_000
 """Output times of one run, at most."""
@@ -55,25 +44,16 @@ class Scene(Model):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
     title: Annotated[str, Field(max_length=300)] = ""
     structure: AnyStructure = PantographRing()
-    rods: AnyRods = GeometricallyExactRods()
+    rods: Annotated[Rods, OneOf()] = GeometricallyExactRods()
     joints: Joints = Joints()
-    stop: Stop | None = Stop()
-    boom: AnyBoom | None = None
+    stop: Annotated[Stop, OneOf(default="spring-damper")] | None = SpringDamperStop()
+    boom: Annotated[Boom, OneOf()] | None = None
     net: Net | None = None
     loads: Loads | None = None
     cables: Cables | None = None
-    faults: Annotated[tuple[AnyFault, ...], ListIn] = ()
+    faults: Annotated[tuple[Annotated[Fault, OneOf()], ...], ListIn] = ()
     solver: Solver = Solver()
     record: Record = Record()
-
-    @model_validator(mode="before")
-    @classmethod
-    def _ring_unless_said(cls, table: Any) -> Any:
-        """A structure that does not say its kind is a pantograph ring."""
-        structure = table.get("structure") if isinstance(table, dict) else None
-        if not isinstance(structure, dict) or "kind" in structure:
-            return table
-        return table | {"structure": {"kind": kind_of(PantographRing()), **structure}}
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
@@ -134,6 +114,15 @@ class Scene(Model):
         ------
         InputError
             If a path or a value is refused.
+
+        Examples
+        --------
+        >>> scene = load_scene("ring18").with_values({"loads.force": 0.02, "boom": "none"})
+        >>> scene.loads.force, scene.boom
+        (0.02, None)
+        >>> stiff = scene.with_values({"rods.young_modulus[3]": 2e11})  # section 3 alone
+        >>> stiff.rods.young_modulus[1:4]
+        (120000000000.0, 200000000000.0, 120000000000.0)
         """
         table = self.to_table()
         for path, value in values.items():
@@ -173,7 +162,7 @@ def _check_faults(scene: Scene) -> None:
             pulleys = scene.pulleys_of(cables[fault.cable - 1][1])
             places |= {"pulley": pulleys, "span": pulleys + 1}
         for name, most in places.items():
-            given = getattr(fault, name, 1)
+            given = getattr(fault, name, 0)
             if isinstance(fault, CableFault) and not cables:
                 raise ValueError(
                     f"faults[{number}] is a fault of a cable, but the scene has none: add "
@@ -234,15 +223,7 @@ def scene_from_toml(text: str, *, source: str) -> Scene:
     InputError
         If the text is not TOML, or its content is refused.
     """
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{source}: not valid TOML: {error}; correct that line") from None
-    except RecursionError:
-        raise InputError(f"{source}: not a scene: its lists or tables nest too deeply") from None
-    except ValueError as error:
-        raise InputError(f"{source}: a number cannot be read: {error}") from None
-    return scene_from_table(table, source=source)
+    return scene_from_table(parse_toml(text, source), source=source)
 
 
 def builtin_scenes() -> dict[str, str]:
@@ -252,35 +233,29 @@ def builtin_scenes() -> dict[str, str]:
     return {f.name.removesuffix(".toml"): f.read_text(encoding="utf-8") for f in files}
 
 
-def load_scene(name_or_path: str | Path) -> Scene:
-    """A built-in scene by name, or a scene file.
+def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
+    """A built-in scene by name, or a scene file; paths may be relative to the folder of a file.
 
     Raises
     ------
     InputError
         If there is no such scene or file, or if its content is refused.
+
+    Examples
+    --------
+    >>> scene = load_scene("ring18")
+    >>> scene.structure.sections, scene.loads.force
+    (18, 0.015)
+    >>> load_scene("ring19")
+    Traceback (most recent call last):
+    ringsim.refusal.InputError: ring19: no such file, and no built-in scene of that name
+    (did you mean ring18?)
     """
     builtin = builtin_scenes()
     if str(name_or_path) in builtin:
         return scene_from_toml(builtin[str(name_or_path)], source=f"scene {name_or_path}")
-    path = Path(name_or_path)
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
+    path = beside.parent / name_or_path
+    if not os.path.exists(path):  # Path.exists raises for names that are too long
         hint = known_or_nearest(str(name_or_path), builtin)
-        raise InputError(
-            f"{path}: no such file, and no built-in scene of that name ({hint})"
-        ) from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: this is a folder: give the name of a scene file") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: cannot be read: {reason}") from None
-    try:
-        text = content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path.name}: not a text file: byte {error.start + 1} is not UTF-8; "
-            "save it as UTF-8 text"
-        ) from None
-    return scene_from_toml(text, source=path.name)
+        raise InputError(f"{path}: no such file, and no built-in scene of that name ({hint})")
+    return scene_from_toml(read_text(path), source=path.name)

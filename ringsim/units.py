@@ -5,20 +5,27 @@ from __future__ import annotations
 import functools
 import types
 import typing
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
     model_serializer,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 
 LEFT_OUT = "none"
 """The word that leaves out a part which would be there by default: ``stop = "none"``."""
+
+
+ListIn = BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
+"""TOML arrays arrive as lists; a frozen record keeps tuples."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +33,19 @@ class Unit:
     """The SI unit of a field, shown in error messages and documents."""
 
     symbol: str
+
+
+def unit_of(field: FieldInfo) -> str:
+    """Symbol of the SI unit of a model's field, also of one in a list; "1" if it has none."""
+    return next(_units_in((*field.metadata, field.annotation)), "1")
+
+
+def _units_in(parts: Iterable[Any]) -> Iterator[str]:
+    for part in parts:
+        if isinstance(part, Unit):
+            yield part.symbol
+        else:
+            yield from _units_in((*getattr(part, "__metadata__", ()), *typing.get_args(part)))
 
 
 class Model(BaseModel):

@@ -17,6 +17,13 @@ RODS = (
 )  # fmt: skip
 
 
+COUNTS = ("steps", "newton_iterations", "jacobians")
+"""What a start of a run takes; "total_" before the name counts all starts."""
+
+TIMINGS = ("wall_time", "cpu_time")
+"""The only variables that differ between repetitions of one run."""
+
+
 class Code(IntEnum):
     """A number in files that stands for a word."""
 
@@ -87,6 +94,10 @@ class Reason(str):
         made.cause = cause
         return made
 
+    def __add__(self, more: str) -> Reason:
+        """The same cause with more words."""
+        return Reason(self.cause, f"{self}{more}")
+
 
 class Fidelity(IntEnum):
     """Which model answered: the full multibody model, or the ideal ring with rigid rods."""
@@ -123,7 +134,7 @@ class Variable:
     dtype: str = "f8"
     needs: tuple[str, ...] = ()
     """What a scene must hold for it, all of: names of parts ("cables", "net", ...), "stress"
-    output, "error bars", a kind of structure."""
+    output, "error bars", a structure's "gauge" or kind."""
     flags: type[Code] | None = None
     """What the values mean where they are codes."""
     error_bar: ErrorBar | None = None

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 from ringsim.analysis.errors import OUTPUTS, Errors
 from ringsim.analysis.frontier import bounds, cheapest, eligible, frontier, in_favour, typical_cost
 from ringsim.analysis.ladder import PATHS, Rung
-from ringsim.analysis.orders import observed_orders
 
 Array = NDArray[np.float64]
 TARGETS = (1e-2, 1e-3, 1e-4)
@@ -24,23 +22,13 @@ _COUNTS = {
     "newton_iterations": ("iterations of Newton's method", "1"),
     "jacobians": ("Jacobians built and factorised", "1"),
 }
-NEEDED = (
-    *OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "final_time",
-)  # fmt: skip
+NEEDED = (*OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "final_time")
 
 
-@dataclass(frozen=True)
-class Truth:
-    """A value that does not come from the multibody model.
+class Truth(NamedTuple):
+    """A value that does not come from the multibody model: one of ``OUTPUTS`` in its unit.
 
-    Attributes
-    ----------
-    output
-        Which of ``OUTPUTS``.
-    source
-        Where it comes from, in words.
-    value
-        In the unit of the output; for the opening angle the mean one over time, shape (time,).
+    Of the opening angle it is the mean one over time, shape (time,).
     """
 
     output: str
@@ -55,11 +43,8 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     ----------
     results
         ``NEEDED`` variables over the dimension ``rung``, one entry per rung.
-    rungs
-        The settings, those of the reference among them
-        (:func:`ringsim.analysis.ladder.references`).
-    truths
-        Independent values, if the scene has any.
+    rungs, truths
+        The settings, those of the reference among them, and independent values, if any.
 
     Returns
     -------
@@ -70,10 +55,9 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         reference, relative; ``reference`` (output): its value, in the output's unit, NaN for
         series (of the asynchrony the largest value); ``frontier`` (rung, output): whether no
         other setting of the scene's own model is both cheaper and better; ``cheapest`` (target,
-        output): the rung among them, -1 if none will do; ``cost`` (rung): processor time without
-        the scatter of single timings, s; ``cpu_time``, ``residual_evaluations``, ``jacobians``,
-        ``steps``, ``status`` and the settings (rung); and for each truth its distance from the
-        reference and from every rung.
+        output): the rung among them, -1 if there is none; ``cost`` (rung): processor time without
+        the scatter of single timings, s; counts, status and settings (rung); ``from_truth``
+        (rung, truth) and ``reference_from_truth`` (truth): distances from the truths, relative.
 
     Raises
     ------
@@ -92,47 +76,47 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     cost = np.where(errors.good, cost, counts["cpu_time"])
     choice = eligible(rungs)
     ranked = np.where(choice[:, None], good, np.nan)
-    graded, orders = observed_orders(errors, rungs)
-    found = xr.Dataset(
-        {
-            "error": (("rung", "output"), error, _words("error relative to the reference", "1")),
-            "bound": (
-                ("rung", "output"), good,
-                _words("largest error of this and all finer settings and the reference", "1"),
-            ),
-            "order": (("graded", "output"), orders, _words("observed order", "1")),
-            "uncertainty": ("output", own, _words("uncertainty of the reference, relative", "1")),
-            "reference": (
-                "output", [errors.best.get(name, np.nan) for name in outputs],
-                _words("extrapolated reference, SI units and degrees", ""),
-            ),
-            "frontier": (
-                ("rung", "output"), frontier(cost, ranked),
-                _words("whether no setting is both cheaper and better", ""),
-            ),
-            "cheapest": (
-                ("target", "output"), cheapest(in_favour(cost, rungs), ranked, TARGETS),
-                _words("the cheapest rung within the target, -1 if there is none", ""),
-            ),
-            "cost": ("rung", cost, _words("processor time, as fitted", "s")),
-            "residual_evaluations": (
-                "rung", residuals, _words("residuals that Newton evaluated in accepted steps", "1"),
-            ),
-            "eligible": ("rung", choice, _words("whether it may be recommended", "")),
-            "status": ("rung", results.status.to_numpy(), _words("how the run ended", "")),
-            "ladder": ("rung", [rung.ladder for rung in rungs], _words("what is varied", "")),
-            "label": ("rung", [rung.label for rung in rungs], _words("the setting", "")),
-        },
-        coords={"output": outputs, "target": list(TARGETS), "graded": graded},
-    )  # fmt: skip
-    for name, count in counts.items():
-        found[name] = ("rung", count, _words(*_COUNTS[name]))
+    graded, orders = errors.orders()
+    ladders = [rung.ladder for rung in rungs]
+    pick = cheapest(in_favour(cost, ladders), ranked, TARGETS)
+    best = [errors.best.get(name, np.nan) for name in outputs]
+    both, one = ("rung", "output"), ("rung",)
+    rows: list[tuple[str, tuple[str, ...], Any, str, str]] = [
+        ("error", both, error, "error relative to the reference", "1"),
+        ("bound", both, good,
+         "largest error of this and all finer settings and the reference", "1"),
+        ("order", ("graded", "output"), orders, "observed order", "1"),
+        ("uncertainty", ("output",), own, "uncertainty of the reference, relative", "1"),
+        ("reference", ("output",), best, "extrapolated reference, SI units and degrees", ""),
+        ("frontier", both, frontier(cost, ranked),
+         "whether no setting is both cheaper and better", ""),
+        ("cheapest", ("target", "output"), pick,
+         "the cheapest rung within the target, -1 if there is none", ""),
+        ("cost", one, cost, "processor time, as fitted", "s"),
+        ("residual_evaluations", one, residuals,
+         "residuals that Newton evaluated in accepted steps", "1"),
+        ("eligible", one, choice, "whether it may be recommended", ""),
+        ("status", one, results.status.to_numpy(), "how the run ended", ""),
+        ("ladder", one, ladders, "what is varied", ""),
+        ("label", one, [rung.label for rung in rungs], "the setting", ""),
+        *((name, one, count, *_COUNTS[name]) for name, count in counts.items()),
+    ]  # fmt: skip
     if "reason" in results:
-        found["reason"] = ("rung", results.reason.to_numpy().astype(str), _words("why", ""))
+        rows.append(("reason", one, results.reason.to_numpy().astype(str), "why", ""))
     for path in PATHS:
-        words = _words(f"setting {path}", "s" if path == "solver.step" else "")
-        found[path.replace(".", "_")] = ("rung", [rung.values[path] for rung in rungs], words)
+        units = "s" if path == "solver.step" else ""
+        values = [rung.values[path] for rung in rungs]
+        rows.append((path.replace(".", "_"), one, values, f"setting {path}", units))
+    found = xr.Dataset(
+        {name: (dims, values, _words(text, units)) for name, dims, values, text, units in rows},
+        coords={"output": outputs, "target": list(TARGETS), "graded": graded},
+    )
     return _add_truths(found, errors, truths)
+
+
+def settings_at(found: xr.Dataset, rung: int) -> dict[str, Any]:
+    """The settings of a rung of a study by scene path."""
+    return {path: found[path.replace(".", "_")].values.tolist()[rung] for path in PATHS}
 
 
 def _words(long_name: str, units: str) -> Mapping[str, str]:
@@ -143,23 +127,20 @@ def _add_truths(found: xr.Dataset, errors: Errors, truths: Sequence[Truth]) -> x
     """How far every rung and the reference are from values of other origin, relative."""
     if not truths:
         return found
-    rows, distance, references_own = [], [], []
-    for truth in truths:
-        values, best = errors.until_the_end(truth.output), errors.best_of(truth.output).value
+    distance, references_own = [], []
+    for name, _, value in truths:
+        values, best = errors.until_the_end(name), errors.best_of(name).value
         both = xr.concat([values, best.expand_dims("rung")], "rung")
-        if truth.output == "opening_angle":
+        if name == "opening_angle":
             mean = both.mean(("plane", "section"))
-            expected = xr.DataArray(truth.value, dims="time", coords={"time": errors.results.time})
-            gap = abs(mean - expected).max("time")
-            apart = (gap / errors.scale(truth.output, best)).to_numpy()
+            expected = xr.DataArray(value, dims="time", coords={"time": errors.results.time})
+            apart = (abs(mean - expected).max("time") / errors.scale(name, best)).to_numpy()
         else:
-            apart = np.abs(both.to_numpy() / truth.value - 1.0)
-        rows.append(f"{truth.output}: {truth.source}")
+            apart = np.abs(both.to_numpy() / value - 1.0)
         distance.append(np.where(errors.good, apart[:-1], np.nan))
         references_own.append(apart[-1])
     long_name = "distance from values of other origin, relative"
     found["from_truth"] = (("rung", "truth"), np.array(distance).T, _words(long_name, "1"))
-    found["reference_from_truth"] = (
-        "truth", references_own, _words(f"reference: {long_name}", "1"),
-    )  # fmt: skip
-    return found.assign_coords(truth=rows)
+    own = ("truth", references_own, _words(f"reference: {long_name}", "1"))
+    rows = [f"{truth.output}: {truth.source}" for truth in truths]
+    return found.assign(reference_from_truth=own).assign_coords(truth=rows)

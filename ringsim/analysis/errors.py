@@ -1,4 +1,4 @@
-"""Errors of all rungs of a ladder against what its finest runs tend to."""
+"""Errors of all rungs of a ladder against the limit of its finest runs, and their orders."""
 
 from __future__ import annotations
 
@@ -9,126 +9,130 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.ladder import Rung, references
-from ringsim.analysis.reference import Limit, reference
+from ringsim.analysis.reference import Limit, largest, limit, order, reference, slope
 
 Array = NDArray[np.float64]
 OUTPUTS = {
     "deployment_time": "deployment time",
-    "opening_angle": "opening angle, largest difference over the travel",
-    "asynchrony": "asynchrony and its largest value, over its largest value",
+    "opening_angle": "opening angle",
+    "asynchrony": "asynchrony",
     "peak_tension": "peak tension",
-    "peak_rod_stress": "peak rod stress",
-    "peak_bending_strain": "peak bending strain",
+    "peak_rod_stress": "peak stress",
+    "peak_bending_strain": "peak strain",
 }
-"""What people use of a result, as far as a scene has it."""
-SCALAR_OF = {"asynchrony": "asynchrony_max"}
-"""Series whose largest value is an output, too."""
+"""What people use of a result, as far as a scene has it, and its name in tables."""
+_LARGEST = {"asynchrony": "asynchrony_max"}
+"""Series whose largest value counts, too: the grid of output times may miss it."""
 LEAST_ASYNCHRONY = 1e-3
-"""deg: a ring without any is not measured by its round-off."""
+"""deg: below this the asynchrony of a symmetric ring is round-off, and its error not relative."""
 GROUPS = {
     "motion": ("deployment_time", "opening_angle"),
     "loads": ("peak_tension", "peak_rod_stress", "peak_bending_strain"),
 }
-"""Outputs that are asked for together: the error is the largest of theirs.  The motion holds
-the asynchrony as a difference of opening angles; over itself it is an output of its own."""
+"""Outputs that are asked for together: the error is the largest of theirs.  The motion contains
+the asynchrony as a difference of opening angles; relative to itself it is an output of its own."""
 
 
 class Errors:
     """Errors, uncertainties and reference values by output.
 
-    Attributes
-    ----------
-    results
-        As they came, over the dimension ``rung``.
-    in_time, in_space
-        Rungs of the reference (:func:`ringsim.analysis.ladder.references`).
-    good
-        Whether a rung ended well, shape (rung,).
-    of
-        Relative errors, shape (rung,) each, by output and group of outputs; NaN where a run
-        failed or has none.
-    uncertainty
-        Of the reference, relative.
-    best
-        The reference's value in the output's unit, where it is a single one.
+    ``of`` has relative errors, shape (rung,) each, by output and group of outputs, NaN where a run
+    failed or has none; ``uncertainty`` that of the reference, relative; ``best`` the reference's
+    value in the output's unit, where it is a single one; ``good``, shape (rung,), whether a rung
+    ended well.
     """
 
     def __init__(self, results: xr.Dataset, rungs: Sequence[Rung]) -> None:
-        """Compare; raises ValueError if a reference run did not end well."""
-        self.results = results
-        self.in_time, self.in_space = references(list(rungs))
-        self.places = sorted({*self.in_time, *self.in_space})
+        """Compare results over ``rung``; raises ValueError if a reference run did not end well."""
+        self.results, self._rungs = results, rungs
+        self._in_time, self._in_space = references(rungs)
+        places = [*self._in_time, *self._in_space]
         self.good = (results.status == 0).to_numpy()
-        if not self.good[self.places].all():
+        if not self.good[places].all():
             raise ValueError("a reference run did not end well")
+        ends = results.deployment_time.isel(rung=places)
+        self._end = float(ends.min(skipna=False))
+        if np.isnan(self._end):
+            self._end = float(results.final_time.isel(rung=places).min())
         self.of: dict[str, Array] = {}
         self.uncertainty: dict[str, float] = {}
         self.best: dict[str, float] = {}
-        for name in OUTPUTS:
-            if name in results and self._known(name):
+        for name in (name for name in OUTPUTS if name in results):
+            if np.isfinite(largest(self.until_the_end(name).isel(rung=places))).all():
                 self._judge(name)
         full = np.array([rung.ladder != "fidelity" for rung in rungs])
         self.of["energy"] = np.where(full & self.good, results.energy_error, np.nan)
         self.uncertainty["energy"] = 0.0
         for group, members in GROUPS.items():
-            present = [m for m in members if m in self.of]
-            if present:
+            if present := [m for m in members if m in self.of]:
                 self.of[group] = np.max([self.of[m] for m in present], axis=0)
                 self.uncertainty[group] = max(self.uncertainty[m] for m in present)
-
-    def _known(self, name: str) -> bool:
-        """Whether all references have an output."""
-        values = self.until_the_end(name).isel(rung=self.places).notnull()
-        inner = [dim for dim in values.dims if dim != "rung"]
-        return bool(values.any(inner).all())
 
     def until_the_end(self, name: str) -> xr.DataArray:
         """A variable, series only up to the earliest deployment time of the references."""
         values = self.results[name]
         if "time" not in values.dims:
             return values
-        ends = self.results.deployment_time.isel(rung=self.places)
-        if not np.isfinite(ends).all():
-            ends = self.results.final_time.isel(rung=self.places)
-        return _held(values.sel(time=values.time <= float(ends.min())))
+        return held(values.sel(time=values.time <= self._end))
 
     def best_of(self, name: str) -> Limit:
         """The reference of a variable, in its unit."""
         values = self.until_the_end(name)
-        return reference(values.isel(rung=self.in_time), values.isel(rung=self.in_space))
+        return reference(values.isel(rung=self._in_time), values.isel(rung=self._in_space))
 
     def scale(self, name: str, best: xr.DataArray) -> float:
-        """What makes an error relative: the value itself, or the extent of a series."""
-        if name in SCALAR_OF or name in SCALAR_OF.values():
-            largest = float(self.results.asynchrony_max.isel(rung=self.in_time[-1]))
-            return max(largest, LEAST_ASYNCHRONY)
-        if name == "opening_angle":
-            return float(best.max() - best.min())
-        return float(abs(best).max())
+        """What an error is relative to: the value itself, or the extent of a series."""
+        if name in _LARGEST or name in _LARGEST.values():
+            most = float(self.results.asynchrony_max.isel(rung=self._in_time[-1]))
+            return max(most, LEAST_ASYNCHRONY)
+        return float(best.max() - best.min() if name == "opening_angle" else abs(best).max())
 
     def _judge(self, name: str) -> None:
-        error, own, best = self._against_reference(name)
-        if name in SCALAR_OF:
-            # The grid of output times may miss the largest value, which the run itself knows.
-            largest, uncertain, best = self._against_reference(SCALAR_OF[name])
-            error, own = np.fmax(error, largest), max(own, uncertain)
+        error, own = np.full(len(self.good), np.nan), 0.0
+        for each in (name, _LARGEST[name]) if name in _LARGEST else (name,):
+            values, best = self.until_the_end(each), self.best_of(each)
+            scale = self.scale(each, best.value)
+            error = np.fmax(error, largest(values - best.value) / scale)
+            own = max(own, best.uncertainty / scale)
         self.of[name] = np.where(self.good, error, np.nan)
         self.uncertainty[name] = own
-        if best.ndim == 0:
-            self.best[name] = float(best)
+        if best.value.ndim == 0:
+            self.best[name] = float(best.value)
 
-    def _against_reference(self, name: str) -> tuple[Array, float, xr.DataArray]:
-        """Errors over the rungs, the reference's uncertainty (both relative), and its value."""
-        values, best = self.until_the_end(name), self.best_of(name)
-        scale = self.scale(name, best.value)
-        inner = [dim for dim in values.dims if dim != "rung"]
-        error = abs(values - best.value).max(inner).to_numpy() / scale
-        return error, best.uncertainty / scale, best.value
+    def orders(self) -> tuple[list[str], Array]:
+        """Names of the ladders that may have an order, and those orders, shape (ladder, output).
+
+        NaN where errors are too small to tell, or hardly change.  Steps show the slope of their
+        errors against the limit of the steps, whatever the elements are; elements and formulations
+        that of the changes from level to level, which all share the error of their steps.
+        """
+        names = list(dict.fromkeys(rung.ladder for rung in self._rungs if rung.size > 0.0))
+        found = np.full((len(names), len(self.of)), np.nan)
+        for row, name in enumerate(names):
+            own = [k for k, rung in enumerate(self._rungs) if rung.ladder == name]
+            if name == "steps":  # longer ones than the scene's own are too long to show an order
+                own = [k for k in own if self._rungs[k].size <= 1.0]
+            sizes = np.array([self._rungs[k].size for k in own])
+            for column, output in enumerate(self.of):
+                if output == "energy":
+                    found[row, column] = slope(sizes, self.of[output][own], 0.0)
+                elif output in OUTPUTS:
+                    values = self.until_the_end(output)
+                    steps = limit(values.isel(rung=self._in_time))
+                    if name not in ("elements", "formulation"):
+                        error = np.where(self.good, largest(values - steps.value), np.nan)
+                        found[row, column] = slope(sizes, error[own], steps.uncertainty)
+                    elif self.good[own].all():
+                        found[row, column] = order(values.isel(rung=own), steps.uncertainty)
+        return names, found
 
 
-def _held(values: xr.DataArray) -> xr.DataArray:
-    """Series with their last value kept from the end of a run on: what has locked stays so."""
+def held(values: xr.DataArray) -> xr.DataArray:
+    """Series with their last value kept from the end of a run on: a locked V-joint stays locked.
+
+    What ``DataArray.ffill`` does, which needs bottleneck or numbagg.
+    """
     series = values.transpose(..., "time").to_numpy()
-    places = np.where(np.isfinite(series), np.arange(series.shape[-1]), 0)
-    held = np.take_along_axis(series, np.maximum.accumulate(places, axis=-1), axis=-1)
-    return values.transpose(..., "time").copy(data=held)
+    last = np.where(np.isfinite(series), np.arange(series.shape[-1]), 0)
+    kept = np.take_along_axis(series, np.maximum.accumulate(last, axis=-1), axis=-1)
+    return values.transpose(..., "time").copy(data=kept)

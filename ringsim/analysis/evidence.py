@@ -1,30 +1,29 @@
 """Settings that were measured to be worth their cost, and picking one for a wanted accuracy.
 
-An accuracy study leaves what is on one of its efficient frontiers behind as a small table; those
-of the built-in scenes come with the package.
+An accuracy study leaves a small table of the settings on its efficient frontiers; those of the
+built-in scenes come with the package.
 """
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-import tomli_w
 import xarray as xr
-from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, ValidationError
 
+from ringsim.analysis.accuracy import settings_at
 from ringsim.analysis.errors import GROUPS, OUTPUTS
-from ringsim.analysis.frontier import WORTH_A_CHANGE
-from ringsim.analysis.ladder import PATHS, STANDING
+from ringsim.analysis.frontier import in_favour
 from ringsim.choice import kind_of
+from ringsim.files import parse_toml, read_text
 from ringsim.parts.solver import NO_DEVIATIONS
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_toml
+from ringsim.units import ListIn, Model
 
 JUDGED_BY = "motion"
 """The errors that a setting is picked by, unless others are named: deployment time and angle."""
@@ -32,59 +31,31 @@ CHOICES = (*GROUPS, *OUTPUTS, "energy")
 """What a setting may be picked by."""
 
 
-@dataclass(frozen=True)
-class Setting:
-    """One setting with what it was measured to give.
+class Setting(Model):
+    """One setting by scene path, with its measured errors and cost."""
 
-    Attributes
-    ----------
-    values
-        By scene path.
-    errors
-        What the setting is good for, relative, by output and group of outputs.
-    seconds
-        Processor time of a run, s.
-    residuals
-        Residuals that Newton evaluated in accepted steps, and the steps: a cost that does not
-        depend on the machine's load, but leaves out factorisations.
-    """
-
-    values: Mapping[str, Any]
-    errors: Mapping[str, float]
+    model_config = ConfigDict(extra="ignore")  # files of earlier versions hold more
     seconds: float
-    residuals: int
+    """Processor time of a run, s."""
+    values: dict[str, Any]
+    errors: dict[str, float]
+    """What the setting is good for, relative, by output and group of outputs."""
 
 
-@dataclass(frozen=True)
-class Evidence:
+class Evidence(Model):
     """The settings of one scene that are worth their cost, cheapest first.
 
-    That which the scene has goes before others that are hardly cheaper.
-
-    Attributes
-    ----------
-    scene
-        Its name.
-    kind
-        What it is, see :func:`kind_of_scene`.
-    references
-        Extrapolated values of its main numbers, SI units and degrees.
+    The scene's own setting comes before others that are hardly cheaper.  ``kind`` is that of
+    :func:`kind_of_scene`.
     """
 
+    model_config = ConfigDict(extra="ignore")
     scene: str
-    kind: Mapping[str, Any]
-    references: Mapping[str, float]
-    settings: tuple[Setting, ...]
+    kind: dict[str, Any]
+    settings: Annotated[tuple[Setting, ...], ListIn, Field(min_length=1)]
 
     def pick(self, accuracy: float, of: str = JUDGED_BY) -> Setting:
-        """The cheapest setting that is good for such an error.
-
-        Parameters
-        ----------
-        accuracy
-            Relative error.
-        of
-            One of ``CHOICES``.
+        """The cheapest setting that is good for a relative error of one of ``CHOICES``.
 
         Raises
         ------
@@ -98,7 +69,7 @@ class Evidence:
         for setting, error in zip(self.settings, errors, strict=True):
             if error <= accuracy:
                 return setting
-        best = float(f"{1.006 * min(errors):.2e}")
+        best = float(f"{1.006 * min(errors):.2e}")  # rounded up, so that asking for it succeeds
         raise InputError(
             f"--accuracy {accuracy:g}: the best setting measured with {self.scene} is good for "
             f"{best:.3g} in {of.replace('_', ' ')}: ask for that, or set solver.tolerance yourself"
@@ -112,13 +83,7 @@ class Evidence:
         return values
 
     def require_like(self, scene: Scene) -> None:
-        """Refuse evidence of another kind of scene.
-
-        Raises
-        ------
-        InputError
-            One line with what differs.
-        """
+        """Raise InputError, with what differs, if this is evidence of another kind of scene."""
         for name, value in kind_of_scene(scene).items():
             if value != self.kind.get(name):
                 raise InputError(
@@ -139,131 +104,61 @@ def kind_of_scene(scene: Scene) -> dict[str, Any]:
 
 
 def evidence_of(found: xr.Dataset) -> Evidence:
-    """The settings of a study, each better in some output than every cheaper one.
+    """The settings of a study that some accuracy picks: each is best so far in some output.
 
-    Parameters
-    ----------
-    found
-        From :func:`ringsim.analysis.accuracy.judge`; its scene is the attribute ``scene``.
+    ``found`` is from :func:`ringsim.analysis.accuracy.judge`; its attribute ``scene`` is its scene.
     """
     scene = scene_from_toml(found.attrs["scene"], source="the study's scene")
     outputs = [str(name) for name in found.output.values]
+    usable = found.eligible.values & np.isfinite(found.bound.values).any(axis=1)
+    cost = np.where(usable, in_favour(found.cost.values, found.ladder.values), np.inf)
     settings: list[Setting] = []
-    for rung in _by_cost(found):
-        bounds = dict(zip(outputs, found.bound.values[rung], strict=True))
-        errors = {name: _rounded_up(bound) for name, bound in bounds.items() if np.isfinite(bound)}
-        if all(any(errors[name] < known.errors[name] for name in errors) for known in settings):
+    best: dict[str, float] = {}
+    for rung in np.argsort(cost, kind="stable")[: usable.sum()].tolist():
+        bounds = zip(outputs, found.bound.values[rung].tolist(), strict=True)
+        errors = {name: _rounded_up(bound) for name, bound in bounds if np.isfinite(bound)}
+        if better := {name: e for name, e in errors.items() if e < best.get(name, np.inf)}:
+            best |= better
+            values = settings_at(found, rung)
+            del values["rods.kind"], values["solver.step_control"]
+            if values["solver.deviation_tolerance"] >= NO_DEVIATIONS:
+                del values["solver.deviation_tolerance"]  # another scene may follow them
             seconds = float(f"{found.cost.values[rung]:.3g}")
-            residuals = int(found.residual_evaluations.values[rung])
-            settings.append(Setting(_values(found, int(rung)), errors, seconds, residuals))
-    references = {
-        name: float(f"{value:.8g}")
-        for name, value in zip(outputs, found.reference.values, strict=True)
-        if np.isfinite(value)
-    }
-    return Evidence(scene.name, kind_of_scene(scene), references, tuple(settings))
-
-
-def _by_cost(found: xr.Dataset) -> NDArray[np.int64]:
-    """Good runs of the full model with the scene's own rods and step control, cheapest first."""
-    own = np.flatnonzero(found.eligible.values & np.isfinite(found.bound.values).any(axis=1))
-    stands = found.ladder.values[own] == STANDING
-    cost = found.cost.values[own] * np.where(stands, WORTH_A_CHANGE, 1.0)
-    return np.asarray(own[np.argsort(cost, kind="stable")])
+            settings.append(Setting(seconds=seconds, values=values, errors=errors))
+    return Evidence(scene=scene.name, kind=kind_of_scene(scene), settings=tuple(settings))
 
 
 def _rounded_up(error: float) -> float:
     return float(f"{1.0049 * error:.2e}")
 
 
-def _values(found: xr.Dataset, rung: int) -> dict[str, Any]:
-    values = {path: found[path.replace(".", "_")].values[rung] for path in PATHS}
-    values = {path: getattr(value, "item", lambda v=value: v)() for path, value in values.items()}
-    del values["rods.kind"], values["solver.step_control"]
-    if values["solver.deviation_tolerance"] >= NO_DEVIATIONS:
-        del values["solver.deviation_tolerance"]  # not followed by this scene, perhaps by others
-    return values
-
-
-def to_toml(evidence: Evidence) -> str:
-    """As a file."""
-    table = {
-        "scene": evidence.scene,
-        "kind": dict(evidence.kind),
-        "references": dict(evidence.references),
-        "settings": [
-            {
-                "seconds": s.seconds,
-                "residuals": s.residuals,
-                "values": dict(s.values),
-                "errors": dict(s.errors),
-            }
-            for s in evidence.settings
-        ],
-    }
-    return tomli_w.dumps(table)
-
-
-def read_evidence(path: Path) -> Evidence:
+def read_evidence(path: Path | Traversable) -> Evidence:
     """The settings.toml of a study.
 
     Raises
     ------
     InputError
-        If it cannot be read.
+        If it cannot be read, or holds something else.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
-    return _from_toml(text, str(path))
+        found = Evidence.model_validate(parse_toml(read_text(path), str(path)))
+        if not all({"solver.step", "rods.elements"} <= set(s.values) for s in found.settings):
+            raise ValueError("a setting without solver.step or rods.elements")
+        return found
+    except ValueError as error:  # also that of pydantic
+        first = error.errors()[0] if isinstance(error, ValidationError) else None
+        fault = f"{'.'.join(map(str, first['loc']))}: {first['msg']}" if first else error
+        raise InputError(
+            f"{path}: not the settings of an accuracy study ({fault}): make it with "
+            "ringsim accuracy"
+        ) from None
 
 
 def evidence_for(scene: Scene) -> Evidence:
-    """What the package knows of the built-in scene that is most like a scene.
-
-    Raises
-    ------
-    InputError
-        If it knows nothing of such scenes.
-    """
-    name = likest(scene)
-    file = resources.files("ringsim") / "scenes" / "evidence" / f"{name}.toml"
-    if not file.is_file():
-        raise InputError(
-            f"--accuracy: no settings for scenes like {name} come with ringsim: give --evidence "
-            "from ringsim accuracy on your scene"
-        )
-    return _from_toml(file.read_text(encoding="utf-8"), file.name)
-
-
-def likest(scene: Scene) -> str:
-    """Name of the built-in scene with the same kind of structure and drive."""
+    """The evidence of the built-in scene with the same kind of structure and drive."""
+    name = "ring18" if scene.cables is None else "ring18-cable"
     if kind_of(scene.structure) == "planar-truss":
-        return "planar-truss"
-    if scene.cables is None:
-        return "ring18"
-    return "ring18-cable" if scene.structure.closed else "truss2"
-
-
-def _from_toml(text: str, name: str) -> Evidence:
-    try:
-        table = tomllib.loads(text)
-        settings = tuple(
-            Setting(
-                dict(s["values"]),
-                {name: float(error) for name, error in s["errors"].items()},
-                float(s["seconds"]),
-                int(s["residuals"]),
-            )
-            for s in table["settings"]
-        )
-        if not settings or any("solver.step" not in s.values for s in settings):
-            raise KeyError("settings")
-        name_of = str(table["scene"])
-        return Evidence(name_of, dict(table["kind"]), dict(table["references"]), settings)
-    except (tomllib.TOMLDecodeError, AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"{name}: not the settings of an accuracy study ({error}): make it with "
-            "ringsim accuracy"
-        ) from None
+        name = "planar-truss"
+    elif scene.cables is not None and not scene.structure.closed:
+        name = "truss2"
+    return read_evidence(resources.files("ringsim") / "scenes" / "evidence" / f"{name}.toml")

@@ -1,9 +1,8 @@
-"""What runs with ever finer steps and elements tend to, and how uncertain that is.
+"""The limit of runs with ever finer steps and elements, how uncertain it is, and its order.
 
-Three levels tell whether halving pays as it should.  Changes that shrink by r from one level to
+Three levels tell whether refining pays as it should.  Changes that shrink by r from one level to
 the next (4 at second order) leave d / (r - 1) of the last change d to go, Richardson (1911);
-those that do not shrink, or go back and forth, say nothing of where they lead, and nothing is
-extrapolated.
+changes that do not shrink, or alternate in sign, are not extrapolated.
 """
 
 from __future__ import annotations
@@ -12,15 +11,23 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
+Array = NDArray[np.float64]
 _SECOND_ORDER = 4.0
 """Ratio of successive changes where steps halve and the order is two; no more is believed."""
 _SHRINKING = 1.5
 """Ratio from which on changes count as shrinking."""
+_CLEAR = 1.5
+"""An error over the limit's uncertainty from which on it counts for a slope."""
+_ABOUT = 0.2
+"""Share by which an error may rise towards finer steps and still count as falling."""
+_MATTERS = 2.0
+"""Ratio of the errors along a ladder from which on it shows an order."""
 
 
 class Limit(NamedTuple):
-    """A value (of any shape), and how far it may be off anywhere, in its own unit."""
+    """A value (of any shape), and its largest uncertainty anywhere, in its own unit."""
 
     value: xr.DataArray
     uncertainty: float
@@ -40,38 +47,44 @@ def limit(values: xr.DataArray) -> Limit:
     if now * _SHRINKING > before:
         return Limit(fine, max(before, now))
     least = before / _SECOND_ORDER / (_SECOND_ORDER - 1.0)
-    if float((first * last).sum()) < 0.0:  # back and forth: the limit lies between the two last
+    if float((first * last).sum()) < 0.0:  # alternating: the limit lies between the last two
         return Limit(fine, max(now, least))
     ratio = min(before / max(now, 1e-300), _SECOND_ORDER)
-    step = last / (ratio - 1.0)
-    return Limit(fine + step, max(now / (ratio - 1.0), least))
+    return Limit(fine + last / (ratio - 1.0), max(now / (ratio - 1.0), least))
 
 
 def reference(in_time: xr.DataArray, in_space: xr.DataArray) -> Limit:
-    """Limit of steps and elements: that of the steps, and what more elements change.
-
-    Parameters
-    ----------
-    in_time, in_space
-        Three levels each along ``rung``.
-    """
+    """Limit of three levels of steps, and what three levels of elements change, along ``rung``."""
     steps, elements = limit(in_time), limit(in_space)
     more = elements.value - in_space.isel(rung=0, drop=True)
     return Limit(steps.value + more, steps.uncertainty + elements.uncertainty)
 
 
+def largest(values: xr.DataArray) -> Array:
+    """The largest size of each rung's values, shape (rung,)."""
+    found: Array = abs(values).max([dim for dim in values.dims if dim != "rung"]).to_numpy()
+    return found
+
+
 def order(values: xr.DataArray, noise: float) -> float:
     """Observed order of three levels along ``rung``; NaN unless changes shrink above the noise.
 
-    Parameters
-    ----------
-    values
-        Of any shape; each level has half the length of elements of the one before.
-    noise
-        What else may change them, in their unit.
+    Each level has half the length of elements of the one before; ``noise`` is the largest effect
+    of anything else, in the unit of the values.
     """
-    changes = abs(values.diff("rung")).max([dim for dim in values.dims if dim != "rung"])
-    first, last = (float(change) for change in changes)
-    if not first > last > noise:
+    first, last = largest(values.diff("rung")).tolist()
+    return float(np.log2(first / last)) if first > last > noise else np.nan
+
+
+def slope(sizes: Array, error: Array, uncertainty: float) -> float:
+    """Slope of log error over log size among all errors above the uncertainty of their limit.
+
+    All of them, because two may agree by chance.  NaN if errors rise somewhere towards finer
+    steps, or hardly change.
+    """
+    clear = np.isfinite(error) & (error > max(_CLEAR * uncertainty, 1e-300))
+    finer = error[clear][np.argsort(-sizes[clear])]
+    falls = len(finer) >= 3 and (np.diff(finer) <= _ABOUT * finer[:-1]).all()
+    if not falls or finer[0] < _MATTERS * finer[-1]:
         return np.nan
-    return float(np.log2(first / last))
+    return float(np.polyfit(np.log(sizes[clear]), np.log(error[clear]), 1)[0])

@@ -2,8 +2,8 @@
 
 A cell is one run.  It is "ok" if it ended well with its errors within their tolerances, "ended"
 if its status and reason name a cause, and "wrong" if it says ok and is not, or fails without a
-cause.  Random ok cells are run again with smaller steps; one that differs by more than it
-promises is wrong.
+cause.  Random ok cells are run again with smaller steps; one that differs by more than ok promises
+is wrong.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.analysis.errors import held
 from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
 from ringsim.variables import Status
@@ -24,8 +25,8 @@ OK, ENDED, WRONG = "ok", "ended", "wrong"
 OUT_OF_STEPS = "step limit"
 CAUSES = (
     (OUT_OF_STEPS, "solver.step_limit = "),
-    ("energy grew", "energy from nothing"),
-    ("energy lost", "energy got lost"),
+    ("energy grew", "time integration added"),
+    ("energy lost", "time integration lost"),
     ("blow-up", "blew up"),
     ("blow-up", "not finite"),
     ("stop passed", "past its stop"),
@@ -40,9 +41,11 @@ CAUSES = (
 )
 """Word of a cause, and the words by which a reason names it; the first that occurs counts."""
 
-TIME_PROMISE, ANGLE_PROMISE, TENSION_PROMISE = 0.01, 0.5, 0.05
+PROMISES = TIME_PROMISE, ANGLE_PROMISE, TENSION_PROMISE = 0.01, 0.5, 0.05
 """What an ok cell promises: relative error of the deployment time, error in degree of the mean
 angle where a run ended before, and error of the largest tension over itself."""
+DIFFERENCES = ("time_difference", "angle_difference", "tension_difference")
+"""Their errors, as a finer run shows them."""
 MORE_STEPS = 1.5
 """Steps of a finer run over those of the cell, at least; Newton may have cut both to the same."""
 ENERGY_PROMISE = Solver().energy_tolerance
@@ -52,19 +55,21 @@ _SCALARS = (
     "energy_error", "constraint_error", "restarts", "steps", "cpu_time", "deployment_time",
     "final_time", "peak_tension",
 )  # fmt: skip
-_MEANING = {
-    "x": ("1", "value on the first axis, in the units of the cell's group"),
-    "y": ("1", "value on the second axis, in the units of the cell's group"),
-    "of_group": ("1", "number of the cell's group"),
-    "reason": ("1", "why the run ended so"),
-    "cause": ("1", "the reason in a word"),
-    "verdict": ("1", "ok, ended with a cause, or wrong"),
-    "check": ("1", "whether a finer run held what ok promises"),
+_MEANING = {name: (VARIABLES[name].units, VARIABLES[name].long_name) for name in _SCALARS} | {
+    "status": ("1", VARIABLES["status"].long_name),
+    "x": ("1", "value on the first axis, in the units of the cell's panel"),
+    "y": ("1", "value on the second axis, in the units of the cell's panel"),
+    "of_group": ("1", "number of the cell's panel"),
+    "reason": ("", "why the run ended so"),
+    "cause": ("", "the reason in a word"),
+    "verdict": ("", "ok, ended with a cause, or wrong"),
+    "check": ("", "whether a finer run held what ok promises"),
     "final_angle": ("degree", "mean opening angle at the last output time"),
     "time_difference": ("1", "change of the deployment time in a finer run, over itself"),
     "angle_difference": ("degree", "change of the mean opening angle in a finer run"),
     "tension_difference": ("1", "change of the largest tension in a finer run, over itself"),
 }
+"""Unit and meaning by variable; words have no unit."""
 
 
 def cause_of(reason: str) -> str:
@@ -74,24 +79,15 @@ def cause_of(reason: str) -> str:
     made smaller: then what ended the first one is the cause.
     """
     last, _, before = reason.partition(" (start ")
-    first = before.partition("start 1: ")[2]
-    found = _named(last)
-    return (_named(first) or found) if found == OUT_OF_STEPS else found
-
-
-def _named(reason: str) -> str:
-    return next((word for word, phrase in CAUSES if phrase in reason), "")
+    found, first = (
+        next((word for word, phrase in CAUSES if phrase in text), "")
+        for text in (last, before.partition("start 1: ")[2])
+    )
+    return (first or found) if found == OUT_OF_STEPS else found
 
 
 def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr.Dataset:
-    """The cells of one campaign.
-
-    Parameters
-    ----------
-    campaign
-        A merged campaign.
-    x, y
-        Values of the two axes for each of its samples.
+    """The cells of a merged campaign, given the values of the two axes for each of its samples.
 
     Returns
     -------
@@ -99,82 +95,56 @@ def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr
         Over ``cell``: ``x``, ``y``, ``status`` (code), ``reason``, ``cause``, ``final_angle`` (mean
         opening angle at the last output time that was reached, degree) and the run's numbers.
     """
-    count = campaign.sizes["sample"]
+    unknown = np.full(campaign.sizes["sample"], np.nan)
     reasons = [str(reason) for reason in campaign["reason"].values]
     status = campaign["status"].values.astype(int)
-    found: dict[str, tuple[str, object]] = {
-        "x": ("cell", np.asarray(x, dtype=float)),
-        "y": ("cell", np.asarray(y, dtype=float)),
-        "status": ("cell", status),
-        "reason": ("cell", np.array(reasons, dtype=object)),
-        "cause": ("cell", np.array([_cause(*one) for one in zip(status, reasons, strict=True)])),
-        "final_angle": ("cell", _final_angle(campaign)),
+    causes = [
+        "" if code == Status.OK else cause_of(reason) or Status(code).word
+        for code, reason in zip(status, reasons, strict=True)
+    ]
+    found: dict[str, Array] = {
+        "x": np.asarray(x, dtype=float),
+        "y": np.asarray(y, dtype=float),
+        "status": status,
+        "reason": np.array(reasons, dtype=object),
+        "cause": np.array(causes),
+        "final_angle": unknown,
     }
+    if "opening_angle" in campaign:
+        angle = campaign["opening_angle"]
+        mean = angle.mean([d for d in angle.dims if d not in ("sample", "time")], skipna=False)
+        found["final_angle"] = held(mean).isel(time=-1).values
     for name in _SCALARS:
-        known = name in campaign
-        values = campaign[name].values.astype(float) if known else np.full(count, np.nan)
-        if known and campaign[name].dtype.kind == "i":
-            values[values < 0.0] = np.nan
-        found[name] = ("cell", values)
-    return _described(xr.Dataset(found))
-
-
-def _described(cells: xr.Dataset) -> xr.Dataset:
-    """Add what each variable means, and its unit."""
-    for name, variable in cells.items():
-        words = _MEANING.get(str(name))
-        if words is None and str(name) in VARIABLES:
-            words = (VARIABLES[str(name)].units, VARIABLES[str(name)].long_name)
-        if words is not None:
-            variable.attrs["long_name"] = words[1]
-            if variable.dtype.kind in "fi":
-                variable.attrs["units"] = words[0]
-    return cells
-
-
-def _cause(status: int, reason: str) -> str:
-    return "" if status == Status.OK else cause_of(reason) or Status(status).word
-
-
-def _final_angle(campaign: xr.Dataset) -> Array:
-    if "opening_angle" not in campaign:
-        return np.full(campaign.sizes["sample"], np.nan)
-    angle = campaign["opening_angle"].transpose("sample", "time", ...).values
-    mean = angle.reshape(*angle.shape[:2], -1).mean(axis=2)
-    known = np.isfinite(mean)
-    last = np.where(known.any(axis=1), mean.shape[1] - 1 - known[:, ::-1].argmax(axis=1), 0)
-    found: Array = mean[np.arange(len(mean)), last]
-    return found
+        values = campaign[name].values if name in campaign else unknown
+        missing = (values.dtype.kind == "i") & (values < 0)  # counts that are missing are -1
+        found[name] = np.where(missing, np.nan, values.astype(float))
+    return xr.Dataset({name: ("cell", values) for name, values in found.items()})
 
 
 def judged(cells: xr.Dataset) -> xr.Dataset:
-    """Add the ``verdict`` of every cell.
+    """Add the ``verdict`` of every cell, and what each variable means.
 
     A cell that ended before its goal is "ended", sound as its motion may be.  One that is ok with
     an energy error over its tolerance, or whose check (see :func:`checked`) failed, is "wrong".
     """
     status = cells["status"].values
-    verdict = np.where(status == Status.OK, OK, ENDED).astype(object)
+    good = status == Status.OK
     nameless = [Status(code).word for code in status] == cells["cause"].values
     crashed = np.isin(status, (Status.ERROR, Status.CRASHED)) & (cells["cause"] != "refused").values
-    verdict[(status != Status.OK) & nameless | crashed] = WRONG
-    verdict[(status == Status.OK) & (cells["energy_error"] > ENERGY_PROMISE).values] = WRONG
+    wrong = (~good & nameless) | crashed | (good & (cells["energy_error"] > ENERGY_PROMISE).values)
     if "check" in cells:
-        verdict[(cells["check"] == "differs").values] = WRONG
-    return cells.assign(verdict=("cell", verdict.astype(str)))
+        wrong |= (cells["check"] == "differs").values
+    found = cells.assign(verdict=("cell", np.where(wrong, WRONG, np.where(good, OK, ENDED))))
+    for name, (units, long_name) in _MEANING.items():
+        if name in found:
+            found[name].attrs |= {"long_name": long_name} | ({"units": units} if units else {})
+    return found
 
 
 def chosen_for_check(cells: xr.Dataset, share: float, seed: int) -> NDArray[np.int64]:
     """Cells to run again with smaller steps: a random share of those that are ok, at least one.
 
-    Parameters
-    ----------
-    cells
-        The judged map.
-    share
-        Between 0 and 1.
-    seed
-        Of the choice.
+    ``share`` is between 0 and 1, ``seed`` that of the choice.
     """
     good = np.flatnonzero((cells["verdict"] == OK).values)
     count = min(len(good), max(1, round(share * len(good))))
@@ -189,10 +159,8 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
     ----------
     cells
         The map.
-    which
-        Numbers of the cells that were run again.
-    finer
-        Those cells, in this order, as :func:`cells_of` gives them.
+    which, finer
+        Numbers of the cells that were run again, and what they gave then, in this order.
 
     Returns
     -------
@@ -201,49 +169,34 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
         ``tension_difference`` (relative) of those cells, and ``check``: "" (not checked),
         "holds", "differs", or "unproven" where the finer run did not end or was hardly finer.
     """
-    found = cells.copy()
-    for name in ("time_difference", "angle_difference", "tension_difference"):
-        found[name] = ("cell", np.full(cells.sizes["cell"], np.nan))
-    mine = cells.isel(cell=which)
-    proves = (finer["status"] == Status.OK).values
-    for name, variable in (("time", "deployment_time"), ("tension", "peak_tension")):
-        there = finer[variable].values
-        change = np.abs(mine[variable].values - there) / np.abs(there)
-        found[f"{name}_difference"].values[which] = change
-    angles = np.abs(mine["final_angle"].values - finer["final_angle"].values)
-    timed = np.isfinite(finer["deployment_time"].values)
-    found["angle_difference"].values[which] = np.where(timed, np.nan, angles)
+    found, mine = cells.copy(), cells.isel(cell=which)
+    times, tensions = (
+        (abs(mine[name] - finer[name]) / abs(finer[name])).values
+        for name in ("deployment_time", "peak_tension")
+    )
+    angles = abs(mine["final_angle"] - finer["final_angle"]).values
+    angles = np.where(np.isfinite(finer["deployment_time"]), np.nan, angles)
     over = np.zeros(len(which), dtype=bool)
-    for name, promise in (
-        ("time", TIME_PROMISE), ("angle", ANGLE_PROMISE), ("tension", TENSION_PROMISE),
-    ):  # fmt: skip
-        over |= found[f"{name}_difference"].values[which] > promise
-    check = np.full(cells.sizes["cell"], "", dtype=object)
+    for name, promise, apart in zip(DIFFERENCES, PROMISES, (times, angles, tensions), strict=True):
+        found[name] = ("cell", np.full(cells.sizes["cell"], np.nan))
+        found[name].values[which] = apart
+        over |= apart > promise
     hardly = (finer["steps"].values < MORE_STEPS * mine["steps"].values) & ~over
-    check[which] = np.where(~proves | hardly, "unproven", np.where(over, "differs", "holds"))
-    found["check"] = ("cell", check.astype(str))
-    return judged(_described(found))
+    unproven = (finer["status"] != Status.OK).values | hardly
+    check = np.full(cells.sizes["cell"], "", dtype="U8")
+    check[which] = np.where(unproven, "unproven", np.where(over, "differs", "holds"))
+    found["check"] = ("cell", check)
+    return judged(found)
 
 
 def joined(groups: Sequence[tuple[dict[str, str], xr.Dataset]]) -> xr.Dataset:
-    """One map of all groups.
+    """One map of all panels, with the dimensions ``group`` (a panel) and ``cell``, judged.
 
-    Parameters
-    ----------
-    groups
-        Name, title and the axes' labels and units (``name``, ``title``, ``x_label``, ``x_units``,
-        ``y_label``, ``y_units``), and the cells of each group.
-
-    Returns
-    -------
-    xr.Dataset
-        Dimensions ``group`` and ``cell``; ``of_group`` is the number of each cell's group.
+    A panel has its words (``name``, ``title``, ``x_label``, ``x_units``, ``y_label``, ``y_units``)
+    and its cells; ``of_group`` is the number of each cell's panel.
     """
-    parts = [
-        cells.assign(of_group=("cell", np.full(cells.sizes["cell"], number)))
-        for number, (_, cells) in enumerate(groups)
-    ]
-    whole = xr.concat(parts, dim="cell")
+    whole = xr.concat([cells for _, cells in groups], dim="cell")
+    whole["of_group"] = ("cell", np.repeat(range(len(groups)), [len(c.x) for _, c in groups]))
     for key in groups[0][0]:
         whole[key] = ("group", np.array([words[key] for words, _ in groups], dtype=object))
-    return _described(judged(whole))
+    return judged(whole)

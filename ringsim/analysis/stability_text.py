@@ -2,127 +2,122 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
 
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.stability import (
-    ANGLE_PROMISE,
-    OK,
-    TENSION_PROMISE,
-    TIME_PROMISE,
-    WRONG,
-)
-from ringsim.analysis.stability_borders import borders
+from ringsim.analysis.stability import DIFFERENCES, OK, PROMISES, WRONG
+from ringsim.tables import markdown_table
+
+_LONGEST_REASON = 300
+"""Characters of an example's reason that are shown."""
 
 
 def to_markdown(whole: xr.Dataset) -> str:
-    """The map as a Markdown text."""
-    lines = ["# Stability map", "", *_counts(whole), "", *_checks(whole), ""]
-    lines += ["![How each cell ended](stability.png)", ""]
-    lines += ["## Borders", "", *_borders(whole), "", "## What lies beyond", "", *_causes(whole)]
-    suspects = np.flatnonzero((whole["verdict"] == WRONG).values)
-    if len(suspects):
-        lines += ["", "## Wrong cells", "", *(_cell(whole, int(k)) for k in suspects)]
-    return "\n".join(lines) + "\n"
+    """A judged map as a Markdown text."""
+    head = ["panel", "axis", "all cells ok", "any cell ok", "below", "above"]
+    parts = ["# Stability map", summary(whole)]
+    if "check" in whole:
+        parts += _checks(whole)
+    parts += ["![How each cell ended](stability.png)"]
+    parts += ["## Borders", markdown_table(head, borders(whole))]
+    parts += ["## What lies beyond", _causes(whole)]
+    if suspects := np.flatnonzero((whole["verdict"] == WRONG).values).tolist():
+        parts += ["## Wrong cells", "\n".join(_cell(whole, k) for k in suspects)]
+    return "\n\n".join(parts) + "\n"
 
 
 def summary(whole: xr.Dataset) -> str:
     """The counts in one line."""
-    return "; ".join(_counts(whole))
-
-
-def _counts(whole: xr.Dataset) -> list[str]:
     verdict = whole["verdict"].values
     words = [f"{np.sum(verdict == word)} {word}" for word in np.unique(verdict)]
     anew = int(np.sum((whole["restarts"].values > 0) & (verdict == OK)))
     minutes = float(np.nansum(whole["cpu_time"].values)) / 60.0
-    return [
-        f"{len(verdict)} cells in {whole.sizes['group']} groups: {', '.join(words)}; "
+    panels = f"{whole.sizes['group']} panel{'s' if whole.sizes['group'] > 1 else ''}"
+    return (
+        f"{len(verdict)} cells in {panels}: {', '.join(words)}; "
         f"{anew} of the ok ones after a new start with smaller steps; "
         f"{minutes:.1f} minutes of processor time"
-    ]
+    )
 
 
 def _checks(whole: xr.Dataset) -> list[str]:
-    if "check" not in whole:
-        return []
     check = whole["check"].values
-    held = int(np.sum(check == "holds"))
-    done = [
+    holds, differs, unproven = (np.sum(check == w) for w in ("holds", "differs", "unproven"))
+    time, angle, tension = PROMISES
+    text = (
         f"{np.sum(check != '')} random ok cells were run again with a quarter of the step and a "
-        f"sixteenth of the tolerance: {held} held what ok promises ({100 * TIME_PROMISE:g} % of "
-        f"the deployment time, {ANGLE_PROMISE:g} deg of the mean angle of runs that end before, "
-        f"{100 * TENSION_PROMISE:g} % of the largest tension), {np.sum(check == 'differs')} did "
-        f"not, {np.sum(check == 'unproven')} stayed unproven because the finer run did not end or "
-        "was hardly finer.",
-        "",
-    ]
-    for name, label, factor, unit in (
-        ("time_difference", "deployment time", 100.0, "%"),
-        ("angle_difference", "mean angle", 1.0, "deg"),
-        ("tension_difference", "largest tension", 100.0, "%"),
-    ):
-        values = whole[name].values[np.isfinite(whole[name].values)] * factor
+        f"sixteenth of the tolerance: {holds} held what ok promises ({100 * time:g} % of the "
+        f"deployment time, {angle:g} deg of the mean angle of runs that end before, "
+        f"{100 * tension:g} % of the largest tension), {differs} did not, {unproven} stayed "
+        "unproven because the finer run did not end or was hardly finer."
+    )
+    lines, labels = [], ("deployment time", "mean angle", "largest tension")
+    for name, label in zip(DIFFERENCES, labels, strict=True):
+        factor, unit = (1.0, "deg") if label == "mean angle" else (100.0, "%")
+        values = whole[name].dropna("cell").values * factor
         if len(values):
-            done.append(
-                f"- {label}: {np.median(values):.2g} {unit} in the middle, "
+            lines.append(
+                f"- {label}: {np.median(values):.2g} {unit} in the median, "
                 f"{values.max():.2g} {unit} at most ({len(values)} cells)"
             )
-    return done
+    return [text, "\n".join(lines)] if lines else [text]
 
 
-def _borders(whole: xr.Dataset) -> list[str]:
-    lines = [
-        "| group | axis | all cells ok | any cell ok | below | above |",
-        "|---|---|---|---|---|---|",
-    ]
-    table = borders(whole)
-    for k in range(table.sizes["border"]):
-        row = table.isel(border=k)
-        group = whole.isel(group=int(row["of_group"]))
-        axis = str(row["axis"].values)
-        units = str(group[f"{axis}_units"].values)
-        label = str(group[f"{axis}_label"].values) + (f" ({units})" if units != "1" else "")
-        sure, some = (
-            _range(float(row[f"lowest_{word}"]), float(row[f"highest_{word}"]))
-            for word in ("sure", "ok")
-        )
-        beyond = [str(row[side].values) or "-" for side in ("below", "above")]
-        lines.append(
-            f"| {group['title'].values} | {label} | {sure} | {some} | {' | '.join(beyond)} |"
-        )
-    return lines
+def borders(whole: xr.Dataset) -> list[list[str]]:
+    """Between which values of each axis runs are ok, as rows of words.
+
+    Title, axis, the longest range of values at which all cells are ok, the range of those at which
+    any cell is, and the commonest causes just below and above the first range.
+    """
+    rows = []
+    for number in range(whole.sizes["group"]):
+        group = whole.isel(group=number, cell=(whole["of_group"] == number).values)
+        good = (group["verdict"] == OK).values
+        causes = np.where(good, OK, group["cause"].values.astype(str))
+        for axis in ("x", "y"):
+            values = np.unique(group[axis].values)
+            columns = [group[axis].values == value for value in values]
+            sure = [bool(good[column].all()) for column in columns]
+            runs = itertools.groupby(range(len(values)), key=sure.__getitem__)
+            longest = max((list(run) for all_ok, run in runs if all_ok), key=len, default=[])
+            beyond = ["-", "-"]
+            for side, k in enumerate((longest[0] - 1, longest[-1] + 1) if longest else ()):
+                if 0 <= k < len(values):
+                    words, counts = np.unique(causes[columns[k] & ~good], return_counts=True)
+                    beyond[side] = str(words[counts.argmax()]) or WRONG
+            some = [k for k, column in enumerate(columns) if good[column].any()]
+            ranges = [
+                f"{values[r[0]]:g} .. {values[r[-1]]:g}" if r else "none" for r in (longest, some)
+            ]
+            label, units = (str(group[f"{axis}_{word}"].values) for word in ("label", "units"))
+            label += "" if units == "1" else f" ({units})"
+            rows.append([str(group["title"].values), label, *ranges, *beyond])
+    return rows
 
 
-def _range(low: float, high: float) -> str:
-    return "none" if not np.isfinite(low) else f"{low:g} .. {high:g}"
-
-
-def _causes(whole: xr.Dataset) -> list[str]:
+def _causes(whole: xr.Dataset) -> str:
     """Each cause with its number of cells and one reason as it was given."""
-    lines = ["| cause | cells | for example |", "|---|---|---|"]
     others = whole.isel(cell=(whole["verdict"] != OK).values)
-    words, first, counts = np.unique(
-        others["cause"].values.astype(str), return_index=True, return_counts=True
-    )
-    for k in np.argsort(-counts, kind="stable"):
-        reason = str(others["reason"].values[first[k]]).replace("|", "/")
-        lines.append(f"| {words[k] or WRONG} | {counts[k]} | {reason[:300]} |")
-    return lines
+    causes = others["cause"].values.astype(str)
+    words, first, counts = np.unique(causes, return_index=True, return_counts=True)
+    rows = [
+        [words[k] or WRONG, counts[k], str(others["reason"].values[first[k]])[:_LONGEST_REASON]]
+        for k in np.argsort(-counts, kind="stable")
+    ]
+    return markdown_table(["cause", "cells", "for example"], rows)
 
 
 def _cell(whole: xr.Dataset, number: int) -> str:
-    cell = whole.isel(cell=number)
-    group = whole.isel(group=int(cell["of_group"]))
-    differences: Sequence[str] = [
+    cell = whole.isel(cell=number, group=int(whole["of_group"][number]))
+    differences = ", ".join(
         f"{name.replace('_', ' ')} {float(cell[name]):.2g}"
-        for name in ("time_difference", "angle_difference", "tension_difference")
+        for name in DIFFERENCES
         if name in cell and np.isfinite(float(cell[name]))
-    ]
+    )
     return (
-        f"- {group['name'].values}: {group['x_label'].values} = {float(cell['x']):g}, "
-        f"{group['y_label'].values} = {float(cell['y']):g}: {cell['reason'].values} "
-        f"({', '.join(differences) or 'no cause named'})"
+        f"- {cell['name'].values}: {cell['x_label'].values} = {float(cell['x']):g}, "
+        f"{cell['y_label'].values} = {float(cell['y']):g}: {cell['reason'].values} "
+        f"({differences or 'no cause named'})"
     )

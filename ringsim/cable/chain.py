@@ -1,4 +1,4 @@
-r"""The tension chain of all cables, from where their pulleys are and how they move.
+r"""The tension chain of all cables, from positions and velocities of their pulleys.
 
 Spans i = 0 .. n-1 run from the winch to the far end, pulley j = 1 .. n-1 stands between spans
 j-1 and j.  For each rope (metre, newton, second):
@@ -14,10 +14,10 @@ Friction.  T_i = c_i T_0, c_i = product over j <= i of eta_j^p_j, p_j = tanh(s_j
 full decay towards the far end while the rope runs to the winch (s_j > 0), inverted where it runs
 back, uniform tension at rest.  The stretch of span i, T_i L_i M / (S EA), summed over the spans
 must be S - M; hence T_i = q c_i / (sum c_k L_k / S), that is T_0 = EA (S - M) (S / M) /
-sum c_k L_k when taut.  To first order of strain that is paper 000's eqs 22-26 put right (their
-products of lengths and slips of index are errors of print); for c = 1 it is exactly
-EA (S - M) / M.  Sums are taken with c relative to its largest value, so that long chains of bad
-pulleys neither overflow nor divide by zero.
+sum c_k L_k when taut.  To first order of strain these are paper 000's eqs 22-26 corrected (their
+products of lengths and shifted indices are misprints); for c = 1 it is exactly
+EA (S - M) / M.  Sums are taken with c relative to its largest value, so that long chains with high
+friction neither overflow nor divide by zero.
 
 Speed of the rope over the pulleys.  Span i holds the natural length m_i.  Rope enters it over
 pulley i+1 and leaves it over pulley i, so dm_i/dt = s_i+1 - s_i with s_0 = winding at the winch
@@ -42,6 +42,7 @@ the model.  T_j-1 - T_j has the sign of s_j: friction never feeds energy in.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -54,9 +55,6 @@ from ringsim.cable.state import ChainState, RopeMaterial
 
 Array = NDArray[np.float64]
 
-SHORTEST = 1e-9
-"""Length in metre below which a span has no direction."""
-
 
 class Chain:
     """The cables of a scene, ready to be evaluated at any motion of their pulleys.
@@ -64,7 +62,7 @@ class Chain:
     Parameters
     ----------
     cables
-        What the scene says of each cable.
+        The record of each cable.
     points_per_cable
         Points of each cable's path: winch, pulleys, far end.
 
@@ -73,23 +71,44 @@ class Chain:
     ValueError
         If a cable has friction coefficients for another number of pulleys.
 
+    Examples
+    --------
+    A rope of 2 m turns by 90 deg over one pulley; 1 mm of it is wound, at 5 mm/s.  The pulley's
+    bearing takes 5.5 % of the tension at the winch.
+
+    >>> from ringsim.cable.friction.bearing import BearingFriction
+    >>> from ringsim.cable.records import Winch
+    >>> from ringsim.cable.winding.constant import ConstantWinding
+    >>> winch = Winch(winding=ConstantWinding(speed=0.005))
+    >>> chain = Chain([Cable(winch=winch, friction=BearingFriction(coefficient=4e-4))], [3])
+    >>> points = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    >>> wound, speed = np.array([[0.001, 0.0]]), np.array([[0.005, 0.0]])
+    >>> state = chain.state(chain.start(points), points, np.zeros((3, 3)), wound, speed)
+    >>> state.tensions.round(2)
+    array([51.44, 48.61])
+    >>> float(state.winch_power.sum().round(4)), state.friction_loss.round(4)
+    (0.2573, array([0.0071]))
+
     """
 
     def __init__(self, cables: Sequence[Cable], points_per_cable: Sequence[int]) -> None:
         self.cables = tuple(cables)
         self.points_per_cable = tuple(points_per_cable)
-        for number, (cable, points) in enumerate(zip(cables, points_per_cable, strict=True), 1):
-            given, pulleys = cable.friction.coefficients.shape, points - 2
-            if given not in ((), (pulleys,)):
+        pulleys = [points - 2 for points in points_per_cable]
+        for number, (cable, count) in enumerate(zip(cables, pulleys, strict=True), 1):
+            given = cable.friction.coefficients.shape
+            if given not in ((), (count,)):
                 raise ValueError(
                     f"cable {number}: friction.coefficient has {given[0]} values, but there "
-                    f"are {pulleys} pulleys: give one value for all, or one for each"
+                    f"are {count} pulleys: give one value for all, or one for each"
                 )
-        pulleys_per_cable = [points - 2 for points in points_per_cable]
-        slip = [c.slip_speed_over(n) for c, n in zip(cables, pulleys_per_cable, strict=True)]
-        self._slip_speed = np.repeat(slip, pulleys_per_cable)
-        self._ropes: Ropes | None = None
-        self._material = self._per_rope(np.arange(len(cables)))
+        slip = [cable.slip_speed_over(n) for cable, n in zip(cables, pulleys, strict=True)]
+        self._slip_speed = np.repeat(slip, pulleys)
+        ends = np.cumsum(pulleys)
+        self._pulleys = [slice(end - n, end) for n, end in zip(pulleys, ends, strict=True)]
+        self._material = np.array(
+            [[c.axial_stiffness, c.damping_time, c.slack_width] for c in cables]
+        ).T
 
     def start(self, points: Array) -> Ropes:
         """One rope per cable, as long as its path at the start plus its initial slack.
@@ -102,8 +121,8 @@ class Chain:
         """
         ropes = Ropes.whole(self.points_per_cable, np.zeros(len(self.cables)))
         lengths = np.linalg.norm(points[ropes.far] - points[ropes.near], axis=1)
-        extra = np.array([c.initial_slack for c in self.cables])
-        return Ropes.whole(self.points_per_cable, np.add.reduceat(lengths, ropes.starts) + extra)
+        slack_rope = np.array([cable.initial_slack for cable in self.cables])
+        return replace(ropes, content=ropes.along(lengths) + slack_rope)
 
     def state(
         self, ropes: Ropes, points: Array, velocities: Array, wound: Array, wound_rate: Array
@@ -126,14 +145,8 @@ class Chain:
             If a span has no length, or a winch has wound up its whole rope.
 
         """
-        near, far, starts = ropes.near, ropes.far, ropes.starts
-        apart = points[far] - points[near]
-        lengths = np.sqrt(np.einsum("ij,ij->i", apart, apart))
-        if not lengths.min() > SHORTEST:
-            raise ValueError(_no_length(ropes, lengths))
-        directions = apart / lengths[:, None]
-        rates = np.einsum("ij,ij->i", directions, velocities[far] - velocities[near])
-        paths, path_rates = np.add.reduceat(lengths, starts), np.add.reduceat(rates, starts)
+        lengths, directions, rates = ropes.measured(points, velocities)
+        paths, path_rates = ropes.along(lengths), ropes.along(rates)
         natural = ropes.content - ropes.per_rope(wound)
         if not natural.min() > 0.0:
             short = int(np.argmin(natural))
@@ -144,22 +157,21 @@ class Chain:
         winding = ropes.per_rope(wound_rate)
 
         angles = _angles(directions, ropes)
-        log_decays = self._log_decays(angles, ropes)
+        log_decays = self._log_decays(angles)
         speeds = _speeds(ropes, lengths, rates, paths, path_rates, natural, winding, wound_rate)
         exponents = np.tanh(speeds / self._slip_speed)
 
         steps = np.zeros(ropes.spans)
         steps[ropes.behind] = exponents * log_decays * ropes.slips
         logs = np.cumsum(steps)
-        weights = np.exp(logs - np.maximum.reduceat(logs, starts)[ropes.of_span])
-        mean = np.add.reduceat(weights * lengths, starts) / paths
-        shares = weights / mean[ropes.of_span]
+        # Relative to the largest decay of the rope: bad pulleys neither overflow nor vanish.
+        weights = np.exp(logs - np.maximum.reduceat(logs, ropes.starts)[ropes.of_span])
+        shares = weights / (ropes.along(weights * lengths) / paths)[ropes.of_span]
 
-        material = self._rope_material(ropes)
-        strain_rate = (path_rates + paths / natural * winding) / natural
-        forces = material.axial_stiffness * (
-            paths / natural - 1.0 + material.damping_time * strain_rate
-        )
+        material = RopeMaterial(*self._material[:, ropes.cable])
+        strains = paths / natural - 1.0
+        strain_rates = (path_rates + paths / natural * winding) / natural
+        forces = material.axial_stiffness * (strains + material.damping_time * strain_rates)
         tension = ropes.alive * slack.tension(forces, material.slack_width)
         return ChainState(
             ropes=ropes,
@@ -169,7 +181,7 @@ class Chain:
             directions=directions,
             angles=angles,
             log_decays=log_decays,
-            friction_slopes=partial(self._log_slopes, angles, ropes),
+            friction_slopes=partial(self._log_slopes, angles),
             speeds=speeds,
             exponents=exponents,
             slip_speeds=self._slip_speed,
@@ -179,37 +191,21 @@ class Chain:
             path_rates=path_rates,
             natural=natural,
             wound_rates=winding,
+            strains=strains,
+            strain_rates=strain_rates,
             forces=forces,
             mean_tensions=tension,
             wound=wound,
             wound_rate=wound_rate,
         )
 
-    def _log_decays(self, angles: Array, ropes: Ropes) -> Array:
-        found = np.empty_like(angles)
-        for number, cable in enumerate(self.cables):
-            own = ropes.pulleys(number)
-            found[own] = cable.friction.log_decay(angles[own], cable.pulley_radius)
-        return found
+    def _log_decays(self, angles: Array) -> Array:
+        own = zip(self.cables, self._pulleys, strict=True)
+        return np.concatenate([c.friction.log_decay(angles[n], c.pulley_radius) for c, n in own])
 
-    def _log_slopes(self, angles: Array, ropes: Ropes) -> Array:
-        found = np.empty_like(angles)
-        for number, cable in enumerate(self.cables):
-            own = ropes.pulleys(number)
-            found[own] = cable.friction.log_slope(angles[own], cable.pulley_radius)
-        return found
-
-    def _rope_material(self, ropes: Ropes) -> RopeMaterial:
-        if self._ropes is not ropes:
-            self._ropes, self._material = ropes, self._per_rope(ropes.cable)
-        return self._material
-
-    def _per_rope(self, cable: NDArray[np.intp]) -> RopeMaterial:
-        return RopeMaterial(
-            axial_stiffness=np.array([c.axial_stiffness for c in self.cables])[cable],
-            damping_time=np.array([c.damping_time for c in self.cables])[cable],
-            slack_width=np.array([c.slack_width for c in self.cables])[cable],
-        )
+    def _log_slopes(self, angles: Array) -> Array:
+        own = zip(self.cables, self._pulleys, strict=True)
+        return np.concatenate([c.friction.log_slope(angles[n], c.pulley_radius) for c, n in own])
 
 
 def _angles(directions: Array, ropes: Ropes) -> Array:
@@ -238,12 +234,3 @@ def _speeds(
     inflow[ropes.last] = -wound_rate[:, 1]
     share_rate = (beyond_rate - beyond * path_rates[rope]) * (natural / paths)[rope]
     return np.asarray((inflow[rope] + winding[rope] * beyond - share_rate) * ropes.slips)
-
-
-def _no_length(ropes: Ropes, lengths: Array) -> str:
-    span = int(np.argmin(lengths)) if np.all(np.isfinite(lengths)) else -1
-    if span < 0:
-        return "the points of the cables are not finite"
-    cable = int(np.searchsorted(ropes.cable_starts, span, side="right")) - 1
-    number = span - int(ropes.cable_starts[cable]) + 1
-    return f"cable {cable + 1}: span {number} has no length, its two points coincide"

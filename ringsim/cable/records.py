@@ -1,8 +1,8 @@
-"""What a scene says of a cable and its winches."""
+"""Records of a cable and its winches."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,11 +11,10 @@ from pydantic import Field, model_validator
 from ringsim.cable import regularisation
 from ringsim.cable.bracket.bisector import BisectorBracket
 from ringsim.cable.bracket.family import Bracket
-from ringsim.cable.faults.family import CableFault
 from ringsim.cable.friction.family import PulleyFriction
 from ringsim.cable.friction.frictionless import Frictionless
 from ringsim.cable.winding.family import PrescribedWinding, WinchState, Winding
-from ringsim.choice import load_package, one_of
+from ringsim.choice import OneOf
 from ringsim.units import (
     AxialStiffness,
     Metre,
@@ -28,20 +27,9 @@ from ringsim.units import (
 )
 
 Array = NDArray[np.float64]
-
-for _package in ("bracket", "friction", "winding", "faults"):
-    load_package(f"ringsim.cable.{_package}")
-
-if TYPE_CHECKING:
-    AnyBracket = Bracket
-    AnyFriction = PulleyFriction
-    AnyWinding = Winding
-    AnyFault = CableFault
-else:
-    AnyBracket = one_of(Bracket)
-    AnyFriction = one_of(PulleyFriction)
-    AnyWinding = one_of(Winding)
-    AnyFault = one_of(CableFault)
+AnyBracket = Annotated[Bracket, OneOf()]
+AnyFriction = Annotated[PulleyFriction, OneOf()]
+AnyWinding = Annotated[Winding, OneOf()]
 
 
 class Winch(Model):
@@ -49,7 +37,7 @@ class Winch(Model):
 
     winding: AnyWinding
     start_time: SecondOrZero = 0.0
-    """The law's time begins here; the drum stands still before."""
+    """Start of the law's time; the drum stands still before."""
     stop_time: SecondOrZero | None = None
     """The drum stands still from here on."""
 
@@ -64,7 +52,7 @@ class Winch(Model):
 
     @property
     def feedback(self) -> bool:
-        """Whether its law answers to the rope (``ringsim.cable.winches``)."""
+        """Whether its law depends on the tension (``ringsim.cable.winches``)."""
         return self.winding.feedback
 
     def turns(self, time: float) -> bool:
@@ -107,7 +95,7 @@ class Cable(Model):
     """Rope speed over a pulley at which 76 % of its friction acts (regularisation).  Left out, it
     follows the winding: see ``ringsim.cable.regularisation``."""
     slack_width: Annotated[Tension, Field(ge=1e-6)] = 0.05
-    """Width of the passage from slack to taut; at the natural length 0.69 of it pulls."""
+    """Width of the transition from slack to taut; tension at the natural length is 0.69 of it."""
     initial_slack: SignedMetre = 0.0
     """Natural length minus path length at the start; negative: the cable is pre-stretched."""
     block_offset: MetreOrZero = 0.105

@@ -1,6 +1,6 @@
-r"""How fast rope must run for the friction of its pulleys to act, and what slower rope costs.
+r"""Slip speed that regularises pulley friction, and the error that it causes at low speed.
 
-Friction turns round with the rope; p_j = tanh(s_j / s_slip) of the full decay makes that smooth
+Friction reverses with the rope; p_j = tanh(s_j / s_slip) of the full decay makes that smooth
 (``ringsim.cable.chain``).  Its share of the rope's speed decides what is left out.  On a ring of
 N sections that open evenly the 2 N spans beside the V pulleys give the rope free, so a pulley
 with m of them beyond it sees
@@ -31,20 +31,24 @@ LARGEST_SLIP_SPEED = 2e-4
 SHARE = 0.5
 """Slip speed over the winding speed per span."""
 TOLERATED = 0.01
-"""Relative error of the far end's tension that a run does not mention."""
+"""Relative error of the far end's tension below which a run does not mention it."""
 _MOVES = 1e-3
 """Share of the largest winding speed above which a winch counts as turning."""
 
 
 def slip_speed(winding: float, pulleys: int) -> float:
-    """The slip speed (m/s) that suits a winding speed (m/s, of all winches of a cable)."""
+    """The slip speed (m/s) that suits a winding speed (m/s, of all winches of a cable).
+
+    >>> round(slip_speed(winding=6e-4, pulleys=5), 9)
+    5e-05
+    """
     if winding <= 0.0:
         return LARGEST_SLIP_SPEED
     return min(LARGEST_SLIP_SPEED, SHARE * winding / (pulleys + 1))
 
 
 def excess(slip: float, winding: float, pulleys: int, decay: float) -> float:
-    """How much too high the tension is where rope runs slowest, relative.
+    """Relative excess of the tension where the rope is slowest.
 
     Parameters
     ----------

@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
+SHORTEST = 1e-9
+"""Length in metre below which a span has no direction: rounding of coordinates, 1e-16 m, turns
+it by 1e-7 rad there."""
 
 
 @dataclass(frozen=True)
@@ -114,17 +117,42 @@ class Ropes:
         """Cable of each rope, shape (ropes,)."""
         return np.searchsorted(self.cable_starts, self.starts, side="right") - 1
 
+    def inner(self, rope: int) -> Flags:
+        """Which pulleys the rope slips over, shape (pulleys,)."""
+        return np.asarray((self.of_pulley == rope) & (self.slips > 0.0))
+
+    def measured(self, points: Array, velocities: Array) -> tuple[Array, Array, Array]:
+        """Lengths (m), unit vectors away from the winch and rates of length (m/s) of all spans.
+
+        Parameters
+        ----------
+        points, velocities
+            Of all cables behind one another, m and m/s, shape (points, 3).
+
+        Raises
+        ------
+        ValueError
+            If a span has no length.
+
+        """
+        apart = points[self.far] - points[self.near]
+        lengths = np.sqrt(np.einsum("ij,ij->i", apart, apart))
+        if not lengths.min() > SHORTEST:
+            raise ValueError(self._no_length(lengths))
+        units = apart / lengths[:, None]
+        moving = velocities[self.far] - velocities[self.near]
+        return lengths, units, np.einsum("ij,ij->i", units, moving)
+
+    def along(self, spans: Array) -> Array:
+        """Sums over the spans of each rope; (spans,) -> (ropes,)."""
+        return np.add.reduceat(spans, self.starts)
+
     def per_rope(self, ends: Array) -> Array:
         """Sum over a rope's ends of a quantity of the winches; (cables, 2) -> (ropes,)."""
         total = np.zeros(len(self.starts))
         total[self.first] += ends[:, 0]
         total[self.last] += ends[:, 1]
         return total
-
-    def pulleys(self, cable: int) -> slice:
-        """The pulleys of a cable, counted from 0."""
-        first = int(self.cable_starts[cable]) - cable
-        return slice(first, first + self.points_per_cable[cable] - 2)
 
     def jam(self, cable: int, pulley: int, stored: Array, wound: Array) -> Ropes:
         """The ropes after a pulley seizes the rope; cable and pulley count from 0.
@@ -175,6 +203,14 @@ class Ropes:
         alive = self.alive.copy()
         alive[self.of_span[self.cable_starts[cable] + span]] = False
         return replace(self, alive=alive)
+
+    def _no_length(self, lengths: Array) -> str:
+        if not np.all(np.isfinite(lengths)):
+            return "the points of the cables are not finite"
+        span = int(np.argmin(lengths))
+        cable = int(np.searchsorted(self.cable_starts, span, side="right")) - 1
+        number = span - int(self.cable_starts[cable]) + 1
+        return f"cable {cable + 1}: span {number} has no length, its two points coincide"
 
     def _check(self, cable: int, place: int, fewer: int, what: str) -> None:
         cables = len(self.points_per_cable)

@@ -8,7 +8,7 @@ With width b (N) the elastic force y (N, negative when the rope is longer than i
 
 Above y = 10 b the tension exceeds y by less than 5e-5 b, below y = -10 b it is less than that.
 No exponential can overflow, and below y = -200 b the tension stays at 1e-87 b: numbers near
-the smallest double would overflow when somebody divides by them.
+the smallest double would overflow in a division.
 """
 
 from __future__ import annotations
@@ -21,12 +21,17 @@ Array = NDArray[np.float64]
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
-
 _SLACKEST = -200.0
+"""y / b below which the tension stays as it is: exp(-200) = 1e-87 is nothing beside any force, and
+its square and its inverse are still doubles."""
 
 
 def tension(force: Array, width: Array) -> Array:
-    """q(y) in N."""
+    """q(y) in N.
+
+    >>> tension(np.array([-1.0, 0.0, 1.0]), np.array(0.05)).round(4)
+    array([0.    , 0.0347, 1.    ])
+    """
     return np.asarray(width * np.logaddexp(0.0, np.maximum(force / width, _SLACKEST)))
 
 

@@ -23,6 +23,11 @@ class RopeMaterial:
     damping_time: Array
     slack_width: Array
 
+    def of(self, rope: int) -> tuple[float, float, float]:
+        """Constants of one rope: EA (N), Kelvin-Voigt time (s), slack width (N)."""
+        one = (self.axial_stiffness[rope], self.damping_time[rope], self.slack_width[rope])
+        return float(one[0]), float(one[1]), float(one[2])
+
 
 @dataclass(frozen=True)
 class ChainState:
@@ -54,6 +59,9 @@ class ChainState:
         Path length of each rope (m) and its rate (m/s), shape (ropes,).
     natural, wound_rates
         Natural length of each rope (m) and what its winches take up (m/s), shape (ropes,).
+    strains, strain_rates
+        Mean strain of each rope, (path - natural) / natural as of paper 001's element, and its
+        rate in 1/s, shape (ropes,).
     forces
         Elastic and viscous force of each rope before smoothing (N), shape (ropes,).
     mean_tensions
@@ -80,32 +88,17 @@ class ChainState:
     path_rates: Array
     natural: Array
     wound_rates: Array
+    strains: Array
+    strain_rates: Array
     forces: Array
     mean_tensions: Array
     wound: Array
     wound_rate: Array
 
     @property
-    def strains(self) -> Array:
-        """Mean strain of each rope, (path - natural) / natural: paper 001's element."""
-        return self.paths / self.natural - 1.0
-
-    @property
-    def strain_rates(self) -> Array:
-        """Rate of the mean strain, in 1/s, shape (ropes,)."""
-        return (self.path_rates + self.paths / self.natural * self.wound_rates) / self.natural
-
-    @property
     def is_slack(self) -> NDArray[np.bool_]:
         """Whether a rope is longer than its path, or cut; shape (ropes,)."""
         return np.asarray((self.paths < self.natural) | ~self.ropes.alive)
-
-    @property
-    def decays(self) -> Array:
-        """C of each span: its tension over the tension of its rope's first span."""
-        first = self.shares[self.ropes.starts][self.ropes.of_span]
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            return np.asarray(self.shares / first)
 
     @property
     def winch_tensions(self) -> Array:
@@ -174,17 +167,6 @@ class ChainState:
         """Power lost inside each rope, in W, never negative, shape (ropes,)."""
         return np.asarray(self.viscous_forces * self.strain_rates * self.natural)
 
-    def viscous_slope(self, rope: int) -> float:
-        """Derivative of a rope's mean tension after the rate of its path, in N s/m."""
-        material = self.material
-        return float(
-            self.ropes.alive[rope]
-            * slack.slope(self.forces[rope], material.slack_width[rope])
-            * material.axial_stiffness[rope]
-            * material.damping_time[rope]
-            / self.natural[rope]
-        )
-
     @property
     def energy_density(self) -> Array:
         """Elastic energy of each rope per natural length, in J/m, shape (ropes,)."""
@@ -198,11 +180,6 @@ class ChainState:
         return self.energy_density * self.natural
 
     @property
-    def drum_power(self) -> Array:
-        """Elastic energy that each rope carries onto its drums, in W, shape (ropes,)."""
-        return self.energy_density * self.wound_rates
-
-    @property
     def winch_forces(self) -> Array:
         """Force of the winches at both ends of each cable per natural length, in N, (cables, 2)."""
         strain = np.stack([self.strains[self.ropes.first], self.strains[self.ropes.last]], axis=-1)
@@ -214,13 +191,10 @@ class ChainState:
         return self.winch_forces * self.wound_rate
 
     def reading(self, cable: int, end: int = 0, path_slope: float = 0.0) -> WinchReading:
-        """What the winch at an end (0 first, 1 far) of a cable (from 0) knows of its rope."""
+        """Readings of the winch at an end (0 first, 1 far) of a cable (from 0)."""
         rope = int((self.ropes.last if end else self.ropes.first)[cable])
         present = float(self.wound_rate[cable, end])
         return WinchReading(
-            axial_stiffness=float(self.material.axial_stiffness[rope]),
-            damping_time=float(self.material.damping_time[rope]),
-            slack_width=float(self.material.slack_width[rope]),
             tension_ratio=self._tension_ratio(rope, end, present),
             path_rate=float(self.path_rates[rope] + self.wound_rates[rope]) - present,
             path_slope=path_slope,
@@ -229,7 +203,7 @@ class ChainState:
     def _tension_ratio(self, rope: int, end: int, present: float) -> Callable[[float], float]:
         """End tension over mean tension, were that end's winch to turn at another speed."""
         ropes = self.ropes
-        inner = (ropes.of_pulley == rope) & (ropes.slips > 0.0)
+        inner = ropes.inner(rope)
         part = self.lengths[ropes.starts[rope] : ropes.ends[rope]] / self.paths[rope]
         share = 1.0 - np.cumsum(part)[:-1] - float(end)
         speeds, slip, decays = self.speeds[inner], self.slip_speeds[inner], self.log_decays[inner]

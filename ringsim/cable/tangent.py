@@ -35,86 +35,36 @@ from ringsim.cable.state import ChainState
 Array = NDArray[np.float64]
 
 STRAIGHT = 1e-7
-"""Sine of the angle between the pulls below which its derivative is taken as zero."""
+"""Sine of the angle between the pulls below which its derivative is taken as zero: far above the
+rounding of unit vectors (1e-16), far below the angles of any path that bends."""
 
 
 @dataclass(frozen=True)
 class RopeTangent:
-    """Derivatives of the forces on the p points of one rope of n = p - 1 spans.
-
-    Matrices have the shape (3 p, 3 p), ordered x, y, z of the first point first.
+    """Derivatives of the tensions in one rope of n spans after the differences of its points.
 
     Attributes
     ----------
-    points
-        The rope's points among those of all cables.
-    directions
-        Unit vectors of its spans, shape (n, 3).
-    by_mean, by_share, by_velocity
-        Derivatives of each span's tension after each difference of points, shape (n, n, 3):
-        through the mean tension (N/m), through its distribution (N/m), and after the
-        difference of velocities (N s/m).
+    spans
+        The rope's spans among those of all cables.
+    mean_by_place, mean_by_velocity
+        Of the mean tension (the material part), N/m and N s/m, shape (n, 3).
     by_direction
         T_i (I - u_i u_i^T) / L_i of each span, in N/m, shape (n, 3, 3).
+    swing
+        Of the rates of length at fixed velocities, 1/s, shape (n, 3).
 
     """
 
-    points: slice
-    directions: Array
-    by_mean: Array
-    by_share: Array
-    by_velocity: Array
+    spans: slice
+    mean_by_place: Array
+    mean_by_velocity: Array
     by_direction: Array
-
-    @property
-    def material(self) -> Array:
-        """Part of dF/dx by the mean tension, in N/m."""
-        return self._assembled(self.by_mean)
-
-    @property
-    def decay(self) -> Array:
-        """Part of dF/dx by the distribution of tension over the spans, in N/m."""
-        return self._assembled(self.by_share)
-
-    @property
-    def geometric(self) -> Array:
-        """Part of dF/dx by the directions of the spans, in N/m."""
-        return self._assembled(None, self.by_direction)
-
-    @property
-    def stiffness(self) -> Array:
-        """The whole dF/dx, in N/m."""
-        return self._assembled(self.by_mean + self.by_share, self.by_direction)
-
-    @property
-    def damping(self) -> Array:
-        """dF/dv, in N s/m: Kelvin-Voigt damping and the regularised friction."""
-        return self._assembled(self.by_velocity)
-
-    def _assembled(self, by_difference: Array | None, by_direction: Array | None = None) -> Array:
-        """-D^T (u_i times the tension's derivatives, and the directions' part) D."""
-        count = len(self.directions)
-        rows = np.zeros((count + 1, 3, count + 1, 3))
-        if by_difference is not None:
-            by_point = np.zeros((count, count + 1, 3))
-            by_point[:, 1:] = by_difference
-            by_point[:, :-1] -= by_difference
-            np.multiply(self.directions[:, :, None, None], by_point[:, None, :, :], out=rows[:-1])
-            rows[1:] -= self.directions[:, :, None, None] * by_point[:, None, :, :]
-        if by_direction is not None:
-            near, far = np.arange(count), np.arange(1, count + 1)
-            for one, other, sign in (
-                (near, near, -1),
-                (far, far, -1),
-                (near, far, 1),
-                (far, near, 1),
-            ):
-                rows[one, :, other, :] += sign * by_direction
-        return rows.reshape(3 * count + 3, 3 * count + 3)
+    swing: Array
 
 
-def tangents(state: ChainState, velocities: Array) -> list[RopeTangent]:
-    """Tangents of all ropes; forces on a point that two ropes share add up.
+def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent:
+    """The tangent of one rope as if the shares of its spans stayed as they are.
 
     Parameters
     ----------
@@ -124,82 +74,53 @@ def tangents(state: ChainState, velocities: Array) -> list[RopeTangent]:
         The velocities that it was evaluated with, in m/s, shape (points, 3).
 
     """
-    return [rope_tangent(state, velocities, k) for k in range(len(state.natural))]
+    ropes, material = state.ropes, state.material
+    spans = slice(int(ropes.starts[rope]), int(ropes.ends[rope]))
+    unit, length = state.directions[spans], state.lengths[spans]
+    relative = velocities[ropes.far[spans]] - velocities[ropes.near[spans]]
+    swing = (relative - unit * state.rates[spans, None]) / length[:, None]
+    across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
+    natural = state.natural[rope]
+    elastic = material.axial_stiffness[rope] / natural * ropes.alive[rope]
+    elastic *= slack.slope(state.forces[rope], material.slack_width[rope])
+    viscous = elastic * material.damping_time[rope]
+    stretched = elastic + viscous * state.wound_rates[rope] / natural
+    return RopeTangent(
+        spans=spans,
+        mean_by_place=stretched * unit + viscous * swing,
+        mean_by_velocity=viscous * unit,
+        by_direction=(state.tensions[spans] / length)[:, None, None] * across,
+        swing=swing,
+    )
 
 
-def mean_tangent(state: ChainState, velocities: Array, rope: int) -> tuple[Array, Array]:
-    """What is left of a rope's tangent if the shares of its spans stay as they are.
+def decay_tangent(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[Array, Array]:
+    """The decay part of one rope: how the shares of its spans change.
 
     Returns
     -------
-    tuple
-        Derivatives of the rope's mean tension after the differences of its points, shape (n, 3),
-        N/m, and T_i (I - u_i u_i^T) / L_i of its spans, shape (n, 3, 3), N/m.
+    tuple of Array
+        Derivatives of each span's tension after each difference of points (N/m) and after each
+        difference of velocities (N s/m), shape (n, n, 3) each.
 
     """
-    ropes = state.ropes
-    spans = slice(int(ropes.starts[rope]), int(ropes.ends[rope]))
-    first = int(ropes.near[spans.start])
-    unit, length = state.directions[spans], state.lengths[spans]
-    natural = float(state.natural[rope])
-    elastic, viscous = _mean_slopes(state, rope)
-    relative = np.diff(velocities[first : first + len(unit) + 1], axis=0)
-    swing = (relative - unit * state.rates[spans, None]) / length[:, None]
-    across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
-    stretched = elastic + viscous * float(state.wound_rates[rope]) / natural
-    scale = (state.tensions[spans] / length)[:, None, None]
-    return stretched * unit + viscous * swing, scale * across
-
-
-def _mean_slopes(state: ChainState, rope: int) -> tuple[float, float]:
-    """Derivatives of a rope's mean tension after its path (N/m) and its rate (N s/m)."""
-    stiffness = float(state.material.axial_stiffness[rope]) / float(state.natural[rope])
-    stiffness *= bool(state.ropes.alive[rope]) * float(
-        slack.slope(state.forces[rope], state.material.slack_width[rope])
-    )
-    return stiffness, stiffness * float(state.material.damping_time[rope])
-
-
-def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent:
-    """The tangent of one rope; see ``tangents``."""
-    ropes = state.ropes
-    spans = slice(int(ropes.starts[rope]), int(ropes.ends[rope]))
-    first = int(ropes.near[spans.start])
-    points = slice(first, first + spans.stop - spans.start + 1)
-    inner = (ropes.of_pulley == rope) & (ropes.slips > 0.0)
-    length, unit = state.lengths[spans], state.directions[spans]
-    share, tension = state.shares[spans], state.tensions[spans]
-    path, natural = float(state.paths[rope]), float(state.natural[rope])
-    # How the unit vectors, and with them the rates of length, follow the differences of points.
-    relative = np.diff(velocities[points], axis=0)
-    swing = (relative - unit * state.rates[spans, None]) / length[:, None]
-    projector = (np.eye(3) - unit[:, :, None] * unit[:, None, :]) / length[:, None, None]
-
-    stiffness, viscous = _mean_slopes(state, rope)
-    elastic = stiffness + viscous * float(state.wound_rates[rope]) / natural
-    material = share[:, None, None] * (elastic * unit + viscous * swing)
-
-    spread, by_place, by_velocity = _distribution(state, spans, inner, rope, swing)
+    spans, swing = tangent.spans, tangent.swing
+    unit, share, tension = state.directions[spans], state.shares[spans], state.tensions[spans]
+    spread, by_place, by_velocity = _distribution(state, spans, rope, swing)
     flat = (tension[:, None] * spread) @ np.stack([by_place, by_velocity]).reshape(2, -1, unit.size)
     decay, drag = flat.reshape(2, len(unit), *unit.shape)
-    decay += tension[:, None, None] * (((1.0 - share) / path)[:, None] * unit)
-    return RopeTangent(
-        points=points,
-        directions=unit,
-        by_mean=material,
-        by_share=decay,
-        by_velocity=share[:, None, None] * (viscous * unit) + drag,
-        by_direction=tension[:, None, None] * projector,
-    )
+    decay += tension[:, None, None] * (((1.0 - share) / state.paths[rope])[:, None] * unit)
+    return decay, drag
 
 
 def _distribution(
-    state: ChainState, spans: slice, inner: NDArray[np.bool_], rope: int, swing: Array
+    state: ChainState, spans: slice, rope: int, swing: Array
 ) -> tuple[Array, Array, Array]:
     """Derivatives of ln(c_i) - sum omega_k ln(c_k) as a product: spread (spans, pulleys) times
     the derivatives of each pulley's logarithm after the differences of points (1/m) and after
     those of velocities (s/m), shape (pulleys, spans, 3) each.
     """
+    inner = state.ropes.inner(rope)
     length, rate, unit = state.lengths[spans], state.rates[spans], state.directions[spans]
     path, path_rate = float(state.paths[rope]), float(state.path_rates[rope])
     ratio = float(state.natural[rope]) / path

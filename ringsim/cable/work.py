@@ -1,8 +1,8 @@
-"""What winches put into the cables, and what the cables lose, between two instants.
+"""Work of the winches on the cables, and losses of the cables, between two instants.
 
-A force does its mean of both instants times the displacement between them: rope wound on a drum,
+The work of a force is its mean at both instants times the displacement: rope wound on a drum,
 rope slipped over a pulley, strain of a rope.  The trapezoidal rule balances exactly these works;
-products of force and rate at the instants alone do not see how far the rope went between them.
+products of force and rate at the instants alone miss the displacement between them.
 Source: the energy balance of Belytschko, Liu and Moran, Nonlinear Finite Elements for Continua
 and Structures (2000), sec. 6.2.3.
 """

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -17,11 +18,9 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 from ringsim.variables import Status
 
-TIMEOUT = 1800.0
-"""Longest time of one rung, s, unless another is given."""
 _STEP_LIMIT = 1_000_000
 """Steps of one rung: its time is limited instead."""
 
@@ -30,29 +29,14 @@ class ReferenceRunError(Exception):
     """A scene has no reference to compare with: its message names setting, reason and cure."""
 
 
-def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float = TIMEOUT) -> xr.Dataset:
-    """Errors and cost of all settings of a scene's ladder.
+def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.Dataset:
+    """Errors and cost of all settings of a scene's ladder (``judge``).
 
     A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
     cheapest run of the reference goes first, then the whole reference, then the rest, so that a
-    scene which cannot be studied costs little.
-
-    Parameters
-    ----------
-    folder
-        Where the campaigns' folders go; a study that was interrupted goes on.
-    scene
-        Any scene that ends well at fine settings.
-    workers
-        Solver processes.
-    timeout
-        Longest time of one rung, s.
-
-    Returns
-    -------
-    xr.Dataset
-        See :func:`ringsim.analysis.accuracy.judge`.  The ideal fidelity is a setting too, where
-        it can represent the scene.
+    scene which cannot be studied costs little.  The ideal fidelity is a setting too, where it can
+    represent the scene.  ``folder`` holds the campaigns, and a study that was interrupted goes on;
+    ``timeout`` is the longest time of one rung, s.
 
     Raises
     ------
@@ -69,17 +53,15 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float = TIMEOU
     for rung in rungs:
         scene.with_values(dict(rung.values))  # refused before anything has run
     in_time, in_space = references(rungs)
-    needed = [*in_time, *in_space]
-    for stage, places in (("first", in_time[:1]), ("reference", needed)):
+    for stage, places in (("first", in_time[:1]), ("reference", in_time + in_space)):
         own = [rungs[k] for k in places]
         _require_ok(own, study.run(stage, own))
     results = study.run("settings", rungs)
     truths = _quadrature(scene)
-    ideal = _ideal(study)
-    if ideal is not None:
+    if (ideal := study.ideal()) is not None:
         results = xr.concat([ideal, results], "rung")
         rungs = [Rung("fidelity", "ideal", 0.0, standing(scene)), *rungs]
-        truths += _truths(ideal)
+        truths += _ideal_truths(ideal.isel(rung=0))
     return judge(results, rungs, truths)
 
 
@@ -91,82 +73,77 @@ class _Study:
     scene: Scene
     workers: int
     timeout: float
-
-    def __post_init__(self) -> None:
-        self._truss = kind_of(self.scene.structure) == "planar-truss"
-        self._known: dict[tuple[object, ...], xr.Dataset] = {}
+    known: dict[tuple[object, ...], xr.Dataset] = field(default_factory=dict)
 
     def run(self, stage: str, rungs: Sequence[Rung]) -> xr.Dataset:
         """Results over the rungs, those that earlier stages ran among them."""
-        keys = [self._key(rung) for rung in rungs]
-        missing = {
-            key: rung for key, rung in zip(keys, rungs, strict=True) if key not in self._known
-        }
-        # What gives a result its shape is the same within a campaign.
-        shapes = {key: self._shape(rung) for key, rung in missing.items()}
-        for shape in dict.fromkeys(shapes.values()):
-            own = [key for key in missing if shapes[key] == shape]
-            found = self._campaign(stage, shape, [missing[key] for key in own])
-            self._known.update({key: found.isel(rung=[k]) for k, key in enumerate(own)})
-        return xr.concat([self._known[key] for key in keys], "rung")
+        keys = [tuple(rung.values[path] for path in PATHS) for rung in rungs]
+        missing: dict[tuple[str, bool], dict[tuple[object, ...], Rung]] = {}
+        for key, rung in zip(keys, rungs, strict=True):
+            if key not in self.known:
+                missing.setdefault(self._campaign(stage, rung), {})[key] = rung
+        for (name, stress), own in missing.items():
+            shared = [path for path in self.scene.structure.shaping if path in PATHS]
+            given = {path: next(iter(own.values())).values[path] for path in shared}
+            paths = [path for path in PATHS if path not in shared]
+            found = self._needed(
+                name, f"Settings of {self.scene.name} against each other ({name})",
+                self.scene.with_values(given | {"record.stress": stress}),
+                [{path: rung.values[path] for path in paths} for rung in own.values()],
+            )  # fmt: skip
+            self.known |= {key: found.isel(rung=[k]) for k, key in enumerate(own)}
+        return xr.concat([self.known[key] for key in keys], "rung")
 
-    @staticmethod
-    def _key(rung: Rung) -> tuple[object, ...]:
-        return tuple(rung.values[path] for path in PATHS)
+    def _campaign(self, stage: str, rung: Rung) -> tuple[str, bool]:
+        """Name and ``record.stress`` of a rung's campaign: all in one have results of one shape."""
+        if kind_of(self.scene.structure) == "planar-truss":  # a strain for each of its elements
+            return f"{stage}-elements-{rung.values['rods.elements']}", False
+        stressed = rung.values["rods.kind"] != "ancf"  # whose elements report no forces
+        return (stage, True) if stressed else (f"{stage}-unstressed", False)
 
-    def _shape(self, rung: Rung) -> tuple[bool, int]:
-        """Whether there are stresses; of a truss the number of elements, each with a strain."""
-        return rung.stressed, rung.values["rods.elements"] if self._truss else 0
+    def ideal(self) -> xr.Dataset | None:
+        """The ideal fidelity's answer as one rung; None if it cannot represent the scene."""
+        plain = self.scene.with_values({"record.stress": False})
+        try:
+            refuse_if_not_ideal(plain)
+        except InputError:
+            return None
+        case, title = {"solver.tolerance": plain.solver.tolerance}, f"{plain.name} with rigid rods"
+        return self._needed("ideal", title, plain, [case], "ideal")
 
-    def _campaign(self, stage: str, shape: tuple[bool, int], rungs: Sequence[Rung]) -> xr.Dataset:
-        stressed, elements = shape
-        given: dict[str, object] = {"record.stress": stressed and not self._truss}
-        name = stage if stressed else f"{stage}-unstressed"
-        if self._truss:
-            name, given["rods.elements"] = f"{stage}-elements-{elements}", elements
-        paths = [path for path in PATHS if path not in given]
-        settings = [{path: rung.values[path] for path in paths} for rung in rungs]
-        title = f"Settings of {self.scene.name} against each other ({name})"
-        cases = Cases(name, title, self.scene.with_values(given), settings, self.timeout)
-        return _needed(run_cases(self.folder, cases, self.workers))
+    def _needed(
+        self, name: str, title: str, scene: Scene, cases: list[dict[str, Any]],
+        fidelity: str = "full",
+    ) -> xr.Dataset:  # fmt: skip
+        """What is compared of a campaign's results, missing variables as NaN."""
+        cases_of = Cases(name, title, scene, cases, self.timeout, fidelity)
+        with xr.open_dataset(run_cases(self.folder, cases_of, self.workers)) as dataset:
+            found = dataset.rename(sample="rung").drop_vars("rung")
+            kept = found[[name for name in (*NEEDED, "reason") if name in found]].load()
+        nothing = ("rung", np.full(kept.sizes["rung"], np.nan))
+        return kept.assign({name: nothing for name in NEEDED if name not in kept})
 
 
 def _require_ok(rungs: Sequence[Rung], results: xr.Dataset) -> None:
-    for k, rung in enumerate(rungs):
-        ended = Status(int(results.status[k]))
-        if ended != Status.OK:
-            settings = ", ".join(f"{path} = {rung.values[path]}" for path in PATHS)
+    for rung, code, reason in zip(rungs, results.status.values, results.reason.values, strict=True):
+        if code != Status.OK:
+            settings = ", ".join(f"{path} = {value}" for path, value in rung.values.items())
             raise ReferenceRunError(
-                f"the reference run with {settings} ended as {ended.word}: "
-                f"{str(results.reason[k].item()) or 'no reason given'}: change the scene so that "
-                "it ends well with fine steps, or give it more time (--timeout) in a new folder"
+                f"the reference run with {settings} ended as {Status(code).word}: "
+                f"{reason or 'no reason given'}: change the scene so that it ends well with fine "
+                "steps, or give it more time (--timeout) in a new folder"
             )
 
 
-def _needed(file: Path) -> xr.Dataset:
-    """What is compared, missing variables as NaN."""
-    with xr.open_dataset(file) as dataset:
-        found = dataset.rename(sample="rung").drop_vars("rung")
-        kept = found[[name for name in (*NEEDED, "reason") if name in found]].load()
-    for name in NEEDED:
-        if name not in kept:
-            kept[name] = ("rung", np.full(kept.sizes["rung"], np.nan))
-    return kept
-
-
-def _ideal(study: _Study) -> xr.Dataset | None:
-    """The ideal fidelity's answer as one rung; None if it cannot represent the scene."""
-    scene = study.scene
-    plain = scene.with_values({"record.stress": False})
-    try:
-        refuse_if_not_ideal(plain)
-    except InputError:
-        return None
-    case = {"solver.tolerance": scene.solver.tolerance}
-    cases = Cases(
-        "ideal", f"{scene.name} with rigid rods", plain, [case], study.timeout, fidelity="ideal"
-    )
-    return _needed(run_cases(study.folder, cases, 1))
+def _ideal_truths(ideal: xr.Dataset) -> list[Truth]:
+    if not np.isfinite(ideal.deployment_time):
+        return []
+    source = "one-coordinate equation of the ideal ring"
+    mean = ideal.opening_angle.mean(("plane", "section")).to_numpy()
+    return [
+        Truth("deployment_time", source, float(ideal.deployment_time)),
+        Truth("opening_angle", f"{source}, mean angle", mean),
+    ]
 
 
 def _quadrature(scene: Scene) -> list[Truth]:
@@ -175,25 +152,12 @@ def _quadrature(scene: Scene) -> list[Truth]:
         return []
     if not scene.structure.closed:
         return []  # the quadrature keeps an arc's end assemblies upright, but they swing
-    joints = scene.joints
-    losses = (joints.pivot, joints.hinge, joints.vjoint)
     if scene.net is not None and scene.net.damping > 0.0:
         return []
-    if any(law is not None for law in losses) or scene.faults or scene.loads is None:
+    if scene.joints.present() or scene.faults or scene.loads is None:
         return []
     try:
-        found = opening_time(IdealRing.of(scene), scene.structure.initial_phi)
-    except ValueError:
+        found = opening_time(OneCoordinate(scene), scene.structure.coordinate)
+    except ValueError:  # the loads do not open it
         return []
     return [Truth("deployment_time", "energy quadrature of the ideal ring", found.time)]
-
-
-def _truths(ideal: xr.Dataset) -> list[Truth]:
-    one = ideal.isel(rung=0)
-    found = []
-    if np.isfinite(one.deployment_time):
-        source = "one-coordinate equation of the ideal ring"
-        found.append(Truth("deployment_time", source, float(one.deployment_time)))
-        mean = one.opening_angle.mean(("plane", "section")).to_numpy()
-        found.append(Truth("opening_angle", f"{source}, mean angle", mean))
-    return found

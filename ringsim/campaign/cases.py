@@ -16,52 +16,35 @@ from typing import Any
 import tomli_w
 
 from ringsim.campaign.folder import prepare_folder
-from ringsim.campaign.run import INTERRUPTED, Choices, run_campaign
+from ringsim.campaign.run import Choices, run_campaign
 from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.execution.local import Local
-from ringsim.refusal import InputError
+from ringsim.exit_codes import EXIT_INTERRUPTED
+from ringsim.files import write_text, writing
 from ringsim.scene import Scene
-from ringsim.storage.files import unwritable
 from ringsim.storage.merge import NAME as MERGED
 
 
 @dataclass(frozen=True)
 class Cases:
-    """Variations of one scene that are to be run.
-
-    Attributes
-    ----------
-    name, title
-        Of the campaign.
-    scene
-        What all cases vary.
-    cases
-        Values by scene path, the same paths in each, one value (no lists) to a path.
-    timeout
-        Longest time of one run, s.
-    fidelity
-        "full" or "ideal".
-    """
+    """Variations of one scene that are to be run."""
 
     name: str
     title: str
     scene: Scene
+    """What all cases vary."""
     cases: Sequence[Mapping[str, Any]]
+    """Values by scene path, the same paths in each, one value (no lists) to a path."""
     timeout: float = 3600.0
+    """Longest time of one run, s."""
     fidelity: str = "full"
+    """``"full"`` or ``"ideal"``."""
 
 
 def run_cases(folder: Path, cases: Cases, workers: int) -> Path:
     """Run the cases that are still missing, and merge them.
 
-    Parameters
-    ----------
-    folder
-        Where the files and the campaign's folder go; it is created.
-    cases
-        What to run.
-    workers
-        Solver processes.
+    Files and the campaign's folder go into ``folder``, which is created.
 
     Returns
     -------
@@ -79,13 +62,8 @@ def run_cases(folder: Path, cases: Cases, workers: int) -> Path:
     campaign = load_campaign(file)
     home = folder / cases.name
     prepare_folder(campaign, home, solver=SOLVERS[cases.fidelity])
-    choices = Choices(
-        scheduler=Local(workers),
-        workers=workers,
-        limits=campaign.specification.limits,
-        description=f"{workers} local workers",
-    )
-    if run_campaign(home, choices) == INTERRUPTED:
+    choices = Choices(Local(workers), campaign.specification.limits)
+    if run_campaign(home, choices) == EXIT_INTERRUPTED:
         raise KeyboardInterrupt
     return home / MERGED
 
@@ -101,30 +79,14 @@ def write_cases(folder: Path, cases: Cases) -> Path:
         "design": {"kind": "list", "file": rows.name},
         "limits": {"timeout": cases.timeout},
     }
-    try:
+    listed = io.StringIO()
+    writer = csv.DictWriter(listed, list(cases.cases[0]), lineterminator="\n")
+    writer.writeheader()
+    for case in cases.cases:
+        writer.writerow({k: str(v).lower() if isinstance(v, bool) else v for k, v in case.items()})
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        scene.write_text(cases.scene.to_toml(), encoding="utf-8")
-        rows.write_text(_csv(cases.cases), encoding="utf-8")
-        file.write_text(tomli_w.dumps(table), encoding="utf-8")
-    except OSError as error:
-        raise unwritable(file, error) from error
+    write_text(scene, cases.scene.to_toml())
+    write_text(rows, listed.getvalue())
+    write_text(file, tomli_w.dumps(table))
     return file
-
-
-def _csv(cases: Sequence[Mapping[str, Any]]) -> str:
-    paths = list(cases[0])
-    for number, case in enumerate(cases):
-        if list(case) != paths:
-            raise InputError(
-                f"case {number} has values for {', '.join(case)}, and must have them for "
-                f"{', '.join(paths)}"
-            )
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(paths)
-    writer.writerows([[_word(value) for value in case.values()] for case in cases])
-    return text.getvalue()
-
-
-def _word(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

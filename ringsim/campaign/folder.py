@@ -11,54 +11,34 @@ from pathlib import Path
 from typing import Any
 
 from ringsim.campaign.specification import Campaign
-from ringsim.execution.work import Retry
+from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError
-from ringsim.sampling.table import Table
+from ringsim.sampling.columns import Table
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.design_file import NAME, read_design, write_design
-from ringsim.storage.files import DRAFT, busy, locked, tries, unwritable
-from ringsim.storage.layout import Output
+from ringsim.storage.journal import FOLDER
+from ringsim.storage.locks import GO_ON, locked, tries
 from ringsim.storage.provenance import provenance
-from ringsim.storage.shards import ASIDE, FOLDER
-from ringsim.storage.store import JOURNALS, create_folders
+from ringsim.storage.survey import Survey, survey
 
 
 @dataclass(frozen=True)
 class Folder:
-    """A prepared campaign folder.
-
-    Attributes
-    ----------
-    path
-        Where it is.
-    identity
-        Digest of everything that decides about the results.
-    table
-        Inputs of all samples.
-    scene
-        Scene that they vary.
-    solver
-        ``module:function`` that runs one sample.
-    attributes
-        Global attributes of the design.
-    """
+    """A prepared campaign folder: the inputs of all samples, and the scene that they vary."""
 
     path: Path
     identity: str
+    """Digest of everything that decides about the results."""
     table: Table
     scene: Scene
     solver: str
+    """``module:function`` that runs one sample."""
     attributes: dict[str, Any]
+    """Global attributes of the design."""
 
-    @property
-    def output(self) -> Output:
-        """How the merged file is stored."""
-        return Output.model_validate_json(self.attributes["output"])
-
-    @property
-    def retry(self) -> Retry:
-        """What is done about runs that the solver could not finish."""
-        return Retry.model_validate_json(self.attributes["retry"])
+    def survey(self) -> Survey:
+        """What it holds of every sample."""
+        return survey(self.path, self.identity, self.table.samples)
 
 
 def open_folder(path: Path) -> Folder:
@@ -74,20 +54,11 @@ def open_folder(path: Path) -> Folder:
     return Folder(path, attributes["identity"], table, scene, attributes["solver"], attributes)
 
 
-def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> Folder:
+def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> None:
     """Create a campaign's folder, or check that it is this campaign's.
 
     A design may have grown since: if its first samples are those of the folder, the new ones
-    are added.
-
-    Parameters
-    ----------
-    campaign
-        What is to be run.
-    path
-        The folder.
-    solver
-        ``module:function`` that runs one sample.
+    are added.  The solver is the ``module:function`` that runs one sample.
 
     Raises
     ------
@@ -101,86 +72,69 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> Folder:
             f"{path}: its name is not UTF-8: choose another folder with --out"
         ) from None
     table = campaign.draw()
-    try:
-        for _ in tries():
-            found = _as_it_is(campaign, path, table, solver)
-            if found is not None:
-                return found
-            create_folders(path)
+    with writing(path / NAME, GO_ON):
+        for _ in tries(path):
+            if _is_ready(campaign, path, table, solver):
+                return
+            (path / FOLDER).mkdir(parents=True, exist_ok=True)
             with locked(path / "lock") as alone:
                 if alone:
-                    found = _as_it_is(campaign, path, table, solver)
-                    return found or _write(campaign, path, table, solver)
+                    if not _is_ready(campaign, path, table, solver):
+                        _write(campaign, path, table, solver)
+                    return
+
+
+def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool:
+    """Whether there is nothing to write to the folder: it is neither new nor does it grow."""
+    if (path / NAME).exists():
+        old = open_folder(path)
+        refuse_another(campaign, old, table, solver)
+        return old.table.samples == table.samples and old.attributes["campaign"] == campaign.text
+    try:
+        names = sorted(entry.name for entry in path.iterdir()) if path.exists() else []
     except OSError as error:
-        raise unwritable(path / NAME, error) from error
-    raise busy(path)
-
-
-def _as_it_is(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder | None:
-    """The folder, if there is nothing to write to it; None if it is new or its design grows."""
-    if not (path / NAME).exists():
-        _refuse_strangers(path)
-        return None
-    old = open_folder(path)
-    refuse_another(campaign, old, table, solver)
-    same = old.table.samples == table.samples and old.attributes["campaign"] == campaign.text
-    return old if same else None
-
-
-def _refuse_strangers(path: Path) -> None:
-    strangers = sorted(entry.name for entry in _entries(path) if not _ours(entry.name))
+        raise InputError(f"{path}: this is no folder to write to: {error.strerror}") from None
+    ours = (FOLDER, "lock", "progress", ".design", ".progress")
+    strangers = [name for name in names if not name.startswith(ours)]
     if strangers:
         raise InputError(
             f"{path}: this folder holds {strangers[0]} and no campaign: choose a new one with --out"
         )
-    for inside, results in ((FOLDER, "shard-*.nc"), (JOURNALS, "*.journal")):
-        if any((path / inside).glob(results)):
-            raise InputError(
-                f"{path}: this folder holds results in {inside}, but its {NAME} is gone, so nobody "
-                f"knows which campaign they belong to: bring {NAME} back, or choose a new folder "
-                "with --out"
-            )
+    if any((path / FOLDER).glob("*.journal")):
+        raise InputError(
+            f"{path}: this folder holds results in {FOLDER}, but its {NAME} is gone, so nobody "
+            f"knows which campaign they belong to: bring {NAME} back, or choose a new folder "
+            "with --out"
+        )
+    return False
 
 
-def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder:
+def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> None:
     wanted = campaign.specification
+    content = json.dumps(_decisive(campaign, table, solver), sort_keys=True)
     attributes = provenance(name=wanted.name, title=wanted.title, action="designed") | {
-        "identity": _identity(campaign, table, solver),
+        "identity": hashlib.sha256(content.encode()).hexdigest()[:32],
         "seed": wanted.seed,
         "solver": solver,
         "campaign": campaign.text,
         "campaign_name": wanted.name,
         "scene": campaign.scene.to_toml(),
         "output": wanted.output.model_dump_json(),
-        "retry": wanted.retry.model_dump_json(),
     }
     for draft in path.glob(f".{NAME}.*{DRAFT}"):
         draft.unlink(missing_ok=True)
     write_design(path, table, attributes)
-    return open_folder(path)
 
 
-def _entries(path: Path) -> list[Path]:
-    try:
-        return list(path.iterdir()) if path.exists() else []
-    except OSError as error:
-        raise InputError(f"{path}: this is no folder to write to: {error.strerror}") from None
-
-
-def _ours(name: str) -> bool:
-    return name in (FOLDER, JOURNALS, ASIDE) or name.startswith((".design", "lock", "progress"))
-
-
-def _identity(campaign: Campaign, table: Table, solver: str) -> str:
-    content = {
-        "scene": campaign.scene.to_toml(),
-        "inputs": [column.path for column in table.columns],
-        "seed": campaign.specification.seed,
-        "retry": campaign.specification.retry.model_dump(),
-        "solver": solver,
-        "version": version("ringsim"),
+def _decisive(campaign: Campaign, table: Table, solver: str) -> dict[str, Any]:
+    """Everything that decides about the results; the keys say what differs if it does."""
+    return {
+        "its scene": campaign.scene.to_toml(),
+        "its seed": campaign.specification.seed,
+        "the version of ringsim": version("ringsim"),
+        "its inputs": [column.path for column in table.columns],
+        "its solver": solver,
     }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 
 def refuse_another(campaign: Campaign, old: Folder, table: Table, solver: str) -> None:
@@ -191,21 +145,24 @@ def refuse_another(campaign: Campaign, old: Folder, table: Table, solver: str) -
     InputError
         If it holds another one; the text says what differs.
     """
-    cure = "choose another folder with --out, or delete this one"
-    if old.identity != _identity(campaign, table, solver):
-        paths = [column.path for column in table.columns]
-        suspects = {
-            "its scene": campaign.scene.to_toml() != old.attributes["scene"],
-            "its seed": campaign.specification.seed != int(old.attributes["seed"]),
-            "its retry": campaign.specification.retry != old.retry,
-            "the version of ringsim": old.attributes["ringsim_version"] != version("ringsim"),
-            "its inputs": paths != [column.path for column in old.table.columns],
-            "its solver": solver != old.solver,
-        }
-        what = " and ".join(word for word, differs in suspects.items() if differs)
-        raise InputError(f"{old.path}: this folder holds another campaign ({what} differs): {cure}")
-    if not table.starts_with(old.table):
+    held = {
+        "its scene": old.attributes["scene"],
+        "its seed": int(old.attributes["seed"]),
+        "the version of ringsim": old.attributes["ringsim_version"],
+        "its inputs": [column.path for column in old.table.columns],
+        "its solver": old.solver,
+    }
+    wanted = _decisive(campaign, table, solver)
+    what = " and ".join(word for word in wanted if wanted[word] != held[word])
+    if what:
+        what = f"{what} differs"
+    elif not table.starts_with(old.table):
+        what = (
+            f"its {old.table.samples} samples are not the first of the {table.samples} that "
+            f"{campaign.file.name} gives"
+        )
+    if what:
         raise InputError(
-            f"{old.path}: this folder holds another campaign (its {old.table.samples} samples are "
-            f"not the first of the {table.samples} that {campaign.file.name} gives): {cure}"
+            f"{old.path}: this folder holds another campaign ({what}): choose another folder with "
+            "--out, or delete this one"
         )

@@ -2,50 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from ringsim.campaign.folder import Folder
-from ringsim.storage.files import DRAFT, in_turn, unwritable
-from ringsim.storage.merge import NAME, merge_shards
+from ringsim.files import DRAFT, writing
+from ringsim.storage.locks import GO_ON, locked
+from ringsim.storage.merge import NAME, write_merged
+from ringsim.storage.netcdf import Output
 from ringsim.storage.provenance import provenance
-from ringsim.storage.store import survey
 
 _KEPT = ("identity", "seed", "solver", "campaign", "campaign_name", "scene", "output")
 
 
-@dataclass(frozen=True)
-class Merged:
-    """What a folder held when it was to be merged.
-
-    Attributes
-    ----------
-    left
-        Samples that have no result in a shard; they are missing from a merged file.
-    failed
-        Samples that failed.
-    path
-        The merged file, or None if it was not wanted yet.
-    """
+class Merged(NamedTuple):
+    """What a folder held when it was to be merged."""
 
     left: int
+    """Samples that have no result; they are missing from a merged file."""
     failed: int
     path: Path | None
+    """The merged file, or None if it was not wanted yet."""
 
 
-def merge(campaign: Folder, *, execution: str, set_aside: bool, partly: bool) -> Merged:
+def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
     """Write ``campaign.nc``, one process at a time, so that it never loses samples it had.
 
-    Parameters
-    ----------
-    campaign
-        The folder.
-    execution
-        Who computed it, in words.
-    set_aside
-        Move broken shards out of the way.
-    partly
-        Write the file also if samples are left.
+    It says in words who computed it, and is written ``partly`` if samples are left.
 
     Raises
     ------
@@ -53,35 +36,17 @@ def merge(campaign: Folder, *, execution: str, set_aside: bool, partly: bool) ->
         If the folder cannot be written to.
     """
     path = campaign.path / NAME
-    try:
-        with in_turn(campaign.path / "lock-merge"):
-            for draft in campaign.path.glob(f".{NAME}.*{DRAFT}"):
-                draft.unlink(missing_ok=True)
-            found = survey(
-                campaign.path, campaign.identity, campaign.table.samples, set_aside=set_aside
-            )
-            left, failed = int((~found.sealed).sum()), len(found.failed)
-            if left and not partly:
-                return Merged(left, failed, None)
-            failed += merge_shards(
-                campaign.path,
-                found.shards,
-                campaign.table,
-                campaign.output,
-                _attributes(campaign, execution),
-            )
-    except OSError as error:
-        raise unwritable(path, error) from error
+    with writing(path, GO_ON), locked(campaign.path / "lock-merge", wait=True):
+        for draft in campaign.path.glob(f".{NAME}.*{DRAFT}"):
+            draft.unlink(missing_ok=True)
+        found = campaign.survey()
+        left, failed = len(found.missing), len(found.failed)
+        if left and not partly:
+            return Merged(left, failed, None)
+        design = campaign.attributes
+        made = provenance(name=design["campaign_name"], title=design["title"], action="merged")
+        attributes = made | {name: design[name] for name in _KEPT} | {"execution": execution}
+        attributes["history"] += f"\n{design['history']}"
+        output = Output.model_validate_json(design["output"])
+        failed += write_merged(campaign.path, found, campaign.table, output, attributes)
     return Merged(left, failed, path)
-
-
-def _attributes(campaign: Folder, execution: str) -> dict[str, str]:
-    attributes = provenance(
-        name=campaign.attributes["campaign_name"],
-        title=campaign.attributes["title"],
-        action="merged",
-    )
-    attributes |= {name: campaign.attributes[name] for name in _KEPT if name in campaign.attributes}
-    attributes["execution"] = execution
-    attributes["history"] += f"\n{campaign.attributes['history']}"
-    return attributes

@@ -7,37 +7,23 @@ from pathlib import Path
 import numpy as np
 
 from ringsim.campaign.folder import open_folder, refuse_another
-from ringsim.campaign.run import Part
+from ringsim.campaign.share import Share
 from ringsim.campaign.specification import Campaign
 from ringsim.campaign.status import in_words
 from ringsim.execution.cost import relative_cost
-from ringsim.execution.slot import TICK, Slot
-from ringsim.execution.work import Task
-from ringsim.sampling.table import Table
+from ringsim.execution.local import Local
+from ringsim.execution.work import Work
+from ringsim.sampling.columns import Table
 from ringsim.storage.design_file import NAME
-from ringsim.storage.layout import NOT_RUN
-from ringsim.storage.record import Result
-from ringsim.storage.store import survey
+from ringsim.storage.result import Result
+from ringsim.storage.survey import survey
 
 
-def plan(campaign: Campaign, folder: Path, *, workers: int, part: Part, solver: str) -> list[str]:
+def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver: str) -> list[str]:
     """The plan as text.
 
     The cost is predicted from samples that are done; if there are none, one sample of middling
-    cost runs as a trial, and nothing of it is kept.
-
-    Parameters
-    ----------
-    campaign
-        What is to be run.
-    folder
-        Where; it need not exist and is not written to.
-    workers
-        Samples that run at the same time.
-    part
-        The share of this process.
-    solver
-        ``module:function`` that runs one sample.
+    cost runs as a trial, and nothing of it is kept.  The folder need not exist.
 
     Raises
     ------
@@ -45,15 +31,13 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, part: Part, solver: 
         If the folder belongs to another campaign.
     """
     table = campaign.draw()
-    status = np.full(table.samples, NOT_RUN, dtype=np.int8)
-    seconds = np.full(table.samples, np.nan)
+    identity = ""
     if (folder / NAME).exists():
         old = open_folder(folder)
         refuse_another(campaign, old, table, solver)
-        found = survey(folder, old.identity, table.samples, set_aside=False)
-        status, seconds = found.status, found.seconds
-    mine = part.holds(np.arange(table.samples))
-    todo = np.flatnonzero(mine & (status == NOT_RUN))
+        identity = old.identity
+    found = survey(folder, identity, table.samples)
+    todo = found.missing[share.holds(found.missing)]
     cost = relative_cost(table, campaign.scene)
     kind = campaign.specification.design.model_dump()["kind"]
     lines = [
@@ -65,13 +49,25 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, part: Part, solver: 
     ]
     if len(todo) == 0:
         return [*lines, "  nothing is left to run"]
-    known = np.flatnonzero(np.isfinite(seconds))
+    known = np.flatnonzero(np.isfinite(found.seconds))
     if len(known):
-        per_cost = float(seconds[known].sum() / cost[known].sum())
+        per_cost = float(found.seconds[known].sum() / cost[known].sum())
         basis = f"from {len(known)} samples that are done"
     else:
         trial = int(todo[np.argsort(cost[todo])[len(todo) // 2]])
-        result = run_once(campaign, table, trial, solver)
+        kept: list[Result] = []
+        Local(1).run(
+            [trial],
+            Work(
+                solver=solver,
+                scene=campaign.scene.to_table(),
+                values_of=table.values_of,
+                limits=campaign.specification.limits,
+                keep=kept.append,
+                stop=lambda: "",
+            ),
+        )
+        (result,) = kept
         per_cost = result.seconds / cost[trial]
         basis = f"from a trial run of sample {trial}: {result.status.word}, {result.reason}"
     each = per_cost * cost[todo]
@@ -82,21 +78,6 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, part: Part, solver: 
         f"{basis}",
         f"  predicted      about {in_words(float(whole))}",
     ]
-
-
-def run_once(campaign: Campaign, table: Table, sample: int, solver: str) -> Result:
-    """Run one sample in a solver process and keep nothing."""
-    wanted = campaign.specification
-    slot = Slot(solver, campaign.scene.to_table(), wanted.limits, wanted.retry)
-    try:
-        slot.submit(Task(sample, table.values_of(sample)))
-        while True:
-            slot.pipe.poll(TICK)
-            result = slot.poll()
-            if result is not None:
-                return result
-    finally:
-        slot.close()
 
 
 def _inputs(table: Table) -> list[str]:

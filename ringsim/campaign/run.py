@@ -1,12 +1,11 @@
-"""Running a campaign: prepare its folder, run what is missing, merge."""
+"""Running a campaign: run what is missing in its folder, merge, say how it ended."""
 
 from __future__ import annotations
 
 import contextlib
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,77 +13,26 @@ from ringsim.analysis.error_budget import budget_lines, error_budget
 from ringsim.analysis.restarts import restart_lines
 from ringsim.campaign.folder import Folder, open_folder
 from ringsim.campaign.merging import merge
-from ringsim.campaign.watch import Progress, Stop, stopping_on_signals
+from ringsim.campaign.share import WHOLE, Share
+from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
 from ringsim.execution.cost import longest_first, relative_cost
-from ringsim.execution.launch import polite_barrier
 from ringsim.execution.work import Limits, Scheduler, Work
+from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.refusal import InputError
-from ringsim.storage.files import reserved
-from ringsim.storage.record import Result
-from ringsim.storage.store import Store, Survey, recover, survey
-
-DONE, TOO_MANY_FAILED, INTERRUPTED = 0, 3, 130
-
-
-@dataclass(frozen=True)
-class Part:
-    """A share of a campaign's samples: every ``count``-th one, starting at ``number`` - 1."""
-
-    number: int = 1
-    count: int = 1
-
-    @property
-    def whole(self) -> bool:
-        """Whether it is all samples."""
-        return self.count == 1
-
-    @property
-    def writer(self) -> str:
-        """Start of the names of files that belong to this share alone."""
-        return "all" if self.whole else f"part{self.number}of{self.count}"
-
-    def holds(self, samples: Any) -> Any:
-        """Which of the samples belong to the share."""
-        return samples % self.count == self.number - 1
+from ringsim.storage.journal import Journal
+from ringsim.storage.locks import reserved
 
 
 @dataclass(frozen=True)
 class Choices:
-    """How a campaign is to be run this time.
-
-    Attributes
-    ----------
-    scheduler
-        Who computes.
-    workers
-        Samples that run at the same time.
-    limits
-        Bounds on each run.
-    max_failed
-        Failures that are put up with, in the whole campaign; None for any number.
-    part
-        The share of this process.
-    retry_failed
-        Run the failed samples again.
-    communicator
-        From mpi4py, if several ranks run this campaign together.
-    description
-        Who computes, in words, for the merged file.
-    """
+    """How a campaign is to be run this time."""
 
     scheduler: Scheduler
-    workers: int
     limits: Limits
     max_failed: int | None = None
-    part: Part = Part()
+    """Failures that are put up with, in the whole campaign; None for any number."""
+    share: Share = WHOLE
     retry_failed: bool = False
-    communicator: Any = None
-    description: str = ""
-
-    @property
-    def rank(self) -> int:
-        """Number of this process among those that run the campaign together."""
-        return 0 if self.communicator is None else int(self.communicator.Get_rank())
 
 
 def run_campaign(folder: Path, choices: Choices) -> int:
@@ -101,50 +49,52 @@ def run_campaign(folder: Path, choices: Choices) -> int:
     InputError
         If the folder is in use or cannot be written.
     """
+    scheduler, share = choices.scheduler, choices.share
     with contextlib.ExitStack() as held:
         stop, fault = held.enter_context(stopping_on_signals()), ""
-        if choices.rank == 0:
+        if scheduler.rank == 0:
             try:
-                held.enter_context(reserved(folder, choices.part.writer, alone=choices.part.whole))
-                share = "" if choices.part.whole else choices.part.writer
-                recover(folder, open_folder(folder).identity, share)
+                held.enter_context(reserved(folder, share.writer, alone=share.whole))
             except InputError as error:
                 fault = str(error)
-        if choices.communicator is not None:
-            fault = choices.communicator.bcast(fault)
+        fault = scheduler.from_first(fault)
         if fault:
             raise InputError(fault)
         campaign = open_folder(folder)
         _run_missing(campaign, choices, stop)
         try:
-            return _conclude(campaign, choices, stop) if choices.rank == 0 else DONE
+            return _conclude(campaign, choices, stop) if scheduler.rank == 0 else EXIT_DONE
         finally:
             # Until rank 0 has merged: a signal would end the others, and they the whole job.
-            if choices.communicator is not None:
-                polite_barrier(choices.communicator)
+            scheduler.wait()
 
 
-def _run_missing(campaign: Folder, choices: Choices, stop: Stop) -> None:
-    writer = f"{choices.part.writer}-rank{choices.rank}"
-    store = Store(campaign.path, campaign.identity, writer, campaign.output.shard_samples)
-    before = _survey(campaign, choices)
-    progress = _progress(campaign, choices, before) if before is not None else None
+def _run_missing(campaign: Folder, choices: Choices, stop: StopRequest) -> None:
+    scheduler = choices.scheduler
+    writer = f"{choices.share.writer}-rank{scheduler.rank}"
+    journal = Journal(campaign.path, campaign.identity, writer)
+    work = Work(
+        solver=campaign.solver,
+        scene=campaign.scene.to_table(),
+        values_of=campaign.table.values_of,
+        limits=choices.limits,
+        keep=journal.append,
+        stop=lambda: stop.reason,
+    )
+    samples: list[int] = []
+    progress = None
+    if scheduler.rank == 0:
+        samples, progress, work = _watched(campaign, choices, stop, work)
     reason = fault = ""
     try:
-        reason = choices.scheduler.run(
-            _to_run(campaign, choices, before),
-            _work(campaign, choices, store, stop, progress, _failed_elsewhere(choices, before)),
-        )
+        reason = scheduler.run(samples, work)
     except InputError as error:
         fault = str(error)
     try:
-        store.close()
+        journal.close()
     except InputError as error:
         fault = fault or str(error)
-    if choices.communicator is not None:
-        polite_barrier(choices.communicator)
-        faults = choices.communicator.allgather(fault)
-        fault = next((each for each in faults if each), "")
+    fault = next(filter(None, scheduler.from_all(fault)), "")
     if reason:
         stop.note(reason, signalled=True)  # another rank was told to stop
     if progress is not None:
@@ -153,102 +103,53 @@ def _run_missing(campaign: Folder, choices: Choices, stop: Stop) -> None:
         raise InputError(fault)
 
 
-def _survey(campaign: Folder, choices: Choices) -> Survey | None:
-    if choices.rank != 0:
-        return None
-    return survey(
-        campaign.path, campaign.identity, campaign.table.samples, set_aside=choices.part.whole
-    )
-
-
-def _to_run(campaign: Folder, choices: Choices, before: Survey | None) -> list[int]:
-    if before is None:
-        return []
-    samples = before.missing
+def _watched(
+    campaign: Folder, choices: Choices, stop: StopRequest, work: Work
+) -> tuple[list[int], Progress, Work]:
+    """The samples to run, longest ones first, and the work with somebody who watches it."""
+    share, most = choices.share, choices.max_failed
+    before = campaign.survey()
+    missing, failed = before.missing, before.failed
+    failed_elsewhere = int((~share.holds(failed)).sum())
     if choices.retry_failed:
-        samples = np.union1d(samples, before.failed)
-    samples = samples[choices.part.holds(samples)]
-    return longest_first(samples, relative_cost(campaign.table, campaign.scene))
-
-
-def _failed_elsewhere(choices: Choices, before: Survey | None) -> int:
-    """Failed samples of other parts, which count against ``max_failed`` too."""
-    if before is None or choices.retry_failed:
-        return 0
-    return int((~choices.part.holds(before.failed)).sum())
-
-
-def _progress(campaign: Folder, choices: Choices, before: Survey) -> Progress:
-    mine = np.arange(campaign.table.samples)
-    mine = mine[choices.part.holds(mine)]
-    missing, failed = (np.intersect1d(mine, those) for those in (before.missing, before.failed))
-    if choices.retry_failed:
-        missing, failed = np.union1d(missing, failed), failed[:0]
-    return Progress(
-        path=campaign.path / f"progress-{choices.part.writer}.json",
+        missing, failed, failed_elsewhere = np.union1d(missing, failed), failed[:0], 0
+    missing = missing[share.holds(missing)]
+    total = int(share.holds(np.arange(campaign.table.samples)).sum())
+    progress = Progress(
+        path=campaign.path / f"progress-{share.writer}.json",
         name=campaign.attributes["campaign_name"],
-        total=len(mine),
-        done=len(mine) - len(missing),
-        failed=len(failed),
-        workers=choices.workers,
+        total=total,
+        done=total - len(missing),
+        failed=int(share.holds(failed).sum()),
+        workers=choices.scheduler.workers,
     )
-
-
-def _work(
-    campaign: Folder,
-    choices: Choices,
-    store: Store,
-    stop: Stop,
-    progress: Progress | None,
-    failed_elsewhere: int,
-) -> Work:
-    most = choices.max_failed
-
-    def check_budget() -> None:
-        if progress is not None and most is not None:
-            failed = progress.failed + failed_elsewhere
-            if failed > most:
-                why = f"{failed} samples failed, more than max_failed = {most}"
-                stop.note(why, signalled=False)
-
-    def finished(result: Result) -> None:
-        if progress is not None:
-            progress.finished(result)
-            check_budget()
 
     def asked() -> str:
-        if progress is not None:
-            progress.refresh()
-        return stop.asked()
+        progress.refresh()
+        failed = progress.failed + failed_elsewhere
+        if most is not None and failed > most:
+            why = f"{failed} samples failed, more than max_failed = {most}"
+            stop.note(why, signalled=False)
+        return stop.reason
 
-    check_budget()
-    return Work(
-        solver=campaign.solver,
-        scene=campaign.scene.to_table(),
-        values_of=campaign.table.values_of,
-        limits=choices.limits,
-        retry=campaign.retry,
-        keep=store.keep,
-        started=progress.started if progress is not None else lambda sample: None,
-        finished=finished,
-        stop=asked,
-    )
+    samples = longest_first(missing, relative_cost(campaign.table, campaign.scene))
+    work = replace(work, started=progress.started, finished=progress.finished, stop=asked)
+    return samples, progress, work
 
 
-def _conclude(campaign: Folder, choices: Choices, stop: Stop) -> int:
+def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
     """Merge if nothing is left, say how it ended, and choose the exit code."""
     stop.at_once = True
     try:
-        merged = merge(
-            campaign, execution=choices.description, set_aside=choices.part.whole, partly=False
-        )
+        merged = merge(campaign, execution=choices.scheduler.description, partly=False)
     except KeyboardInterrupt:
         _tell(f"{stop.reason}; the samples are not merged yet: the same command goes on with that")
-        return INTERRUPTED
+        return EXIT_INTERRUPTED
     finally:
         stop.at_once = False
     left, failed = merged.left, merged.failed
     over_budget = bool(stop.reason) and not stop.signalled
+    interrupted = left and (stop.signalled or choices.share.whole)
     if merged.path is not None:
         _tell(f"{merged.path}: {campaign.table.samples} samples, {failed} failed")
         for line in _notes(campaign, merged.path):
@@ -258,14 +159,14 @@ def _conclude(campaign: Folder, choices: Choices, stop: Stop) -> int:
             f"{stop.reason}; {left} samples are left: raise max_failed, or mend what fails and "
             "give the same command with --retry-failed"
         )
-    elif left and (stop.signalled or choices.part.whole):
+    elif interrupted:
         why = stop.reason or "some results were lost"
         _tell(f"{why}; {left} samples are left: the same command goes on with them")
     elif left:
         _tell(f"this part is done; {left} samples of other parts are left")
     if over_budget or failed == campaign.table.samples:
-        return TOO_MANY_FAILED
-    return INTERRUPTED if left and (stop.signalled or choices.part.whole) else DONE
+        return EXIT_FAILED
+    return EXIT_INTERRUPTED if interrupted else EXIT_DONE
 
 
 def _tell(line: str) -> None:

@@ -2,63 +2,59 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError
 
-from ringsim.execution.work import Limits, Retry
-from ringsim.refusal import InputError, explain, known_or_nearest
+from ringsim.execution.work import Limits
+from ringsim.files import parse_toml, read_text
+from ringsim.refusal import InputError, explain
+from ringsim.sampling.columns import Table
 from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.table import AnyDesign, AnyDistribution, Table, draw, with_error_bars
-from ringsim.scene import Scene, builtin_scenes, load_scene
-from ringsim.storage.layout import Output
+from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
+from ringsim.scene import Scene, load_scene
+from ringsim.storage.netcdf import Output
 from ringsim.units import Model
 
 SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_ideal"}
 """What maps a scene to its outcome, by fidelity."""
 
 
-def _flat(inner: Callable[[Any], bool]) -> Callable[[Any], Any]:
-    """Join nested tables to dotted paths, down to tables that ``inner`` keeps."""
-
-    def flatten(table: Any, prefix: str = "") -> Any:
-        if not isinstance(table, dict):
-            return table
-        found: dict[str, Any] = {}
-        for name, value in table.items():
-            if isinstance(value, dict) and not inner(value):
-                found |= flatten(value, f"{prefix}{name}.")
-            else:
-                found[f"{prefix}{name}"] = value
-        return found
-
-    return flatten
+def _flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
+    """Join nested tables to dotted paths, down to tables that have the key ``whole``."""
+    if prefix and (not isinstance(table, dict) or whole in table):
+        return {prefix: table}
+    if not isinstance(table, dict):
+        return table
+    found: dict[str, Any] = {}
+    for name, inner in table.items():
+        found |= _flat(inner, whole, f"{prefix}.{name}" if prefix else name)
+    return found
 
 
 class Specification(Model):
     """Content of a campaign file."""
+
+    gone: ClassVar[dict[str, str]] = {
+        "retry": "runs that fail start anew by themselves, see solver.restarts; leave it out",
+    }
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
     title: Annotated[str, Field(max_length=300)] = ""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     scene: str
     """Built-in scene, or scene file looked up beside the campaign file."""
-    set: Annotated[dict[str, Any], BeforeValidator(_flat(lambda table: False))] = Field(
-        default_factory=dict
-    )
+    set: Annotated[dict[str, Any], BeforeValidator(_flat)] = Field(default_factory=dict)
     """Values by scene path that all samples share."""
     inputs: Annotated[
-        dict[str, AnyDistribution], BeforeValidator(_flat(lambda table: "kind" in table))
+        dict[str, AnyDistribution], BeforeValidator(lambda table: _flat(table, "kind"))
     ] = Field(default_factory=dict)
     """Distribution by scene path."""
     correlations: list[Correlation] = Field(default_factory=list)
     design: AnyDesign
     limits: Limits = Limits()
-    retry: Retry = Retry()
     fidelity: Literal["full", "ideal"] = "full"
     """full: the flexible multibody model; ideal: rigid rods."""
     error_bars_every: Annotated[int, Field(ge=0)] = 0
@@ -70,19 +66,7 @@ class Specification(Model):
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign file with the scene that it names.
-
-    Attributes
-    ----------
-    file
-        The campaign file.
-    text
-        Its text.
-    specification
-        Its content.
-    scene
-        The scene that its samples vary.
-    """
+    """A campaign file, its text and content, and the scene that its samples vary."""
 
     file: Path
     text: str
@@ -99,15 +83,15 @@ class Campaign:
         """
         wanted = self.specification
         try:
-            table = draw(
+            return draw(
                 self.scene,
                 wanted.inputs,
                 wanted.correlations,
                 wanted.design,
                 seed=wanted.seed,
                 folder=self.file.parent,
+                error_bars_every=wanted.error_bars_every,
             )
-            return with_error_bars(table, wanted.error_bars_every)
         except InputError as error:
             raise InputError(f"{self.file.name}: {error}") from None
 
@@ -120,34 +104,16 @@ def load_campaign(path: Path) -> Campaign:
     InputError
         If it cannot be read, or if its content or its scene is refused.
     """
+    text = read_text(path)
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path.name}: not a text file: byte {error.start + 1} is not UTF-8; save it as UTF-8"
-        ) from None
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path.name}: not valid TOML: {error}; correct that line") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path.name}: not a campaign: {error}") from None
-    try:
-        specification = Specification.model_validate(table)
+        specification = Specification.model_validate(parse_toml(text, path.name))
     except ValidationError as error:
         raise InputError(explain(error, Specification, path.name)) from None
-    name, builtin = specification.scene, builtin_scenes()
-    beside = path.parent / name
-    if name not in builtin and not beside.is_file():
-        raise InputError(
-            f"{path.name}: scene = {name!r}: there is no file {beside}, and no built-in scene of "
-            f"that name ({known_or_nearest(name, builtin)})"
-        )
-    base = load_scene(name if name in builtin else beside)
+    key = "scene"
     try:
+        base = load_scene(specification.scene, beside=path)
+        key = "set"
         scene = base.with_values(specification.set)
     except InputError as error:
-        raise InputError(f"{path.name}: set: {error}") from None
+        raise InputError(f"{path.name}: {key}: {error}") from None
     return Campaign(path, text, specification, scene)

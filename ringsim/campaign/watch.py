@@ -16,34 +16,23 @@ from typing import Any
 
 from tqdm import tqdm
 
-from ringsim.storage.record import Result
+from ringsim.files import whole
+from ringsim.storage.result import Result
 
-STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
+_STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 _PLAIN_SECONDS = 30.0
 _FILE_SECONDS = 1.0
 
 
 @dataclass
-class Stop:
-    """Whether the campaign is to stop, and why; falsy text means go on.
-
-    Attributes
-    ----------
-    reason
-        Why.
-    signalled
-        Whether a signal asked for it.
-    at_once
-        Whether a signal interrupts what is being done, instead of waiting to be asked for.
-    """
+class StopRequest:
+    """Whether the campaign is to stop, and why; falsy text means go on."""
 
     reason: str = ""
     signalled: bool = False
+    """Whether a signal asked for it."""
     at_once: bool = False
-
-    def asked(self) -> str:
-        """The reason to stop, or an empty string."""
-        return self.reason
+    """Whether a signal interrupts what is being done, instead of waiting to be asked for."""
 
     def note(self, reason: str, *, signalled: bool) -> None:
         """Wish for a stop; the first reason counts."""
@@ -52,18 +41,18 @@ class Stop:
 
 
 @contextlib.contextmanager
-def stopping_on_signals() -> Iterator[Stop]:
+def stopping_on_signals() -> Iterator[StopRequest]:
     """Turn the first stop signal into a wish; a second one ends the process as usual."""
-    stop = Stop()
+    stop = StopRequest()
 
     def note(number: int, _frame: Any) -> None:
         stop.note(f"stopped by {signal.Signals(number).name}", signalled=True)
-        for each in STOPPERS:
+        for each in _STOPPERS:
             signal.signal(each, before[each])
         if stop.at_once:
             raise KeyboardInterrupt
 
-    before = {each: signal.signal(each, note) for each in STOPPERS}
+    before = {each: signal.signal(each, note) for each in _STOPPERS}
     try:
         yield stop
     finally:
@@ -73,44 +62,31 @@ def stopping_on_signals() -> Iterator[Stop]:
 
 @dataclass
 class Progress:
-    """Counts samples, and tells the terminal and the progress file.
-
-    Attributes
-    ----------
-    path
-        The progress file.
-    name
-        Of the campaign.
-    total, done, failed
-        Samples of this process's share: all, finished, failed among the finished.
-    workers
-        Samples that run at the same time.
-    """
+    """Counts samples, and tells the terminal and the progress file."""
 
     path: Path
+    """The progress file."""
     name: str
     total: int
     done: int
     failed: int
+    """Samples of this process's share: all, finished, failed among the finished."""
     workers: int
+    """Samples that run at the same time."""
     running: dict[int, float] = field(default_factory=dict)
-    _before: int = 0
-    _begin: float = field(default_factory=time.monotonic)
-    _told: float = field(default_factory=time.monotonic)
-    _written: float = -_FILE_SECONDS
-    _news: bool = False
-    _bar: Any = None
 
     def __post_init__(self) -> None:
-        self._before = self.done
-        if sys.stderr.isatty():
-            self._bar = tqdm(
-                total=self.total, initial=self.done, desc=self.name, unit="sample", smoothing=0.1
-            )
-            self._bar.set_postfix(failed=self.failed)
-        else:
-            print(f"{self.name}: {self.done} of {self.total} samples done, {self.workers} workers",
-                  file=sys.stderr, flush=True)  # fmt: skip
+        self._before, self._news, self._written = self.done, False, -_FILE_SECONDS
+        self._begin = self._told = time.monotonic()
+        self._bar = tqdm(
+            total=self.total, initial=self.done, desc=self.name, unit="sample", smoothing=0.1,
+            postfix={"failed": self.failed}, disable=not sys.stderr.isatty(),
+        )  # fmt: skip
+        if self._bar.disable:
+            self._tell(f"{self.done} of {self.total} samples done, {self.workers} workers")
+
+    def _tell(self, text: str) -> None:
+        print(f"{self.name}: {text}", file=sys.stderr, flush=True)
 
     def started(self, sample: int) -> None:
         """Note that a sample runs."""
@@ -123,15 +99,12 @@ class Progress:
         self.running.pop(result.sample, None)
         self.done += 1
         self.failed += result.status.failed
-        if self._bar is not None:
-            self._bar.set_postfix(refresh=False, failed=self.failed)
-            self._bar.update()
-        elif time.monotonic() - self._told > _PLAIN_SECONDS:
-            self._told = time.monotonic()
-            print(f"{self.name}: {self.done} of {self.total} done, {self.failed} failed",
-                  file=sys.stderr, flush=True)  # fmt: skip
         self._news = True
-        self.refresh()
+        self._bar.set_postfix(refresh=False, failed=self.failed)
+        self._bar.update()
+        if self._bar.disable and time.monotonic() - self._told > _PLAIN_SECONDS:
+            self._told = time.monotonic()
+            self._tell(f"{self.done} of {self.total} done, {self.failed} failed")
 
     def refresh(self) -> None:
         """Write the progress file if there are news, not more often than each second."""
@@ -140,8 +113,7 @@ class Progress:
 
     def close(self, state: str) -> None:
         """Say how it ended."""
-        if self._bar is not None:
-            self._bar.close()
+        self._bar.close()
         self.running.clear()
         self._save(state=state)
 
@@ -162,7 +134,5 @@ class Progress:
             "failed": self.failed,
             "running": {sample: now - begin for sample, begin in self.running.items()},
         }
-        draft = self.path.with_name(f"{self.path.name}.{os.getpid()}")
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError), whole(self.path, lasting=False) as draft:
             draft.write_text(json.dumps(content), encoding="utf-8")
-            os.replace(draft, self.path)

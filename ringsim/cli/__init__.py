@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE, EXIT_INTERRUPTED
 from ringsim.refusal import InputError
 
 VERBS = {
@@ -24,8 +25,6 @@ VERBS = {
     "accuracy": "Compare numerical settings of a scene: error against run time.",
 }
 """Verb and its line of help; the command ``VERB`` lives in ringsim.cli.VERB as ``command``."""
-
-EXIT_DONE, EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED = 0, 2, 3, 130
 
 
 class _Verbs(click.Group):

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 
 import click
+import tomli_w
 
-from ringsim.cli import EXIT_FAILED
+from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
+from ringsim.files import write_text
 from ringsim.overrides import parse_assignment
-from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 
 
@@ -31,48 +31,37 @@ from ringsim.scene import load_scene
     help="Longest time of one setting, s.",
 )  # fmt: skip
 def command(
-    scene: str,
-    settings: tuple[str, ...],
-    out: Path | None,
-    workers: int | None,
-    timeout: float,
-) -> None:
+    scene: str, settings: tuple[str, ...], out: Path | None, workers: int | None, timeout: float
+) -> int:
     """Compare numerical settings of SCENE: error against run time, and which to choose.
 
     Writes accuracy.nc, accuracy.md, accuracy.png and settings.toml (for ``run --accuracy``); the
     same command again goes on with an interrupted study.  Exit codes: 0 done, 2 bad input, 3 a
     run that the reference needs did not end well.
     """
-    chosen = load_scene(scene)
-    if settings:
-        chosen = chosen.with_values(dict(parse_assignment(text) for text in settings))
+    chosen = load_scene(scene).with_values(dict(parse_assignment(text) for text in settings))
     folder = out or Path("runs") / f"accuracy-{chosen.name}"
 
     from ringsim.analysis.accuracy_text import tables
-    from ringsim.analysis.evidence import evidence_of, to_toml
+    from ringsim.analysis.evidence import evidence_of
     from ringsim.campaign.accuracy import ReferenceRunError, run_ladder
     from ringsim.dataset import save
-    from ringsim.plots.accuracy import draw_accuracy
+    from ringsim.plots.accuracy import accuracy
+    from ringsim.plots.style import write
 
     try:
         found = run_ladder(folder, chosen, workers or len(os.sched_getaffinity(0)), timeout)
     except ReferenceRunError as error:
         click.echo(f"{chosen.name}: {error}", err=True)
-        sys.exit(EXIT_FAILED)
+        return EXIT_FAILED
     found.attrs["title"] = f"Error against run time: {chosen.name}"
     found.attrs["scene"] = chosen.to_toml()
     save(found, folder / "accuracy.nc")
     text = tables(found, str(found.attrs["title"]))
-    _write(folder / "accuracy.md", text)
-    _write(folder / "settings.toml", to_toml(evidence_of(found)))
-    draw_accuracy(found, folder / "accuracy.png")
+    write_text(folder / "accuracy.md", text)
+    write_text(folder / "settings.toml", tomli_w.dumps(evidence_of(found).model_dump()))
+    write(accuracy(found), folder / "accuracy.png")
     click.echo(text)
     for name in ("accuracy.nc", "accuracy.md", "accuracy.png", "settings.toml"):
         click.echo(f"wrote {folder / name}")
-
-
-def _write(file: Path, text: str) -> None:
-    try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written: {error.strerror}") from None
+    return EXIT_DONE

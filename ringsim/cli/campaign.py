@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,27 +11,16 @@ import click
 
 from ringsim.campaign.folder import prepare_folder
 from ringsim.campaign.plan import plan
-from ringsim.campaign.run import Choices, Part, run_campaign
+from ringsim.campaign.run import Choices, run_campaign
+from ringsim.campaign.share import Share
 from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
-from ringsim.cli import EXIT_BAD_INPUT, EXIT_DONE
-from ringsim.execution.launch import aborting, describe, launched_size, mpi_world
+from ringsim.execution.launch import aborting, launched_size, mpi_world
 from ringsim.execution.local import Local
 from ringsim.execution.mpi import Mpi
 from ringsim.execution.serial import Serial
+from ringsim.execution.work import Scheduler
+from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.refusal import InputError
-
-
-@dataclass(frozen=True)
-class Request:
-    """What the command line asks for."""
-
-    file: Path
-    workers: int | None
-    out: Path | None
-    part: str
-    retry_failed: bool
-    dry_run: bool
-    solver: str
 
 
 @click.command()
@@ -46,7 +35,16 @@ class Request:
 @click.option("--retry-failed", is_flag=True, help="Run the failed samples again, too.")
 @click.option("--dry-run", is_flag=True, help="Show plan and predicted cost; keep nothing.")
 @click.option("--solver", default="", hidden=True)
-def command(**options: Any) -> int:
+def command(
+    file: Path,
+    workers: int | None,
+    out: Path | None,
+    part: str,
+    *,
+    retry_failed: bool,
+    dry_run: bool,
+    solver: str,
+) -> int:
     """Run the campaign of FILE; the same command again goes on with what is missing.
 
     Under mpiexec or srun every rank computes, and --workers is left out.  Exit codes: 0 all
@@ -54,84 +52,53 @@ def command(**options: Any) -> int:
     130 stopped by a signal.
     """
     logging.basicConfig(format="%(message)s")
-    request = Request(**options)
     size = launched_size()
-    if request.dry_run:
-        return _show_plan(request, size)
-    if size > 1:
-        return _under_mpi(request)
-    folder, choices = _prepare(load_campaign(request.file), request, request.workers)
-    return run_campaign(folder, choices)
 
+    def asked_for() -> tuple[Campaign, Path, str, Share]:
+        campaign = load_campaign(file)
+        wanted = campaign.specification
+        folder = out or Path("runs") / wanted.name
+        return campaign, folder, solver or SOLVERS[wanted.fidelity], Share.parse(part)
 
-def _folder(campaign: Campaign, request: Request) -> Path:
-    return request.out or Path("runs") / campaign.specification.name
+    def prepare() -> tuple[Path, tuple[Any, ...]]:
+        if size > 1 and workers is not None:
+            raise InputError(
+                f"--workers {workers}: under an MPI launcher every rank drives one solver "
+                "process: leave out --workers"
+            )
+        campaign, folder, name, share = asked_for()
+        prepare_folder(campaign, folder, solver=name)
+        wanted = campaign.specification
+        return folder, (wanted.limits, wanted.max_failed, share, retry_failed)
 
-
-def _solver(campaign: Campaign, request: Request) -> str:
-    return request.solver or SOLVERS[campaign.specification.fidelity]
-
-
-def _part(text: str) -> Part:
-    number, slash, count = text.partition("/")
-    if not (slash and number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
-        raise InputError(f"--part {text}: must read i/n with 1 <= i <= n, for example 2/8")
-    return Part(int(number), int(count))
-
-
-def _show_plan(request: Request, size: int) -> int:
-    campaign = load_campaign(request.file)
-    for line in plan(
-        campaign,
-        _folder(campaign, request),
-        workers=max(1, request.workers or size),
-        part=_part(request.part),
-        solver=_solver(campaign, request),
-    ):
-        click.echo(line)
-    return EXIT_DONE
-
-
-def _prepare(campaign: Campaign, request: Request, workers: int | None) -> tuple[Path, Choices]:
-    wanted, folder = campaign.specification, _folder(campaign, request)
-    count = 1 if workers is None else workers
-    choices = Choices(
-        scheduler=Local(count) if count else Serial(),
-        workers=max(1, count),
-        limits=wanted.limits,
-        max_failed=wanted.max_failed,
-        part=_part(request.part),
-        retry_failed=request.retry_failed,
-        description=f"{count} local workers" if count else "in one process",
-    )
-    prepare_folder(campaign, folder, solver=_solver(campaign, request))
-    return folder, choices
-
-
-def _under_mpi(request: Request) -> int:
+    if dry_run:
+        campaign, folder, name, share = asked_for()
+        count = max(1, workers or size)
+        for line in plan(campaign, folder, workers=count, share=share, solver=name):
+            click.echo(line)
+        return EXIT_DONE
+    if size == 1:
+        return _run(Serial() if workers == 0 else Local(workers or 1), prepare)
     world = mpi_world()
     with aborting(world):
-        rank, fault, prepared = world.Get_rank(), "", None
-        if rank == 0:
-            try:
-                if request.workers is not None:
-                    raise InputError(
-                        f"--workers {request.workers}: under an MPI launcher every rank drives one "
-                        "solver process: leave out --workers"
-                    )
-                prepared = _prepare(load_campaign(request.file), request, world.Get_size())
-            except InputError as error:
-                fault = str(error)
-        fault, prepared = world.bcast((fault, prepared))
+        return _run(Mpi(world), prepare)
+
+
+def _run(scheduler: Scheduler, prepare: Callable[[], tuple[Path, tuple[Any, ...]]]) -> int:
+    """Prepare on rank 0 and run on all ranks; what is refused is told once."""
+    prepared, fault = None, ""
+    if scheduler.rank == 0:
         try:
-            if prepared is None:
-                raise InputError(fault)
-            folder, choices = prepared
-            choices = replace(
-                choices, scheduler=Mpi(world), communicator=world, description=describe(world)
-            )
-            return run_campaign(folder, choices)
+            prepared = prepare()
         except InputError as error:
-            if rank == 0:
-                click.echo(str(error), err=True)
-            return EXIT_BAD_INPUT
+            fault = str(error)
+    prepared, fault = scheduler.from_first((prepared, fault))
+    try:
+        if prepared is None:
+            raise InputError(fault)
+        folder, choices = prepared
+        return run_campaign(folder, Choices(scheduler, *choices))
+    except InputError as error:
+        if scheduler.rank == 0:
+            click.echo(str(error), err=True)
+        return EXIT_BAD_INPUT

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
+from collections import Counter
 
 import click
-import numpy as np
 
 from ringsim.choice import kind_of
-from ringsim.geometry.mobility import internal_mobility
-from ringsim.geometry.ring import RingGeometry
+from ringsim.layout.layout import Layout
+from ringsim.layout.mobility import internal_mobility
+from ringsim.layout.of_scene import layout_of
 from ringsim.overrides import parse_assignment
-from ringsim.parts.structure.pantograph_ring import PantographRing
-from ringsim.parts.structure.planar_truss import PlanarTruss
 from ringsim.refusal import show
 from ringsim.scene import Scene, load_scene
 from ringsim.units import Model
@@ -54,7 +52,7 @@ def command(scene: str, assignments: tuple[str, ...], time: float | None) -> Non
 def summary(scene: Scene) -> list[tuple[str, str]]:
     """What a scene builds, as pairs of a label and a text."""
     lines = [("scene", f"{scene.name}: {scene.title}" if scene.title else scene.name)]
-    lines += _OF_KIND[type(scene.structure)](scene)
+    lines += [*scene.structure.describe().items(), *_parts(scene)]
     for name in sorted(type(scene).parts()):
         part = getattr(scene, name)
         if part is not None:
@@ -67,99 +65,52 @@ def summary(scene: Scene) -> list[tuple[str, str]]:
     return lines
 
 
-def _of_ring(scene: Scene) -> list[tuple[str, str]]:
-    structure, rods = scene.structure, scene.rods
-    geometry = structure.geometry()
-    sections, corners = geometry.sections, len(geometry.plan)
-    shape = "closed ring" if geometry.closed else f"open arc of a {structure.polygon}-gon"
-    masses = _masses(scene)
-    return [
-        ("structure", f"{kind_of(structure)}, {shape}, {_count(sections, 'section')}"),
-        ("polygon", _polygon(geometry)),
-        ("deployed", _size(geometry, 0.0)),
-        ("initial", f"{_size(geometry, structure.initial_phi)} at {structure.opening_angle} deg"),
-        ("rods", f"{6 * sections} {kind_of(rods)} ({_count(rods.elements, 'element')} a rod half)"),
-        ("points", f"{2 * corners} hinge assemblies, {2 * sections} V-joints, {sections} pivots"),
-        ("joints", f"{11 * sections} revolutes"),
-        ("mobility", _mobility(geometry, structure.initial_phi)),
-        ("mass", f"{sum(masses.values()):.4g} kg: {_listed(masses)}"),
-    ]
-
-
-def _of_planar_truss(scene: Scene) -> list[tuple[str, str]]:
-    truss, rods = scene.structure, scene.rods
-    assert isinstance(truss, PlanarTruss)
-    geometry = truss.geometry()
-    ends = [truss.initial_angle, truss.stowed_angle]
-    cable, strut = geometry.cable(ends), geometry.strut(ends)
-    angles = [math.degrees(angle) for angle in ends]
-    tubes = rods.diagonal.area + truss.strut_inner.area
-    masses = {
-        "axis": rods.density * truss.axis.area * truss.axis_length,
-        "beams": 2 * rods.density * rods.bar.area * truss.beam_length,
-        "synchronising beam": rods.density * truss.bar_width * truss.bar_depth * truss.axis_length,
-        "strut": rods.density * tubes * truss.strut_tube_length,
+def _parts(scene: Scene) -> list[tuple[str, str]]:
+    """What the layout of a scene holds."""
+    layout, rods = layout_of(scene), scene.rods
+    counts = Counter(joint.kind for joint in layout.joints)
+    families = Counter(joint.family for joint in layout.joints)
+    masses = layout.masses()
+    points = {
+        "hinge assemblies": sum(map(len, layout.corners)),
+        "V-joints": families["vjoint"],
+        "pivots": families["pivot"],
     }
-    return [
-        ("structure", f"{kind_of(truss)}, two beams of {truss.beam_length} m"),
-        ("initial", f"{angles[0]:.4g} deg, {cable[0]:.4g} m of cable, strut {strut[0]:.4g} m"),
-        ("at its rest", f"{angles[1]:.4g} deg, {cable[1]:.4g} m of cable, strut {strut[1]:.4g} m"),
-        ("rods", f"2 {kind_of(rods)} ({2 * rods.elements} and 2 elements)"),
-        ("joints", "6 revolutes, 1 prismatic joint"),
-        ("mobility", "1 internal degree of freedom with rigid beams"),
+    lines = [
+        ("rods", f"{len(layout.rods)} {kind_of(rods)} ({_elements(layout)})"),
+        ("points", ", ".join(f"{count} {name}" for name, count in points.items() if count)),
+        ("joints", ", ".join(_count(count, _JOINTS[kind]) for kind, count in counts.items())),
+        ("mobility", _mobility(layout)),
         ("mass", f"{sum(masses.values()):.4g} kg: {_listed(masses)}"),
     ]
+    return [(label, text) for label, text in lines if text]
 
 
-_OF_KIND = {PantographRing: _of_ring, PlanarTruss: _of_planar_truss}
+_JOINTS = {
+    "revolute": "revolute",
+    "prismatic": "prismatic joint",
+    "sleeve": "sliding joint",
+    "weld": "clamp",
+}
+
+
+def _elements(layout: Layout) -> str:
+    """Elements of the rods, by what they are called."""
+    found = {rod.group: len(rod.stations) - 1 for rod in layout.rods}
+    return ", ".join(f"{_count(count, 'element')} in {group}" for group, count in found.items())
 
 
 def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def _polygon(geometry: RingGeometry) -> str:
-    """Axes of the deployed ellipse: the first corner lies on its major axis."""
-    semi_major = float(geometry.plan[0, 0])
-    x, y = geometry.plan[1, :2]
-    semi_minor = abs(y) / math.sqrt(1.0 - (x / semi_major) ** 2)
-    scale = 2.0 * geometry.deployed_chord
-    return (
-        f"equal chords of {geometry.deployed_chord:.4f} m on an ellipse with axes "
-        f"{scale * semi_major:.4f} m and {scale * semi_minor:.4f} m"
-    )
-
-
-def _size(geometry: RingGeometry, phi: float) -> str:
-    extent = np.ptp(geometry.fold(phi).corners.reshape(-1, 3), axis=0)
-    return " x ".join(f"{length:.3f}" for length in extent) + " m"
-
-
-def _mobility(geometry: RingGeometry, phi: float) -> str:
-    if geometry.sections > MOST_SECTIONS_FOR_MOBILITY:
+def _mobility(layout: Layout) -> str:
+    sections = len(layout.openings[0])
+    if sections > MOST_SECTIONS_FOR_MOBILITY:
         return f"not computed above {MOST_SECTIONS_FOR_MOBILITY} sections"
-    freedom = internal_mobility(geometry, phi)
-    tilts = "" if geometry.closed else ": the fold, and the tilts of the four end hinges"
+    freedom = internal_mobility(layout)
     noun = "internal degree" if freedom == 1 else "internal degrees"
-    return f"{freedom} {noun} of freedom with rigid rods{tilts}"
-
-
-def _masses(scene: Scene) -> dict[str, float]:
-    """Mass of each group of parts, kg."""
-    structure, rods = scene.structure, scene.rods
-    sections = structure.sections
-    corners = sections if structure.closed else sections + 1
-    masses = {
-        "diagonals": 4 * sections * structure.half_diagonal * rods.density * rods.diagonal.area,
-        "bars": 4 * sections * structure.half_bar * rods.density * rods.bar.area,
-        "hinges": 2 * corners * structure.corner_mass,
-        "V-joints": 2 * sections * structure.vjoint_mass,
-    }
-    if scene.boom is not None:
-        masses["boom"] = scene.boom.mass
-    if scene.net is not None:
-        masses["hub"] = scene.net.hub_mass
-    return masses
+    return f"{freedom} {noun} of freedom with rigid rods"
 
 
 def _listed(masses: dict[str, float]) -> str:

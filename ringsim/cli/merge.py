@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 from pathlib import Path
 
@@ -10,8 +9,6 @@ import click
 
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.merging import merge
-from ringsim.storage.files import locked, unwritable
-from ringsim.storage.store import recover
 
 
 @click.command()
@@ -19,19 +16,11 @@ from ringsim.storage.store import recover
 def command(folder: Path) -> None:
     """Write campaign.nc in FOLDER from the samples that are done; the others are missing values.
 
-    It may be called at any time and any number of times.  While the campaign runs, samples that
-    are not in a shard yet are left out.
+    It may be called at any time and any number of times, also while the campaign runs.
     """
     logging.basicConfig(format="%(message)s")
     campaign = open_folder(folder)
-    with contextlib.ExitStack() as held:
-        try:
-            alone = held.enter_context(locked(folder / "lock"))
-        except OSError as error:
-            raise unwritable(folder / "lock", error) from error
-        if alone:
-            recover(folder, campaign.identity, "")
-    merged = merge(campaign, execution="merged on its own", set_aside=alone, partly=True)
+    merged = merge(campaign, execution="merged on its own", partly=True)
     click.echo(
         f"{merged.path}: {campaign.table.samples} samples, {merged.left} not run, "
         f"{merged.failed} failed"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,12 +10,12 @@ import click
 import numpy as np
 
 from ringsim.choice import kind_of
+from ringsim.exit_codes import EXIT_FAILED
+from ringsim.files import require_place
 from ringsim.overrides import parse_assignment
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
-
-EXIT_FAILED = 3
 
 
 @click.command("run")
@@ -28,29 +27,22 @@ EXIT_FAILED = 3
     "--out", metavar="FILE", type=click.Path(path_type=Path), help="netCDF file to write."
 )
 @click.option(
-    "--fidelity",
-    type=click.Choice(["full", "ideal"]),
-    default="full",
-    show_default=True,
+    "--fidelity", type=click.Choice(["full", "ideal"]), default="full", show_default=True,
     help="Full model, or the ideal ring of rigid rods (in seconds; no asynchrony, no stress).",
-)
+)  # fmt: skip
 @click.option(
-    "--accuracy",
-    type=click.FloatRange(1e-8, 1.0),
+    "--accuracy", type=click.FloatRange(1e-8, 1.0),
     help="Relative error of deployment time and opening angle to aim at: picks the cheapest "
     "settings measured to give it.",
-)
+)  # fmt: skip
 @click.option(
-    "--of",
-    metavar="OUTPUT",
+    "--of", metavar="OUTPUT",
     help="Aim --accuracy at another output: loads, asynchrony, peak_tension, ...",
-)
+)  # fmt: skip
 @click.option(
-    "--evidence",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
+    "--evidence", metavar="FILE", type=click.Path(path_type=Path),
     help="settings.toml of ringsim accuracy (default: that of the built-in scene most alike).",
-)
+)  # fmt: skip
 @click.option("--plot", is_flag=True, help="Draw figures beside the netCDF file.")
 def command(
     scene: str,
@@ -85,7 +77,7 @@ def command(
     from ringsim.simulation import FIDELITIES
     from ringsim.variables import Status
 
-    _require_folder(target)
+    require_place(target)
     outcome = FIDELITIES[fidelity](chosen)
     values = outcome.values
     click.echo(f"{chosen.name}: {outcome.status.word}: {outcome.reason}")
@@ -161,13 +153,3 @@ def _with_accuracy(
     click.echo(f"settings for {accuracy:g}: {words}")
     click.echo(f"  measured with {known.scene} to be good for: {errors}")
     return scene.with_values(values)
-
-
-def _require_folder(target: Path) -> None:
-    """Refuse a target that cannot be written before time is spent on the run."""
-    if target.is_dir():
-        raise InputError(f"--out {target}: is a folder; name a file in it")
-    if not target.parent.is_dir():
-        raise InputError(f"--out {target}: there is no folder {target.parent}; create it first")
-    if not os.access(target.parent, os.W_OK):
-        raise InputError(f"--out {target}: the folder {target.parent} cannot be written")

@@ -1,65 +1,97 @@
-"""``ringsim stability``: where the solver is sound, and how it ends where it is not."""
+"""``ringsim stability SCENE``: where the solver is sound, and how it ends where it is not."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from ringsim.cli import EXIT_DONE, EXIT_FAILED
-from ringsim.refusal import InputError
+from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
+from ringsim.files import write_text
+from ringsim.overrides import parse_assignment
+from ringsim.scene import load_scene
+
+if TYPE_CHECKING:
+    from ringsim.campaign.panels import Panel
 
 _SEED = 1
+"""Of the random choice of cells that are checked: the same at every resumption."""
 
 
-@click.command()
+@click.command("stability")
+@click.argument("scene", metavar="SCENE")
 @click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    default=Path("runs/stability"),
-    show_default=True,
-    help="Folder for the map and its campaigns.",
+    "--set", "settings", metavar="PATH=VALUE", multiple=True, help="Override a scene field."
 )
+@click.option(
+    "--over", metavar="PATH=LOW..HIGH", multiple=True,
+    help="Axis of a panel; every two make one (x, then y). cables.*.NAME is that of all cables. "
+    "Default: panels chosen from what the scene holds.",
+)  # fmt: skip
+@click.option(
+    "--points",
+    type=click.IntRange(2, 30),
+    default=5,
+    show_default=True,
+    help="Values of each axis.",
+)
+@click.option(
+    "--out", metavar="DIR", type=click.Path(path_type=Path),
+    help="Folder for the map and its campaigns (default runs/stability-SCENE).",
+)  # fmt: skip
 @click.option(
     "--workers", type=click.IntRange(1, 4096), default=1, show_default=True,
     help="Solver processes.",
 )  # fmt: skip
-@click.option("--quick", is_flag=True, help="A dozen cells instead of all.")
 @click.option(
-    "--check",
-    "percent",
-    type=click.FloatRange(0.0, 100.0, min_open=True),
-    default=10.0,
-    show_default=True,
-    help="Share in percent of the ok cells that are run again with smaller steps.",
-)
-def command(out: Path, workers: int, *, quick: bool, percent: float) -> int:
-    """Map over stiffness, masses, friction, fold angle, steps, stops, sections and loads.
+    "--check", "percent", type=click.FloatRange(0.0, 100.0, min_open=True), default=10.0,
+    show_default=True, help="Percentage of the ok cells that are run again with smaller steps.",
+)  # fmt: skip
+def command(
+    scene: str, settings: tuple[str, ...], over: tuple[str, ...], points: int, out: Path | None,
+    workers: int, percent: float,
+) -> int:  # fmt: skip
+    """Map around SCENE: which pairs of values run well, and how runs end elsewhere.
 
-    Writes stability.nc, stability.png and stability.md into the folder.  The same command goes on
-    after an interruption.  Exit codes: 0 every cell is ok within what that promises, or ended
-    with a cause; 3 some are wrong.
+    Each panel has two axes, for example --over cables.*.axial_stiffness=1e3..1e7 --over
+    solver.step=0.01..1; each of its cells is one run.  From HIGH = 10 LOW on values are spaced
+    geometrically.  Writes stability.nc, stability.png and stability.md; the same command goes on
+    after an interruption.  Exit codes: 0 every cell is ok, or ended with a named cause; 2 bad
+    input; 3 some cells are wrong.
     """
+    chosen = load_scene(scene).with_values(dict(parse_assignment(text) for text in settings))
+
+    from ringsim.campaign.panels import panels_over
+
+    panels = panels_over(chosen, over, points)
+    for panel in panels:
+        axes = " ".join(
+            f"--over {sweep.label}={sweep.values[0]:g}..{sweep.values[-1]:g}"
+            for sweep in (panel.x, panel.y)
+        )
+        click.echo(f"{panel.title}: {axes}: {len(list(panel.cells()))} cells")
+    return draw_map(out or Path("runs") / f"stability-{chosen.name}", panels, workers, percent)
+
+
+def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float) -> int:
+    """Run panels, check some percent of the ok cells, and write the map; returns the exit code."""
     from ringsim.analysis.stability import WRONG
     from ringsim.analysis.stability_text import summary, to_markdown
     from ringsim.campaign.stability import run_check, run_map
-    from ringsim.campaign.stability_groups import GROUPS, QUICK
     from ringsim.dataset import save
     from ringsim.plots import style
     from ringsim.plots.stability import stability
 
     logging.basicConfig(format="%(message)s")
-    groups = QUICK if quick else GROUPS
-    whole = run_map(out, groups, workers)
-    whole = run_check(out, groups, whole, share=0.01 * percent, seed=_SEED, workers=workers)
-    save(whole, out / "stability.nc")
-    style.write(stability(whole), out / "stability.png")
-    try:
-        (out / "stability.md").write_text(to_markdown(whole), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{out / 'stability.md'}: cannot be written: {error.strerror}") from None
+    whole = run_map(folder, panels, workers)
+    whole = run_check(folder, panels, whole, share=0.01 * percent, seed=_SEED, workers=workers)
+    save(whole, folder / "stability.nc")
+    style.write(stability(whole), folder / "stability.png")
+    write_text(folder / "stability.md", to_markdown(whole))
     click.echo(summary(whole))
     for name in ("stability.nc", "stability.png", "stability.md"):
-        click.echo(f"wrote {out / name}")
+        click.echo(f"wrote {folder / name}")
     return EXIT_FAILED if (whole["verdict"] == WRONG).any() else EXIT_DONE

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.status import standing
+from ringsim.campaign.status import status_lines
 
 
 @click.command()
@@ -19,5 +19,5 @@ def command(folder: Path) -> None:
     It only reads, and may be called while the campaign runs.
     """
     logging.basicConfig(format="%(message)s")
-    for line in standing(open_folder(folder)).lines():
+    for line in status_lines(open_folder(folder)):
         click.echo(line)

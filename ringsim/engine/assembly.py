@@ -12,8 +12,8 @@ import numpy as np
 from exudyn.advancedUtilities import CreateSymbolicUserFunction
 from numpy.typing import NDArray
 
-from ringsim.engine import quaternions
 from ringsim.engine.rod_dampers import RodDampers
+from ringsim.engine.rotations import turn_of, turn_rates
 
 Array = NDArray[np.float64]
 exu.config.printToConsole = False
@@ -72,14 +72,11 @@ class Assembly:
 
     def add_rigid_node(self, frame: Frame) -> Any:
         """A node with Euler parameters."""
+        turn = turn_of(frame.axes)
         node = self.system.AddNode(
-            item.NodeRigidBodyEP(
-                referenceCoordinates=[*frame.position, *quaternions.of_axes(frame.axes)],
-            )
+            item.NodeRigidBodyEP(referenceCoordinates=[*frame.position, *turn])
         )
-        turning = 0.5 * quaternions.product(
-            np.concatenate([[0.0], frame.turn]), quaternions.of_axes(frame.axes)
-        )
+        turning = turn_rates(turn[None], frame.turn[None])[0]
         self.starts[int(node)] = np.concatenate([frame.acceleration, turning])
         self.rigid_nodes.append(node)
         return node
@@ -142,6 +139,10 @@ class Assembly:
                 constrainedAxes=axes,
             )
         )
+
+    def prismatic(self, first: Any, second: Any) -> Any:
+        """A joint that slides along the common x axis of two markers."""
+        return self.system.AddObject(item.ObjectJointPrismaticX(markerNumbers=[first, second]))
 
     def torsion_spring(self, first: Any, second: Any, **settings: Any) -> Any:
         """A torsion spring-damper about the common z axis of two markers."""

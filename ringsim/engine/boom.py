@@ -1,4 +1,4 @@
-"""The boom at the first corner: rigid in the upper hinge assembly, or a chain of elements."""
+"""A flexible boom: a chain of elements, clamped at its top, with a body that slides along it."""
 
 from __future__ import annotations
 
@@ -9,44 +9,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.choice import kind_of
-from ringsim.engine.pantograph_ring import RingModel
+from ringsim.engine.model import Model
 from ringsim.parts.boom.flexible import FlexibleBoom
-from ringsim.parts.boom.rigid import RigidBoom
 
 Array = NDArray[np.float64]
-_ALL = [1, 1, 1, 1, 1, 1]
-_ACROSS = [1, 1, 0, 0, 0, 0]
 
 
-def add_boom(model: RingModel) -> None:
-    """Connect the boom, if any; the rigid one's inertia is already in the hinge assembly."""
-    boom = model.scene.boom
+def add_boom(model: Model) -> None:
+    """The flexible boom, if there is one; a rigid one is part of its hinge assembly."""
+    boom = model.layout.boom
     if boom is None:
         return
-    if boom.base == "fixed":
-        top = model.fold.corners[0, 0]
-        model.assembly.generic_joint(
-            model.assembly.ground_marker(top),
-            model.assembly.body_marker(model.hinges[0][0][0], np.zeros(3)),
-            _ALL,
-        )
-    if isinstance(boom, RigidBoom):
-        model.assembly.generic_joint(
-            model.assembly.body_marker(model.hinges[0][0][0], np.zeros(3)),
-            model.assembly.body_marker(model.hinges[1][0][0], np.zeros(3)),
-            _ACROSS,
-        )
-    elif isinstance(boom, FlexibleBoom):
-        _add_flexible(model, boom)
-    else:
-        raise TypeError(f"no builder for a boom of kind {kind_of(boom)}")
+    if not isinstance(boom.record, FlexibleBoom):
+        raise TypeError(f"no builder for a boom of kind {kind_of(boom.record)}")
+    (top_body, top_node), (low_body, _) = model.bodies[boom.top.body], model.bodies[boom.low.body]
+    top, low = (model.layout.bodies[end.body].pose.place for end in (boom.top, boom.low))
+    _add_flexible(model, boom.record, (top_body, top_node, top), (low_body, low))
 
 
-def _add_flexible(model: RingModel, boom: FlexibleBoom) -> None:
+def _add_flexible(
+    model: Model, boom: FlexibleBoom, clamp: tuple[Any, Any, Array], sleeve: tuple[Any, Array]
+) -> None:
     assembly, system = model.assembly, model.assembly.system
-    top_body, top_node = model.hinges[0][0]
-    low_body, _ = model.hinges[1][0]
-    top, low = model.fold.corners[0, 0], model.fold.corners[1, 0]
+    (top_body, top_node, top), (low_body, low) = clamp, sleeve
     start = assembly.starts[int(top_node)]
     spin = 2.0 * start[4:7]
     nodes = []
@@ -79,7 +64,7 @@ def _add_flexible(model: RingModel, boom: FlexibleBoom) -> None:
     _slide(model, low_body, cables, length, float(top[2] - low[2]))
 
 
-def _clamp(model: RingModel, body: Any, cable: Any, reach: float) -> None:
+def _clamp(model: Model, body: Any, cable: Any, reach: float) -> None:
     """Hold the boom's end on the upper hinge assembly at two points, ``reach`` apart.
 
     The element's nodes have a slope but no orientation, so the direction is held by a second
@@ -99,7 +84,7 @@ def _clamp(model: RingModel, body: Any, cable: Any, reach: float) -> None:
         )
 
 
-def _slide(model: RingModel, body: Any, cables: list[Any], length: float, place: float) -> None:
+def _slide(model: Model, body: Any, cables: list[Any], length: float, place: float) -> None:
     """Let the lower hinge assembly slide along the chain of elements."""
     system = model.assembly.system
     markers = [system.AddMarker(item.MarkerBodyBeamShape(bodyNumber=c)) for c in cables]

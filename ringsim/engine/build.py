@@ -6,24 +6,22 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
 from ringsim.engine.boom import add_boom
+from ringsim.engine.cable_path import CablePath
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.faults import Faults
 from ringsim.engine.joints import add_friction, add_stops
-from ringsim.engine.loads import add_loads
-from ringsim.engine.net import HubNet, add_net
-from ringsim.engine.pantograph_ring import RingModel, build_ring
-from ringsim.engine.ring_path import ring_path
+from ringsim.engine.model import Model, assemble, side_of
+from ringsim.engine.net import add_net
 from ringsim.engine.rods import Formulation
 from ringsim.engine.rods_ancf import Ancf
 from ringsim.engine.rods_geometrically_exact import GeometricallyExact
+from ringsim.layout.bodies import OnBody
 from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.scene import Scene
-
-Array = NDArray[np.float64]
 
 FORMULATIONS: dict[type, Formulation] = {
     GeometricallyExactRods: GeometricallyExact(),
@@ -33,12 +31,12 @@ FORMULATIONS: dict[type, Formulation] = {
 
 @dataclass(frozen=True)
 class Built:
-    """A ring model with its optional parts.
+    """A model with its optional parts.
 
     Attributes
     ----------
-    forces
-        Loads along z on the V-joints, shape (2, sections), N.
+    hub
+        Node of the net's hub; None without a net.
     stops
         Stop connectors, [plane][section]; empty without stops.
     cables
@@ -48,9 +46,8 @@ class Built:
 
     """
 
-    ring: RingModel
-    net: HubNet | None
-    forces: Array
+    model: Model
+    hub: Any
     stops: list[list[Any]]
     cables: CableDrive | None
     faults: Faults
@@ -58,17 +55,28 @@ class Built:
 
 def build(scene: Scene) -> Built:
     """Build every part that the scene names, and nothing else."""
-    ring = build_ring(scene, FORMULATIONS[type(scene.rods)])
-    add_boom(ring)
-    net = add_net(ring)
-    forces = add_loads(ring)
-    add_friction(ring)
-    stops = add_stops(ring)
+    model = assemble(scene, FORMULATIONS[type(scene.rods)])
+    add_boom(model)
+    hub = add_net(model)
+    add_friction(model)
+    stops = add_stops(model)
     cables = None
     if scene.cables is not None:
-        cables = CableDrive(ring, scene.cables, ring_path(ring, scene.cables))
-    faults = Faults(ring, cables)
-    ring.assembly.finish()
+        paths = [[_on_nodes(model, sheave) for sheave in path] for path in model.layout.paths]
+        path = CablePath(paths, slopes=isinstance(model.formulation, Ancf))
+        cables = CableDrive(model, scene.cables, path)
+    faults = Faults(model, cables)
+    model.assembly.finish()
     if cables is not None:
         cables.locate()
-    return Built(ring, net, forces, stops, cables, faults)
+    return Built(model, hub, stops, cables, faults)
+
+
+def _on_nodes(model: Model, sheave: Sheave) -> Sheave:
+    """A sheave of the layout on the nodes that carry it."""
+    if isinstance(sheave, BlockSheave):
+        left, right = (side_of(model, mount)[0] for mount in (sheave.left, sheave.right))
+        return BlockSheave(left, right, sheave.sense, sheave.offset)
+    node, arm = side_of(model, sheave.node)
+    axes = sheave.node.axes if isinstance(sheave.node, OnBody) else np.eye(3)
+    return FixedSheave(node, arm + axes @ sheave.arm)

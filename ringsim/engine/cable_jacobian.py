@@ -6,7 +6,8 @@ tension.  The coupling of all spans of a rope through its mean tension is then a
 instead of a dense block over the whole ring; eliminating the unknowns gives P^T (dF/dx) P with
 the material, decay and geometric parts of ringsim.cable.tangent.  The decay part alone is dense
 (spans by spans).  Its entries are written only where they matter to Newton's convergence:
-those of friction that turns round within a step, unless all are asked for.
+those of friction that turns round within a step.  Velocities of the points are taken as fixed while
+nodes turn at fixed rates; against the rest that is of the order of a node's turn within one step.
 """
 
 from __future__ import annotations
@@ -16,16 +17,12 @@ from numpy.typing import NDArray
 
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.state import ChainState
-from ringsim.cable.tangent import RopeTangent, mean_tangent, rope_tangent
+from ringsim.cable.tangent import RopeTangent, decay_tangent, rope_tangent
 from ringsim.engine.cable_path import CablePath, Placed
 
 Array = NDArray[np.float64]
 _PER_SPAN = 4
 """Auxiliary unknowns of a span: three for its difference vector, one for its tension."""
-_STEADY = 0.9999
-"""Share of the full friction from which its changes with the rope's speed do not matter."""
-_NEGLIGIBLE = 0.02
-"""Decay entries are left out below this share of the largest geometric stiffness T / L."""
 
 
 def auxiliary_unknowns(spans: int, ropes: int) -> int:
@@ -37,20 +34,28 @@ class JacobianPattern:
     """Rows and columns of the Jacobian, found once, and its values.
 
     The object's equation is mass * acceleration - force = 0; what follows is its left-hand side.
+
+    Attributes
+    ----------
+    steady
+        Share of the full friction from which its changes with the rope's speed do not matter: the
+        decay of a rope above it over all its pulleys is left out.
+    negligible
+        Decay entries are left out below this share of the largest geometric stiffness T / L.
+        Newton needs one iteration more at most (tests/cable_engine/test_newton.py).
     """
+
+    steady = 0.9999
+    negligible = 0.02
 
     def __init__(self, path: CablePath, ropes: Ropes, auxiliary: int) -> None:
         self._path = path
         self._size = path.size
         self._spans = ropes.spans
-        legs: list[tuple[int, int, float]] = []
-        for span in range(ropes.spans):
-            for point, sign in ((ropes.near[span], -1.0), (ropes.far[span], 1.0)):
-                found = np.flatnonzero(path.leg_point == point)
-                legs += [(span, int(leg), sign) for leg in found]
-        self._span = np.array([leg[0] for leg in legs])
-        self._leg = np.array([leg[1] for leg in legs])
-        self._sign = np.array([leg[2] for leg in legs])
+        # Every leg of the two points of every span; the far point adds to the difference.
+        ends = np.stack([ropes.near, ropes.far], axis=1).ravel()
+        end, self._leg = np.nonzero(path.leg_point == ends[:, None])
+        self._span, self._sign = end // 2, 2.0 * (end % 2) - 1.0
         nodes = path.leg_node[self._leg]
         own, width = path.spots[nodes], path.width
         differences = self._difference(self._span)
@@ -88,9 +93,6 @@ class JacobianPattern:
     def _tension(self, span: NDArray[np.int64]) -> NDArray[np.int64]:
         return np.asarray(self._size + 3 * self._spans + span)
 
-    def _mean(self, rope: int) -> NDArray[np.int64]:
-        return np.array([[self._size + _PER_SPAN * self._spans + rope]])
-
     def empty(self) -> Array:
         """Entries of a cable that pulls nothing, shape (entries, 3)."""
         empty = self._entries[: self._unknowns].copy()
@@ -103,30 +105,26 @@ class JacobianPattern:
         placed: Placed,
         by_q: float,
         by_rate: float,
-        *,
-        exact: bool,
         left: Array | None = None,
     ) -> Array:
         """All entries as (row, column, value), shape (entries, 3), until the next call.
 
-        ``left`` is the share of each rope's stiffness that its winches do not answer.
+        Parameters
+        ----------
+        by_q, by_rate
+            What the derivatives after coordinates and after rates are multiplied with.
+        left
+            Share of each rope's stiffness that its winches do not answer; None for all of it.
         """
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
         turned = maps.transpose(0, 2, 1)
         directions = np.empty((self._spans, 3, 3))
         parts: list[Array] = []
         for rope in range(len(state.natural)):
-            spans = slice(int(state.ropes.starts[rope]), int(state.ropes.ends[rope]))
+            tangent = rope_tangent(state, placed.velocities, rope)
+            directions[tangent.spans] = tangent.by_direction
             share = 1.0 if left is None else float(left[rope])
-            if not exact and self._steady(state, rope):
-                mean, directions[spans] = mean_tangent(state, placed.velocities, rope)
-                parts += self._steady_rope(state, rope, share * mean, by_q, by_rate)
-            else:
-                tangent = rope_tangent(state, placed.velocities, rope)
-                directions[spans] = tangent.by_direction
-                parts += self._rope(state, tangent, rope, by_q, by_rate, exact=exact, left=share)
-                if exact:
-                    parts.append(self._swinging(placed, tangent, spans, by_q))
+            parts += self._rope(state, tangent, rope, by_q, by_rate, share)
         blocks = [
             -maps,
             turned @ state.directions[self._span, :, None],
@@ -148,25 +146,6 @@ class JacobianPattern:
             self._entries[: self._known] = kept[: self._known]
         return self._entries[:count]
 
-    @staticmethod
-    def _steady(state: ChainState, rope: int) -> bool:
-        """Whether the rope runs over all its pulleys in one direction, well above their slip."""
-        own = (state.ropes.of_pulley == rope) & (state.ropes.slips > 0.0)
-        return bool(np.all(np.abs(state.exponents[own]) > _STEADY))
-
-    def _steady_rope(
-        self, state: ChainState, rope: int, mean_slope: Array, by_q: float, by_rate: float
-    ) -> list[Array]:
-        """The same with the shares of its spans held: the mean tension alone moves."""
-        spans = np.arange(state.ropes.starts[rope], state.ropes.ends[rope])
-        tension, difference = self._tension(spans)[None], self._difference(spans).reshape(1, -1)
-        viscous = state.viscous_slope(rope) * state.directions[spans]
-        mean = self._mean(rope)
-        return [
-            _entries(tension.T, mean, -by_q * state.shares[spans]),
-            _entries(mean, difference, -(by_q * mean_slope + by_rate * viscous)),
-        ]
-
     def _rope(
         self,
         state: ChainState,
@@ -174,47 +153,25 @@ class JacobianPattern:
         rope: int,
         by_q: float,
         by_rate: float,
-        *,
-        exact: bool,
         left: float,
     ) -> list[Array]:
         """How a rope's span tensions follow its mean tension and the differences of its points."""
-        spans = np.arange(state.ropes.starts[rope], state.ropes.ends[rope])
+        spans = np.arange(tangent.spans.start, tangent.spans.stop)
         tension, difference = self._tension(spans)[:, None], self._difference(spans).reshape(1, -1)
-        shares = state.shares[spans]
-        largest = int(np.argmax(shares))
-        by_mean = left * (tangent.by_mean[largest] / shares[largest]).ravel()
-        viscous = state.viscous_slope(rope) * tangent.directions.ravel()
-        decay = by_q * tangent.by_share + by_rate * (
-            tangent.by_velocity - shares[:, None, None] * viscous.reshape(-1, 3)
-        )
-        flat = decay.reshape(len(spans), -1)
-        kept = np.ones(flat.shape, dtype=bool)
-        if not exact:
-            stiffest = float(np.max(state.tensions[spans] / state.lengths[spans]))
-            kept = np.abs(flat) > by_q * _NEGLIGIBLE * max(stiffest, 1.0)
-        row, column = np.nonzero(kept)
-        mean = self._mean(rope)
-        return [
-            _entries(tension, mean, -by_q * shares),
-            _entries(mean, difference, -(by_q * by_mean + by_rate * viscous)),
-            np.stack([tension[row, 0], difference[0, column], -flat[row, column]], axis=1),
+        mean = np.array([[self._size + _PER_SPAN * self._spans + rope]])
+        mean_values = by_q * left * tangent.mean_by_place + by_rate * tangent.mean_by_velocity
+        entries = [
+            _entries(tension, mean, -by_q * state.shares[spans]),
+            _entries(mean, difference, -mean_values),
         ]
-
-    def _swinging(self, placed: Placed, tangent: RopeTangent, spans: slice, by_q: float) -> Array:
-        """How a rope's span tensions follow velocities that turn with the nodes at fixed rates.
-
-        Against the rest it is of the order of a node's turn within one step.
-        """
-        own = np.flatnonzero((self._span >= spans.start) & (self._span < spans.stop))
-        swings = self._path.leg_swings(placed)[self._leg[own]] * self._sign[own, None, None]
-        by_velocity = tangent.by_velocity[:, self._span[own] - spans.start]
-        values = -by_q * np.einsum("slj,ljk->slk", by_velocity, swings)
-        tension = self._tension(np.arange(spans.start, spans.stop))
-        columns = self._path.spots[self._path.leg_node[self._leg[own]]]
-        places = np.broadcast_arrays(tension[:, None, None], columns, values)
-        found = np.stack([place.ravel() for place in places], axis=1)
-        return found[found[:, 1] >= 0.0]
+        if np.all(np.abs(state.exponents[state.ropes.inner(rope)]) > self.steady):
+            return entries
+        by_place, by_velocity = decay_tangent(state, tangent, rope)
+        flat = (by_q * by_place + by_rate * by_velocity).reshape(len(spans), -1)
+        stiffest = float(np.max(state.tensions[spans] / state.lengths[spans]))
+        row, column = np.nonzero(np.abs(flat) > by_q * self.negligible * max(stiffest, 1.0))
+        decay = [tension[row, 0], difference[0, column], -flat[row, column]]
+        return [*entries, np.stack(decay, axis=1)]
 
 
 def _entries(rows: NDArray[np.int64], columns: NDArray[np.int64], values: Array) -> Array:

@@ -6,7 +6,7 @@ Jacobian that of ringsim.engine.cable_jacobian.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import exudyn as exu
 import exudyn.itemInterface as item
@@ -17,10 +17,24 @@ from ringsim.cable.cables import Cables
 from ringsim.cable.chain import Chain
 from ringsim.cable.state import ChainState
 from ringsim.cable.winches import Winches
+from ringsim.engine.assembly import Assembly
 from ringsim.engine.cable_jacobian import JacobianPattern, auxiliary_unknowns
-from ringsim.engine.cable_path import CablePath, Carrier, Placed
+from ringsim.engine.cable_path import CablePath, Placed
+from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
+
+
+class Carrier(Protocol):
+    """What carries cables: the model of any structure."""
+
+    @property
+    def scene(self) -> Scene:
+        """What the model was built from."""
+
+    @property
+    def assembly(self) -> Assembly:
+        """The system under construction."""
 
 
 class _Answered(NamedTuple):
@@ -38,70 +52,59 @@ class CableDrive:
 
     Attributes
     ----------
+    path
+        What the cables run over, on the model's nodes.
     chain, ropes
-        See ringsim.cable.
+        See ringsim.cable; faults replace the ropes.
     winches
         What winds them.
-    planes
-        Plane of each cable.
+    auxiliary
+        Unknowns of the object beyond the nodes' coordinates.
     refusal
         Why the chain last had no answer to a state that Newton tried; empty if it always had.
     """
 
     def __init__(self, model: Carrier, cables: Cables, path: CablePath) -> None:
-        present = cables.present()
-        self.planes = [plane for plane, _ in present]
-        self.path = path
-        self.chain = Chain([cable for _, cable in present], self.path.per_cable)
-        self._model = model
-        self._reference = self._gather_reference()
-        start = self.path.place(self._reference, np.zeros_like(self._reference))
+        present = [cable for _, cable in cables.present()]
+        self.path, self._assembly = path, model.assembly
+        parameter = model.assembly.system.GetNodeParameter
+        reference = [parameter(node, "referenceCoordinates") for node in path.nodes]
+        self._reference = path.by_node(np.concatenate(reference))
+        self.chain = Chain(present, path.per_cable)
+        start = path.place(self._reference, np.zeros_like(self._reference))
         self.ropes = self.chain.start(start.points)
-        self.winches = Winches(self.chain.cables)
-        self._size = self.path.size
+        self.winches = Winches(present)
         self._answered: _Answered | None = None
-        most_ropes = len(present) + len(model.scene.faults)
-        self.auxiliary = auxiliary_unknowns(self.ropes.spans, most_ropes)
-        self.exact_tangent = False
+        # Every fault may split one rope in two.
+        self.auxiliary = auxiliary_unknowns(
+            self.ropes.spans, len(present) + len(model.scene.faults)
+        )
+        self._size = path.size + self.auxiliary
         self.refusal = ""
-        self.pattern = JacobianPattern(self.path, self.ropes, self.auxiliary)
+        self.pattern = JacobianPattern(path, self.ropes, self.auxiliary)
         self._add_object()
 
     def evaluate(self, coordinates: Array, rates: Array, time: float) -> tuple[ChainState, Placed]:
         """The chain from the nodes' total coordinates and rates, (nodes, width)."""
-        placed = self.path.place(coordinates, rates)
-        wound, wound_rate = self.winches.at(time, self.ropes, *self._paths(placed))
-        state = self.chain.state(self.ropes, placed.points, placed.velocities, wound, wound_rate)
+        placed, ropes = self.path.place(coordinates, rates), self.ropes
+        path = path_rate = None
+        if self.winches.answering:
+            lengths, _, moving = ropes.measured(placed.points, placed.velocities)
+            path, path_rate = ropes.along(lengths), ropes.along(moving)
+        wound, wound_rate = self.winches.at(time, ropes, path, path_rate)
+        state = self.chain.state(ropes, placed.points, placed.velocities, wound, wound_rate)
         return state, placed
 
-    def _paths(self, placed: Placed) -> tuple[Array | None, Array | None]:
-        """Path of each rope and its rate, m and m/s, if a winch asks for them."""
-        if not self.winches.answering:
-            return None, None
-        ropes = self.ropes
-        apart = placed.points[ropes.far] - placed.points[ropes.near]
-        moving = placed.velocities[ropes.far] - placed.velocities[ropes.near]
-        lengths = np.sqrt(np.einsum("ij,ij->i", apart, apart))
-        rates = np.einsum("ij,ij->i", apart, moving) / lengths
-        return np.add.reduceat(lengths, ropes.starts), np.add.reduceat(rates, ropes.starts)
-
-    def advance(self, time: float, duration: float, state: ChainState, slopes: Array) -> None:
-        """Let the winches begin the next step.
+    def advance(self, time: float, state: ChainState, slopes: Array) -> None:
+        """Let the winches begin the next step at a time (s) in a state of the chain.
 
         Parameters
         ----------
         slopes
             Derivative of each cable's ideal path length after the opening angle, m/rad.
         """
-        del duration
         self._answered = None
         self.winches.advance(time, state, slopes)
-
-    def _left(self, state: ChainState, time: float) -> Array | None:
-        """Share of the material stiffness that the winches leave to each rope; None for all."""
-        if not self.winches.answering:
-            return None
-        return self.winches.stiffness_left(time, self.ropes, state.paths, state.path_rates)
 
     def current(self, position: Array, velocity: Array, time: float) -> ChainState:
         """The chain at a state of the whole system (total coordinates)."""
@@ -110,21 +113,12 @@ class CableDrive:
 
     def locate(self) -> None:
         """Look up where the nodes' coordinates stand in the system vector; after assembly."""
-        assembly = self._model.assembly
-        self._columns = np.concatenate([assembly.coordinates_of(n) for n in self.path.nodes])
-
-    def _gather_reference(self) -> Array:
-        system = self._model.assembly.system
-        return self.path.by_node(
-            np.concatenate(
-                [system.GetNodeParameter(node, "referenceCoordinates") for node in self.path.nodes]
-            )
-        )
+        nodes = [self._assembly.coordinates_of(node) for node in self.path.nodes]
+        self._columns = np.concatenate(nodes)
 
     def _add_object(self) -> None:
-        system = self._model.assembly.system
         zeros = np.zeros(self.auxiliary)
-        auxiliary = system.AddNode(
+        auxiliary = self._assembly.system.AddNode(
             item.NodeGenericODE2(
                 referenceCoordinates=zeros,
                 initialCoordinates=zeros,
@@ -133,9 +127,8 @@ class CableDrive:
             )
         )
         mass = exu.MatrixContainer()
-        size = self._size + self.auxiliary
-        mass.SetWithSparseMatrix(np.zeros((1, 3)), size, size)
-        system.AddObject(
+        mass.SetWithSparseMatrix(np.zeros((1, 3)), self._size, self._size)
+        self._assembly.system.AddObject(
             item.ObjectGenericODE2(
                 nodeNumbers=[*self.path.nodes, auxiliary],
                 massMatrix=mass,
@@ -144,13 +137,11 @@ class CableDrive:
             )
         )
 
-    def _split(self, q: Any, q_t: Any) -> tuple[Array, Array]:
-        place, rates = (self.path.by_node(np.asarray(x[: self._size])) for x in (q, q_t))
-        return place + self._reference, rates
-
     def _answer(self, q: Any, q_t: Any, time: float) -> tuple[ChainState, Placed]:
         """The chain at a state of the object; Newton asks twice for force and Jacobian."""
-        place, rates = self._split(q, q_t)
+        size = self.path.size
+        place, rates = (self.path.by_node(np.asarray(x[:size])) for x in (q, q_t))
+        place = place + self._reference
         known = self._answered
         if (
             known is None
@@ -164,37 +155,31 @@ class CableDrive:
         return known.chain, known.placed
 
     def _force(self, mbs: Any, t: float, number: int, q: Any, q_t: Any) -> Array:
-        force = np.zeros(self._size + self.auxiliary)
+        force = np.zeros(self._size)
+        own = force[: self.path.size]
         try:
             with np.errstate(all="ignore"):
                 state, placed = self._answer(q, q_t, t)
-                force[: self._size] = self.path.in_a_row(
-                    self.path.generalised(placed, state.point_forces)
-                )
+                own[:] = self.path.in_a_row(self.path.generalised(placed, state.point_forces))
         except ValueError as error:
             # A stray Newton iterate, or no rope left: no number makes Newton take a smaller step.
             self.refusal = str(error)
-            force[: self._size] = np.nan
+            own[:] = np.nan
         return force
 
     def _jacobian(
         self, mbs: Any, t: float, number: int, q: Any, q_t: Any, by_q: float, by_rate: float
     ) -> Any:
-        matrix = exu.MatrixContainer()
-        size = self._size + self.auxiliary
         try:
             with np.errstate(all="ignore"):
                 state, placed = self._answer(q, q_t, t)
-                triplets = self.pattern.triplets(
-                    state,
-                    placed,
-                    by_q,
-                    by_rate,
-                    exact=self.exact_tangent,
-                    left=self._left(state, t),
-                )
+                left = None
+                if self.winches.answering:
+                    left = self.winches.stiffness_left(t, self.ropes, state.paths, state.path_rates)
+                triplets = self.pattern.triplets(state, placed, by_q, by_rate, left)
         except ValueError as error:
             self.refusal = str(error)
             triplets = self.pattern.empty()
-        matrix.SetWithSparseMatrix(triplets, size, size)
+        matrix = exu.MatrixContainer()
+        matrix.SetWithSparseMatrix(triplets, self._size, self._size)
         return matrix

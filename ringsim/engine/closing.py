@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from ringsim.outputs.recorder import History
+from ringsim.outputs.recorder import Recorder
 
 
-def close(history: History, system: Any, solver: Any) -> None:
+def close(history: Recorder, system: Any, solver: Any) -> None:
     """Note in a history what the solver has done, and take its callbacks away."""
     history.newton_iterations = int(solver.it.newtonStepsCount)
     history.jacobians = int(solver.it.newtonJacobiCount)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import exudyn as exu
 import numpy as np
@@ -10,13 +11,12 @@ from numpy.typing import NDArray
 
 from ringsim.cable.state import ChainState
 from ringsim.engine.faults import Faults
-from ringsim.engine.joints import friction_torque, stop_torque
-from ringsim.engine.net import HubNet, net_forces
-from ringsim.engine.pantograph_ring import RingModel
+from ringsim.engine.model import Model
 from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.work import StepWork
-from ringsim.outputs.instant import Energies
-from ringsim.parts.joints import JointFriction
+from ringsim.parts.joint_friction.family import JointFriction
+from ringsim.parts.persection import at_section
+from ringsim.stepping.instant import Energies
 
 Array = NDArray[np.float64]
 _KINETIC = exu.OutputVariableType.KineticEnergy
@@ -34,21 +34,29 @@ class EnergyMeter:
     damp inside and do not tell, so with damping their balance is unknown (NaN).
     """
 
-    def __init__(self, model: RingModel, net: HubNet | None, forces: Array, faults: Faults) -> None:
-        self._model, self._net, self._forces, self._faults = model, net, forces, faults
-        assembly = model.assembly
+    def __init__(self, model: Model, hub: Any, faults: Faults) -> None:
+        self._model, self._faults = model, faults
+        assembly, layout = model.assembly, model.layout
+        place = assembly.coordinates_of
         self._output = assembly.system.GetObjectOutputBody
-        self._elements = [e for rods in model.rods.values() for rod in rods for e in rod.elements]
+        self._elements = [element for rod in model.rods for element in rod.elements]
         self._lifts = np.array(
-            [[assembly.coordinates_of(j.gap[0])[2] for j in plane] for plane in model.vjoints]
+            [place(model.joints[joint].nodes[0])[:3] for joint, _ in layout.forces], dtype=np.int64
         )
+        self._forces = np.array([force for _, force in layout.forces])
         self._friction = self._friction_groups()
         self._since = StepWork()
-        if net is not None:
-            self._corners = np.array(
-                [assembly.coordinates_of(node)[:3] for _, node in model.hinges[0]]
-            )
-            self._hub = assembly.coordinates_of(net.hub)[:3]
+        self._springs = [
+            (spring, place(model.bodies[spring.first][1]), place(model.bodies[spring.second][1]))
+            for spring in layout.springs
+        ]
+        self._contacts = [
+            (contact, place(model.bodies[contact.body][1])[contact.axis])
+            for contact in layout.contacts
+        ]
+        if layout.net is not None:
+            self._corners = np.array([place(model.bodies[b][1])[:3] for b in layout.net.bodies])
+            self._hub = place(hub)[:3]
 
     def read(
         self,
@@ -71,15 +79,17 @@ class EnergyMeter:
         """
         kinetic = sum(self._output(body, _KINETIC) for body in self._model.assembly.bodies)
         elastic = float(sum(self._output(element, _POTENTIAL) for element in self._elements))
-        lifted = (state.position - state.reference)[self._lifts]
-        damped = [self._stop_damping(angles, rates, latched)]
-        for law, group, sections in self._friction:
+        moved = (state.position - state.reference)[self._lifts]
+        in_stops, stop_damping = self._stop_energy(angles, rates, latched)
+        damped = [stop_damping]
+        for law, group in self._friction:
             rate = group.rate(state)
-            damped.append((friction_torque(law, group.sections, sections, rate), rate))
+            damped.append((law.torque(rate), rate))
         stored, net_damping = self._net_energy(state)
         stuck, stuck_damping = self._faults.stuck_energy(angles, rates)
-        damped += [net_damping, stuck_damping]
-        elastic += stored + stuck + self._stored_in_stops(angles, latched)
+        inside, spring_damping = self._spring_energy(state)
+        damped += [net_damping, stuck_damping, spring_damping]
+        elastic += inside + stored + stuck + in_stops
         if chain is not None:
             elastic += float(chain.elastic_energy.sum())
         passed = self._since.since(
@@ -91,7 +101,7 @@ class EnergyMeter:
         return Energies(
             float(kinetic),
             elastic,
-            float(np.sum(self._forces * lifted)),
+            float(np.sum(self._forces * moved)),
             passed.lost + self._lost_in_rods(time),
             passed.driven,
         )
@@ -120,43 +130,42 @@ class EnergyMeter:
             return math.nan
         return model.assembly.dampers.lost(model.assembly.system, time)
 
-    def _friction_groups(self) -> list[tuple[JointFriction, JointGroup, int]]:
-        laws = self._model.scene.joints
+    def _friction_groups(self) -> list[tuple[JointFriction, JointGroup]]:
         found = []
-        for family, law in (("pivot", laws.pivot), ("hinge", laws.hinge), ("vjoint", laws.vjoint)):
-            if law is not None:
-                joints = [joint for joint in self._model.joints if joint.family == family]
-                group = JointGroup(self._model, joints)
-                found.append((law, group, self._model.geometry.sections))
+        for family, law in self._model.scene.joints.present().items():
+            joints = [joint for joint in self._model.joints if joint.family == family]
+            group = JointGroup(self._model, joints)
+            found.append((at_section(law, group.sections), group))
         return found
 
-    def _stored_in_stops(self, angles: Array, latched: Array) -> float:
+    def _stop_energy(self, angles: Array, rates: Array, latched: Array) -> tuple[float, Damping]:
         stop = self._model.scene.stop
         if stop is None:
-            return 0.0
-        folded = np.pi - angles
-        stowed = np.pi - np.radians(stop.stowed_angle)
-        ends = np.maximum(-folded, 0.0) + np.maximum(folded - stowed, 0.0)
-        return 0.5 * stop.stiffness * float(np.sum(np.where(latched, folded, ends) ** 2))
+            return 0.0, _NOTHING
+        reaction = stop.torque(np.pi - angles, -rates, latched)
+        return float(np.sum(reaction.stored)), (reaction.damping.ravel(), -rates.ravel())
 
-    def _stop_damping(self, angles: Array, rates: Array, latched: Array) -> Damping:
-        stop = self._model.scene.stop
-        if stop is None:
-            return _NOTHING
-        folded, turning = np.pi - angles, -rates
-        spring = stop_torque(stop, folded, np.zeros_like(turning), latched)
-        torque = stop_torque(stop, folded, turning, latched)
-        return (torque - spring).ravel(), turning.ravel()
+    def _spring_energy(self, state: State) -> tuple[float, Damping]:
+        """Energy in springs and contacts of the structure, J, and their damping."""
+        found, rates = [], []
+        for spring, near, far in self._springs:
+            arm = (state.position[far] - state.position[near])[:3]
+            length = float(np.linalg.norm(arm))
+            rates.append(float((state.velocity[far] - state.velocity[near])[:3] @ arm) / length)
+            found.append(spring.law.tension(length, rates[-1]))
+        for contact, where in self._contacts:
+            rates.append(-float(state.velocity[where]))
+            found.append(contact.law.push(contact.room - float(state.position[where]), rates[-1]))
+        stored = float(sum(one.stored for one in found))
+        return stored, (np.array([one.damping for one in found]), np.array(rates))
 
     def _net_energy(self, state: State) -> tuple[float, Damping]:
         net = self._model.scene.net
-        if self._net is None or net is None:
+        if net is None:
             return 0.0, _NOTHING
         arms = state.position[self._corners] - state.position[self._hub]
         moving = state.velocity[self._corners] - state.velocity[self._hub]
         lengths = np.linalg.norm(arms, axis=1)
         stretch, rate = lengths - net.neutral_length, np.sum(arms * moving, axis=1) / lengths
-        spring, damper = net_forces(
-            stretch, rate, self._net.stiffness, net.damping, two_sided=net.two_sided
-        )
-        return 0.5 * float(np.sum(spring * stretch)), (damper, rate)
+        tension = at_section(net, np.arange(len(arms))).tension(stretch, rate)
+        return float(np.sum(tension.stored)), (tension.damping, rate)

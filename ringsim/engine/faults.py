@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.state import ChainState
 from ringsim.engine.cables import CableDrive
-from ringsim.engine.pantograph_ring import RingModel
+from ringsim.engine.model import Model
 from ringsim.parts.faults.family import Fault
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 
@@ -34,15 +34,15 @@ class Faults:
     A stuck V-joint is a torsion spring that lies inactive until its time comes.
     """
 
-    def __init__(self, model: RingModel, drive: CableDrive | None) -> None:
+    def __init__(self, model: Model, drive: CableDrive | None) -> None:
         self._model, self._drive = model, drive
         self._waiting = sorted(model.scene.faults, key=lambda fault: fault.time)
         self._springs: dict[int, Any] = {}
         self._joints: list[_Stuck] = []
         for fault in self._waiting:
             if isinstance(fault, StuckVJoint):
-                plane = ("upper", "lower").index(fault.plane)
-                joint = model.vjoints[plane][fault.section - 1]
+                plane = model.scene.structure.planes.index(fault.plane)
+                joint, _ = model.openings()[plane][fault.section - 1]
                 self._joints.append(_Stuck(fault, (plane, fault.section - 1)))
                 self._springs[id(fault)] = model.assembly.torsion_spring(
                     *joint.markers,
@@ -85,17 +85,18 @@ class Faults:
         for number, stuck in enumerate(self._joints):
             if stuck.angle is not None:
                 turned = float(angles[stuck.place]) - stuck.angle
-                stored += 0.5 * stuck.fault.stiffness * turned**2
-                forces[number] = stuck.fault.damping * turning[number]
+                reaction = stuck.fault.torque(turned, turning[number])
+                stored += reaction.stored
+                forces[number] = reaction.damping
         return stored, (forces, turning)
 
     def _strike(self, fault: Fault, angles: Array, state: ChainState | None) -> None:
         if isinstance(fault, StuckVJoint):
-            plane = ("upper", "lower").index(fault.plane)
-            sense = 1.0 if plane == 0 else -1.0
-            folded = math.pi - float(angles[plane, fault.section - 1])
             stuck = next(stuck for stuck in self._joints if stuck.fault is fault)
-            stuck.angle = math.pi - folded
+            plane, section = stuck.place
+            _, sense = self._model.openings()[plane][section]
+            stuck.angle = float(angles[stuck.place])
+            folded = math.pi - stuck.angle
             spring, system = self._springs[id(fault)], self._model.assembly.system
             system.SetObjectParameter(spring, "offset", sense * folded)
             system.SetObjectParameter(spring, "activeConnector", True)

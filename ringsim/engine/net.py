@@ -6,101 +6,50 @@ to weightless as it is, with the energy of its first stretch.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
-import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
-from numpy.typing import NDArray
 
-from ringsim.engine.pantograph_ring import RingModel
-from ringsim.parts.persection import spread
-from ringsim.theory.ideal_net import FreeHub
-
-Array = NDArray[np.float64]
-_ONSET = 1e-4
-"""Stretch in m over which the damping of a spring comes in."""
+from ringsim.engine.assembly import Assembly
+from ringsim.engine.laws import SYMBOLIC, symbolic_law
+from ringsim.engine.model import Model
+from ringsim.parts.net import Net
+from ringsim.parts.persection import at_section
 
 
-@dataclass(frozen=True)
-class HubNet:
-    """The hub's node and the springs' constants.
-
-    Attributes
-    ----------
-    hub
-        Node of the hub.
-    stiffness
-        Spring rates, one per upper corner, N/m.
-
-    """
-
-    hub: Any
-    stiffness: Array
-
-
-def add_net(model: RingModel) -> HubNet | None:
-    """The hub and its springs, if the scene has a net."""
-    net = model.scene.net
-    if net is None:
+def add_net(model: Model) -> Any:
+    """Build hub and springs of a layout with a net; returns the hub's node, None without."""
+    net, held = model.scene.net, model.layout.net
+    if net is None or held is None:
         return None
     assembly = model.assembly
-    corners = model.fold.corners[0]
-    hub = assembly.system.AddNode(
-        item.NodePoint(
-            referenceCoordinates=list(FreeHub(net, len(corners)).hub(corners)),
-        )
-    )
-    starts = [assembly.starts[int(node)][:3] for _, node in model.hinges[0]]
+    hub = assembly.system.AddNode(item.NodePoint(referenceCoordinates=list(held.hub)))
+    nodes = [model.bodies[number][1] for number in held.bodies]
+    starts = [assembly.starts[int(node)][:3] for node in nodes]
     assembly.starts[int(hub)] = np.mean(starts, axis=0)
-    body = assembly.system.AddObject(
-        item.ObjectMassPoint(
-            nodeNumber=hub,
-            mass=net.hub_mass,
-        )
-    )
+    body = assembly.system.AddObject(item.ObjectMassPoint(nodeNumber=hub, mass=held.mass))
     assembly.bodies.append(body)
     middle = assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=hub))
-    stiffness = spread(net.stiffness, len(corners))
-    for rate, (_, node) in zip(stiffness, model.hinges[0], strict=True):
-        settings: dict[str, Any] = {"stiffness": float(rate), "damping": net.damping}
-        if not net.two_sided:
-            settings["springForceUserFunction"] = assembly.symbolic(
-                "net",
-                _one_sided,
-                "ObjectConnectorSpringDamper",
-                "springForceUserFunction",
-            )
+    for corner, node in enumerate(nodes):
+        far = assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=node))
         assembly.system.AddObject(
             item.ObjectConnectorSpringDamper(
-                markerNumbers=[
-                    middle,
-                    assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=node)),
-                ],
+                markerNumbers=[middle, far],
                 referenceLength=net.neutral_length,
-                **settings,
+                **_string(assembly, at_section(net, corner)),
             )
         )
-    return HubNet(hub, stiffness)
+    return hub
 
 
-def _one_sided(
-    mbs: Any, t: Any, itemNumber: Any, deltaL: Any, deltaL_t: Any,  # noqa: N803
-    stiffness: Any, damping: Any, force: Any,
-) -> Any:  # fmt: skip
-    least, most = exu.symbolic.min, exu.symbolic.max
-    stretch = most(deltaL, 0.0)
-    return most(stiffness * stretch + damping * deltaL_t * least(stretch / _ONSET, 1.0), 0.0)
-
-
-def net_forces(
-    stretch: Array, rate: Array, stiffness: Array, damping: float, *, two_sided: bool
-) -> tuple[Array, Array]:
-    """Spring and damper parts of the tensions, N; the same law in numpy."""
-    if two_sided:
-        return stiffness * stretch, damping * rate
-    taut = np.maximum(stretch, 0.0)
-    spring = stiffness * taut
-    damper = damping * rate * np.minimum(taut / _ONSET, 1.0)
-    return spring, np.maximum(damper, -spring)
+def _string(assembly: Assembly, net: Net) -> dict[str, Any]:
+    linear = {"stiffness": net.stiffness, "damping": net.damping}
+    if net.two_sided:
+        return linear
+    return linear | symbolic_law(
+        assembly,
+        "ObjectConnectorSpringDamper",
+        net,
+        lambda stretch, rate, _: net.tension(stretch, rate, SYMBOLIC).total,
+    )

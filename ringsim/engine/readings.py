@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine import quaternions
-from ringsim.engine.pantograph_ring import Joint, RingModel
+from ringsim.engine.model import Joint, Model
+from ringsim.engine.rods import NodeFrames
+from ringsim.engine.rods_geometrically_exact import GeometricallyExact
+from ringsim.engine.rotations import axes_of, spin
+from ringsim.layout.joints import ChordOpening
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -16,7 +21,7 @@ Indices = NDArray[np.int64]
 class State:
     """Total coordinates and rates of a model, copied from exudyn by ``refresh``."""
 
-    def __init__(self, model: RingModel) -> None:
+    def __init__(self, model: Model) -> None:
         self._data = model.assembly.system.systemData
         self.reference = np.array(self._data.GetODE2Coordinates(exu.ConfigurationType.Reference))
         self.position = self.reference
@@ -32,63 +37,116 @@ class State:
         return bool(np.isfinite(self.position).all() and np.isfinite(self.velocity).all())
 
 
+class Side:
+    """One side of some joints: places and frames of n mounts on nodes of one kind."""
+
+    def __init__(self, model: Model, nodes: list[Any], arms: list[Array]) -> None:
+        found = [model.assembly.coordinates_of(node) for node in nodes]
+        self._where = np.array(found)
+        rigid = len(found[0]) == 7
+        self._read = GeometricallyExact().read if rigid else model.formulation.read
+        self._arms = np.array(arms) if rigid and np.any(arms) else None
+
+    def frames(self, state: State) -> NodeFrames:
+        """Frames of the nodes."""
+        return self._read(state.position[self._where], state.velocity[self._where])
+
+    def spin_about(self, state: State, axes: Array) -> Array:
+        """Angular rate about given axes, shape (n, 3), rad/s; of nodes with Euler parameters."""
+        place, rates = state.position[self._where], state.velocity[self._where]
+        return np.asarray(np.sum(spin(place[:, 3:7], rates[:, 3:7]) * axes, axis=1))
+
+    def points(self, state: State) -> Array:
+        """Places, shape (n, 3), m."""
+        nodes = state.position[self._where]
+        if self._arms is None:
+            return np.array(nodes[:, :3])
+        turned = np.einsum("nij,nj->ni", axes_of(nodes[:, 3:7]), self._arms)
+        return np.asarray(nodes[:, :3] + turned)
+
+
 class JointGroup:
     """Joints of one family, read together."""
 
-    def __init__(self, model: RingModel, joints: list[Joint]) -> None:
-        assembly = model.assembly
-        self._read = model.formulation.read
+    def __init__(self, model: Model, joints: list[Joint]) -> None:
         self.sections = np.array([joint.section for joint in joints])
-        self._first = np.array([assembly.coordinates_of(joint.gap[0]) for joint in joints])
-        self._second = np.array([assembly.coordinates_of(joint.gap[1]) for joint in joints])
-        arms = [joint.gap[2] for joint in joints if joint.gap[2] is not None]
-        self._arms = np.array(arms) if arms else None
+        self._first, self._second = (
+            Side(model, [j.nodes[k] for j in joints], [j.arms[k] for j in joints]) for k in (0, 1)
+        )
+        self._bodies = any(np.any(joint.arms[1]) for joint in joints)
 
     def turn(self, state: State) -> tuple[Array, Array]:
         """Angle in (-pi, pi] from the first rods' frames to the second's about z, and its rate."""
-        first = self._read(state.position[self._first], state.velocity[self._first])
-        second = self._read(state.position[self._second], state.velocity[self._second])
+        first, second = self._first.frames(state), self._second.frames(state)
         sine = np.sum(np.cross(first.y, second.y) * first.z, axis=1)
         angle = np.arctan2(sine, np.sum(first.y * second.y, axis=1))
         return angle, second.spin - first.spin
 
     def rate(self, state: State) -> Array:
         """Relative angular rate about the joint axis, rad/s."""
-        if self._arms is None:
+        if not self._bodies:
             return self.turn(state)[1]
-        rod = self._read(state.position[self._first], state.velocity[self._first])
-        hinge = quaternions.angular_velocity(
-            state.position[self._second][:, 3:7], state.velocity[self._second][:, 3:7]
-        )
-        return np.asarray(rod.spin - np.sum(hinge * rod.z, axis=1))
+        rod = self._first.frames(state)
+        return np.asarray(rod.spin - self._second.spin_about(state, rod.z))
 
     def gaps(self, state: State) -> Array:
         """Distances of the points that the joints hold together, m."""
-        first = state.position[self._first][:, :3]
-        second = state.position[self._second]
-        place = second[:, :3]
-        if self._arms is not None:
-            axes = quaternions.axes_of(second[:, 3:7])
-            place = place + np.einsum("nij,nj->ni", axes, self._arms)
-        return np.asarray(np.linalg.norm(first - place, axis=1))
+        apart = self._first.points(state) - self._second.points(state)
+        return np.asarray(np.linalg.norm(apart, axis=1))
+
+
+def joint_groups(model: Model) -> list[JointGroup]:
+    """All revolutes, by what they join, so that each group reads nodes of one kind."""
+    groups: dict[Any, list[Joint]] = {}
+    size = model.assembly.coordinates_of
+    kinds = [joint.kind for joint in model.layout.joints]
+    for kind, joint in zip(kinds, model.joints, strict=True):
+        if kind == "revolute":
+            key = (joint.family, *(len(size(node)) for node in joint.nodes))
+            groups.setdefault(key, []).append(joint)
+    return [JointGroup(model, joints) for joints in groups.values()]
 
 
 class Openings:
-    """Opening angles of all V-joints."""
+    """Opening angles of a structure."""
 
-    def __init__(self, model: RingModel) -> None:
-        self._planes = [JointGroup(model, joints) for joints in model.vjoints]
+    def __init__(self, model: Model) -> None:
+        self._planes: list[Any] = []
+        for plane, joints in zip(model.layout.openings, model.openings(), strict=True):
+            if joints:
+                senses = np.array([sense for _, sense in joints])
+                self._planes.append((JointGroup(model, [j for j, _ in joints]), senses))
+            else:
+                self._planes.append([
+                    (model.assembly.coordinates_of(model.bodies[one.body][1])[:3], one.centre)
+                    for one in plane
+                    if isinstance(one, ChordOpening)
+                ])  # fmt: skip
 
     def read(self, state: State) -> tuple[Array, Array]:
-        """Opening angles and their rates, shape (2, sections), rad and rad/s.
+        """Opening angles and their rates, shape (planes, sections), rad and rad/s."""
+        found = [
+            _of_chords(state, plane) if isinstance(plane, list) else _of_joints(state, *plane)
+            for plane in self._planes
+        ]
+        return np.array([angle for angle, _ in found]), np.array([rate for _, rate in found])
 
-        The folded angle pi - delta is followed from -pi/2 to 3 pi/2, so that neither the
-        deployed nor the stowed end lies on the jump of the arc tangent.
-        """
-        angles, rates = [], []
-        for group, sense in zip(self._planes, (1.0, -1.0), strict=True):
-            turned, rate = group.turn(state)
-            folded = sense * turned
-            angles.append(np.pi - np.where(folded < -0.5 * np.pi, folded + 2.0 * np.pi, folded))
-            rates.append(-sense * rate)
-        return np.array(angles), np.array(rates)
+
+def _of_joints(state: State, group: JointGroup, senses: Array) -> tuple[Array, Array]:
+    """The folded angle pi - delta is followed from -pi/2 to 3 pi/2, so that neither the deployed
+    nor the stowed end lies on the jump of the arc tangent.
+    """
+    turned, rate = group.turn(state)
+    folded = senses * turned
+    angle = np.pi - np.where(folded < -0.5 * np.pi, folded + 2.0 * np.pi, folded)
+    return angle, -senses * rate
+
+
+def _of_chords(state: State, chords: list[tuple[Indices, Array]]) -> tuple[Array, Array]:
+    angles, rates = [], []
+    for where, centre in chords:
+        x, y, _ = state.position[where] - centre
+        moving = state.velocity[where]
+        angles.append(np.arctan2(x, -y))
+        rates.append((x * moving[1] - y * moving[0]) / (x * x + y * y))
+    return np.array(angles), np.array(rates)

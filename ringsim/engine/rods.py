@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -30,8 +31,10 @@ class Rod:
         Initial frame, columns in global coordinates, shape (3, 3).
     tube
         Cross-section.
-    length
-        Length of one element, m.
+    lengths
+        Of the elements, m.
+    young_modulus
+        Pa.
 
     """
 
@@ -39,7 +42,8 @@ class Rod:
     elements: list[Any]
     axes: Array
     tube: Tube
-    length: float
+    lengths: Array
+    young_modulus: float
 
 
 class NodeFrames(NamedTuple):
@@ -116,16 +120,20 @@ def add_rod(
     assembly: Assembly,
     formulation: Formulation,
     ends: tuple[Frame, Frame],
-    elements: int,
+    stations: Sequence[float],
     rods: Rods,
     tube: Tube,
     young_modulus: float,
 ) -> Rod:
-    """A straight rod between two frames that share their axes; motion is interpolated."""
+    """A straight rod between two frames that share their axes; motion is interpolated.
+
+    Parameters
+    ----------
+    stations
+        Shares of its length at which it has nodes, from 0 to 1.
+    """
     first, last = ends
-    length = float(np.linalg.norm(last.position - first.position)) / elements
-    constant_over = length if formulation.constant_curvature else 0.0
-    section = beam_section(rods, tube, young_modulus, constant_over)
+    lengths = np.diff(stations) * float(np.linalg.norm(last.position - first.position))
     frames = [
         Frame(
             (1 - share) * first.position + share * last.position,
@@ -133,12 +141,18 @@ def add_rod(
             (1 - share) * first.acceleration + share * last.acceleration,
             first.turn,
         )
-        for share in np.linspace(0.0, 1.0, elements + 1)
+        for share in stations
     ]
     nodes = [formulation.add_node(assembly, frame) for frame in frames]
+    sections = {
+        length: beam_section(
+            rods, tube, young_modulus, length if formulation.constant_curvature else 0.0
+        )
+        for length in set(lengths.tolist())
+    }
     objects = [
-        formulation.add_element(assembly, nodes[k : k + 2], length, section)
-        for k in range(elements)
+        formulation.add_element(assembly, nodes[k : k + 2], length, sections[length])
+        for k, length in enumerate(lengths.tolist())
     ]
     assembly.bodies += objects
-    return Rod(nodes, objects, first.axes, tube, length)
+    return Rod(nodes, objects, first.axes, tube, lengths, young_modulus)

@@ -8,9 +8,9 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine import quaternions
 from ringsim.engine.assembly import Assembly, Frame
 from ringsim.engine.rods import NodeFrames
+from ringsim.engine.rotations import axes_of, spin
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,6 @@ class GeometricallyExact:
     def read(self, coordinates: Array, rates: Array) -> NodeFrames:
         """See ``Formulation``."""
         turned = coordinates[:, 3:7]
-        axes = quaternions.axes_of(turned)
-        spin = quaternions.angular_velocity(turned, rates[:, 3:7])
+        axes, spins = axes_of(turned), spin(turned, rates[:, 3:7])
         z = axes[:, :, 2]
-        return NodeFrames(coordinates[:, :3], axes[:, :, 1], z, np.sum(spin * z, axis=1))
+        return NodeFrames(coordinates[:, :3], axes[:, :, 1], z, np.sum(spins * z, axis=1))

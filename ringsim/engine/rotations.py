@@ -1,15 +1,32 @@
-"""Rotations of many bodies at once: unit quaternions (w, v), shape (n, 4), and vectors, (n, 3)."""
+"""Rotations of many bodies at once: unit quaternions (w, v), shape (n, 4), and vectors, (n, 3).
+
+Euler parameters are unit quaternions with the scalar first; scipy's Rotation puts it last.  What
+Rotation offers is taken from there.  Its rotation matrices cost as much as the two columns alone
+by hand (10.8 us against 10.9 us for 36 nodes), and a third of np.stack.  What stays by hand is
+called in every residual: numpy's cross product takes 2.8 times as long on such small arrays.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
 
+def axes_of(turns: Array) -> Array:
+    """Rotation matrices, shape (n, 3, 3), of quaternions, shape (n, 4), brought to unit length."""
+    return np.asarray(Rotation.from_quat(turns[:, [1, 2, 3, 0]]).as_matrix())
+
+
+def turn_of(axes: Array) -> Array:
+    """Unit quaternion, shape (4,), of a rotation matrix, shape (3, 3)."""
+    return np.roll(Rotation.from_matrix(axes).as_quat(), 1)
+
+
 def gyration(turns: Array) -> Array:
-    """G = 2 [-v, w I + skew(v)] of quaternions (w, v): angular velocity = G q_dot."""
+    """G = 2 [-v, w I + skew(v)] of quaternions (w, v), shape (n, 3, 4): spin = G q_dot."""
     found = np.empty((len(turns), 3, 4))
     found[:, :, 0] = -2.0 * turns[:, 1:]
     found[:, :, 1:] = 2.0 * skew(turns[:, 1:])
@@ -18,32 +35,21 @@ def gyration(turns: Array) -> Array:
 
 
 def spin(turns: Array, rates: Array) -> Array:
-    """Angular velocity G q_dot, shape (n, 3), of quaternions (w, v) and their rates."""
+    """Angular velocity G q_dot in global axes, rad/s, of quaternions and their rates (1/s)."""
     vector, by_vector = turns[:, 1:], rates[:, 1:]
     return 2.0 * (turns[:, :1] * by_vector - rates[:, :1] * vector + cross(vector, by_vector))
 
 
-def rotated(turns: Array, vectors: Array) -> Array:
-    """Vectors turned by unit quaternions (w, v): a + 2 w v x a + 2 v x (v x a)."""
-    vector = turns[:, 1:]
-    once = 2.0 * cross(vector, vectors)
-    return vectors + turns[:, :1] * once + cross(vector, once)
+def turn_rates(turns: Array, spins: Array) -> Array:
+    """Rates q_dot = G^T spin / 4 of unit quaternions, 1/s, shape (n, 4); the inverse of ``spin``.
 
-
-def first_axes(turns: Array) -> tuple[Array, Array]:
-    """First and second column of the rotation matrices of unit quaternions, shape (n, 3)."""
-    w, x, y, z = turns.T
-    along, across = np.empty((2, 3, len(turns)))
-    xy, wz, zz = x * y, w * z, z * z
-    along[0] = 1.0 - 2.0 * (y * y + zz)
-    along[1], along[2] = 2.0 * (xy + wz), 2.0 * (x * z - w * y)
-    across[1] = 1.0 - 2.0 * (x * x + zz)
-    across[0], across[2] = 2.0 * (xy - wz), 2.0 * (y * z + w * x)
-    return along.T, across.T
+    Angular accelerations of bodies at rest give the second derivatives.
+    """
+    return np.asarray(0.25 * np.einsum("nij,ni->nj", gyration(turns), spins))
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Cross products row by row; numpy's own costs four times as much on small arrays."""
+    """Cross products row by row."""
     (ax, ay, az), (bx, by, bz) = a.T, b.T
     found = np.empty((3, len(b)))
     found[0] = ay * bz - az * by

@@ -1,93 +1,75 @@
-"""Scales of a scene that the step control starts from."""
+"""Reference numbers of a scene's structure, as its run's control needs them."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from ringsim.engine.build import Built
-from ringsim.engine.cables import CableDrive
+from ringsim.engine.model import Model
 from ringsim.engine.rod_dampers import STIFFENING
-from ringsim.scene import Scene
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.layout.bodies import OnRod
+from ringsim.layout.joints import JointOpening
+from ringsim.stepping import scales
+from ringsim.theory.one_coordinate import OneCoordinate
+
+_SLIGHT = 1e-3
+"""Energy that does not matter, over the largest force of a structure's springs along a rod."""
 
 
-def usual_rate(scene: Scene) -> float:
-    """Mean opening rate in rad/s if the initial acceleration of the ideal ring lasted."""
-    ring = scene.structure
-    travel = math.pi - math.radians(ring.opening_angle)
-    pull = 2.0 * abs(IdealRing.of(scene).acceleration_from_rest(ring.initial_phi))
-    return max(math.sqrt(0.5 * pull * travel), travel / scene.solver.end_time)
-
-
-def usual_energy(scene: Scene) -> float:
-    """Kinetic energy in J of the ideal ring, as stowed, at its usual rate."""
-    ring = scene.structure
-    inertia = float(IdealRing.of(scene).motion(ring.initial_phi).inertia)
-    return 0.5 * inertia * (0.5 * usual_rate(scene)) ** 2
-
-
-def slight_energy(cables: CableDrive) -> float:
-    """Energy in J that does not matter: a tenth of the slack width pulled along every path."""
-    content = np.abs(cables.ropes.content)
-    widths = np.array([cable.slack_width for cable in cables.chain.cables])
-    return 0.1 * float(np.sum(widths * content))
-
-
-def contact_step(built: Built) -> float:
-    """Step that resolves a V-joint's bounce: a twentieth of its period on the stop's spring."""
-    scene = built.ring.scene
-    if scene.stop is None:
-        return scene.solver.step
-    rods, ring = scene.rods, scene.structure
-    half = rods.density * rods.bar.area * ring.half_bar**3 / 3.0
-    inertia = 2.0 * half + ring.vjoint_mass * ring.half_bar**2
-    return 2.0 * math.pi * math.sqrt(inertia / scene.stop.stiffness) / 20.0
-
-
-def rope_step(built: Built) -> float:
-    """Step that resolves how the ring, as stowed, swings on taut ropes: a fiftieth of the period.
-
-    A winch that starts at once throws the ring into that swing, often with the largest tension of
-    the run; the first V-joint moves before the others, so that it is faster than the ideal ring's.
-    Infinite without cables.
-    """
-    scene = built.ring.scene
-    if built.cables is None:
-        return math.inf
-    ring = scene.structure
-    inertia = 0.25 * float(IdealRing.of(scene).motion(ring.initial_phi).inertia)
-    cables, content = built.cables.chain.cables, np.abs(built.cables.ropes.content)
-    opening = math.pi - 2.0 * ring.initial_phi
+def scales_of(built: Built) -> scales.Scales:
+    """What the ideal structure, as stowed, the stops and the cables say before a run."""
+    model, scene, structure = built.model, built.model.scene, built.model.scene.structure
+    angles, rates = model.layout.opening_angles()
+    travel, per_angle = math.pi - float(angles.mean()), float(rates.mean())
+    ideal = OneCoordinate(scene)
+    acceleration = per_angle * ideal.acceleration_from_rest(structure.coordinate)
+    inertia = ideal.motion(structure.coordinate).inertia / per_angle**2
+    rate = scales.reference_rate(acceleration, travel, scene.solver.end_time)
+    # Springs of its own set their own scale: what they would do along a rod.
+    pushed = _SLIGHT * structure.push * structure.reach
+    energy = pushed or 0.5 * inertia * rate**2
+    found = scales.Scales(rate, energy, travel, structure.reach, contact_step=_contact_step(model))
+    if built.cables is None or scene.cables is None:
+        return found
+    cables, lengths = scene.cables.present(), np.abs(built.cables.ropes.content)
+    widths = np.array([cable.slack_width for _, cable in cables])
     stiffness = sum(
-        cable.axial_stiffness
-        / float(length)
-        * (ring.sections * float(cable.path_slope(ring.half_bar, opening))) ** 2
-        for cable, length in zip(cables, content, strict=True)
+        cable.axial_stiffness / float(length) * structure.path_slope(cable, angles[plane]) ** 2
+        for (plane, cable), length in zip(cables, lengths, strict=True)
     )
-    return 2.0 * math.pi * math.sqrt(inertia / stiffness) / 50.0
+    return replace(
+        found,
+        first_step=scales.swing_step(inertia, stiffness, 50),
+        slack_tension=float(widths.max()),
+        slack_energy=0.1 * float(np.sum(widths * lengths)),
+    )
+
+
+def _contact_step(model: Model) -> float:
+    """Of the first V-joint with its two rods; infinite without stops or V-joints."""
+    opening, stop = model.layout.openings[0][0], model.scene.stop
+    if stop is None or not isinstance(opening, JointOpening):
+        return math.inf
+    joint, inertia = model.layout.joints[opening.joint], 0.0
+    for mount in (joint.first, joint.second):
+        if isinstance(mount, OnRod):
+            rod = model.layout.rods[mount.rod]
+            ends = sum(mass for _, mass in rod.masses)
+            inertia += (rod.mass / 3.0 + ends) * rod.length**2
+    return scales.swing_step(inertia, stop.stiffness, 20)
 
 
 def residual_tolerance(built: Built) -> float:
-    """Residual norm in N at which Newton stops.
-
-    ``newton_tolerance`` times the driving forces, but above what round-off lets the residual
-    reach: the stiffest element's rate EA / L times coordinates of order 1 m, per coordinate.
-    """
-    scene = built.ring.scene
-    drive = float(np.linalg.norm(built.forces))
-    if scene.net is not None and built.net is not None:
-        drive += float(np.linalg.norm(built.net.stiffness)) * scene.net.neutral_length
-    stiffest = max(
-        np.max(scene.rods.young_modulus) * tube.area * scene.rods.elements / length
-        for tube, length in (
-            (scene.rods.diagonal, scene.structure.half_diagonal),
-            (scene.rods.bar, scene.structure.half_bar),
-        )
-    )
+    """Residual norm in N at which Newton stops, from loads, springs and the stiffest element."""
+    scene, layout = built.model.scene, built.model.layout
+    drive = float(np.linalg.norm([force for _, force in layout.forces])) + scene.structure.push
+    if scene.net is not None and layout.net is not None:
+        drive += float(np.linalg.norm(layout.net.stiffness)) * scene.net.neutral_length
+    stiffest = max(rod.young_modulus * rod.tube.area / rod.shortest for rod in layout.rods)
     if scene.rods.damping > 0.0:
         stiffest *= STIFFENING
-    size = built.ring.assembly.system.systemData.ODE2Size()
-    round_off = 4.0 * np.finfo(float).eps * float(stiffest) * math.sqrt(size)
-    return max(scene.solver.newton_tolerance * drive, round_off)
+    size = built.model.assembly.system.systemData.ODE2Size()
+    return scales.residual_tolerance(scene.solver.newton_tolerance, drive, float(stiffest), size)

@@ -18,15 +18,12 @@ the rest is the chain rule.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.engine.rotations import cross, skew
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 SLOPES = 6
 """Coordinates of the two slope vectors of a node."""
 
@@ -35,20 +32,20 @@ class Direction:
     """The unit vectors u of vectors v, shape (n, 3), with their derivatives."""
 
     def __init__(self, vectors: Array) -> None:
-        self.size = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
-        self.unit = vectors / self.size
+        self._size = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None, None]
+        self.unit = vectors / self._size[:, 0]
         self._outer = self.unit[:, :, None] * self.unit[:, None, :]
 
     def first(self) -> Array:
         """du/dv, shape (n, 3, 3)."""
-        return np.asarray((np.eye(3) - self._outer) / self.size[:, :, None])
+        return np.asarray((np.eye(3) - self._outer) / self._size)
 
     def second(self, along: Array) -> Array:
         """Second derivative of g . u after v with g = ``along`` (n, 3), shape (n, 3, 3)."""
         dot = np.einsum("ij,ij->i", self.unit, along)[:, None, None]
         mixed = along[:, :, None] * self.unit[:, None, :]
         curved = dot * (np.eye(3) - 3.0 * self._outer) + mixed + mixed.transpose(0, 2, 1)
-        return np.asarray(-curved / self.size[:, :, None] ** 2)
+        return np.asarray(-curved / self._size**2)
 
 
 class Half:
@@ -78,84 +75,46 @@ class Half:
         return found
 
 
-@dataclass(frozen=True)
-class SlopePlaced:
-    """The blocks at one instant.
+class PlacedBlocks:
+    """Blocks at one instant, between a left and a right node each.
+
+    Parameters
+    ----------
+    slopes, rates
+        Slopes of the left and the right nodes and their rates, shape (2, blocks, 6).
+    sense, offset
+        Of ``BlockSheave``, shape (blocks, 1); m.
 
     Attributes
     ----------
     arms, arm_rates
         From the V-joint to the pulley (m) and its rate (m/s), shape (blocks, 3).
     maps
-        Derivative of the arms after the slopes of the left and the right node, each of shape
-        (blocks, 3, 6).
+        Derivative of the arms after the slopes of either node, shape (2, blocks, 3, 6).
     """
 
-    arms: Array
-    arm_rates: Array
-    maps: tuple[Array, Array]
-    reach: Array
-    block: Direction
-    halves: tuple[Half, Half]
-    rates: tuple[Array, Array]
+    def __init__(self, slopes: Array, rates: Array, sense: Array, offset: Array) -> None:
+        count = len(sense)
+        self._halves = Half(slopes.reshape(-1, SLOPES), np.concatenate([-sense, sense]))
+        self._block = Direction(self._halves.vector[:count] + self._halves.vector[count:])
+        self._reach = -sense * offset
+        self._by_half = self._halves.first().reshape(2, count, 3, SLOPES)
+        self.arms = self._reach * self._block.unit
+        self.maps = self._reach[:, :, None] * self._block.first() @ self._by_half
+        self.arm_rates = np.einsum("sbij,sbj->bi", self.maps, rates)
 
-    def turning(self, forces: Array) -> list[list[Array]]:
-        """Second derivative of F . arm after the slopes of two nodes, [first][second].
+    def turning(self, forces: Array) -> Array:
+        """Second derivative of F . arm after the slopes of two nodes, shape (2, 2, blocks, 6, 6).
 
         Parameters
         ----------
         forces
             F on the pulleys, N, shape (blocks, 3).
         """
-        scaled = self.reach * forces
-        curved = self.block.second(scaled)
-        along = (self.block.first() @ scaled[:, :, None])[:, :, 0]
-        slopes = [half.first() for half in self.halves]
-        found = [[a.transpose(0, 2, 1) @ curved @ b for b in slopes] for a in slopes]
-        for k, half in enumerate(self.halves):
-            found[k][k] = found[k][k] + half.second(along)
+        scaled = self._reach * forces
+        along = (self._block.first() @ scaled[:, :, None])[:, :, 0]
+        curved = self._by_half.transpose(0, 1, 3, 2) @ self._block.second(scaled)
+        found: Array = curved[:, None] @ self._by_half[None]
+        own = self._halves.second(np.concatenate([along, along]))
+        found[range(2), range(2)] += own.reshape(2, -1, SLOPES, SLOPES)
         return found
-
-    def swings(self) -> tuple[Array, Array]:
-        """Derivative of the arms' rates after the slopes of either node at fixed rates."""
-        found = np.zeros((2, len(self.arms), 3, SLOPES))
-        for axis in range(3):
-            force = np.broadcast_to(np.eye(3)[axis], self.arms.shape)
-            second = self.turning(force)
-            for k in range(2):
-                for other, rate in enumerate(self.rates):
-                    found[k, :, axis] += (second[k][other] @ rate[:, :, None])[:, :, 0]
-        return found[0], found[1]
-
-
-@dataclass(frozen=True)
-class SlopeBlocks:
-    """Blocks between the nodes ``left`` and ``right``; sense (+1, -1) and offset (m), (n, 1)."""
-
-    left: Indices
-    right: Indices
-    sense: Array
-    offset: Array
-
-    def place(self, coordinates: Array, rates: Array) -> SlopePlaced:
-        """The blocks from the coordinates of all nodes and their rates, shape (nodes, 9)."""
-        ends = (self.left, self.right)
-        signs = (-self.sense, self.sense)
-        halves = tuple(
-            Half(coordinates[end, 3:], sign) for end, sign in zip(ends, signs, strict=True)
-        )
-        moving = tuple(rates[end, 3:] for end in ends)
-        block = Direction(halves[0].vector + halves[1].vector)
-        reach = -self.sense * self.offset
-        first = reach[:, :, None] * block.first()
-        maps = tuple(first @ half.first() for half in halves)
-        turned = sum((m @ r[:, :, None])[:, :, 0] for m, r in zip(maps, moving, strict=True))
-        return SlopePlaced(
-            arms=reach * block.unit,
-            arm_rates=np.asarray(turned),
-            maps=(maps[0], maps[1]),
-            reach=reach,
-            block=block,
-            halves=(halves[0], halves[1]),
-            rates=(moving[0], moving[1]),
-        )

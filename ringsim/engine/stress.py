@@ -1,4 +1,4 @@
-"""Axial + bending stress at the ends of the rods."""
+"""Axial + bending stress at the ends of the rods, and bending strain along one of them."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.pantograph_ring import RingModel
-from ringsim.variables import RODS
+from ringsim.engine.model import Model
+from ringsim.layout.halves import Half, halves
 
 Array = NDArray[np.float64]
 _FORCE = exu.OutputVariableType.ForceLocal
@@ -25,29 +25,17 @@ class StressMeter:
     carries there; along it the moment follows the shear force, dM_z/dx = -Q_y and dM_y/dx = Q_z.
     """
 
-    def __init__(self, model: RingModel) -> None:
+    def __init__(self, model: Model) -> None:
         self._system, self._dampers = model.assembly.system, model.assembly.dampers
         self._output = self._system.GetObjectOutputBody
-        self._places = [self._rows(model, name) for name in RODS]
+        self._rows = [[_ends(model, half) for half in row] for row in halves(model.layout).values()]
 
     def read(self) -> Array:
-        """Stresses at the current state, shape (8, sections), Pa."""
+        """Stresses at the current state, shape (rod halves, sections), Pa."""
         damping = self._dampers.latest
         return np.array(
-            [[self._worst(ends, tube, damping) for ends, tube in row] for row in self._places]
+            [[self._worst(ends, tube, damping) for ends, tube in row] for row in self._rows]
         )
-
-    def _rows(self, model: RingModel, name: str) -> list[Any]:
-        whole = name if name.startswith("bar") else name.rsplit("_", 1)[0]
-        rows = []
-        for rod in model.rods[whole]:
-            elements = rod.elements
-            if whole != name:
-                middle = len(elements) // 2
-                elements = elements[:middle] if name.endswith("left") else elements[middle:]
-            ends = [(elements[0], -0.5 * rod.length), (elements[-1], 0.5 * rod.length)]
-            rows.append((ends, rod.tube))
-        return rows
 
     def _worst(self, ends: Any, tube: Any, damping: Array) -> float:
         worst = 0.0
@@ -61,3 +49,42 @@ class StressMeter:
             bending = moment * 0.5 * tube.outer_diameter
             worst = max(worst, abs(force[0]) / tube.area + bending / tube.second_moment)
         return worst
+
+
+class BendingMeter:
+    """Bending strain of a rod's outer fibre at its nodes, on the side of its y axis's negative.
+
+    Where two elements meet their moments differ by what turns the node alone; their mean counts.
+    ``stations`` are the nodes' distances from the rod's first end, m.
+    """
+
+    def __init__(self, model: Model, name: str) -> None:
+        number = next(k for k, rod in enumerate(model.layout.rods) if rod.name == name)
+        self._rod = rod = model.rods[number]
+        gauged = model.layout.rods[number]
+        self.stations = np.array(gauged.stations) * gauged.length
+        self._output = model.assembly.system.GetObjectOutputBody
+        self._per_moment = (
+            0.5 * rod.tube.outer_diameter / (rod.young_modulus * rod.tube.second_moment)
+        )
+
+    def read(self) -> Array:
+        """Strains at the current state, shape (nodes,)."""
+        elements = self._rod.elements
+        moments = np.array([self._output(e, _TORQUE, _MIDDLE)[2] for e in elements])
+        shear = np.array([self._output(e, _FORCE, _MIDDLE)[1] for e in elements])
+        change = 0.5 * shear * self._rod.lengths
+        first, last = moments + change, moments - change
+        at_nodes = np.concatenate([first[:1], 0.5 * (first[1:] + last[:-1]), last[-1:]])
+        return np.asarray(-self._per_moment * at_nodes)
+
+
+def _ends(model: Model, half: Half) -> tuple[list[tuple[Any, float]], Any]:
+    """First and last element of a half with the place (m) of its outer end from its middle."""
+    rod = model.rods[half.rod]
+    first, last = half.first, half.last - 1
+    ends = [
+        (rod.elements[first], -0.5 * float(rod.lengths[first])),
+        (rod.elements[last], 0.5 * float(rod.lengths[last])),
+    ]
+    return ends, rod.tube

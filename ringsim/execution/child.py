@@ -34,14 +34,15 @@ def main() -> None:
 
 
 def _serve(pipe: Connection, setup: dict[str, Any]) -> None:
-    from ringsim.execution.solve import fresh_scene, load_solver, solve
+    from ringsim.execution.solve import load_solver, solve
+    from ringsim.scene import Scene
 
     try:
-        solver, base = load_solver(setup["solver"]), fresh_scene(setup["scene"])
+        solver, base = load_solver(setup["solver"]), Scene.model_validate(setup["scene"])
     except InputError as error:
         pipe.send(str(error))
         return
-    _limit(resource.RLIMIT_DATA, int(setup["memory"]))
+    _limit(resource.RLIMIT_DATA, int(setup["limits"].memory))
     _limit(resource.RLIMIT_FSIZE, _MOST_LOG_BYTES)
     _limit(resource.RLIMIT_CORE, 0)
     for stream in (sys.stdout, sys.stderr):
@@ -53,7 +54,8 @@ def _serve(pipe: Connection, setup: dict[str, Any]) -> None:
         os.ftruncate(1, 0)
         _flush()  # what did not fit into the log before
         os.ftruncate(1, 0)
-        signal.setitimer(signal.ITIMER_REAL, setup["backstop"])
+        # Ends this process, should its parent be unable to look at it.
+        signal.setitimer(signal.ITIMER_REAL, 2.0 * setup["limits"].timeout + 60.0)
         result = solve(solver, base, task)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         _flush()

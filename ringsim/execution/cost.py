@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.overrides import section_of
-from ringsim.sampling.table import Column, Table
+from ringsim.sampling.columns import Table
 from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
@@ -24,39 +24,26 @@ _ANCF = 2.7
 
 
 def relative_cost(table: Table, base: Scene) -> Array:
-    """Predicted cost of every sample, shape (samples,), with a mean of 1.
-
-    Parameters
-    ----------
-    table
-        Inputs of the samples.
-    base
-        Scene that they vary.
-    """
+    """Predicted cost of every sample of the scene ``base``, shape (samples,), with a mean of 1."""
     cost = np.ones(table.samples)
+    unused = "tolerance" if base.solver.step_control == "constant" else "step"
     for column in table.columns:
-        cost *= _factor(column, base)
+        path = section_of(column.path)[0]
+        values = column.values.reshape(table.samples, -1)
+        if path == "rods.kind":
+            cost *= np.where(values[:, 0] == "ancf", _ANCF, 1.0)
+        elif path in _EXPONENTS and path != f"solver.{unused}":
+            size = np.abs(values.astype(float)).mean(axis=1)
+            cost *= np.maximum(size, 1e-12) ** _EXPONENTS[path]  # no force, no division by it
     relative: Array = cost / cost.mean()
     return relative
 
 
 def longest_first(samples: NDArray[np.int64], cost: Array) -> list[int]:
-    """Samples in the order of falling cost, equal ones by their index."""
+    """Samples in the order of falling cost, equal ones by their index.
+
+    >>> longest_first(np.array([0, 2, 3]), np.array([1.0, 9.0, 1.0, 2.0]))
+    [3, 0, 2]
+    """
     found: list[int] = samples[np.argsort(-cost[samples], kind="stable")].tolist()
     return found
-
-
-def _factor(column: Column, base: Scene) -> Array:
-    path = section_of(column.path)[0]
-    values = column.values
-    flat = values.reshape(len(values), -1)
-    if path == "rods.kind":
-        return np.where(flat[:, 0] == "ancf", _ANCF, 1.0)
-    constant = base.solver.step_control == "constant"
-    if path not in _EXPONENTS or (
-        path.startswith("solver.") and constant != (path == "solver.step")
-    ):
-        return np.ones(len(values))
-    size = np.abs(flat.astype(float)).mean(axis=1)
-    factor: Array = np.maximum(size, 1e-12) ** _EXPONENTS[path]
-    return factor

@@ -6,7 +6,6 @@ import contextlib
 import os
 import subprocess
 import sys
-import time
 import traceback
 from collections.abc import Iterator
 from typing import Any
@@ -17,14 +16,13 @@ OF_MPI = ("PMI", "PMIX", "OMPI", "OPAL", "PRTE", "HYDRA", "HYDI", "MPI", "I_MPI"
 """How names of variables begin by which launchers and libraries speak to each other."""
 
 _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
-_OPEN_MPI = "Open MPI"
 _LIBRARY = """
 import mpi4py
 mpi4py.rc.initialize = False
 from mpi4py import MPI
 print(MPI.Get_library_version())
 """
-_POLITE = 5e-3
+"""Tells the version of the MPI library without starting it; nothing if it cannot be loaded."""
 
 
 def launched_size() -> int:
@@ -47,8 +45,12 @@ def mpi_world() -> Any:
     expected = launched_size()
     if "OMPI_COMM_WORLD_SIZE" in os.environ:
         # Other libraries do not even start under this launcher: they end the process.
-        library = _library()
-        if library and not library.startswith(_OPEN_MPI):
+        environment = {k: v for k, v in os.environ.items() if not k.startswith(OF_MPI)}
+        library = subprocess.run(
+            [sys.executable, "-c", _LIBRARY], env=environment, capture_output=True, text=True,
+            check=False,
+        ).stdout.strip()  # fmt: skip
+        if library and not library.startswith("Open MPI"):
             raise _stranger(expected, library)
     try:
         from mpi4py import MPI
@@ -63,16 +65,6 @@ def mpi_world() -> Any:
     return world
 
 
-def _library() -> str:
-    """Version of the MPI library, which is not started for that; empty if it cannot be loaded."""
-    environment = {name: v for name, v in os.environ.items() if not name.startswith(OF_MPI)}
-    told = subprocess.run(
-        [sys.executable, "-c", _LIBRARY], env=environment, capture_output=True, text=True,
-        check=False,
-    )  # fmt: skip
-    return told.stdout.strip()
-
-
 def _stranger(expected: int, library: str) -> InputError:
     name = library.splitlines()[0].strip(" \0")
     return InputError(
@@ -80,21 +72,6 @@ def _stranger(expected: int, library: str) -> InputError:
         f"launcher belongs to another MPI than the one loaded ({name}); use that one's mpiexec "
         "(under Slurm: srun --mpi=pmi2)"
     )
-
-
-def describe(communicator: Any) -> str:
-    """Size and library of an MPI world, in words."""
-    from mpi4py import MPI
-
-    library = " ".join(MPI.Get_library_version().split("\n")[0].split())
-    return f"MPI, {communicator.Get_size()} ranks, {library}"
-
-
-def polite_barrier(communicator: Any) -> None:
-    """Wait for all ranks without spinning."""
-    request = communicator.Ibarrier()
-    while not request.Test():
-        time.sleep(_POLITE)
 
 
 @contextlib.contextmanager

@@ -4,49 +4,34 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import replace
 from multiprocessing.connection import wait
 
 from ringsim.execution.slot import TICK, Slot
-from ringsim.execution.work import Work
+from ringsim.execution.work import Scheduler, Work
 
 
-class Local:
-    """A number of solver processes, supervised by one event loop.
-
-    Parameters
-    ----------
-    workers
-        Samples that run at the same time.
-    """
+class Local(Scheduler):
+    """A number of solver processes, supervised by one event loop."""
 
     def __init__(self, workers: int) -> None:
-        self.workers = workers
+        self.workers, self.description = workers, f"{workers} local workers"
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """Run samples; see :class:`Scheduler`."""
         queue = deque(samples)
         count = min(self.workers, len(queue))
-        slots = [Slot(work.solver, work.scene, work.limits, work.retry) for _ in range(count)]
+        slots = [Slot(work.solver, work.scene, work.limits) for _ in range(count)]
         try:
             while True:
                 reason = work.stop()
                 if reason:
                     return reason
                 for slot in slots:
-                    if queue and not slot.busy:
-                        sample = queue.popleft()
-                        slot.submit(work.task(sample))
-                        work.started(sample)
-                busy = [slot for slot in slots if slot.busy]
+                    slot.serve(queue, work)
+                busy = [slot.pipe for slot in slots if slot.busy]
                 if not busy:
                     return work.stop()
-                wait([slot.pipe for slot in busy], timeout=TICK)
-                for slot in busy:
-                    result = slot.poll()
-                    if result is not None:
-                        work.keep(result)
-                        work.finished(replace(result, arrays=(), body=b""))
+                wait(busy, timeout=TICK)
         finally:
             for slot in slots:
                 slot.close()

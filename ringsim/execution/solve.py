@@ -6,7 +6,6 @@ import importlib
 import time
 import traceback
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -14,10 +13,10 @@ from ringsim.execution.work import Task
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.storage.record import Result, pack, plain
+from ringsim.storage.result import Result, pack, plain
 from ringsim.variables import Cause, Outcome, Status
 
-Solver = Callable[[Scene], Outcome]
+Run = Callable[[Scene], Outcome]
 LOG_CHARACTERS = 4000
 """So much of what a failed run printed is kept."""
 
@@ -25,7 +24,7 @@ _ALWAYS_THERE = ("final_time", "energy_error", "constraint_error", "asynchrony_m
 """Numbers that every run has that went well."""
 
 
-def load_solver(name: str) -> Solver:
+def load_solver(name: str) -> Run:
     """The function ``module:function``.
 
     Raises
@@ -35,44 +34,27 @@ def load_solver(name: str) -> Solver:
     """
     module, _, function = name.partition(":")
     try:
-        solver: Solver = getattr(importlib.import_module(module), function)
+        solver: Run = getattr(importlib.import_module(module), function)
     except (ImportError, AttributeError) as error:
         raise InputError(f"solver {name} cannot be loaded: {error}") from None
     return solver
 
 
-def solve(solver: Solver, base: Scene, task: Task) -> Result:
-    """Run one sample.
-
-    Parameters
-    ----------
-    solver
-        Maps a scene to an outcome.
-    base
-        Scene that the sample varies.
-    task
-        Which sample.
-    """
-    step, begin = float("nan"), time.monotonic()
+def solve(solver: Run, base: Scene, task: Task) -> Result:
+    """Run one sample of the scene ``base``."""
+    begin, log, form, body = time.monotonic(), "", "", b""
     try:
-        scene = base.with_values(task.values)
-        if task.shrink != 1.0:
-            scene = scene.with_values({"solver.step": scene.solver.step * task.shrink})
-        if not task.restarts:
-            scene = scene.with_values({"solver.restarts": 0})
-        step = scene.solver.step
-        outcome = solver(scene)
-        arrays, body = pack(outcome.coordinates | outcome.values)
-        status, reason, log = Status(outcome.status), str(outcome.reason), ""
-        cause = outcome.cause
+        outcome = solver(base.with_values(task.values))
+        form, body = pack(outcome.coordinates | outcome.values)
+        status, reason, cause = Status(outcome.status), str(outcome.reason), outcome.cause
         fault = not_finite(outcome) if not status.failed else ""
         if fault:
             status, reason, cause = Status.DIVERGED, fault, Cause.NOT_FINITE
     except MemoryError:
-        status, reason, log = Status.MEMORY, "the run needed more memory than allowed", _trace()
-        arrays, body, cause = (), b"", Cause.MEMORY
+        status, reason = Status.MEMORY, "the run needed more memory than allowed"
+        log, cause = traceback.format_exc(), Cause.MEMORY
     except (Exception, SystemExit) as error:
-        status, log, arrays, body = Status.ERROR, _trace(), (), b""
+        status, log = Status.ERROR, traceback.format_exc()
         reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
         cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
     return Result(
@@ -80,11 +62,10 @@ def solve(solver: Solver, base: Scene, task: Task) -> Result:
         status=status,
         reason=plain(" ".join(reason.split())[:1000]),
         cause=cause,
-        log=plain(log),
-        step=step,
+        log=plain(log[-LOG_CHARACTERS:]),
         seconds=time.monotonic() - begin,
         finished=time.time(),
-        arrays=arrays,
+        form=form,
         body=body,
     )
 
@@ -112,29 +93,9 @@ def not_finite(outcome: Outcome) -> str:
             broken = bool((gaps.any(axis=along) & ~gaps.all(axis=along)).any())
         else:
             broken = name in _ALWAYS_THERE and bool(np.isnan(array).any())
-            broken = broken and not (name == "energy_error" and _unknown(outcome, "dissipation"))
+            if name == "energy_error" and "dissipation" in outcome.values:
+                # Nobody can tell the dissipation of damped ANCF rods, nor then the energy's error.
+                broken = broken and not np.isnan(outcome.values["dissipation"]).all()
         if broken:
             return f"{name} is not a number: try a smaller solver.step"
     return ""
-
-
-def _unknown(outcome: Outcome, name: str) -> bool:
-    """Whether nobody can tell a series, as the dissipation of damped ANCF rods."""
-    values = outcome.values.get(name)
-    return values is not None and bool(np.isnan(values).all())
-
-
-def _trace() -> str:
-    return traceback.format_exc()[-LOG_CHARACTERS:]
-
-
-def fresh_scene(table: dict[str, Any]) -> Scene:
-    """The scene of nested tables that have been checked before."""
-    return Scene.model_validate(table)
-
-
-def retold(reason: str, attempts: int, first: str) -> str:
-    """The reason of a run, with what became of the attempts before it."""
-    return (
-        f"{reason} (attempt {attempts}, with a smaller step; first: {first})" if first else reason
-    )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, TypeVar
 
 from pydantic import Field
 
-from ringsim.storage.record import Result
+from ringsim.storage.result import Result
 from ringsim.units import Model, Second, Unit
 
+_T = TypeVar("_T")
 Bytes = Annotated[float, Field(ge=1e8, le=1e15), Unit("B")]
 
 
@@ -25,70 +26,65 @@ class Limits(Model):
     """Runs after which a solver process is replaced by a fresh one."""
 
 
-class Retry(Model):
-    """Repeating a run that the solver could not finish, each time with a smaller step.
-
-    Where it does, runs do not start anew by themselves (``solver.restarts``): a sample is
-    attempted 1 + times times, not (1 + times) (1 + restarts) times.
-    """
-
-    times: Annotated[int, Field(ge=0, le=10)] = 0
-    step_factor: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
-    """Factor on solver.step from one attempt to the next."""
-
-
 @dataclass(frozen=True)
 class Task:
     """One run that is asked for."""
 
     sample: int
     values: dict[str, Any]
-    shrink: float = 1.0
-    """Factor on the scene's largest step."""
-    restarts: bool = True
-    """Whether the run may start anew by itself (``solver.restarts``)."""
 
 
 @dataclass(frozen=True)
 class Work:
-    """The samples' content, and where results go.
-
-    Attributes
-    ----------
-    solver
-        ``module:function`` that maps a scene to an outcome.
-    scene
-        Base scene as nested tables.
-    values_of
-        Inputs of a sample by scene path.
-    limits, retry
-        Bounds on one run, and what to repeat.
-    keep
-        Stores a result; called in the process that supervised the run.
-    started, finished
-        Tell the scheduling process what goes on; results come without their arrays.
-    stop
-        A reason to stop, or an empty string; asked often.
-    """
+    """The samples' content, and where results go."""
 
     solver: str
+    """``module:function`` that maps a scene to an outcome."""
     scene: dict[str, Any]
     values_of: Callable[[int], dict[str, Any]]
+    """Inputs of a sample by scene path."""
     limits: Limits
-    retry: Retry
     keep: Callable[[Result], None]
-    started: Callable[[int], None]
-    finished: Callable[[Result], None]
+    """Stores a result; called in the process that supervised the run."""
     stop: Callable[[], str]
+    """A reason to stop, or an empty string; asked often."""
+    started: Callable[[int], None] = lambda sample: None
+    finished: Callable[[Result], None] = lambda result: None
+    """Tell rank 0 what goes on; results of other ranks come without their arrays."""
 
     def task(self, sample: int) -> Task:
-        """The first run of a sample."""
-        return Task(sample, self.values_of(sample), restarts=self.retry.times == 0)
+        """The run of a sample."""
+        return Task(sample, self.values_of(sample))
 
 
-class Scheduler(Protocol):
-    """The one seam between a campaign and the processes that compute it."""
+class Scheduler:
+    """The one seam between a campaign and the processes that compute it.
+
+    Every process that takes part has one and calls the same methods in the same order; what
+    stands here is for a process that is alone.
+    """
+
+    rank = 0
+    """Number of this process among those that run the campaign together."""
+    workers = 1
+    """Samples that run at the same time."""
+    description = ""
+    """Who computes, in words."""
 
     def run(self, samples: Sequence[int], work: Work) -> str:
-        """Run samples, first ones first; returns the reason if it stopped before the end."""
-        ...
+        """Run samples, first ones first; returns the reason if it stopped before the end.
+
+        Only the samples of rank 0 are looked at.
+        """
+        raise NotImplementedError
+
+    def from_first(self, value: _T) -> _T:
+        """The value of rank 0, on all ranks."""
+        return value
+
+    def from_all(self, value: _T) -> list[_T]:
+        """The values of all ranks, on all of them."""
+        return [value]
+
+    def wait(self) -> None:
+        """Return when all ranks have come here."""

@@ -32,9 +32,9 @@ class Asynchrony(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Differences on the output grid; the maximum is looked for between readings, too."""
-        joints = run.locks.size
-        if joints < 2:
+        if not run.scene.structure.locks:
             return {}
+        joints = run.locks.size
         opening = np.degrees(run.angles.on_grid(run.rates.values)).reshape(joints, -1)
         apart = opening.max(axis=0) - opening.min(axis=0)
         angles, rates = (each.values.reshape(-1, joints) for each in (run.angles, run.rates))

@@ -1,15 +1,15 @@
-"""Bending strain of a planar truss's upper beam."""
+"""Bending strain of the rod that carries a structure's gauge."""
 
 import numpy as np
 
-from ringsim.outputs.family import Array, Instant, Output, Run, Series, Values, Variable
+from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
 
 
 class BendingStrain(Output):
     """Strain of the outer fibre at the nodes, where a beam loaded at its nodes is bent most."""
 
     rank = 44
-    needs = ("planar-truss",)
+    needs = ("gauge",)
     coordinates = (
         Variable("station", ("station",), "m", "distance along the upper beam from the fixed axis"),
     )
@@ -23,7 +23,7 @@ class BendingStrain(Output):
         ),
     )  # fmt: skip
 
-    def read(self, now: Instant) -> Array | None:
+    def read(self, now: Reading) -> Array | None:
         """Shape (stations,)."""
         return now.strain
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ringsim.outputs.family import Array, ErrorBar, Instant, Output, Run, Series, Values, Variable
+from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
 from ringsim.parts.solver import TENSION_BEND
 
 
@@ -33,7 +33,7 @@ class CableTension(Output):
         Variable("peak_tension_time", (), "s", "time of the largest tension"),
     )  # fmt: skip
 
-    def read(self, now: Instant) -> Array | None:
+    def read(self, now: Reading) -> Array | None:
         """Shape (planes, spans), N; NaN where a plane has no cable or one of fewer spans."""
         if now.chain is None:
             return None

@@ -19,5 +19,7 @@ class Deployment(Output):
     )  # fmt: skip
 
     def reduce(self, run: Run, series: Series) -> Values:
-        """As the run knows them; see ``ringsim.outputs.series.lock_times``."""
+        """As the run knows them; see ``ringsim.stepping.locks.lock_times``."""
+        if not run.scene.structure.locks:
+            return {}
         return {"lock_time": run.locks, "deployment_time": run.locks.max()}

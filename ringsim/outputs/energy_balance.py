@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ringsim.outputs.family import Array, Instant, Output, Run, Series, Values, Variable
+from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
 
 
 class EnergyBalance(Output):
@@ -20,7 +20,7 @@ class EnergyBalance(Output):
         ),
     )  # fmt: skip
 
-    def read(self, now: Instant) -> Array:
+    def read(self, now: Reading) -> Array:
         """In the order of the variables, J, shape (4,)."""
         return np.array(now.energies[:4])
 

@@ -1,20 +1,20 @@
-"""What a run may be wrong by, from a second run with steps twice as long.
+"""Numerical error of a run, estimated from a second run with steps twice as long.
 
 The integrator is of second order, so that doubling the steps multiplies an error by four and the
 two runs differ by three times the error of the finer one.  That holds on average; a single number
 (the largest of an oscillating quantity, the time of one event) may agree by chance.  The bars
 therefore take about the whole difference, and of times and angles the largest of all joints.
 The asynchrony as a function of time oscillates with the ring's own vibrations, which long steps do
-not follow: its bar at any time is made of the largest difference up to then, and an asynchrony
-below its bar says nothing.  What few elements leave out does not depend on the steps and is added:
+not resolve: its bar at any time follows from the largest difference up to then; an asynchrony
+below its bar is not significant.  The error of few elements, independent of the steps, is added:
 the rods' own inertia between two nodes, as a share that falls with the square of their number.
 So is the part of a peak tension that may lie between two readings, as the step control allows it.
 
-Where the second run does not end well with longer steps, one with steps of half the length takes
+Where the run with longer steps does not end as ok, one with steps of half the length takes
 its place; it differs by three quarters of the error, so that its differences count four times.
 
-Each output states its factors (``ErrorBar``): those that cover 9 errors of 10 over random scenes
-and are not much larger; benchmarks/error_bars.py, docs/accuracy.md.
+Each output states its factors (``ErrorBar``), the smallest that cover about 9 of 10 errors over
+random scenes: benchmarks/error_bars.py, docs/accuracy.md.
 """
 
 from __future__ import annotations
@@ -24,14 +24,11 @@ import numpy as np
 from ringsim.outputs.family import VARIABLES, Array, ErrorBar
 from ringsim.variables import Outcome, Status
 
-OF_FINER = 4.0
-"""Factor on differences to a run with half of the steps: (4 - 1) / (1 - 1/4)."""
-
 
 def error_bars(
     run: Outcome, other: Outcome, elements: int, tolerance: float, scale: float = 1.0
 ) -> dict[str, Array]:
-    """Error bars of a run's main numbers.
+    """Error bars of the main results of a run.
 
     Parameters
     ----------
@@ -44,7 +41,7 @@ def error_bars(
     tolerance
         ``solver.tolerance`` of the run that counts.
     scale
-        Factor on the differences: 1 for longer steps, ``OF_FINER`` for shorter ones.
+        Factor on the differences: 1 for longer steps, 4 for shorter ones.
 
     Returns
     -------
@@ -66,7 +63,7 @@ def rules() -> dict[str, ErrorBar]:
 
 
 def differences(one: Outcome, other: Outcome) -> dict[str, Array]:
-    """How far two runs of a scene are apart in what has an error bar, as far as they have it.
+    """Differences of two runs of a scene in what has an error bar, as far as both have it.
 
     The largest difference of all joints and output times; of a function of time alone the largest
     up to each output time, shape (time,).
@@ -82,7 +79,7 @@ def differences(one: Outcome, other: Outcome) -> dict[str, Array]:
 
 
 def largest(outcome: Outcome, name: str) -> Array:
-    """Value of a run's number, or the largest of its series; of one over time up to each time."""
+    """Value of a result, or the largest of its series; of one over time up to each time."""
     return _largest(name, outcome.values[name])
 
 
@@ -95,7 +92,7 @@ def _largest(name: str, values: Array) -> Array:
 def bar(
     name: str, apart: Array | float, value: Array | float, elements: int, tolerance: float
 ) -> Array:
-    """Error bar of a number from the difference of two runs, in its unit."""
+    """Error bar of a result from the difference of two runs, in its unit."""
     rule = rules()[name]
     share = rule.of_one_element / elements**2 + rule.between_readings * tolerance
     return np.asarray(rule.safety * apart + share * value)

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.choice import kind_of
-from ringsim.outputs.instant import Array, Instant
+from ringsim.outputs.reading import Array, Reading
 from ringsim.outputs.series import Run, Series, output_times
 from ringsim.scene import Scene
-from ringsim.variables import RODS, ErrorBar, Variable
+from ringsim.variables import ErrorBar, Variable
 
-__all__ = ["Array", "ErrorBar", "Instant", "Output", "Run", "Series", "Values", "Variable"]
+__all__ = ["Array", "ErrorBar", "Output", "Reading", "Run", "Series", "Values", "Variable"]
 
 Values = dict[str, Any]
 """Arrays and numbers by the names of their variables."""
@@ -32,7 +32,6 @@ COORDINATES = {
         Variable("section", ("section",), "1", "section number, counted from the boom", "i4"),
         Variable("time", ("time",), "s", "time since the start of the run"),
         Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
-        Variable("rod", ("rod",), "1", "rod half of a section", "str"),
     )
 }
 """Dimensions of the variables; an output may declare more."""
@@ -70,7 +69,7 @@ class Output:
         for output in OUTPUTS:
             VARIABLES.update(_declared(output))
 
-    def read(self, now: Instant) -> Array | float | None:
+    def read(self, now: Reading) -> Array | float | None:
         """What to keep of the state after an accepted step; None if this run does not tell it."""
         return np.empty(0)
 
@@ -102,7 +101,11 @@ def _declared(output: type[Output]) -> dict[str, Variable]:
 def holds(scene: Scene) -> set[str]:
     """Everything that a variable may need and the scene has."""
     parts = {name for name in type(scene).parts() if getattr(scene, name) is not None}
-    asked = {"stress": scene.record.stress, "error bars": scene.solver.error_bars}
+    asked = {
+        "stress": scene.record.stress,
+        "error bars": scene.solver.error_bars,
+        "gauge": bool(scene.structure.gauge),
+    }
     return parts | {kind_of(scene.structure)} | {name for name, wanted in asked.items() if wanted}
 
 
@@ -113,5 +116,4 @@ def axes(scene: Scene) -> dict[str, NDArray[Any]]:
         "section": np.arange(1, scene.structure.sections + 1),
         "time": output_times(scene),
         "span": np.arange(1, scene.spans + 1),
-        "rod": np.array(RODS),
     }

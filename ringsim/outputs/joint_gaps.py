@@ -1,6 +1,6 @@
 """How well the joints hold together."""
 
-from ringsim.outputs.family import Instant, Output, Run, Series, Values, Variable
+from ringsim.outputs.family import Output, Reading, Run, Series, Values, Variable
 
 
 class JointGaps(Output):
@@ -15,7 +15,7 @@ class JointGaps(Output):
         ),
     )  # fmt: skip
 
-    def read(self, now: Instant) -> float:
+    def read(self, now: Reading) -> float:
         """The gap, m."""
         return now.gap
 

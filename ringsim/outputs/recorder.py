@@ -3,71 +3,55 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.outputs.family import COORDINATES, OUTPUTS, VARIABLES, Array, Output, axes, holds
-from ringsim.outputs.instant import Energies, Instant
-from ringsim.outputs.series import Run, Series, lock_times, output_times
+from ringsim.outputs.reading import Reading
+from ringsim.outputs.series import Run, Series, output_times
 from ringsim.scene import Scene
-from ringsim.variables import Cause, Outcome, Reason, Status
-
-
-@dataclass
-class History:
-    """What the control of a run needs of its steps so far; lists of equal length.
-
-    Attributes
-    ----------
-    angles, rates
-        Opening angles and rates, rad and rad/s, shape (planes, sections) each.
-    gaps
-        Largest joint gap, m.
-    tensions
-        Tension of every span of all cables behind one another, N; empty without cables.
-    """
-
-    times: list[float] = field(default_factory=list)
-    angles: list[Array] = field(default_factory=list)
-    rates: list[Array] = field(default_factory=list)
-    energies: list[Energies] = field(default_factory=list)
-    gaps: list[float] = field(default_factory=list)
-    tensions: list[Array] = field(default_factory=list)
-    status: Status = Status.UNFINISHED
-    reason: str = ""
-    cause: Cause = Cause.NONE
-    newton_iterations: int = 0
-    jacobians: int = 0
-    halvings: int = 0
-
-    def end(self, status: Status, reason: Reason) -> None:
-        """Note how the run ended and why."""
-        self.status, self.reason, self.cause = status, str(reason), reason.cause
+from ringsim.stepping.instant import Energies
+from ringsim.stepping.locks import lock_times
+from ringsim.variables import Outcome, Reason, Status
 
 
 class Recorder:
-    """The outputs of one run of a scene, and the ``history`` that its control needs."""
+    """A run of a scene, step by step.
+
+    Attributes
+    ----------
+    times, angles, rates, energies, gaps
+        Of all accepted steps; see ``ringsim.stepping.instant``.
+    status, reason
+        How the run has ended and why.
+    repeats, newton_iterations, jacobians
+        What the solver took.
+    """
 
     def __init__(self, scene: Scene, coordinates: Mapping[str, NDArray[Any]] | None = None) -> None:
         """Begin a run; ``coordinates`` are those that its outputs declare themselves."""
-        self.history = History()
         self._scene, self._coordinates = scene, coordinates or {}
         self._readings: dict[Output, list[Any]] = {output: [] for output in outputs_of(scene)}
         self._lost = self._driven = 0.0
+        self.times: list[float] = []
+        self.angles: list[Array] = []
+        self.rates: list[Array] = []
+        self.energies: list[Energies] = []
+        self.gaps: list[float] = []
+        self.status, self.reason = Status.UNFINISHED, Reason()
+        self.repeats = self.newton_iterations = self.jacobians = 0
 
-    def note(self, now: Instant) -> None:
+    def note(self, now: Reading) -> None:
         """Keep an accepted step; its energies lost and driven are those since the step before."""
-        history, energies = self.history, now.energies
-        history.times.append(now.time)
-        history.angles.append(now.angles)
-        history.rates.append(now.rates)
-        history.energies.append(energies)
-        history.gaps.append(now.gap)
-        if now.chain is not None:
-            history.tensions.append(now.chain.tensions)
+        energies = now.energies
+        self.times.append(now.time)
+        self.angles.append(now.angles)
+        self.rates.append(now.rates)
+        self.energies.append(energies)
+        self.gaps.append(now.gap)
         self._lost += energies.lost
         self._driven += energies.driven
         work = energies.work + self._driven
@@ -77,18 +61,23 @@ class Recorder:
 
     def outcome(self) -> Outcome:
         """Put the run on the output grid; what lies after its end is NaN."""
-        history, grid = self.history, output_times(self._scene)
-        times, rates = np.array(history.times), np.array(history.rates)
-        angles = Series(times, np.array(history.angles), grid)
+        times, grid = np.array(self.times), output_times(self._scene)
+        angles, rates = np.array(self.angles), np.array(self.rates)
         counts = {
             "steps": len(times) - 1,
-            "repeated_steps": history.halvings,
-            "newton_iterations": history.newton_iterations,
-            "jacobians": history.jacobians,
+            "repeated_steps": self.repeats,
+            "newton_iterations": self.newton_iterations,
+            "jacobians": self.jacobians,
         }
-        locks = lock_times(times, angles.values, rates)
-        ending = (history.status, history.cause)
-        run = Run(self._scene, angles, Series(times, rates, grid), locks, counts, *ending)
+        run = Run(
+            self._scene,
+            Series(times, angles, grid),
+            Series(times, rates, grid),
+            lock_times(times, angles, rates),
+            counts,
+            self.status,
+            self.reason.cause,
+        )
 
         def series_of(output: Output) -> Series | None:
             readings = self._readings[output]
@@ -97,7 +86,7 @@ class Recorder:
 
         values = reduced(run, self._readings, series_of)
         coordinates = spanned(values, axes(self._scene) | dict(self._coordinates))
-        return Outcome(history.status, history.reason, coordinates, values, history.cause)
+        return Outcome(self.status, str(self.reason), coordinates, values, self.reason.cause)
 
 
 def outputs_of(scene: Scene) -> list[Output]:

@@ -1,6 +1,6 @@
 """Stress of the rods."""
 
-from ringsim.outputs.family import Array, ErrorBar, Instant, Output, Run, Series, Values, Variable
+from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
 
 
 class RodStress(Output):
@@ -8,6 +8,7 @@ class RodStress(Output):
 
     rank = 30
     needs = ("stress",)
+    coordinates = (Variable("rod", ("rod",), "1", "rod half of a section", "str"),)
     variables = (
         Variable(
             "rod_stress", ("rod", "section", "time"), "Pa",
@@ -20,8 +21,8 @@ class RodStress(Output):
         ),
     )  # fmt: skip
 
-    def read(self, now: Instant) -> Array | None:
-        """Shape (8, sections), Pa."""
+    def read(self, now: Reading) -> Array | None:
+        """Shape (rod halves, sections), Pa."""
         return now.stress
 
     def reduce(self, run: Run, series: Series) -> Values:

@@ -103,27 +103,3 @@ def output_times(scene: Scene) -> Array:
     """The scene's output grid in s: multiples of ``record.interval`` up to the end time."""
     count = math.floor(scene.solver.end_time / scene.record.interval * _SAME)
     return np.asarray(np.arange(count + 1) * scene.record.interval, dtype=float)
-
-
-def lock_times(times: Array, angles: Array, rates: Array) -> Array:
-    """First time at which each V-joint reaches 180 deg, shape (planes, sections), s; NaN if never.
-
-    The crossing is the root of the cubic that fits angles and rates at both ends of the step.
-
-    Parameters
-    ----------
-    times, angles, rates
-        Shapes (n,), (n, planes, sections) and the same; s, rad, rad/s.
-    """
-    found = np.full(angles.shape[1:], np.nan)
-    for place in np.ndindex(*found.shape):
-        past = angles[(slice(None), *place)] - math.pi
-        crossing = np.flatnonzero(past >= 0.0)
-        if len(crossing) == 0 or crossing[0] == 0:
-            continue
-        ends = slice(crossing[0] - 1, crossing[0] + 1)
-        cubic = CubicHermiteSpline(times[ends], past[ends], rates[(ends, *place)])
-        roots = cubic.roots(extrapolate=False)
-        inside = roots[(roots >= times[ends][0]) & (roots <= times[ends][1])]
-        found[place] = inside.min() if len(inside) else times[crossing[0]]
-    return found

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ringsim.outputs.family import Array, Instant, Output, Run, Series, Values, Variable
+from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
 
 
 class SlackDuration(Output):
@@ -16,7 +16,7 @@ class SlackDuration(Output):
         ),
     )
 
-    def read(self, now: Instant) -> Array | None:
+    def read(self, now: Reading) -> Array | None:
         """1 where the rope at the first winch is slack, else 0, shape (planes,)."""
         chain = now.chain
         return None if chain is None else now.by_plane(chain.is_slack[chain.ropes.first])

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from ringsim.parts.persection import PerSection
+from ringsim.parts.springs import Reaction, one_sided, two_sided
 from ringsim.units import DampingRate, Kilogram, Metre, Model, SpringRate
+
+ONSET = 1e-4
+"""Stretch over which the damper of a string comes in, m: a ten-thousandth of its length."""
 
 
 class Net(Model):
@@ -20,3 +28,12 @@ class Net(Model):
     neutral_length: Metre = 0.7116
     two_sided: bool = False
     hub_mass: Kilogram = 1e-5
+
+    def tension(self, stretch: Any, rate: Any, xp: Any = np) -> Reaction:
+        """Of strings longer than neutral by ``stretch`` (m), at its rate (m/s).
+
+        The stiffness is that of all corners, or of those that ``at_section`` has picked.
+        """
+        if self.two_sided:
+            return two_sided(stretch, rate, self.stiffness, self.damping)
+        return one_sided(stretch, rate, self.stiffness, self.damping, ONSET, xp)

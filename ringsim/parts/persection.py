@@ -6,20 +6,15 @@ from typing import Annotated, Any, TypeVar, Union
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Discriminator, Tag
+from pydantic import Discriminator, Tag
+
+from ringsim.units import ListIn, Model
 
 Array = NDArray[np.float64]
 _T = TypeVar("_T")
+_Record = TypeVar("_Record", bound=Model)
 
 ONE, EACH = "one value", "a value each"
-
-
-def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
-
-
-ListIn = BeforeValidator(_as_tuple)
-"""TOML arrays arrive as lists; a frozen record keeps tuples."""
 
 
 def _one_or_each(value: Any) -> str:
@@ -29,9 +24,18 @@ def _one_or_each(value: Any) -> str:
 PerSection = Annotated[
     Union[Annotated[_T, Tag(ONE)], Annotated[tuple[_T, ...], Tag(EACH)]],  # noqa: UP007
     Discriminator(_one_or_each),
-    BeforeValidator(_as_tuple),
+    ListIn,
 ]
 """One value for all sections, or a list (TOML array) with one value for each."""
+
+
+def at_section(record: _Record, where: int | NDArray[np.int64]) -> _Record:
+    """A record whose lists hold the values of one section (floats), or of several (arrays)."""
+    lists = {name: value for name, value in record if isinstance(value, tuple)}
+    one = isinstance(where, int)
+    return record.model_copy(
+        update={n: v[where] if one else np.asarray(v)[where] for n, v in lists.items()}
+    )
 
 
 def spread(value: float | tuple[float, ...], sections: int) -> Array:

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from ringsim.units import Model, Ratio, Second, SecondOrZero
 
 _FINER = 0.25
-"""Factor on the step from one start of a run to the next."""
+"""Factor on the step from one start of a run to the next: two restarts reach a sixteenth."""
 NO_DEVIATIONS = 1e6
 """``deviation_tolerance`` from which on the deviations choose no steps."""
 TENSION_BEND = 15.0
@@ -18,6 +18,8 @@ At 3e-3, the tolerance of ``ring18-cable``, that is 0.045, and the peaks found a
 (rings of 4 and 5 sections that lock slowly) or better, for at most a third more steps."""
 _LEAST_STEP, _LEAST_TOLERANCE, _LARGEST_TOLERANCE = 1e-9, 1e-8, 0.1
 _LEAST_DEVIATION = 1e-6
+MOST_STEPS = 10_000_000
+"""Upper bound of ``step_limit``."""
 
 
 class Solver(Model):
@@ -45,7 +47,7 @@ class Solver(Model):
     steps resolve the ring's own vibrations where ``record.stress`` asks for them; 1e6: not
     followed."""
 
-    step_limit: Annotated[int, Field(ge=1, le=10_000_000)] = 20_000
+    step_limit: Annotated[int, Field(ge=1, le=MOST_STEPS)] = 20_000
     """A run that has not ended after so many steps is given up."""
 
     energy_tolerance: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.1
@@ -71,39 +73,22 @@ class Solver(Model):
         return self
 
     def refined(self, times: int) -> Solver:
-        """The settings of a restart: a quarter of every step, ``times`` times over.
+        """The settings of a restart: a quarter of every step, ``times`` times over."""
+        return self.scaled(_FINER**times)
 
-        Steps go with the square root of the tolerance, so that takes a sixteenth of it.
+    def scaled(self, factor: float) -> Solver:
+        """Every step so many times as long.
+
+        The largest step is scaled, and with it the smallest, or a run at one of them would hardly
+        differ; steps go with the square root of the tolerances, which take the factor's square.
+        Only where a run is a single step there is no longer one.
         """
+        tolerance = min(max(self.tolerance * factor**2, _LEAST_TOLERANCE), _LARGEST_TOLERANCE)
         return self.model_copy(
             update={
-                "step": max(self.step * _FINER**times, _LEAST_STEP),
-                "tolerance": max(self.tolerance * _FINER ** (2 * times), _LEAST_TOLERANCE),
-                "deviation_tolerance": self.deviations_scaled(_FINER ** (2 * times)),
-            }
-        )
-
-    def coarsened(self) -> Solver:
-        """The settings of the second run of ``error_bars``: every step twice as long.
-
-        The largest step doubles too, and the smallest with it, or a run at one of them would
-        differ too little from the first; only where a run is a single step there is no longer one.
-        """
-        return self.model_copy(
-            update={
-                "step": min(2.0 * self.step, self.end_time),
-                "tolerance": min(4.0 * self.tolerance, _LARGEST_TOLERANCE),
-                "deviation_tolerance": self.deviations_scaled(4.0),
-            }
-        )
-
-    def halved(self) -> Solver:
-        """Every step half as long."""
-        return self.model_copy(
-            update={
-                "step": max(0.5 * self.step, _LEAST_STEP),
-                "tolerance": max(0.25 * self.tolerance, _LEAST_TOLERANCE),
-                "deviation_tolerance": self.deviations_scaled(0.25),
+                "step": min(max(self.step * factor, _LEAST_STEP), self.end_time),
+                "tolerance": tolerance,
+                "deviation_tolerance": self.deviations_scaled(factor**2),
             }
         )
 

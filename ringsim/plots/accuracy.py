@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from ringsim.analysis.errors import OUTPUTS
 from ringsim.plots import style
 
 _LOOKS = {
@@ -22,15 +21,6 @@ _LOOKS = {
     "newton": (style.VERMILLION, "P"),
     "setting": (style.GREY, "X"),
 }
-_TITLES = {
-    "deployment_time": "Deployment time",
-    "opening_angle": "Opening angle",
-    "asynchrony": "Asynchrony",
-    "peak_tension": "Peak tension",
-    "peak_rod_stress": "Peak rod stress",
-    "peak_bending_strain": "Peak bending strain",
-    "energy": "Energy balance",
-}
 
 
 @style.styled
@@ -38,29 +28,25 @@ def accuracy(found: xr.Dataset) -> Figure:
     """One panel an output: relative error over processor time.
 
     The line is the frontier: what settings are good for, which is no less than the error of any
-    finer one.  What the ideal ring gives stands in words: it is too cheap for the axis.
-
-    Parameters
-    ----------
-    found
-        From ``ringsim.analysis.accuracy.judge``.
+    finer one.  The ideal ring is named in words: it is too cheap for the axis.  ``found`` is from
+    ``ringsim.analysis.accuracy.judge``.
     """
-    outputs = [name for name in _TITLES if name in found.output.values]
+    titles = {**OUTPUTS, "energy": "energy balance"}
+    outputs = [name for name in titles if name in found.output.values]
     columns = min(3, len(outputs))
     rows = -(-len(outputs) // columns)
     figure = style.new_figure(3.6 * columns, 3.0 * rows + 0.9)
     panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-    for panel, name in zip(panels, outputs, strict=False):
+    for k, (panel, name) in enumerate(zip(panels, outputs, strict=False)):
         _panel(panel, found.sel(output=name))
-        style.name_panel(panel, _TITLES[name])
-    for panel in panels[len(outputs) :]:
-        panel.set_visible(False)
-    for k, panel in enumerate(panels[: len(outputs)]):
+        style.name_panel(panel, titles[name].capitalize())
         if k % columns == 0:
             panel.set_ylabel("Relative error")
         if k + columns >= len(outputs):
             panel.set_xlabel("Processor time of the run (s)")
             panel.tick_params(labelbottom=True)
+    for panel in panels[len(outputs) :]:
+        panel.set_visible(False)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
     figure.suptitle(str(found.attrs.get("title", "Accuracy")), x=0.012, ha="left")
@@ -68,47 +54,37 @@ def accuracy(found: xr.Dataset) -> Figure:
 
 
 def _panel(axes: Axes, found: xr.Dataset) -> None:
-    cost, error = found.cost.values, found.error.values
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    cost, error, ladder = found.cost.values, found.error.values, found.ladder.values
+    drawn = np.isfinite(error) & (error > 0.0)
+    axes.loglog()
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
     for name, (colour, marker) in _LOOKS.items():
-        own = (found.ladder.values == name) & np.isfinite(error) & (error > 0.0)
-        if (found.ladder.values == name).any():
-            size = 150 if marker == "*" else 34
+        own = (ladder == name) & drawn
+        if (ladder == name).any():
+            size, order = (150, 4) if marker == "*" else (34, 3)
             axes.scatter(
                 cost[own], error[own], s=size, color=colour, marker=marker, label=name,
-                linewidths=0.0, alpha=0.9, zorder=4 if marker == "*" else 3,
+                linewidths=0.0, alpha=0.9, zorder=order,
             )  # fmt: skip
-    full = found.ladder.values != "fidelity"
     best = np.flatnonzero(found.frontier.values & (error > 0.0))
     best = best[np.argsort(cost[best])]
     axes.step(
         cost[best], found.bound.values[best], where="post", color=style.INK, linewidth=1.1,
         label="frontier: good for", zorder=2,
     )  # fmt: skip
-    floor = float(found.uncertainty)
-    known = error[np.isfinite(error) & (error > 0.0) & full]
-    lowest, highest = known.min(initial=np.inf), known.max(initial=0.0)
-    if floor > 0.0:
-        lowest = min(0.5 * floor, lowest)
-        highest = max(floor, highest)
-    if highest > 0.0:
-        axes.set_ylim(0.4 * lowest, 30.0 * highest)
+    floor, ideal = float(found.uncertainty), ladder == "fidelity"
+    known = error[drawn & ~ideal]
+    if known.size or floor > 0.0:
+        lowest = min(known.min(initial=np.inf), 0.5 * floor or np.inf)
+        axes.set_ylim(0.4 * lowest, 30.0 * max(known.max(initial=0.0), floor))
     axes.axhspan(
         axes.get_ylim()[0], max(floor, axes.get_ylim()[0]), color=style.PALE, zorder=0.5,
         linewidth=0.0, label="uncertainty of the reference",
     )  # fmt: skip
-    for k in np.flatnonzero(~full & np.isfinite(error)):
+    for k in np.flatnonzero(ideal & np.isfinite(error)):
         axes.text(
             0.97, 0.88, f"ideal ring: {error[k]:.1e} in {cost[k]:.2g} s", ha="right", va="top",
             transform=axes.transAxes, fontsize="small", color=style.INK,
         )  # fmt: skip
-
-
-def draw_accuracy(found: xr.Dataset, path: Path) -> Path:
-    """Write the figure as PNG."""
-    style.write(accuracy(found), path)
-    return path

@@ -1,4 +1,4 @@
-"""How far the sections are apart over time."""
+"""Asynchrony of the sections over time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ringsim.plots import style, wording
 
 @style.styled
 def asynchrony(dataset: xr.Dataset) -> Figure:
-    """Asynchrony over time, its largest value up to the deployment marked.
+    """Asynchrony over time, with its largest value up to the deployment.
 
     Parameters
     ----------

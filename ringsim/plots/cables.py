@@ -1,4 +1,4 @@
-"""What the cables do: the quantities that a study of one winch asks for."""
+"""Spans, tensions and pulley forces of a cable over time."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ringsim.cable.records import Cable
-from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.plots import style, wording
 from ringsim.scene import scene_from_toml
+from ringsim.structures.pantograph_ring import PantographRing
 
 Array = NDArray[np.float64]
 
 _PANELS = (
-    ("Length of a span (m)", "_lengths"),
-    ("Elongation of a span (mm)", "_elongations"),
+    ("Span length (m)", "_lengths"),
+    ("Span elongation (mm)", "_elongations"),
     ("Decay factor of a section", "_decays"),
-    ("Tension at section's start (N)", "_tensions"),
+    ("Tension at section start (N)", "_tensions"),
     ("Force on hinge pulley (N)", "_hinge_forces"),
     ("Force on V pulley (N)", "_block_forces"),
 )
@@ -109,13 +109,13 @@ class SectionSeries:
     def hinge_forces(self) -> Array:
         """Force on the first hinge pulley, N.
 
-        The rope comes up the boom at the first section, and from the section before, square to
-        the boom and by half the turn of the plan aside, at all others.  Paper 000, eqs 28 and 29,
+        The rope arrives along the boom at the first section, and from the section before, normal to
+        the boom and turned by half the angle between both, at all others.  Paper 000, eqs 28, 29,
         with T1 + T2 sin gamma in the first.
         """
         level = (self._half * np.cos(self._fold) + self._aside) / self.lengths
         fall = self._drop / self.lengths
-        # Cosine of the angle between the pulls; half the plan's turn lies at either hinge pulley.
+        # Cosine of the angle between the spans; each hinge pulley has half the turn of the plan.
         cosine = np.concatenate([fall[:1], -level[1:] * self._half_turns])
         square = self.entry**2 + self.arriving**2 + 2.0 * self.entry * self.arriving * cosine
         return np.asarray(np.sqrt(np.maximum(square, 0.0)))
@@ -124,7 +124,7 @@ class SectionSeries:
     def block_forces(self) -> Array:
         """Force on the V pulley along its bisector, N: (T2 + T3) sin gamma.
 
-        Paper 000, eq. 30, prints the difference of both; the pulls add up (``docs/cables.md``).
+        Paper 000, eq. 30, prints the difference of both, but they add up (``docs/cables.md``).
         """
         return np.asarray(self._drop * (self.entry / self._before + self.behind / self._behind))
 

@@ -1,4 +1,4 @@
-"""Orthographic view of points in space: true to scale, so one scale bar serves the drawing."""
+"""Orthographic view of points in space: true to scale, so one scale bar is enough."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) 
         A run with ``rod_stress`` (rod, section, time).
     sections
         Section numbers, at most six; by default the first one in black and the one half-way
-        round the structure in red (1 and 9 of 18).
+        around the structure in red (1 and 9 of 18).
 
     Returns
     -------
@@ -70,7 +70,7 @@ def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) 
 
 
 def default_sections(sections: int) -> tuple[int, ...]:
-    """The section at the boom and the one half-way round: 1 and 9 of 18."""
+    """The section at the boom and the one opposite: 1 and 9 of 18."""
     return tuple(dict.fromkeys((1, max(sections // 2, min(2, sections)))))
 
 

@@ -1,4 +1,4 @@
-"""Where the energy of a run comes from and goes to."""
+"""Work, energies and energy balance of a run over time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LOOKS = {
 
 @style.styled
 def energy(dataset: xr.Dataset) -> Figure:
-    """Energies over time, and what the balance lacks.
+    """Energies over time, and the imbalance.
 
     Parameters
     ----------

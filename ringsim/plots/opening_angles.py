@@ -15,7 +15,7 @@ from matplotlib.ticker import MultipleLocator
 from ringsim.plots import style, wording
 
 _LEAST_SPAN = 0.01
-"""Deviations below this (degree) are drawn flat, so that rounding does not look like motion."""
+"""Smallest range (degree) of the axis of deviations, so that round-off is not magnified."""
 
 
 @style.styled

@@ -63,7 +63,7 @@ def strain_over_length(dataset: xr.Dataset) -> Figure:
     Returns
     -------
     Figure
-        Left over the cable's length, at the station that is strained most and in the middle of
+        Left over the cable's length, at the station with the largest strain and in the middle of
         the beam; right along the beam at some lengths while reeled in.
     """
     strain = dataset["bending_strain"]
@@ -132,7 +132,7 @@ def _length_axis(axes: Axes, dataset: xr.Dataset) -> None:
 
 
 def _mark_end(axes: Axes, dataset: xr.Dataset, tension: xr.DataArray) -> None:
-    """Name the rise at the shortest length, if there is one."""
+    """Annotate the rise at the shortest length, if there is one."""
     length = dataset["cable_length"].isel(plane=0)
     at, peak = 1e3 * float(length.min()), float(tension.max())
     if float(tension.isel(time=int(np.nanargmin(length.values)))) < 0.9 * peak:

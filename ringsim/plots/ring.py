@@ -15,10 +15,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from ringsim.layout.lines import lines_of
+from ringsim.layout.of_scene import layout_at_opening, layout_of
 from ringsim.plots import style, wording
 from ringsim.plots.camera import Camera
-from ringsim.plots.ring_parts import facing_azimuth, ring_parts
-from ringsim.scene import scene_from_toml
+from ringsim.scene import Scene, scene_from_toml
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ _WIDTH, _HIGHEST, _SIDE, _GAP = 10.6, 4.6, 0.3, 0.35
 _BELOW, _ABOVE, _BAR, _CAPTION = 1.2, 1.12, 0.46, 2.4
 """Room on the sheet, in inch: the drawing; beside, below and above it; a caption's width."""
 _FADE = 0.6
-"""How far the farthest line is blended with the white of the paper."""
+"""Share of white in the farthest line."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,15 @@ class _Look:
 
 _LOOKS = {
     "diagonals": _Look(style.BLUE, 1.5),
-    "folding bars": _Look(style.VERMILLION, 1.5),
+    "bars": _Look(style.VERMILLION, 1.5),
     "hinge assemblies": _Look(style.INK, 3.0),
     "boom": _Look(style.GREY, 5.0),
     "net, taut": _Look(style.GREEN, 0.9),
     "net, slack": _Look(style.GREEN, 0.9, (0, (1.5, 2.5))),
 }
+
+_NAMES = {"bars": "folding bars"}
+"""Words of the legend, where they differ from the layout's."""
 
 
 @style.styled
@@ -63,13 +67,28 @@ def ring(dataset: xr.Dataset) -> Figure:
         Orthographic views with a scale bar in metre; nearer lines are darker.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
-    camera = Camera(facing_azimuth(scene.structure.geometry()), _ELEVATION)
+    camera = Camera(facing_azimuth(scene), _ELEVATION)
     moments = instants(dataset)
     shots = []
     for _, angles in moments:
-        parts = ring_parts(scene, angles.transpose("plane", "section").values)
-        shots.append({part.name: camera.view(part.lines) for part in parts})
+        lines = lines_at(scene, np.radians(angles.transpose("plane", "section").values))
+        shots.append({name: camera.view(ends) for name, ends in lines.items()})
     return _compose(dataset, moments, shots)
+
+
+def lines_at(scene: Scene, openings: Array) -> dict[str, Array]:
+    """Lines of a scene at opening angles in rad, shape (planes, sections): see ``lines_of``."""
+    net = scene.net
+    beyond = 0.0 if net is None or net.two_sided else net.neutral_length
+    return lines_of(layout_at_opening(scene, float(openings.mean())), openings, taut_beyond=beyond)
+
+
+def facing_azimuth(scene: Scene) -> float:
+    """Direction to look from, degree: the boom to the left in front; an arc from outside."""
+    outward = np.mean([rod.start.axes[:, 2] for rod in layout_of(scene).rods], axis=0)
+    if scene.structure.closed or np.hypot(*outward[:2]) < 1e-6:
+        return 42.0
+    return float(np.degrees(np.arctan2(outward[1], outward[0]))) + 35.0
 
 
 def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
@@ -204,7 +223,14 @@ def _scale_bar(axes: Axes, length: float, top: float) -> None:
 
 def _legend(figure: Figure, drawn: set[str]) -> None:
     entries = [
-        Line2D([], [], color=look.colour, linewidth=look.width, linestyle=look.dashes, label=name)
+        Line2D(
+            [],
+            [],
+            color=look.colour,
+            linewidth=look.width,
+            linestyle=look.dashes,
+            label=_NAMES.get(name, name),
+        )
         for name, look in _LOOKS.items()
         if name in drawn
     ]

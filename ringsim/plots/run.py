@@ -1,4 +1,4 @@
-"""All figures of a run that apply to it."""
+"""All figures that apply to a run."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ringsim.parts.structure.pantograph_ring import PantographRing
-from ringsim.parts.structure.planar_truss import PlanarTruss
 from ringsim.plots import style
 from ringsim.plots.asynchrony import asynchrony
 from ringsim.plots.cables import cables
@@ -22,6 +20,7 @@ from ringsim.plots.planar_truss import strain_over_length, tension_over_length
 from ringsim.plots.ring import ring
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
+from ringsim.structures.pantograph_ring import PantographRing
 
 
 @dataclass(frozen=True)
@@ -30,26 +29,19 @@ class _Picture:
     draw: Callable[[xr.Dataset], Figure]
     needs: tuple[str, ...]
     """Variables that must be recorded at one time at least."""
+    ring_only: bool = False
 
 
-_ENERGY = _Picture("energy", energy, ("work", "kinetic_energy", "elastic_energy", "dissipation"))
 PICTURES = (
-    _Picture("opening_angles", opening_angles, ("opening_angle",)),
+    _Picture("opening_angles", opening_angles, ("opening_angle", "lock_time")),
     _Picture("asynchrony", asynchrony, ("asynchrony",)),
-    _Picture("diagonal_stress", diagonal_stress, ("rod_stress",)),
-    _Picture("ring", ring, ("opening_angle",)),
-    _ENERGY,
-)
-"""Of a ring."""
-CABLE_PICTURES = (_Picture("cables", cables, ("cable_tension", "opening_angle")),)
-"""Of a ring with cables, besides."""
-TRUSS_PICTURES = (
+    _Picture("diagonal_stress", diagonal_stress, ("rod_stress",), ring_only=True),
+    _Picture("ring", ring, ("opening_angle", "asynchrony")),
+    _Picture("cables", cables, ("cable_tension", "asynchrony"), ring_only=True),
     _Picture("tension", tension_over_length, ("cable_tension", "cable_length")),
     _Picture("bending_strain", strain_over_length, ("bending_strain", "cable_length")),
-    _ENERGY,
+    _Picture("energy", energy, ("work", "kinetic_energy", "elastic_energy", "dissipation")),
 )
-"""Of a planar truss."""
-_OF_KIND = {PantographRing: PICTURES + CABLE_PICTURES, PlanarTruss: TRUSS_PICTURES}
 
 
 def draw_run(dataset: xr.Dataset, folder: str | Path, prefix: str = "") -> list[Path]:
@@ -88,10 +80,16 @@ def draw_run(dataset: xr.Dataset, folder: str | Path, prefix: str = "") -> list[
 
 
 def _pictures(dataset: xr.Dataset) -> tuple[_Picture, ...]:
-    """The pictures of the run's kind of structure for which something was recorded."""
+    """The pictures for which something was recorded, and whose rods or cables are those of a ring
+    where they draw these alone.
+    """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
-    pictures = _OF_KIND[type(scene.structure)]
-    return tuple(picture for picture in pictures if _recorded(picture, dataset))
+    is_ring = isinstance(scene.structure, PantographRing)
+    return tuple(
+        picture
+        for picture in PICTURES
+        if _recorded(picture, dataset) and (is_ring or not picture.ring_only)
+    )
 
 
 def _recorded(picture: _Picture, dataset: xr.Dataset) -> bool:

@@ -1,8 +1,7 @@
-"""The stability map: one panel per group, one square per cell."""
+"""The stability map: a panel for each pair of axes, a square for each cell."""
 
 from __future__ import annotations
 
-import math
 import textwrap
 
 import numpy as np
@@ -39,58 +38,54 @@ _COLUMNS = 3
 
 @style.styled
 def stability(whole: xr.Dataset) -> Figure:
-    """Panels over the values of two axes; values are listed, not to scale.
+    """Panels over the values of two axes, which are listed, not to scale.
 
-    Parameters
-    ----------
-    whole
-        A judged map (``ringsim.analysis.stability.joined``).
+    ``whole`` is a judged map (``ringsim.analysis.stability.joined``).
     """
     groups = whole.sizes["group"]
-    rows = math.ceil(groups / _COLUMNS)
-    figure = style.new_figure(13.5, 3.5 * rows + 1.0)
-    panels = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
-    seen: dict[str, tuple[str, str]] = {}
-    for number, axes in enumerate(panels):
-        if number >= groups:
-            axes.set_axis_off()
-            continue
-        cells = whole.isel(cell=(whole["of_group"] == number).values)
-        seen |= _panel(axes, cells, whole.isel(group=number))
+    columns = min(_COLUMNS, groups)
+    rows = -(-groups // columns)
+    figure = style.new_figure(4.5 * columns, 3.5 * rows + 1.0)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    seen: set[str] = set()
+    for number, axes in enumerate(panels[:groups]):
+        cells = whole.isel(cell=(whole["of_group"] == number).values, group=number)
+        kinds = [_kind(cells.isel(cell=k)) for k in range(cells.sizes["cell"])]
+        _panel(axes, cells, kinds)
+        seen |= set(kinds)
+    for axes in panels[groups:]:
+        axes.set_axis_off()
     handles = [
-        Patch(facecolor=seen[word][0], edgecolor=style.GREY, label=_legend(word, seen[word][1]))
-        for word in sorted(seen, key=_order)
+        Patch(facecolor=colour, edgecolor=style.GREY, label=f"{letter}  {word}".strip())
+        for word in [*_LOOKS, *sorted(seen - set(_LOOKS))]
+        for colour, letter in [_LOOKS.get(word, _OTHER)]
+        if word in seen
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 7))
+    most = min(len(handles), 2 * columns + 1)
+    figure.legend(handles=handles, loc="outside lower center", ncols=most)
     figure.suptitle(
         f"Stability map: {whole.sizes['cell']} runs and how they ended", x=0.012, ha="left"
     )
     return figure
 
 
-def _panel(axes: Axes, cells: xr.Dataset, group: xr.Dataset) -> dict[str, tuple[str, str]]:
-    """Draw the cells of a group; returns the kinds of cells that occur, with their looks."""
+def _panel(axes: Axes, cells: xr.Dataset, kinds: list[str]) -> None:
     x, column = np.unique(cells["x"].values, return_inverse=True)
     y, row = np.unique(cells["y"].values, return_inverse=True)
-    seen = {}
-    for k in range(cells.sizes["cell"]):
-        word = _kind(cells.isel(cell=k))
-        colour, letter = seen[word] = _LOOKS.get(word, _OTHER)
-        place = (float(column[k]) - 0.5, float(row[k]) - 0.5)
+    for left, below, word in zip(column.tolist(), row.tolist(), kinds, strict=True):
+        colour, letter = _LOOKS.get(word, _OTHER)
+        place = (left - 0.5, below - 0.5)
         axes.add_patch(Rectangle(place, 1.0, 1.0, facecolor=colour, edgecolor="white", zorder=2))
-        ink = "white" if _dark(colour) else style.INK
-        axes.text(
-            column[k], row[k], letter, ha="center", va="center", fontsize=8, color=ink, zorder=3
-        )
-    axes.set_xlim(-0.5, len(x) - 0.5)
-    axes.set_ylim(-0.5, len(y) - 0.5)
+        # Dark by the eye's weights of red, green and blue.
+        ink = "white" if np.dot(to_rgb(colour), (0.3, 0.59, 0.11)) < 0.47 else style.INK
+        axes.text(left, below, letter, ha="center", va="center", fontsize=8, color=ink, zorder=3)
+    axes.set(xlim=(-0.5, len(x) - 0.5), ylim=(-0.5, len(y) - 0.5))
     axes.set_xticks(range(len(x)), [_short(v) for v in x], fontsize=8)
     axes.set_yticks(range(len(y)), [_short(v) for v in y], fontsize=8)
     axes.grid(visible=False)
-    axes.set_title(str(group["title"].values), color=style.INK, weight="bold")
-    axes.set_xlabel(_label(group, "x"), fontsize=9)
-    axes.set_ylabel(_label(group, "y"), fontsize=9)
-    return seen
+    axes.set_title(str(cells["title"].values), color=style.INK, weight="bold")
+    axes.set_xlabel(_label(cells, "x", 44), fontsize=9)
+    axes.set_ylabel(_label(cells, "y", 32), fontsize=9)
 
 
 def _kind(cell: xr.Dataset) -> str:
@@ -100,28 +95,16 @@ def _kind(cell: xr.Dataset) -> str:
     return verdict if verdict == "wrong" else str(cell["cause"].values)
 
 
-def _order(word: str) -> int:
-    return list(_LOOKS).index(word) if word in _LOOKS else len(_LOOKS)
-
-
-def _legend(word: str, letter: str) -> str:
-    return f"{letter}  {word}" if letter else word
-
-
-def _label(group: xr.Dataset, axis: str) -> str:
+def _label(group: xr.Dataset, axis: str, width: int) -> str:
     label, units = (str(group[f"{axis}_{word}"].values) for word in ("label", "units"))
-    whole = label[:1].upper() + label[1:] + ("" if units == "1" else f" ({units})")
-    return textwrap.fill(whole, 44 if axis == "x" else 32)
+    if "." not in label.split()[0]:  # a path stays as it is typed
+        label = label[:1].upper() + label[1:]
+    return textwrap.fill(label if units == "1" else f"{label} ({units})", width)
 
 
 def _short(value: float) -> str:
     """A number as short as it is clear: 1e5, 0.03, 179.9."""
     if value == 0.0 or 1e-3 <= abs(value) < 1e4:
-        return f"{value:g}"
+        return f"{value:.4g}"
     digits, power = f"{value:.1e}".split("e")
     return f"{digits.removesuffix('.0')}e{int(power)}"
-
-
-def _dark(colour: str) -> bool:
-    red, green, blue = to_rgb(colour)
-    return 0.3 * red + 0.59 * green + 0.11 * blue < 0.47

@@ -1,4 +1,4 @@
-"""The look that all figures share."""
+"""Style shared by all figures."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ INK, GREY, PALE = "#222222", "#6e6e6e", "#e4e4e4"
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
     "#0072b2", "#56b4e9", "#009e73", "#e69f00", "#d55e00", "#cc79a7",
 )  # fmt: skip
-"""Colours that people with any kind of colour vision tell apart (Okabe and Ito 2008)."""
+"""Colour-blind safe palette (Okabe and Ito 2008)."""
 
 PAPER: Any = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5}
-"""Ground of words that stand on a grid."""
+"""Background of text on a grid."""
 
 DPI = 150
 _FLAT = 0.05
-"""Typical over largest value below which a linear axis says little."""
+"""Median over largest value below which the axis becomes logarithmic."""
 _SETTINGS: Any = {
     "axes.axisbelow": True,
     "axes.edgecolor": GREY,
@@ -74,7 +74,7 @@ def styled(draw: Callable[_Arguments, Figure]) -> Callable[_Arguments, Figure]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure (inch) that lays itself out and needs no display."""
+    """An empty figure (size in inch) with constrained layout; needs no display."""
     layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08)
     figure = Figure(figsize=(width, height), layout=layout, facecolor="white")
     FigureCanvasAgg(figure)
@@ -82,7 +82,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def section_colours(sections: int) -> Colormap:
-    """One colour a section, perceptually uniform, without the yellow that is lost on white."""
+    """One colour a section, perceptually uniform, without the light yellow end."""
     viridis = mpl.colormaps["viridis"]
     steps = max(sections - 1, 1)
     return ListedColormap([viridis(0.88 * k / steps) for k in range(sections)])
@@ -96,9 +96,9 @@ def span_time(axes: Axes, values: xr.DataArray) -> None:
 
 
 def span_sizes(axes: Axes, sizes: np.ndarray) -> None:
-    """A value axis from zero; logarithmic where most of the run would be a flat line.
+    """Value axis from zero; logarithmic where most of the run would be a flat line.
 
-    Locking gives peaks that are hundreds of times larger than all before, so a linear axis
+    Peaks at locking are hundreds of times larger than values before, so a linear axis
     would show nothing else.
 
     Parameters
@@ -130,7 +130,7 @@ def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
 
 
 def mark_moment(axes: Axes, moment: float, text: str = "") -> None:
-    """A dashed vertical line at a moment (s), with a word above the frame."""
+    """A dashed vertical line at a time (s), with a label above the frame."""
     axes.axvline(moment, color=INK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=1.5)
     if text:
         first, last = axes.get_xlim()

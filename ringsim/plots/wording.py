@@ -1,4 +1,4 @@
-"""Words of the figures: labels, units and titles, all from the dataset's attributes."""
+"""Labels, units and titles of the figures, from the dataset's attributes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> 
 
 
 def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
-    """A factor and a prefixed unit that bring the largest value between 0.5 and 500.
+    """Factor and prefixed unit that scale the largest value to between 0.5 and 500.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def largest_magnitude(variable: xr.DataArray) -> float:
 
 
 def status_word(dataset: xr.Dataset) -> str:
-    """The word of the run's status, from the flags of the variable ``status``."""
+    """The run's status in words, from the flags of the variable ``status``."""
     flags = np.atleast_1d(dataset["status"].attrs["flag_values"]).tolist()
     words = str(dataset["status"].attrs["flag_meanings"]).split()
     word: str = words[flags.index(int(dataset["status"]))]

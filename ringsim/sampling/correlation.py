@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 from scipy.special import ndtr, ndtri
 
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.sampling.distributions.family import Array, inside
-from ringsim.units import Model
-
-
-def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+from ringsim.units import ListIn, Model
 
 
 class Correlation(Model):
@@ -25,7 +21,7 @@ class Correlation(Model):
     (Gaussian copula); between two normal inputs it is their own correlation.
     """
 
-    between: Annotated[tuple[str, str], BeforeValidator(_as_tuple)]
+    between: Annotated[tuple[str, str], ListIn]
     coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]
 
 
@@ -47,21 +43,19 @@ def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correl
     InputError
         If a pair names what is not drawn, or if the pairs contradict each other.
     """
-    pairs = {
-        (first, second): pair.coefficient
+    pairs = [
+        (first, second, pair.coefficient)
         for pair in correlations
         for first, second in _columns(paths, pair)
-    }
-    moved = sorted({axis for axes in pairs for axis in axes})
+    ]
+    moved = sorted({axis for first, second, _ in pairs for axis in (first, second)})
     if not moved:
         return points
-    place = {axis: k for k, axis in enumerate(moved)}
-    matrix = np.eye(len(moved))
-    for (one, other), coefficient in pairs.items():
-        first, second = place[one], place[other]
+    matrix = np.eye(len(paths))
+    for first, second, coefficient in pairs:
         matrix[first, second] = matrix[second, first] = coefficient
     try:
-        lower = np.linalg.cholesky(matrix)
+        lower = np.linalg.cholesky(matrix[np.ix_(moved, moved)])
     except np.linalg.LinAlgError:
         raise InputError(
             "correlations: the coefficients contradict each other (their matrix is not positive "

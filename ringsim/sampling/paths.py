@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import typing
 from typing import Any
 
 from pydantic import BaseModel
@@ -10,7 +9,7 @@ from pydantic import BaseModel
 from ringsim.overrides import section_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.units import Unit
+from ringsim.units import unit_of
 
 FIXED = (
     "name", "title", "structure.kind", "structure.sections", "structure.closed", "solver.end_time",
@@ -46,15 +45,11 @@ def field_at(scene: Scene, path: str) -> Any:
 
 def unit_at(scene: Scene, path: str) -> str:
     """Symbol of the SI unit of the field at a path, "1" if it has none."""
-    *inner, last = section_of(path)[0].split(".")
-    owner: Any = scene
-    for step in inner:
-        owner = getattr(owner, step)
+    inner, _, last = section_of(path)[0].rpartition(".")
+    owner = field_at(scene, inner) if inner else scene
     if not isinstance(owner, BaseModel) or last not in type(owner).model_fields:
         return "1"
-    field = type(owner).model_fields[last]
-    found = _units(field.metadata) + _units(field.annotation)
-    return found[0] if found else "1"
+    return unit_of(type(owner).model_fields[last])
 
 
 def each_of(scene: Scene, path: str, value: Any) -> int:
@@ -75,11 +70,3 @@ def each_of(scene: Scene, path: str, value: Any) -> int:
     if not isinstance(each, tuple):
         raise InputError(f"inputs: {path} is one value for all sections: leave out each_section")
     return len(each)
-
-
-def _units(part: Any) -> list[str]:
-    if isinstance(part, Unit):
-        return [part.symbol]
-    inner = part if isinstance(part, (list, tuple)) else ()
-    inner = (*inner, *getattr(part, "__metadata__", ()), *typing.get_args(part))
-    return [symbol for each in inner for symbol in _units(each)]

@@ -1,1 +1,1 @@
-"""What a campaign keeps on disk: design, journals, shards, and the merged file."""
+"""What a campaign keeps on disk: design, journals, and the merged file."""

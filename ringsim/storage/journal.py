@@ -1,129 +1,131 @@
-"""Journal of finished samples: each is on file at once, long before its shard is complete."""
+"""Journals: every finished sample is in a file at once, one file for each process."""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import secrets
 import struct
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from ringsim.storage.files import sync
-from ringsim.storage.record import Result, from_header
+from ringsim.files import sync, writing
+from ringsim.storage.locks import GO_ON
+from ringsim.storage.result import Result
 
+FOLDER = "journals"
 _FRAME = struct.Struct("<8sIQ16s")
-_MAGIC = b"ringsim1"
+_MAGIC = b"ringsim2"
 _SYNC_SECONDS = 1.0
-"""Records are forced to the disk when this much time has passed since the last time."""
+"""Records are forced to the disk when this much time has passed since the last time: for samples
+longer than that each is, for shorter ones it would cost more than the run."""
 
 
 class Journal:
     """An append-only file with one writer.
 
     A record is complete or, if the writer was killed within it, recognised as torn and ignored.
-    The writer reads its records back through its own descriptor: whatever happens to the file's
-    name, they are there.
-
-    Parameters
-    ----------
-    path
-        The file; it must not exist.
+    Its checksum is right for this campaign only.  The writer is named after its share of the
+    samples, and its number among the processes that run it.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.samples = 0
-        self.size = 0
+    def __init__(self, folder: Path, campaign: str, writer: str) -> None:
+        # No two processes share a journal, even where the file system has no locks.
+        self.path = folder / FOLDER / f"{writer}-{secrets.token_hex(4)}.journal"
+        self._campaign = campaign
+        self._descriptor = -1
+        self._size = 0
         self._synced = -_SYNC_SECONDS
-        self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o666)
-        sync(path.parent)
 
     def append(self, result: Result) -> None:
-        """Add one result.
+        """Add one result; the first one creates the file.
 
         Raises
         ------
-        OSError
+        InputError
             If the disk is full; the records before remain whole.
         """
-        header = result.header()
-        check = hashlib.blake2b(header, digest_size=16)
-        check.update(result.body)
-        frame = _FRAME.pack(_MAGIC, len(header), len(result.body), check.digest())
-        record = memoryview(b"".join((frame, header, result.body)))
-        written = 0
-        try:
-            while written < len(record):
-                written += os.write(self._descriptor, record[written:])
-        except OSError:
-            os.ftruncate(self._descriptor, self.size)
-            raise
-        self.size += len(record)
-        self.samples += 1
-        if time.monotonic() - self._synced >= _SYNC_SECONDS:
-            os.fdatasync(self._descriptor)
-            self._synced = time.monotonic()
-
-    def records(self) -> Iterator[Result]:
-        """What has been added so far."""
-        with os.fdopen(os.dup(self._descriptor), "rb") as file:
-            file.seek(0)
-            yield from _records(file, bodies=True)
+        header, body = result.header(), result.body
+        check = _checksum(header, body, self._campaign)
+        frame = _FRAME.pack(_MAGIC, len(header), len(body), check)
+        record = memoryview(b"".join((frame, header, body)))
+        with writing(self.path, GO_ON):
+            if self._descriptor < 0:
+                flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND
+                self._descriptor = os.open(self.path, flags, 0o666)
+                sync(self.path.parent)
+            written = 0
+            try:
+                while written < len(record):
+                    written += os.write(self._descriptor, record[written:])
+            except OSError:
+                os.ftruncate(self._descriptor, self._size)
+                raise
+            self._size += len(record)
+            if time.monotonic() - self._synced >= _SYNC_SECONDS:
+                self._sync()
 
     def close(self) -> None:
-        """Close the file and leave it."""
+        """Force everything to the disk and leave the file.
+
+        Raises
+        ------
+        InputError
+            If the disk refuses it.
+        """
         if self._descriptor >= 0:
-            os.close(self._descriptor)
+            with writing(self.path, GO_ON):
+                self._sync()
+                os.close(self._descriptor)
             self._descriptor = -1
 
-    def remove(self) -> None:
-        """Close and delete the file: its samples are in a shard now."""
-        self.close()
-        self.path.unlink(missing_ok=True)
+    def _sync(self) -> None:
+        os.fdatasync(self._descriptor)
+        self._synced = time.monotonic()
 
 
-def read_journal(path: Path, *, bodies: bool = True) -> Iterator[Result]:
-    """The whole records of a journal in the order in which they were written.
+def read_journal(path: Path, campaign: str) -> Iterator[tuple[int, Result | None]]:
+    """The records of a journal in the order in which they were written, with their places.
 
-    Parameters
-    ----------
-    path
-        The file; it may still be growing.
-    bodies
-        Also read the arrays; without them only a torn header is noticed.
+    None stands for bytes between two records that are no record of this campaign: one that is
+    damaged does not hide those behind it.  What a writer left unfinished at the end is left out:
+    the file may still be growing.
     """
-    try:
-        file = path.open("rb")
-    except FileNotFoundError:
-        return
-    with file:
-        yield from _records(file, bodies=bodies)
-
-
-def _records(file: BinaryIO, *, bodies: bool) -> Iterator[Result]:
-    """Records whose checksum is right; one that is damaged does not hide those behind it."""
-    size = os.fstat(file.fileno()).st_size
-    while True:
-        frame = file.read(_FRAME.size)
-        if len(frame) < _FRAME.size:
-            return
-        magic, header_size, body_size, expected = _FRAME.unpack(frame)
-        if magic != _MAGIC or file.tell() + header_size + body_size > size:
-            return
-        header = file.read(header_size)
-        body = b""
-        if bodies:
-            body = file.read(body_size)
-            check = hashlib.blake2b(header, digest_size=16)
-            check.update(body)
-            if check.digest() != expected:
+    with path.open("rb") as file:
+        place, size = 0, os.fstat(file.fileno()).st_size
+        while place < size:
+            result = read_record(file, place, campaign)
+            if result is not None:
+                yield place, result
+                place = file.tell()
                 continue
-        else:
-            file.seek(body_size, os.SEEK_CUR)
-        try:
-            result = from_header(header, body)
-        except (ValueError, TypeError, KeyError):
-            continue
-        yield result
+            file.seek(place + 1)
+            gap = file.read().find(_MAGIC)
+            if gap < 0:
+                return
+            yield place, None
+            place += 1 + gap
+
+
+def read_record(file: BinaryIO, place: int, campaign: str) -> Result | None:
+    """The record that begins at a place of a journal; None if there is no whole one."""
+    file.seek(place)
+    frame = file.read(_FRAME.size)
+    if len(frame) < _FRAME.size:
+        return None
+    magic, header_size, body_size, expected = _FRAME.unpack(frame)
+    # A damaged size must not be believed: it may be more than there is memory.
+    if magic != _MAGIC or file.tell() + header_size + body_size > os.fstat(file.fileno()).st_size:
+        return None
+    header, body = file.read(header_size), file.read(body_size)
+    if _checksum(header, body, campaign) != expected:
+        return None
+    return Result.from_header(header, body)
+
+
+def _checksum(header: bytes, body: bytes, campaign: str) -> bytes:
+    check = hashlib.blake2b(header, digest_size=16, key=campaign.encode())
+    check.update(body)
+    return check.digest()

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.outputs import VARIABLES
-from ringsim.sampling.table import Table
-from ringsim.storage.design_file import add_inputs
-from ringsim.storage.files import whole
-from ringsim.storage.layout import (
+from ringsim.files import whole
+from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.sampling.columns import Table, add_inputs
+from ringsim.storage.netcdf import (
     CHUNK_BYTES,
     PER_SAMPLE,
     Output,
     add_coordinate,
-    add_samples,
     add_variable,
     blank,
-    open_new,
 )
-from ringsim.storage.shards import Shard, latest, rows_of, shapes_in
+from ringsim.storage.survey import Survey
 from ringsim.variables import Cause, Status, Variable
 
 NAME = "campaign.nc"
@@ -35,30 +33,12 @@ UNFIT = (
 """Reason of samples that cannot stand in one file with the others."""
 
 
-def merge_shards(
-    folder: Path,
-    shards: Sequence[Shard],
-    table: Table,
-    output: Output,
-    attributes: Mapping[str, Any],
+def write_merged(
+    folder: Path, found: Survey, table: Table, output: Output, attributes: Mapping[str, Any]
 ) -> int:
-    """Write ``campaign.nc``, whole or not at all.
+    """Write ``campaign.nc`` of what was found in a folder, whole or not at all.
 
-    Samples that have not been run have the status "not_run" and missing values.  Of a sample
-    that was run twice the result of greater precedence counts.
-
-    Parameters
-    ----------
-    folder
-        The campaign's folder.
-    shards
-        Its shards.
-    table
-        The inputs.
-    output
-        Compression, digits and variables to leave out.
-    attributes
-        Global attributes.
+    Samples that have not been run have the status "not_run" and missing values.
 
     Returns
     -------
@@ -67,78 +47,67 @@ def merge_shards(
 
     Raises
     ------
-    OSError
+    OSError, RuntimeError
         If the disk is full; an older file stays.
     """
-    axes, names, fits = _common(shards)
+    axes, names, fits = _common(found)
     scalars = {n for n, v in VARIABLES.items() if not v.dims and not v.needs}
     wanted = {
         name: variable
         for name, variable in VARIABLES.items()
         if name in names | scalars and name not in PER_SAMPLE and name not in output.leave_out
     } | PER_SAMPLE
-    owner, row = latest(shards, table.samples)
-    path = folder / NAME
-    with whole(path) as draft:
-        try:
-            with open_new(draft) as file:
-                file.setncatts(dict(attributes))
-                add_samples(file, np.arange(table.samples))
-                for name, values in axes.items():
-                    add_coordinate(file, name, values)
-                add_inputs(file, table, compression=output.compression)
-                for name, variable in wanted.items():
-                    digits = output.significant_digits.get(name)
-                    add_variable(file, variable, compression=output.compression, digits=digits)
-                _copy(file, shards, fits, (owner, row), wanted)
-        except RuntimeError as error:
-            raise OSError(str(error)) from error
-    return int((~fits[owner[owner >= 0]]).sum())
+    with whole(folder / NAME) as draft, netCDF4.Dataset(draft, "w") as file:
+        file.setncatts(dict(attributes))
+        add_coordinate(file, "sample", np.arange(table.samples))
+        for name, values in axes.items():
+            add_coordinate(file, name, values)
+        add_inputs(file, table, compression=output.compression)
+        for name, variable in wanted.items():
+            digits = output.significant_digits.get(name)
+            add_variable(file, variable, compression=output.compression, digits=digits)
+        _copy(file, found, fits, wanted)
+    return int((~fits[found.form[found.form >= 0]]).sum())
 
 
-def _common(
-    shards: Sequence[Shard],
-) -> tuple[dict[str, NDArray[Any]], set[str], NDArray[np.bool_]]:
-    """Coordinates of the first samples, the outputs that occur, and which shards fit."""
+def _common(found: Survey) -> tuple[dict[str, NDArray[Any]], set[str], NDArray[np.bool_]]:
+    """Coordinates of the first samples, the outputs that occur, and which forms fit."""
     axes: dict[str, NDArray[Any]] = {}
     names: set[str] = set()
-    fits = np.ones(len(shards), dtype=bool)
-    for number in sorted(range(len(shards)), key=lambda k: int(shards[k].samples[0])):
-        found, outputs = shapes_in(shards[number].path)
-        fits[number] = all(np.array_equal(axes.get(n, v), v) for n, v in found.items())
-        if fits[number]:
-            names |= outputs
-            axes |= found
+    fits = np.ones(len(found.forms), dtype=bool)
+    forms, first = np.unique(found.form, return_index=True)
+    for sample in np.sort(first[forms >= 0]):  # the lowest sample of each form
+        (result,) = found.results([sample])
+        arrays = result.arrays()
+        own = {name: arrays[name] for name in COORDINATES if name in arrays}
+        fit = all(np.array_equal(axes.get(n, v), v) for n, v in own.items())
+        fits[found.form[sample]] = fit
+        if fit:
+            axes |= own
+            names |= arrays.keys() - own.keys()
     return axes, names, fits
 
 
 def _copy(
-    file: Any,
-    shards: Sequence[Shard],
-    fits: NDArray[np.bool_],
-    place: tuple[NDArray[np.int64], NDArray[np.int64]],
-    wanted: Mapping[str, Variable],
+    file: Any, found: Survey, fits: NDArray[np.bool_], wanted: Mapping[str, Variable]
 ) -> None:
-    """Fill blocks of samples, each read from the shards that hold them."""
-    owner, row = place
+    """Fill blocks of samples, each read from the journals that hold them."""
     sizes = {dim: d.size for dim, d in file.dimensions.items()}
     shapes = {n: tuple(sizes[dim] for dim in v.dims) for n, v in wanted.items()}
     bytes_each = sum(8 * int(np.prod(shape, dtype=np.int64)) for shape in shapes.values())
     aligned = max(1, CHUNK_BYTES // max(1, bytes_each))
     count = max(1, BLOCK_BYTES // max(1, bytes_each * aligned)) * aligned
-    for start in range(0, len(owner), count):
-        stop = min(start + count, len(owner))
+    for start in range(0, len(found.status), count):
+        stop = min(start + count, len(found.status))
         blocks = {n: blank(v, (stop - start, *shapes[n])) for n, v in wanted.items()}
-        for number in np.unique(owner[start:stop]):
-            if number < 0:
-                continue
-            here = np.flatnonzero(owner[start:stop] == number)
-            names = list(wanted if fits[number] else PER_SAMPLE)
-            read = rows_of(shards[number].path, names, row[start + here])
-            for name, values in read.items():
-                blocks[name][here] = values
-            if not fits[number]:
-                blocks["status"][here], blocks["reason"][here] = Status.ERROR, UNFIT
-                blocks["cause"][here] = Cause.UNFIT
+        for result in found.results(np.arange(start, stop)):
+            k, fit = result.sample - start, fits[found.form[result.sample]]
+            for name, values in result.arrays().items() if fit else ():
+                if name in blocks:
+                    blocks[name][k] = values
+            blocks["status"][k] = result.status if fit else Status.ERROR
+            blocks["cause"][k] = result.cause if fit else Cause.UNFIT
+            blocks["reason"][k] = result.reason if fit else UNFIT
+            blocks["log"][k] = result.log
         for name, values in blocks.items():
             file[name][start:stop] = values

@@ -6,7 +6,7 @@ import os
 import platform
 import subprocess
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +14,10 @@ _PACKAGES = ("ringsim", "exudyn", "numpy", "scipy", "netCDF4", "mpi4py")
 
 
 def provenance(*, name: str, title: str, action: str) -> dict[str, Any]:
-    """Global attributes that say by whom, when, where and with what a file was made.
-
-    Parameters
-    ----------
-    name, title
-        Of the campaign.
-    action
-        What was done, in one or two words.
-    """
+    """Global attributes that say by whom, when, where and with what a campaign's file was made."""
     now = datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
     software = f"ringsim {version('ringsim')}"
-    found: dict[str, Any] = {
+    return {
         "Conventions": "CF-1.11, ACDD-1.3",
         "title": title or name,
         "summary": f"Campaign {name} of simulated ring deployments: inputs and outputs by sample.",
@@ -39,13 +31,7 @@ def provenance(*, name: str, title: str, action: str) -> dict[str, Any]:
         "platform": platform.platform(),
         "host": platform.node(),
         "git_commit": git_commit(),
-    }
-    for package in _PACKAGES:
-        try:
-            found[f"{package}_version"] = version(package)
-        except PackageNotFoundError:
-            found[f"{package}_version"] = "not installed"
-    return found
+    } | {f"{package}_version": version(package) for package in _PACKAGES}
 
 
 def git_commit() -> str:
@@ -53,15 +39,12 @@ def git_commit() -> str:
     tree = Path(__file__).resolve().parents[2]
     if not (tree / ".git").exists():
         return "unknown"
-    git = ["git", "-C", os.fspath(tree)]
+    # Without tags, so that it is the commit itself.
+    describe = ["describe", "--always", "--abbrev=40", "--dirty=+changes", "--exclude=*"]
     try:
-        commit = subprocess.run(
-            [*git, "rev-parse", "HEAD"], capture_output=True, text=True, timeout=10, check=True
-        ).stdout.strip()
-        changed = subprocess.run(
-            [*git, "status", "--porcelain", "--untracked-files=no"],
+        return subprocess.run(
+            ["git", "-C", os.fspath(tree), *describe],
             capture_output=True, text=True, timeout=10, check=True,
         ).stdout.strip()  # fmt: skip
     except (OSError, subprocess.SubprocessError):
         return "unknown"
-    return f"{commit}+changes" if changed else commit

@@ -1,1 +1,1 @@
-"""Closed forms and quadratures: truths that need no multibody engine; numpy only."""
+"""Closed forms and quadratures: references independent of the multibody engine."""

@@ -7,24 +7,24 @@ import math
 from scipy.optimize import brentq
 
 from ringsim.cable.bracket.bar_half import BarHalfBracket
-from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.theory.ideal_course import Integration
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 
 _WIDEST, _LEAST = 179.0, 1.0
 """Opening angles that are tried, deg."""
 _PATIENCE, _LONGEST = 2.0, 1e6
-"""A run is given up after so many times the wanted time, or after so many seconds."""
+"""A run is stopped after this multiple of the wanted time, or after this time (s)."""
 _CLOSE = 1e-5
-"""To which the angle is found, deg."""
+"""Tolerance of the angle, deg."""
 
 
 def opening_angle_for(scene: Scene, time: float) -> float:
     """Initial opening angle in deg from which the scene's ideal ring deploys in ``time``.
 
-    Every angle that is tried is a run of the ideal fidelity, with all that the scene holds:
+    Every angle that is tried is a run of the ideal fidelity with all parts of the scene:
     loads, net, friction, cables, faults.
 
     Raises
@@ -35,7 +35,7 @@ def opening_angle_for(scene: Scene, time: float) -> float:
     """
     if not isinstance(scene.structure, PantographRing):
         raise InputError(
-            f"scene {scene.name} is no pantograph ring: only those have a stowed angle to find"
+            f"scene {scene.name} is no pantograph ring: only those have a stowed angle to determine"
         )
     if not (math.isfinite(time) and time > 0.0):
         raise InputError(f"a deployment time of {time:g} s must be finite and above 0 s")
@@ -49,7 +49,7 @@ def opening_angle_for(scene: Scene, time: float) -> float:
     def excess(angle: float) -> float:
         course = Integration(plain.with_values({"structure.opening_angle": angle})).run()
         if course.status.failed:
-            raise InputError(f"from {angle:.4g} deg there is no answer: {course.reason}")
+            raise InputError(f"from {angle:.4g} deg the ideal ring fails: {course.reason}")
         found = course.lock_time - time
         return found if math.isfinite(found) else math.inf
 

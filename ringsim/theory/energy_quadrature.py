@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
@@ -27,7 +27,7 @@ class OpeningTime:
 
 
 def opening_time(
-    ring: IdealRing, phi_start: float, phi_end: float = 0.0, *, panels: int = 24
+    ring: OneCoordinate, phi_start: float, phi_end: float = 0.0, *, panels: int = 24
 ) -> OpeningTime:
     """Time from rest at ``phi_start`` until the bar angle ``phi_end`` is reached.
 
@@ -51,7 +51,7 @@ def opening_time(
     return OpeningTime(fine, abs(fine - coarse))
 
 
-def _integrate(ring: IdealRing, phi_start: float, phi_end: float, panels: int) -> float:
+def _integrate(ring: OneCoordinate, phi_start: float, phi_end: float, panels: int) -> float:
     span = phi_start - phi_end
     work_start = ring.work(phi_start)
     total = 0.0

@@ -1,4 +1,4 @@
-"""Whether a run's slip speed left its pulleys their friction, from the rope that was wound."""
+"""Whether the slip speed of a run reduced pulley friction, judged by the length wound."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ringsim.variables import PLANES, Outcome
 
 
 def with_remark(outcome: Outcome, scene: Scene) -> Outcome:
-    """The outcome, its reason naming every cable whose friction has faded.
+    """The outcome; its reason names every cable whose pulley friction is reduced.
 
     A law with feedback finds its speed in the run, and a scene may set the slip speed, so this is
     judged afterwards, up to the deployment time; see ``ringsim.cable.regularisation``.

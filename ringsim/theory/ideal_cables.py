@@ -1,8 +1,7 @@
 """The cables of an ideal ring: ringsim.cable's chain on points that follow its coordinates.
 
-Only the spans beside a V pulley change their lengths, with phi alone: hinge pulleys sit on the
-pins about which the end assemblies swing, and a winch keeps its distance from its first pulley.
-The generalised force on phi is - sum T_i dL_i/dphi.
+Sheaves are points like all others; the generalised force of a cable is its force on each of them
+times how that point moves with the coordinates.
 """
 
 from __future__ import annotations
@@ -16,12 +15,11 @@ from numpy.typing import NDArray
 
 from ringsim.cable.chain import Chain
 from ringsim.cable.faults.family import CableFault
-from ringsim.cable.records import Cable, Winch
+from ringsim.cable.records import Winch
 from ringsim.cable.state import ChainState
 from ringsim.cable.winding.family import FeedbackWinding, WinchState
 from ringsim.scene import Scene
-from ringsim.theory.ideal_mechanism import Mechanism, Pose
-from ringsim.theory.ideal_points import UP
+from ringsim.theory.ideal_mechanism import Configuration, Mechanism
 
 Array = NDArray[np.float64]
 
@@ -34,16 +32,16 @@ class Pull(NamedTuple):
     chain
         See ringsim.cable.
     force
-        Generalised force on phi, N m.
+        Generalised force on (q, psi), N m.
     commands
-        Speeds that the laws of the winches with feedback ask for, m/s.
+        Speeds commanded by the laws of the winches with feedback, m/s.
     loss, power, elastic
         Power lost (W), power put in by the winches less the energy wound up with the rope (W),
         elastic energy (J).
     """
 
     chain: ChainState
-    force: float
+    force: Array
     commands: Array
     loss: float
     power: float
@@ -64,7 +62,10 @@ class IdealCables:
     Attributes
     ----------
     planes
-        Planes of each cable: two where both planes have cables that pull alike all the time.
+        Planes of each cable: two where the cables of both planes are identical.
+    paths
+        Coefficients of all paths' points, winch, sheaves and far end, behind one another; shape
+        (points, 3, functions), m.
     ropes
         Which spans form one rope; ``strike`` changes them.
     spans
@@ -75,22 +76,19 @@ class IdealCables:
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
         assert scene.cables is not None
-        self._mechanism, present = mechanism, scene.cables.present()
+        present = scene.cables.present()
         self.planes: list[tuple[int, ...]] = [(plane,) for plane, _ in present]
         alike = scene.structure.closed and len(present) == 2 and not scene.faults
         if alike and present[0][1] == present[1][1]:
             present, self.planes = present[:1], [(0, 1)]
         self._copies = np.array([float(len(planes)) for planes in self.planes])
-        self._cables = [cable for _, cable in present]
-        self._winch_distance = scene.cables.winch_distance
-        paths = [self._path(plane, cable) for plane, cable in present]
-        per_cable = [len(path) for path in paths]
-        self._paths = np.concatenate(paths)
-        self._starts, self._sizes = np.cumsum([0, *per_cable[:-1]]), per_cable
-        self._hung = self._swinging()
-        self._chain = Chain(self._cables, per_cable)
-        start = mechanism.pose(_initial(scene, mechanism), np.zeros(mechanism.freedom))
-        self.ropes = self._chain.start(self.points(start))
+        self._structure, self._cables = scene.structure, [cable for _, cable in present]
+        paths = [mechanism.points.path(number) for number in range(len(present))]
+        self.paths = np.concatenate(paths)
+        self._chain = Chain(self._cables, [len(path) for path in paths])
+        released = np.eye(mechanism.freedom)[0] * scene.structure.coordinate
+        start = mechanism.configuration(released, 0.0 * released)
+        self.ropes = self._chain.start(self.paths @ start.values)
         self.spans = scene.spans
         self._slip = min(cable.slip_speed_over(scene.pulleys_of(cable)) for cable in self._cables)
         self._places = [
@@ -108,7 +106,7 @@ class IdealCables:
 
     @property
     def nudges(self) -> tuple[float, float]:
-        """Increments of a length (m) and a rate (1/s) over which tensions are as good as linear.
+        """Increments of a length (m) and a rate (1/s) over which tensions are nearly linear.
 
         A slack rope becomes taut within slack_width / EA of strain; friction turns within the
         slip speed.
@@ -116,7 +114,7 @@ class IdealCables:
         soft = min(cable.slack_width / cable.axial_stiffness for cable in self._cables)
         return min(max(1e-2 * soft, 1e-9), 1e-6), 1e-2 * self._slip
 
-    def pull(self, time: float, pose: Pose, motors: Array) -> Pull:
+    def pull(self, time: float, now: Configuration, motors: Array) -> Pull:
         """Evaluate the cables.
 
         Parameters
@@ -131,19 +129,21 @@ class IdealCables:
         ValueError
             If a span has no length, or a winch has wound up its whole rope.
         """
-        points, slopes = self.points(pose), self._paths @ pose.basis[1]
-        state = self._wind(time, points, slopes * pose.rate[0], motors)
-        ropes = self.ropes
-        longer = np.einsum("ij,ij->i", state.directions, slopes[ropes.far] - slopes[ropes.near])
-        copies, cable, density = self._copies, ropes.cable, state.energy_density
-        on_rope, on_pulley = copies[cable], copies[cable][ropes.of_pulley]
+        points, slopes = self.paths @ now.values, self.paths @ now.by_place
+        state = self._wind(time, points, slopes @ now.rate, motors)
+        ropes, copies = self.ropes, self._copies
+        on_rope = copies[ropes.cable]
+        of_points = np.repeat(copies, ropes.points_per_cable)[:, None] * state.point_forces
         return Pull(
             state,
-            -float((on_rope[ropes.of_span] * state.tensions) @ longer),
-            self._commands(time, pose, state),
-            float(on_pulley @ state.friction_loss + on_rope @ state.damping_loss),
-            float(copies @ state.winch_power.sum(axis=1) - on_rope @ (density * state.wound_rates)),
-            float(on_rope @ (density * state.natural)),
+            np.tensordot(of_points, slopes, 2),
+            self._commands(time, now, state),
+            float(on_rope[ropes.of_pulley] @ state.friction_loss + on_rope @ state.damping_loss),
+            float(
+                copies @ state.winch_power.sum(axis=1)
+                - on_rope @ (state.energy_density * state.wound_rates)
+            ),
+            float(on_rope @ state.elastic_energy),
         )
 
     def strike(self, fault: CableFault, state: ChainState) -> None:
@@ -161,12 +161,12 @@ class IdealCables:
             wound[place.cable, place.end], speed[place.cable, place.end] = length, rate
         return self._chain.state(self.ropes, points, velocities, wound, speed)
 
-    def _commands(self, time: float, pose: Pose, state: ChainState) -> Array:
-        """Speeds that the laws with feedback ask for, m/s, shape (winches,).
+    def _commands(self, time: float, now: Configuration, state: ChainState) -> Array:
+        """Speeds commanded by the laws with feedback, m/s, shape (winches,).
 
-        Winches on one rope share what the structure gives free.
+        Winches on one rope share the length that the structure releases.
         """
-        ring, opening = self._mechanism.geometry, math.pi - 2.0 * float(pose.place[0])
+        opening = np.full(self._structure.sections, math.pi - 2.0 * float(now.place[0]))
         on = [place for place in self.answering if place.winch.turns(time)]
         ends = (self.ropes.first, self.ropes.last)
         running = [int(ends[place.end][place.cable]) for place in on]
@@ -179,8 +179,7 @@ class IdealCables:
             if place not in on or not isinstance(law, FeedbackWinding):
                 continue
             rope = int(ends[place.end][place.cable])
-            own = self._cables[place.cable].path_slope(ring.half_bar, opening)
-            slope = ring.sections * float(own)
+            slope = self._structure.path_slope(self._cables[place.cable], opening)
             reading = replace(
                 state.reading(place.cable, place.end, slope),
                 path_rate=float(rest[rope]) / running.count(rope),
@@ -189,63 +188,3 @@ class IdealCables:
             least, most = law.limits()
             found[number] = min(max(law.command(tension, reading), least), most)
         return found
-
-    def points(self, pose: Pose) -> Array:
-        """Points of all paths, winch, pulleys and far end, behind one another, shape (n, 3), m."""
-        points: Array = self._paths @ pose.basis[0]
-        if self._mechanism.ends is None:
-            return points
-        for winch, pulley, swing, along in self._hung:
-            arm, angle = points[winch, 2] - points[pulley, 2], float(pose.place[1 + swing])
-            turned = math.cos(angle) * UP - math.sin(angle) * along
-            points[winch] = points[pulley] + arm * turned
-        return points
-
-    def _swinging(self) -> list[tuple[int, int, int, Array]]:
-        """Each winch on an end assembly: its point and its pulley's, the swing that it shares, its
-        section's way.
-        """
-        ways, found = self._mechanism.geometry.directions, []
-        for start, size, cable, planes in zip(
-            self._starts, self._sizes, self._cables, self.planes, strict=True
-        ):
-            last = cable.end == "last"
-            first = int(start)
-            found.append((first, first + 1, planes[0] + 2 * last, ways[-1 if last else 0]))
-            if cable.end == "both":
-                far = first + size - 1
-                found.append((far, far - 1, planes[0] + 2, ways[-1]))
-        return found
-
-    def _path(self, plane: int, cable: Cable) -> Array:
-        """Coefficients of a path's points: winch, pulleys, far end; shape (points, 3, 4)."""
-        geometry, points = self._mechanism.geometry, self._mechanism.points
-        inward = np.array([0.0, 0.0, -1.0 if plane == 0 else 1.0])
-        left, right = points.left[plane], points.right[plane]
-        aside, inwards = _in_basis(cable)
-        drop = inwards + geometry.half_bar * np.eye(4)[2]
-        blocks = 0.5 * (left + right) + np.outer(inward, drop)
-        blocks += geometry.directions[:, :, None] * aside
-        path = np.stack([left, blocks, right], axis=1).reshape(-1, 3, 4)
-        if cable.end == "last":
-            path = path[::-1]
-        down = np.outer(self._winch_distance * inward, np.eye(4)[0])
-        far = path[-1:] + down if cable.end == "both" else path[:0]
-        return np.concatenate([path[:1] + down, path, far])
-
-
-def _initial(scene: Scene, mechanism: Mechanism) -> Array:
-    return np.append(scene.structure.initial_phi, np.zeros(mechanism.freedom - 1))
-
-
-def _in_basis(cable: Cable) -> tuple[Array, Array]:
-    """Coefficients of the V pulley's place beside and inside of its joint, shape (4,) each, m.
-
-    Brackets turn with the bars, so that both are linear in 1, cos(phi) and sin(phi).
-    """
-    at = cable.bracket.place(np.array([0.0, 0.5 * np.pi, np.pi]), cable.block_offset)
-    found = []
-    for zero, right, half_turn in at:
-        mean = 0.5 * (zero + half_turn)
-        found.append(np.array([mean, 0.5 * (zero - half_turn), right - mean, 0.0]))
-    return found[0], found[1]

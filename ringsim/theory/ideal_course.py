@@ -1,8 +1,8 @@
-"""Integrating an ideal ring from its release to its end, and what that leaves behind.
+"""Integrating an ideal ring from its release to its end.
 
 Steps are those of scipy's Radau IIA (order 5, for stiff equations).  A stop is a kink of the
-equations: a step that meets or leaves one is taken again to end there.  Switching a winch, and
-every fault, begins the integration anew.
+equations: a step that meets or leaves one is repeated to end there.  Switching a winch, and
+every fault, restarts the integration.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Piece:
 
 @dataclass
 class Course:
-    """What became of a run.
+    """Result of a run.
 
     Attributes
     ----------
@@ -248,7 +248,7 @@ class Integration:
         self._end = min(self._end, max(time, 0.0) + settling)
 
     def _cause(self) -> str:
-        """Why steps became too small: a rope at twice its natural length is wound up."""
+        """Why steps became too small: a rope at twice its natural length has been wound up."""
         pull = self._motion.instant(self._time, self._state).pull
         if pull is not None and pull.chain.strains.max() > 1.0:
             return "a winch has wound up its whole rope (limit its winding law, or stop it)"

@@ -1,4 +1,4 @@
-"""The ideal fidelity: a scene answered by its ring of rigid rods.
+"""The ideal fidelity: a scene run with a ring of rigid rods.
 
 A closed ring of rigid rods has one coordinate, an open arc up to five.  What they cannot represent
 is refused; what they can is integrated to tolerances far below those of the full model
@@ -13,13 +13,13 @@ import time
 import numpy as np
 
 from ringsim.choice import kind_of
+from ringsim.layout.free_hub import FreeHub
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.net import Net
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.faded_friction import with_remark
 from ringsim.theory.ideal_course import Integration
-from ringsim.theory.ideal_net import FreeHub
 from ringsim.theory.ideal_outcome import to_outcome
 from ringsim.variables import Cause, Outcome, Status
 
@@ -41,14 +41,14 @@ def refuse_if_not_ideal(scene: Scene) -> None:
     kind = kind_of(scene.structure)
     if kind != "pantograph-ring":
         raise InputError(
-            f'structure.kind = "{kind}": the ideal fidelity knows the pantograph ring alone '
+            f'structure.kind = "{kind}": the ideal fidelity supports only the pantograph ring '
             "(use the full fidelity)"
         )
     for number, fault in enumerate(scene.faults, 1):
         if isinstance(fault, StuckVJoint):
             raise InputError(
                 f'faults[{number}].kind = "{fault.kind}": with rigid rods one stuck V-joint stops '
-                f"the whole ring, so the ideal fidelity has no answer {cure}"
+                f"the whole ring, so the ideal fidelity does not support it {cure}"
             )
     if scene.record.stress:
         raise InputError(
@@ -60,7 +60,7 @@ def refuse_if_not_ideal(scene: Scene) -> None:
 
 
 def _refuse_net(scene: Scene, net: Net) -> None:
-    corners = scene.structure.geometry().fold(scene.structure.initial_phi).corners[0]
+    corners = scene.structure.geometry().fold(scene.structure.coordinate).corners[0]
     aside = FreeHub(net, len(corners)).imbalance(corners)
     if net.damping > 0.0 and aside > _CENTRED:
         raise InputError(
@@ -73,7 +73,7 @@ def _refuse_net(scene: Scene, net: Net) -> None:
     if net.hub_mass > _LIGHT_HUB * total:
         raise InputError(
             f"net.hub_mass = {net.hub_mass:g} kg must be at most {_LIGHT_HUB * total:.2g} kg in "
-            "the ideal fidelity, which leaves its inertia out (lower it, or use the full fidelity)"
+            "the ideal fidelity, which neglects its inertia (lower it, or use the full fidelity)"
         )
 
 

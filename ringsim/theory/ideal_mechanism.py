@@ -1,17 +1,17 @@
-"""The ideal ring as a mechanism: its coordinates, its mass, its equations of motion.
+"""A structure with rigid rods as a mechanism: its coordinates, its mass, its equations of motion.
 
-A closed ring of rigid rods has one coordinate, the bar angle phi.  An open arc has the swings psi
-of its four end assemblies besides (ringsim.theory.ideal_ends): five coordinates, or four where a
-boom joins two of them.
+A closed ring has one coordinate, the fold q.  An open arc has the swings psi of its four end
+assemblies besides (ringsim.theory.ideal_points): five, or four where a boom joins two of them.
 
-All but the end assemblies is the core: it moves as one rigid body (velocity V, rotation W, along
-the core's own axes) and folds.  For masses m at r(p), p = (phi, psi),
+The structure moves as one rigid body (velocity V, rotation W, along its own axes), folds and
+swings.  For masses m at r(p), p = (q, psi),
 
     sum m J^T (J (V' + W x V, W', p'') + W x (W x r) + 2 W x r' + r'') = forces,
     J = (1, -[r]x, dr/dp),
 
-Kane's equations.  A base that floats has no force on the core's translation; a fixed one holds
-the first upper assembly, and so gives V and W as functions of p and p'.
+Kane's equations.  With r = P s the sums over the masses are constant: sum m, sum m P and
+sum m P_i P_j^T.  A base that floats has no force on the translation; a fixed one holds the first
+upper assembly, and so gives V and W as functions of p and p'.
 Source: Kane and Levinson, Dynamics: Theory and Applications (1985), secs. 4.11 and 6.1.
 """
 
@@ -24,8 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.scene import Scene
-from ringsim.theory.ideal_ends import RIGID, Ends, Reach, boom_masses, on_the_boom
-from ringsim.theory.ideal_points import UP, basis, point_masses, points_of
+from ringsim.theory.ideal_points import UP, Points
 
 Array = NDArray[np.float64]
 
@@ -36,36 +35,91 @@ def skew(r: Array) -> Array:
 
 
 def _axial(w: Array) -> Array:
-    """Sum of a x b from the sum of a b^T."""
-    return np.array([w[1, 2] - w[2, 1], w[2, 0] - w[0, 2], w[0, 1] - w[1, 0]])
+    """Sums of a x b from sums of a b^T, shape (..., 3, 3)."""
+    return np.stack(
+        [w[..., 1, 2] - w[..., 2, 1], w[..., 2, 0] - w[..., 0, 2], w[..., 0, 1] - w[..., 1, 0]], -1
+    )
 
 
-class Pose(NamedTuple):
+class Moments(NamedTuple):
+    """Masses of a structure at one instant, with n coordinates.
+
+    Attributes
+    ----------
+    first
+        Sums of m P s_k, k over the columns of ``Points.functions``, shape (3, n + 3).
+    second
+        Sums of m (P s_j) (P s_k)^T, shape (n + 1, n + 3, 3, 3).
+    matrix
+        Mass matrix of (V, W, p'), shape (6 + n, 6 + n).
+    """
+
+    first: Array
+    second: Array
+    matrix: Array
+
+
+class MassSums:
+    """Sums over the masses of a structure."""
+
+    def __init__(self, masses: Array, places: Array) -> None:
+        count, flat = places.shape[-1], places.reshape(len(masses), -1)
+        self._mass, self._first = float(masses.sum()), np.tensordot(masses, places, 1)
+        second = ((flat.T * masses) @ flat).reshape(3, count, 3, count)
+        self._second = second.transpose(1, 3, 0, 2).reshape(count, -1)
+
+    def at(self, functions: Array) -> Moments:
+        """Moments where ``Points.functions`` has these values."""
+        size, columns = functions.shape
+        n = columns - 3
+        first = self._first @ functions
+        half = (functions[:, : n + 1].T @ self._second).reshape(n + 1, size, 9)
+        second = (functions.T @ half).reshape(n + 1, columns, 3, 3)
+        matrix = np.zeros((6 + n, 6 + n))
+        matrix[:3, :3] = self._mass * np.eye(3)
+        matrix[:3, 3:6] = -skew(first[:, 0])
+        matrix[3:6, 3:6] = np.trace(second[0, 0]) * np.eye(3) - second[0, 0]
+        matrix[:3, 6:] = first[:, 1 : n + 1]
+        matrix[3:6, 6:] = _axial(second[0, 1 : n + 1]).T
+        matrix[6:, 6:] = np.trace(second[1:, 1 : n + 1], axis1=2, axis2=3)
+        matrix[3:6, :3] = matrix[:3, 3:6].T
+        matrix[6:, :6] = matrix[:6, 6:].T
+        return Moments(first, second, matrix)
+
+
+class Configuration(NamedTuple):
     """Coordinates and rates of the mechanism at one instant.
 
     Attributes
     ----------
-    basis
-        s, s', s'' of ringsim.theory.ideal_points, shape (3, 4).
     place, rate
-        p = (phi, psi) and its rate, shape (1,) or (5,), rad and rad/s.
+        p = (q, psi) and its rate, shape (n,), rad and rad/s.
+    functions
+        ``Points.functions`` there.
     slopes
-        Derivatives of p after the free coordinates, shape (len(p), freedom).
+        Derivatives of p after the free coordinates, shape (n, freedom).
     bias
         p'' less slopes times the free accelerations, rad/s^2.
-    reach
-        The end assemblies of an open arc.
-    held
-        On a fixed base: derivatives of (V, W) after p', and what is left of their rates.
+    moments
+        Of the masses.
     """
 
-    basis: Array
     place: Array
     rate: Array
+    functions: Array
     slopes: Array
     bias: Array
-    reach: Reach | None = None
-    held: tuple[Array, Array] | None = None
+    moments: Moments
+
+    @property
+    def values(self) -> Array:
+        """Functions s, so that points are at P s, shape (functions,)."""
+        return self.functions[:, 0]
+
+    @property
+    def by_place(self) -> Array:
+        """Derivatives of s after p, shape (functions, n)."""
+        return self.functions[:, 1:-2]
 
 
 class Mechanism:
@@ -73,179 +127,130 @@ class Mechanism:
 
     Attributes
     ----------
-    geometry, points
-        Its fold states, and the coefficients of its points.
-    ends
-        The end assemblies of an open arc.
+    points
+        Coefficients of its points.
     freedom
-        Number of free coordinates: 1, or 4 or 5 for an open arc; phi is the first.
+        Number of free coordinates: 1, or 4 or 5 for an open arc; q is the first.
     fixed
         Whether the first upper assembly is held.
     """
 
     def __init__(self, scene: Scene) -> None:
-        ring, rods, boom = scene.structure, scene.rods, scene.boom
-        self.geometry = ring.geometry()
-        self.points = points_of(self.geometry)
-        self.fixed = boom is not None and boom.base == "fixed"
-        self.freedom = 1 if ring.closed else 5 if boom is None else 4
-        self._along = self.geometry.directions[0]
-        diagonal, bar = (
-            (rods.density * tube.area, rods.density * tube.second_moment)
-            for tube in (rods.diagonal, rods.bar)
-        )
-        masses, places = point_masses(self.geometry, self.points, diagonal, bar, ring.vjoint_mass)
-        corners = self.points.corners
-        inner = corners if ring.closed else corners[:, 1:-1]
-        inner = inner.reshape(-1, 3, 4)
-        masses = np.concatenate([masses, np.full(len(inner), ring.corner_mass)])
-        places = np.concatenate([places, inner])
-        spin = ring.corner_mass * ring.hinge_size**2 / 6.0
-        self._core_spin = spin * len(inner)
-        self.ends: Ends | None = None
-        if ring.closed:
-            hung, arms = boom_masses(scene)
-            masses = np.concatenate([masses, hung])
-            places = np.concatenate([places, corners[0, 0] + arms[:, :, None] * np.eye(4)[0]])
-        else:
-            self.ends = Ends(scene, self.geometry, self.points)
-            self._hinge_spin, self._end_spin = spin, spin * self.ends.spins()
-        self._mass = float(masses.sum())
-        self._first = np.einsum("i,iap->ap", masses, places)
-        self._second = np.einsum("i,iap,ibq->apbq", masses, places, places)
+        self.points = points = Points(scene)
+        self.fixed = bool(points.layout.supports)
+        self._sums = MassSums(*points.masses())
+        self.upper_corners = points.upper_corners()
+        swings = len(points.swinging)
+        self._on_boom = swings > 0 and scene.boom is not None
+        self.freedom = 1 + swings - self._on_boom
+        if self._on_boom:
+            pins = points.pins
+            self._height = pins[0, 2] - pins[1, 2]
+            self._offset = float(np.linalg.norm(self.upper_corners[0, :, pins.shape[-1]]))
 
-    def pose(self, free: Array, rates: Array) -> Pose:
-        """Where everything is at free coordinates (rad) and their rates (rad/s)."""
-        s = basis(self.geometry, float(free[0]))
-        if self.ends is None:
-            found = Pose(s, free, rates, np.ones((1, 1)), np.zeros(1))
-        else:
-            place, slopes, bias = free, np.eye(5), np.zeros(5)
-            if self.freedom == 4:
-                place, slopes, bias = on_the_boom(self.geometry, s, free, rates)
-            reach = self.ends.reach(s, place[1:])
-            found = Pose(s, place, slopes @ rates, slopes, bias, reach)
-        return found._replace(held=self._held(found)) if self.fixed else found
+    def configuration(self, free: Array, rates: Array) -> Configuration:
+        """The mechanism at free coordinates (rad) and their rates (rad/s)."""
+        place, slopes, bias = free, np.eye(self.freedom), np.zeros(self.freedom)
+        if self._on_boom:
+            place, slopes, bias = self._along_the_boom(free, rates)
+        rate = slopes @ rates
+        functions = self.points.functions(place, rate)
+        return Configuration(place, rate, functions, slopes, bias, self._sums.at(functions))
 
-    def corner_motion(self, pose: Pose) -> tuple[Array, Array]:
-        """Upper corners and their derivatives after p, shapes (corners, 3), (corners, 3, p), m."""
-        upper = self.points.corners[0]
-        places, slopes = upper @ pose.basis[0], np.zeros((len(upper), 3, len(pose.place)))
-        slopes[:, :, 0] = upper @ pose.basis[1]
-        if pose.reach is not None:
-            places[[0, -1]] = pose.reach.places[[0, 2]]
-            slopes[[0, -1]] = pose.reach.jacobian[[0, 2], :, RIGID:]
-        return places, slopes
-
-    def vertical(self, pose: Pose) -> Array:
-        """Unit vector that points up in space, in the core's axes, of a ring that cannot pitch."""
-        if self.ends is None or not self.fixed:
+    def vertical(self, now: Configuration) -> Array:
+        """Unit vector that points up in space, in the structure's axes, if it cannot pitch."""
+        if not (self.fixed and self.points.swinging):
             return UP
-        angle = pose.place[1]
-        return np.asarray(math.cos(angle) * UP - math.sin(angle) * self._along)
+        angle, normal = now.place[1], self.points.normals[0]
+        return np.asarray(math.cos(angle) * UP + math.sin(angle) * np.cross(normal, UP))
 
-    def mass(self, pose: Pose) -> Array:
-        """Mass matrix of (V, W, p), shape (6 + len(p), 6 + len(p))."""
-        size = RIGID + len(pose.place)
-        matrix = np.zeros((size, size))
-        first = self._first @ pose.basis[:2].T
-        second = self._seconds(pose.basis[:2])
-        matrix[:3, :3] = self._mass * np.eye(3)
-        matrix[:3, 3:6] = -skew(first[:, 0])
-        matrix[3:6, 3:6] = (np.trace(second[0, 0]) + self._core_spin) * np.eye(3) - second[0, 0]
-        matrix[:3, 6] = first[:, 1]
-        matrix[3:6, 6] = _axial(second[0, 1])
-        matrix[6, 6] = np.trace(second[1, 1])
-        matrix[3:6, :3] = matrix[:3, 3:6].T
-        matrix[6, :6] = matrix[:6, 6]
-        if self.ends is not None and pose.reach is not None:
-            flat = pose.reach.jacobian.reshape(-1, size)
-            matrix += (flat.T * np.repeat(self.ends.masses, 3)) @ flat + self._end_spin
-        return matrix
-
-    def inertial(self, pose: Pose, spin: Array) -> Array:
-        """Mass times acceleration at zero (V' + W x V, W', p''), shape (6 + len(p),)."""
-        rate, turn = pose.rate[0], skew(spin)
-        first = self._first @ pose.basis.T
-        second = self._seconds(pose.basis)
-        whirl = turn @ turn
-        found = np.zeros(RIGID + len(pose.place))
-        found[:3] = whirl @ first[:, 0] + 2.0 * rate * turn @ first[:, 1] + rate**2 * first[:, 2]
-        about, along = (
-            second[k, 0] @ whirl.T + 2.0 * rate * second[k, 1] @ turn.T + rate**2 * second[k, 2]
-            for k in (0, 1)
-        )
-        found[3:6] = _axial(about)
-        found[6] = np.trace(along)
-        if self.ends is not None and pose.reach is not None:
-            moving = self.ends.accelerations(pose.reach, pose.basis, pose.rate, turn)
-            flat = pose.reach.jacobian.reshape(-1, len(found))
-            found += (self.ends.masses[:, None] * moving).ravel() @ flat
-            found[3:6] += self._hinge_spin * turn @ (pose.rate[1:] @ self.ends.normals[:4])
-        return found
-
-    def rigid_rates(self, pose: Pose, matrix: Array, spin: Array | None = None) -> Array:
-        """V and W of the core, shape (6,).
+    def rigid_rates(self, now: Configuration, spin: Array | None = None) -> Array:
+        """V and W, shape (6,).
 
         On a fixed base those that hold the first assembly; else those without momentum, with the
         rotation ``spin`` (rad/s) or, if None, without angular momentum too.
         """
-        if pose.held is not None:
-            return np.asarray(pose.held[0] @ pose.rate)
+        matrix = now.moments.matrix
+        if self.fixed:
+            return np.asarray(self._held(now) @ now.rate)
         if spin is None:
-            return np.asarray(np.linalg.solve(matrix[:6, :6], -matrix[:6, 6:] @ pose.rate))
-        momentum = matrix[:3, 3:6] @ spin + matrix[:3, 6:] @ pose.rate
+            return np.asarray(np.linalg.solve(matrix[:6, :6], -matrix[:6, 6:] @ now.rate))
+        momentum = matrix[:3, 3:6] @ spin + matrix[:3, 6:] @ now.rate
         return np.concatenate([-momentum / matrix[0, 0], spin])
 
     def accelerations(
-        self, pose: Pose, matrix: Array, spin: Array, torque: Array, forces: Array
+        self, now: Configuration, spin: Array, torque: Array, forces: Array
     ) -> tuple[Array, Array]:
         """Accelerations of the free coordinates, and W' of a base that floats; rad/s^2.
 
         Parameters
         ----------
-        matrix
-            From ``mass``.
         spin
             W, rad/s.
         torque
-            On the core, N m, shape (3,).
+            On the structure as one body, N m, shape (3,).
         forces
             Generalised forces on p, N m.
         """
-        load = np.concatenate([np.zeros(3), torque, forces]) - self.inertial(pose, spin)
-        load -= matrix[:, 6:] @ pose.bias
-        if pose.held is not None:
-            slopes, bias = pose.held
-            load -= matrix[:, :6] @ (slopes @ pose.bias + bias)
-            reach = np.concatenate([slopes @ pose.slopes, pose.slopes])
-            return np.asarray(np.linalg.solve(reach.T @ matrix @ reach, reach.T @ load)), UP * 0.0
-        if self.freedom < len(pose.place):
-            reach = np.zeros((len(matrix), RIGID + self.freedom))
-            reach[:6, :6] = np.eye(6)
-            reach[6:, 6:] = pose.slopes
-            matrix, load = reach.T @ matrix @ reach, reach.T @ load
-        found = np.linalg.solve(matrix, load)
-        return np.asarray(found[6:]), np.asarray(found[3:6])
+        (first, second, matrix), turn = now.moments, skew(spin)
+        whirl, rigid = turn @ turn, 0 if self.fixed else 6
+        # Accelerations of the masses at zero (V' + W x V, W', p'') are linear in s, s' and s''.
+        about = second[:, 0] @ whirl.T + 2.0 * second[:, -2] @ turn.T + second[:, -1]
+        inertial = whirl @ first[:, 0] + 2.0 * turn @ first[:, -2] + first[:, -1]
+        along = np.trace(about[1:], axis1=1, axis2=2)
+        load = np.concatenate([-inertial, torque - _axial(about[0]), forces - along])
+        reach = np.zeros((len(matrix), rigid + self.freedom))
+        reach[:rigid, :rigid] = np.eye(rigid)
+        reach[6:, rigid:] = now.slopes
+        rest = np.concatenate([np.zeros(6), now.bias])
+        if self.fixed:
+            top, slopes = self.upper_corners[0], self._held(now)
+            reach[:6] = slopes @ now.slopes
+            rest[:6] = slopes @ now.bias
+            rest[:3] -= top @ now.functions[:, -1]
+            rest[:3] -= whirl @ (top @ now.values) + 2.0 * turn @ (top @ now.functions[:, -2])
+        found = np.linalg.solve(reach.T @ matrix @ reach, reach.T @ (load - matrix @ rest))
+        return np.asarray(found[rigid:]), np.asarray(found[3:6] if rigid else np.zeros(3))
 
-    def _held(self, pose: Pose) -> tuple[Array, Array]:
-        """What holds the first upper assembly, see ``Pose``."""
-        slopes, bias = np.zeros((RIGID, len(pose.place))), np.zeros(RIGID)
-        rate = pose.rate[0]
-        if self.ends is None or pose.reach is None:
-            corner = self.points.corners[0, 0]
-            slopes[:3, 0] = -corner @ pose.basis[1]
-            bias[:3] = -(rate**2) * (corner @ pose.basis[2])
-            return slopes, bias
-        pin, place, across = self.ends.pins[0], pose.reach.places[0], pose.reach.across[0]
-        turn, swing, sliding = skew(self.ends.normals[0]), pose.rate[1], pin @ pose.basis[1]
-        slopes[3:, 1] = -self.ends.normals[0]
-        slopes[:3, 0] = -sliding
-        slopes[:3, 1] = turn @ place - across
-        bias[:3] = -(rate**2) * (pin @ pose.basis[2]) + 2.0 * swing * rate * (turn @ sliding)
-        bias[:3] += swing**2 * (turn @ (across - turn @ place))
-        return slopes, bias
+    def _held(self, now: Configuration) -> Array:
+        """Derivatives of (V, W) after p' that hold the first upper assembly, shape (6, n)."""
+        top, slopes = self.upper_corners[0], np.zeros((6, len(now.place)))
+        slopes[:3] = -top @ now.by_place
+        if self.points.swinging:
+            normal = self.points.normals[0]
+            slopes[3:, 1] = -normal
+            slopes[:3, 1] += np.cross(normal, top @ now.values)
+        return slopes
 
-    def _seconds(self, s: Array) -> Array:
-        """Sums of m (P s_i) (P s_j)^T, shape (i, j, 3, 3)."""
-        return np.asarray(np.einsum("ip,apbq,jq->ijab", s, self._second, s))
+    def _along_the_boom(self, free: Array, rates: Array) -> tuple[Array, Array, Array]:
+        """p, its derivatives after (q, b, psi_3, psi_4), and p'' at zero accelerations of these.
+
+        A boom in the first end assembly, on which the second slides, leaves the angle b between
+        these two: with a the distance of the pins from the assembly's centre and h that of the
+        pins,
+
+            sin(psi_1) = a (1 - cos b) / h,   psi_2 = psi_1 + b.
+
+        The second derivatives come from sin(psi_1) h = a (1 - cos b), differentiated twice.  NaN
+        where the boom blocks the lower assembly.
+        """
+        h, h_slope, h_bend = self.points.basis(float(free[0])) @ self._height
+        offset = self._offset
+        b, b_rate, q_rate = free[1], rates[1], rates[0]
+        lean = offset * (1.0 - math.cos(b)) / h
+        angle = math.asin(lean) if abs(lean) < 1.0 else math.nan
+        level = h * math.cos(angle)
+        by_b, by_q = offset * math.sin(b) / level, -lean * h_slope / level
+        rate = by_b * b_rate + by_q * q_rate
+        bias = (
+            offset * math.cos(b) * b_rate**2
+            + rate**2 * h * lean
+            - 2.0 * rate * math.cos(angle) * h_slope * q_rate
+            - lean * h_bend * q_rate**2
+        ) / level
+        slopes = np.zeros((5, 4))
+        slopes[0, 0] = slopes[3, 2] = slopes[4, 3] = slopes[2, 1] = 1.0
+        slopes[1:3, 0] = by_q
+        slopes[1:3, 1] += by_b
+        place = np.array([free[0], angle, angle + b, free[2], free[3]])
+        return place, slopes, np.array([0.0, bias, bias, 0.0, 0.0])

@@ -26,17 +26,17 @@ from ringsim.theory.ideal_points import UP
 Array = NDArray[np.float64]
 
 MOTOR_LAG = 1e-6
-"""Time in s within which a motor takes up the speed that its law asks for.
+"""Time constant in s with which a motor follows the speed that its law commands.
 
-A law answers to a tension that answers to the speed: a motor without inertia would need the two
-solved together.  Ropes swing in milliseconds.
+The law depends on the tension, which depends on the speed: without this lag both would have to be
+solved together.  Cables oscillate within milliseconds.
 """
 _ANGLE, _RATE = 1e-6, 1e-4
 """Largest increments of angles (rad) and rates (rad/s) for derivatives of the equations."""
 
 
 class Instant(NamedTuple):
-    """Everything about one instant.
+    """Accelerations and energies at one instant.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class IdealMotion:
         Time at which something is switched on or off next, s: laws of winches are taken from
         before it.
     refusal
-        Why the cables last had no answer; empty if they always had.
+        Why the cables could last not be evaluated; empty if they always could.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -82,9 +82,9 @@ class IdealMotion:
         self.forces = Forces(scene, self.mechanism)
         self.cables = None if scene.cables is None else IdealCables(scene, self.mechanism)
         self.latched, self.until, self.refusal = False, math.inf, ""
-        self._initial = scene.structure.initial_phi
+        self._initial = scene.structure.coordinate
         n = self.mechanism.freedom
-        self._tilts = not self.mechanism.fixed and self.forces.load != 0.0
+        self._tilts = not self.mechanism.fixed and self.forces.loaded
         tilt = 3 if self._tilts else 0
         motors = 0 if self.cables is None else 2 * len(self.cables.answering)
         ends = np.cumsum([n, n, tilt, tilt, motors])
@@ -115,21 +115,20 @@ class IdealMotion:
             If the cables have no answer (ringsim.cable.chain).
         """
         mechanism = self.mechanism
-        pose = mechanism.pose(state[self._place], state[self._rate])
-        matrix = mechanism.mass(pose)
-        rigid = mechanism.rigid_rates(pose, matrix, state[self._spin] if self._tilts else None)
-        up = state[self._up] if self._tilts else mechanism.vertical(pose)
-        acting = self.forces.act(pose, up, self.latched)
+        now = mechanism.configuration(state[self._place], state[self._rate])
+        rigid = mechanism.rigid_rates(now, state[self._spin] if self._tilts else None)
+        up = state[self._up] if self._tilts else mechanism.vertical(now)
+        acting = self.forces.act(now, up, self.latched)
         force, pull = acting.force, None
         if self.cables is not None:
             earlier = min(time, self.until * (1.0 - 1e-12))
-            pull = self.cables.pull(earlier, pose, state[self._motors].reshape(2, -1))
-            force = force.copy()
-            force[0] += pull.force
+            pull = self.cables.pull(earlier, now, state[self._motors].reshape(2, -1))
+            force = force + pull.force
         spin = rigid[3:]
-        moving, turning = mechanism.accelerations(pose, matrix, spin, acting.couple, force)
-        rates = np.concatenate([rigid, pose.rate])
-        return Instant(moving, turning, spin, 0.5 * float(rates @ matrix @ rates), acting, pull)
+        moving, turning = mechanism.accelerations(now, spin, acting.couple, force)
+        rates = np.concatenate([rigid, now.rate])
+        kinetic = 0.5 * float(rates @ now.moments.matrix @ rates)
+        return Instant(moving, turning, spin, kinetic, acting, pull)
 
     def rates(self, time: float, state: Array) -> Array:
         """Derivative of the state; NaN where the cables have no answer."""

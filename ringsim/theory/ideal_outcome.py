@@ -12,17 +12,17 @@ from scipy.interpolate import CubicHermiteSpline
 
 from ringsim.cable.state import ChainState
 from ringsim.outputs.cable_tension import CableTension
-from ringsim.outputs.effort import counts_of, note_starts
 from ringsim.outputs.family import Output, Values, axes
-from ringsim.outputs.instant import Energies, Instant
+from ringsim.outputs.reading import Reading
 from ringsim.outputs.recorder import outputs_of, reduced, spanned
 from ringsim.outputs.series import Run, Series, output_times
 from ringsim.scene import Scene
+from ringsim.stepping.instant import Energies
 from ringsim.theory.ideal_course import Course, Piece, quintic
-from ringsim.variables import Fidelity, Outcome
+from ringsim.variables import COUNTS, Fidelity, Outcome
 
 Array = NDArray[np.float64]
-_Reader = Callable[[Instant], Array | float | None]
+_Reader = Callable[[Reading], Array | float | None]
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,15 @@ def to_outcome(course: Course, scene: Scene) -> Outcome:
     if course.motion.cables is not None:
         values |= {name: np.asarray(value) for name, value in ideal.cables().items()}
     coordinates = spanned(values, axes(scene))
-    outcome = Outcome(course.status, course.reason, coordinates, values, course.cause)
-    note_starts(outcome, Fidelity.IDEAL, scene.solver, [counts_of(outcome)])
-    return outcome
+    found = {
+        "fidelity": int(Fidelity.IDEAL),
+        "restarts": 0,
+        "step_used": scene.solver.step,
+        "tolerance_used": np.nan,
+        **{f"total_{name}": ideal.run.counts[name] for name in COUNTS},
+    }
+    values |= {name: np.array(value) for name, value in found.items()}
+    return Outcome(course.status, course.reason, coordinates, values, course.cause)
 
 
 class _IdealRun:
@@ -58,9 +64,9 @@ class _IdealRun:
     def __init__(self, course: Course, scene: Scene) -> None:
         self._course, self._shape = course, (2, scene.structure.sections)
         self._grid, self._lifted = output_times(scene), 0.0
-        self._known: dict[bytes, list[Instant]] = {}
-        self._steps: list[Instant] = []
-        self._balanced: list[Instant] = []  # ends of steps, collocation points between them
+        self._known: dict[bytes, list[Reading]] = {}
+        self._steps: list[Reading] = []
+        self._balanced: list[Reading] = []  # ends of steps, collocation points between them
         first = course.pieces[0]
         self._lifted = self._at(first, np.array(first.times[:1]))[0].energies.work
         for piece in course.pieces:
@@ -101,7 +107,7 @@ class _IdealRun:
 
         return _Evaluated(*_readings(read, self._steps), self._grid, evaluate)
 
-    def _instants(self, where: Array) -> list[Instant]:
+    def _instants(self, where: Array) -> list[Reading]:
         """The run at some times; the later piece where two meet."""
         pieces, key = self._course.pieces, where.tobytes()
         if key not in self._known:
@@ -110,7 +116,7 @@ class _IdealRun:
             self._known[key] = [now for part in seen for now in part]
         return self._known[key]
 
-    def _at(self, piece: Piece, where: Array) -> list[Instant]:
+    def _at(self, piece: Piece, where: Array) -> list[Reading]:
         """A piece at times within it."""
         motion = self._course.motion
         motion.latched, motion.until = piece.latched, piece.times[-1]
@@ -128,13 +134,13 @@ class _IdealRun:
             found[:, :turn], found[:, turn : 2 * turn] = curve(where), curve.derivative()(where)
         return [self._told(float(t), y) for t, y in zip(where, found, strict=True)]
 
-    def _told(self, time: float, state: Array) -> Instant:
+    def _told(self, time: float, state: Array) -> Reading:
         """A state as every output reads it; work counts from the first one."""
         motion = self._course.motion
         now = motion.instant(time, state)
         work = now.acting.work - self._lifted + state[-1]
         opening, rate = math.pi - 2.0 * state[0], -2.0 * state[motion.rate_of_phi]
-        return Instant(
+        return Reading(
             time,
             np.full(self._shape, opening),
             np.full(self._shape, rate),
@@ -145,7 +151,7 @@ class _IdealRun:
         )
 
 
-def _readings(read: _Reader, instants: list[Instant]) -> tuple[Array, Array]:
+def _readings(read: _Reader, instants: list[Reading]) -> tuple[Array, Array]:
     values = np.array([read(now) for now in instants], dtype=float)
     return np.array([now.time for now in instants]), values
 

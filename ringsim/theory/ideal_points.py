@@ -1,129 +1,204 @@
-"""Every point of an ideal ring as a linear function of four numbers.
+"""Every point of a structure with rigid rods as a linear function of a few numbers.
 
-With the bar angle phi, half bar l, half diagonal d and the diagonals' angle theta,
-d cos(theta) = l cos(phi), let
+Where a structure has a basis s(q) (``Structure.basis``), every point is r = P s with a constant P,
+found from places and derivatives of the layout at three coordinates; then r' = P s' and
+r'' = P s''.  Elsewhere P = (r, r') and s = (1, 0), s' = (0, 1), good at one coordinate alone.
 
-    s(phi) = (1, cos(phi), sin(phi), sin(theta)),   sin(theta) = sqrt(1 - (l / d)^2 cos(phi)^2).
+The hinge assemblies at the ends of an open arc hang on the pins of one section each, and swing on
+them by angles psi.  A point of theirs at the arm a from the pin, a = b + c with b along the pin's
+axis n, stands at
 
-The distance of two corners 2 (l cos(phi) + a), half the height d sin(theta) and the rods'
-directions are linear in s, so every point is r = P s with a constant P of shape (3, 4), and its
-derivatives after phi are P s' and P s''.
+    pin + b + cos(psi) c + sin(psi) n x a,
+
+linear in two more functions for each of them.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ringsim.geometry.ring import RingGeometry
+from ringsim.cable.sheaves import FixedSheave
+from ringsim.layout.bodies import Mount, OnBody
+from ringsim.layout.layout import Layout
+from ringsim.layout.of_scene import layout_of
+from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
+Pairs = tuple[Array, Array]
+"""Places, or axes, and their derivatives after the coordinate, shape (..., 3) each."""
 
 UP = np.array([0.0, 0.0, 1.0])
-SIGN = np.array([1.0, -1.0])
-"""Upper and lower plane."""
-_ONE, _COS, _SIN, _HEIGHT = np.eye(4)
+NODES = (0.2, 0.8, 1.4)
+"""Coordinates at which the layout is built, rad: apart, and away from both ends of the travel."""
+_CLOSE = 1e-10
+"""What the basis may leave over of a place of size 1: round-off leaves 1e-14."""
 
 
-@dataclass(frozen=True)
 class Points:
-    """Coefficients of the named points, each shape (..., 3, 4), m.
+    """Coefficients P of the points of a scene.
 
     Attributes
     ----------
-    corners
-        Centres of the hinge assemblies, shape (2, corners, 3, 4).
-    left, right
-        Pins of a section at its first and second corner, shape (2, sections, 3, 4).
-    vjoints
-        Middle joints of the folding bars, shape (2, sections, 3, 4).
+    basis
+        The functions s of the structure and their derivatives, see ``Structure.basis``.
+    layout
+        One of those that they were found from: what is connected with what.
+    swinging
+        Bodies that swing: left upper, left lower, right upper, right lower; empty unless the
+        structure is an open arc with a basis.
+    pins, normals
+        Their pins' coefficients, shape (swinging, 3, functions of the structure), and axes,
+        shape (swinging, 3).
     """
 
-    corners: Array
-    left: Array
-    right: Array
-    vjoints: Array
+    def __init__(self, scene: Scene, at: float | None = None) -> None:
+        self.basis = scene.structure.basis if at is None else _alone
+        nodes = NODES if at is None else (at,)
+        self._layouts = [layout_of(scene, q) for q in nodes]
+        self._known = np.concatenate([self.basis(q)[:2] for q in nodes])
+        self.layout = self._layouts[0]
+        hinges = [] if at is not None else _end_hinges(self.layout)
+        self.swinging = tuple(hinge.body for hinge in hinges)
+        self.pins, self.normals = np.zeros((0, 3, 0)), np.zeros((0, 3))
+        if hinges:
+            self.pins = self.fit(
+                lambda layout: _stacked(layout.bodies[h.body].pose.at(h.arm) for h in hinges)
+            )
+            self.normals = np.array([self.layout.pose(hinge).axes[:, 2] for hinge in hinges])
+
+    def fit(self, read: Callable[[Layout], Pairs]) -> Array:
+        """Coefficients of what is read of a layout, shape (..., 3, functions of the structure).
+
+        Raises
+        ------
+        ValueError
+            If it is not linear in the structure's basis.
+        """
+        values = np.stack([part for layout in self._layouts for part in read(layout)])
+        flat = values.reshape(len(values), -1)
+        found = np.linalg.lstsq(self._known, flat, rcond=None)[0]
+        left = np.abs(self._known @ found - flat).max(initial=0.0)
+        if left > _CLOSE * max(np.abs(flat).max(initial=0.0), 1.0):
+            raise ValueError(
+                f"structure: a place is {left:.3g} m off what its basis says: list in basis() all "
+                "functions of the coordinate that layout() uses"
+            )
+        return np.moveaxis(found.reshape(len(found), *values.shape[1:]), 0, -1)
+
+    def swung(self, read: Callable[[Layout], Pairs], bodies: Iterable[int]) -> Array:
+        """Coefficients of points, those on swinging bodies with their swings.
+
+        Parameters
+        ----------
+        read
+            Of a layout, shapes (points, 3).
+        bodies
+            Number of each point's body; -1 for any part that cannot swing.
+
+        Returns
+        -------
+        Array
+            Shape (points, 3, functions), m.
+        """
+        rigid, bodies = self.fit(read), np.array(list(bodies), dtype=int)
+        more = np.zeros((*rigid.shape[:-1], 2 * len(self.swinging)))
+        for number, body in enumerate(self.swinging):
+            own = bodies == body
+            ahead = np.cross(self.normals[number], rigid[own, :, 0] - self.pins[number, :, 0])
+            across = np.cross(ahead, self.normals[number])
+            rigid[own, :, 0] -= across
+            more[own, :, 2 * number], more[own, :, 2 * number + 1] = across, ahead
+        return np.concatenate([rigid, more], axis=-1)
+
+    def functions(self, place: ArrayLike, rate: ArrayLike) -> Array:
+        """The functions s, their derivatives after p = (q, psi), and two more columns.
+
+        These are ds/dt at the rates p', and d^2s/dt^2 where the rates are constant.
+
+        Parameters
+        ----------
+        place, rate
+            p and p', shape (1 + swinging,), rad and rad/s.
+
+        Returns
+        -------
+        Array
+            Shape (functions, 1 + len(p) + 2).
+        """
+        p, w = np.asarray(place, dtype=float), np.asarray(rate, dtype=float)
+        s = self.basis(float(p[0]))
+        first, swings = s.shape[1], np.arange(len(self.swinging))
+        found = np.zeros((first + 2 * len(swings), len(p) + 3))
+        found[:first, :2] = s[:2].T
+        found[:first, -2:] = (s[1:].T) * [w[0], w[0] ** 2]
+        cosine, sine, spin = np.cos(p[1:]), np.sin(p[1:]), w[1:]
+        for rows, value, slope in (
+            (first + 2 * swings, cosine, -sine),
+            (first + 2 * swings + 1, sine, cosine),
+        ):
+            found[rows, 0], found[rows, 2 + swings] = value, slope
+            found[rows, -2], found[rows, -1] = spin * slope, -(spin**2) * value
+        return found
+
+    def masses(self) -> tuple[Array, Array]:
+        """All point masses, kg, and their coefficients; shapes (n,) and (n, 3, functions)."""
+        known = self.layout.point_masses()
+        return known.masses, self.swung(lambda layout: layout.point_masses()[2:], known.bodies)
+
+    def upper_corners(self) -> Array:
+        """Coefficients of the upper hinge assemblies' centres, shape (corners, 3, functions), m."""
+        bodies = self.layout.corners[0]
+        return self.swung(
+            lambda layout: _stacked(layout.bodies[b].pose.at(UP * 0.0) for b in bodies), bodies
+        )
+
+    def forces(self) -> tuple[Array, Array]:
+        """The loads, N, and where they act; shapes (forces, 3) and (forces, 3, functions)."""
+        mounts = [self.layout.joints[joint].first for joint, _ in self.layout.forces]
+        vectors = np.array([force for _, force in self.layout.forces]).reshape(-1, 3)
+
+        def read(layout: Layout) -> Pairs:
+            poses = [layout.pose(mount) for mount in mounts]
+            return _stacked((pose.place, pose.rate) for pose in poses)
+
+        return vectors, self.swung(read, map(body_of, mounts))
+
+    def path(self, number: int) -> Array:
+        """Coefficients of a cable's sheaves, shape (sheaves, 3, functions), m."""
+        path = self.layout.paths[number]
+        bodies = [body_of(s.node) if isinstance(s, FixedSheave) else -1 for s in path]
+        return self.swung(lambda layout: _stacked(map(layout.sheave, layout.paths[number])), bodies)
 
 
-def basis(geometry: RingGeometry, phi: float) -> Array:
-    """The functions s and their first and second derivatives after phi, shape (3, 4).
-
-    NaN where the diagonals could not reach.
-    """
-    ratio = (geometry.half_bar / geometry.half_diagonal) ** 2
-    c, s = math.cos(phi), math.sin(phi)
-    rest = 1.0 - ratio * c * c
-    h = math.sqrt(rest) if rest > 0.0 else math.nan
-    slope = ratio * c * s / h
-    bend = (ratio * (c * c - s * s) - slope * slope) / h
-    return np.array([[1.0, c, s, h], [0.0, -s, c, slope], [0.0, -c, -s, bend]])
+def body_of(mount: Mount) -> int:
+    """Number of a mount's body; -1 on rods and in space."""
+    return mount.body if isinstance(mount, OnBody) else -1
 
 
-def points_of(geometry: RingGeometry) -> Points:
-    """Coefficients of corners, pins and V-joints about the polygon's centre."""
-    bar, offset = geometry.half_bar, geometry.hinge_offset
-    chord = 2.0 * (bar * _COS + offset * _ONE)
-    lift = SIGN[:, None, None, None] * np.outer(UP, geometry.half_diagonal * _HEIGHT)
-    first = geometry.plan[: geometry.sections]
-    second = np.roll(geometry.plan, -1, axis=0)[: geometry.sections]
-    inside = _outer(geometry.directions, offset * _ONE)
-    drop = SIGN[:, None, None, None] * np.outer(UP, bar * _SIN)
-    return Points(
-        corners=_outer(geometry.plan, chord) + lift,
-        left=_outer(first, chord) + inside + lift,
-        right=_outer(second, chord) - inside + lift,
-        vjoints=_outer(0.5 * (first + second), chord) + lift - drop,
-    )
+def _alone(q: float) -> Array:
+    del q
+    return np.eye(3, 2)
 
 
-def point_masses(
-    geometry: RingGeometry,
-    points: Points,
-    diagonal: tuple[float, float],
-    bar: tuple[float, float],
-    vjoint: float,
-) -> tuple[Array, Array]:
-    """Point masses that move as rods and V-joints do, shape (n,) and (n, 3, 4).
-
-    A rod of mass m is m / 6 at its ends and 2 m / 3 in its middle (Simpson's rule, exact for what
-    is quadratic along it), the latter spread over four points across the rod so that its
-    cross-sections' own rotation counts.
-
-    Parameters
-    ----------
-    diagonal, bar
-        Mass per length (kg/m) and transverse rotary inertia per length (kg m).
-    vjoint
-        Mass of a V-joint, kg.
-    """
-    along, ratio = geometry.directions, geometry.half_bar / geometry.half_diagonal
-    normals = _outer(geometry.normals, _ONE)
-    tall = np.outer(UP, _COS)
-    slant = _outer(along, _SIN)
-    steep = _outer(along, _HEIGHT)
-    masses, places = [np.full(points.vjoints[..., 0, 0].size, vjoint)], [points.vjoints]
-    left, right, middle = points.left, points.right, points.vjoints
-    slanted = (*diagonal, 2.0 * geometry.half_diagonal)
-    folding = (*bar, geometry.half_bar)
-    for start, end, across, (density, inertia, length) in (
-        (left[1], right[0], ratio * tall - steep, slanted),
-        (left[0], right[1], ratio * tall + steep, slanted),
-        (left[0], middle[0], tall + slant, folding),
-        (middle[0], right[0], tall - slant, folding),
-        (left[1], middle[1], tall - slant, folding),
-        (middle[1], right[1], tall + slant, folding),
-    ):
-        share = density * length / 6.0
-        reach = math.sqrt(3.0 * inertia / density)
-        centre = 0.5 * (start + end)
-        sides = [centre + sign * reach * way for way in (across, normals) for sign in (1.0, -1.0)]
-        masses.append(np.full(6 * len(start), share))
-        places += [start, end, *sides]
-    return np.concatenate(masses), np.concatenate([p.reshape(-1, 3, 4) for p in places])
+def _stacked(pairs: Iterable[Sequence[Array]]) -> Pairs:
+    found = np.array(list(pairs)).reshape(-1, 2, 3)
+    return found[:, 0], found[:, 1]
 
 
-def _outer(vectors: Array, function: Array) -> Array:
-    return np.asarray(vectors[..., :, None] * function)
+def _end_hinges(layout: Layout) -> list[OnBody]:
+    """A mount on each hinge assembly at an end of an arc, all of whose hinges share one axis."""
+    found = []
+    for end in (0, -1):
+        for plane in layout.corners[:2]:
+            hinges = [
+                mount
+                for joint in layout.joints
+                for mount in (joint.first, joint.second)
+                if joint.kind == "revolute" and body_of(mount) == plane[end]
+            ]
+            if np.ptp([hinge.axes[:, 2] for hinge in hinges], axis=0).max() < _CLOSE:
+                found.append(hinges[0])
+    return [mount for mount in found if isinstance(mount, OnBody)]

@@ -25,7 +25,7 @@ f(0) = 1/3 being the textbook's deflection at a force between two supports.  It 
 strut and turns it: F, D and T are those of the displaced head, found by repetition.  Left out:
 the shortening of the beam's chord (of the order w^2 / b) and its stretch N / (E A).  The strain
 of the outer fibre is M r / (E I).
-Source: paper 001, section 4, for the features; statics by hand.
+Source: paper 001, section 4, for the features; own statics.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ringsim.parts.structure.planar_truss import PlanarTruss
 from ringsim.scene import Scene
+from ringsim.structures.planar_truss import PlanarTruss
 
 Array = NDArray[np.float64]
 _REPETITIONS = 12
-"""Each takes the error of the deflection down a hundredfold: it changes the moment by 1 %."""
+"""Each reduces the error of the deflection a hundredfold, as it changes the moment by 1 %."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def spring_force(truss: PlanarTruss, cable: ArrayLike) -> Array:
     """Push of the deploying spring at cable lengths (m) with rigid beams, N."""
     geometry = truss.geometry()
     strut = geometry.strut(geometry.angle(cable))
-    return np.asarray(truss.spring.stiffness * (truss.spring.free_length - strut))
+    return np.asarray(-truss.spring.tension(strut).elastic)
 
 
 def tension(truss: PlanarTruss, cable: ArrayLike) -> Array:
@@ -93,7 +93,7 @@ def statics(scene: Scene, cable: ArrayLike) -> TrussStatics:
     for _ in range(_REPETITIONS):
         along, across = head - foot * np.cos(angle), bend + foot * np.sin(angle)
         strut = np.hypot(along, across)
-        push = truss.spring.stiffness * (truss.spring.free_length - strut)
+        push = -truss.spring.tension(strut).elastic
         lever = (head * across - bend * along) / strut
         hold = push * lever / (beam * cable_across)
         pull = push * along / strut - hold * cable_along
@@ -130,12 +130,12 @@ def bending_strain(scene: Scene, cable: ArrayLike, station: ArrayLike) -> Array:
 
 
 def _wave(scene: Scene, pull: Array) -> NDArray[np.complex128]:
-    """Wave number n, 1/m: real in a taut beam, imaginary in a pressed one, never quite zero."""
+    """Wave number n, 1/m: real in tension, imaginary in compression, never exactly zero."""
     return np.asarray(np.sqrt(pull / _stiffness(scene) + 1e-12j))
 
 
 def _taut(z: NDArray[np.complex128]) -> Array:
-    """f(z) = (z coth z - 1) / z^2, by its series where the quotient would lose its digits."""
+    """f(z) = (z coth z - 1) / z^2, by its series where the quotient would lose precision."""
     square = z * z
     small = np.abs(square) < 1e-4
     safe = np.where(small, 1.0, z)

@@ -74,8 +74,9 @@ def test_slope_vector_rods_need_their_own_evidence(tmp_path: Path) -> None:
 def test_a_scene_without_a_good_end_is_told_early(tmp_path: Path) -> None:
     """The cheapest reference run tells; nothing else is run."""
     small = [*SMALL, "--set", "solver.end_time=0.2"]
-    found = ringsim("accuracy", "ring18", *small, "--out", str(tmp_path), "--workers", "1")
-    assert found.exit_code == 3
+    words = ["accuracy", "ring18", *small, "--out", str(tmp_path), "--workers", "1"]
+    found = CliRunner().invoke(cli, words, standalone_mode=False)
+    assert found.return_value == 3
     assert "reference run with solver.step_control = motion" in found.output
     assert "locked" in found.output
     assert "change the scene" in found.output

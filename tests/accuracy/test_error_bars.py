@@ -11,12 +11,16 @@ from ringsim.analysis.error_budget import budget_lines, error_budget
 from ringsim.campaign.cases import Cases, run_cases
 from ringsim.campaign.specification import load_campaign
 from ringsim.dataset import to_dataset
-from ringsim.engine.stepping import StepControl, StopContact
 from ringsim.outputs.error_bars import error_bars, rules
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
+from ringsim.stepping.constant_steps import ConstantSteps
+from ringsim.stepping.instant import Energies, Instant
+from ringsim.stepping.locks import StopContact
+from ringsim.stepping.motion_steps import MotionSteps
+from ringsim.stepping.scales import Scales
 from ringsim.variables import Outcome, Status
 
 TIMES = np.linspace(0.0, 4.0, 41)
@@ -61,10 +65,15 @@ def test_a_method_of_second_order_is_covered_three_times_and_more() -> None:
 
 def steps_of(solver: Solver, rates: list[float], stops: StopContact) -> list[float]:
     """Steps chosen while the mean rate goes through these values."""
-    control, time, steps = StepControl(solver, contact_step=2e-3, usual_rate=0.1), 0.0, []
+    scales = Scales(0.1, 1.0, travel=3.0, length=1.0, contact_step=2e-3)
+    constant = solver.step_control == "constant"
+    control = ConstantSteps(solver.step, recover=False) if constant else MotionSteps(solver, scales)
+    time, steps = 0.0, []
     for rate in rates:
         time += control.step
-        steps.append(control.advance(time, rate, stops))
+        rest = Energies(0.0, 0.0, 0.0, 0.0)
+        control.advance(Instant(time, np.zeros(1), np.array([rate]), rest), stops)
+        steps.append(control.step)
     return steps
 
 
@@ -78,12 +87,12 @@ CALM, WILD = [1.0] * 40, [1.0, -1e9] * 20
 @pytest.mark.parametrize("control", ["motion", "constant"])
 def test_the_second_run_doubles_every_step(rates, stops, control) -> None:
     solver = Solver(step=0.1, step_control=control, tolerance=1e-3)
-    one, two = (steps_of(s, rates, stops) for s in (solver, solver.coarsened()))
+    one, two = (steps_of(s, rates, stops) for s in (solver, solver.scaled(2.0)))
     np.testing.assert_allclose(two, 2.0 * np.array(one), rtol=1e-12)
 
 
 def test_a_second_run_stays_within_its_bounds() -> None:
-    solver = Solver(step=0.8, end_time=1.0, tolerance=0.05).coarsened()
+    solver = Solver(step=0.8, end_time=1.0, tolerance=0.05).scaled(2.0)
     assert (solver.step, solver.tolerance) == (1.0, 0.1)
     assert Solver.model_validate(solver.model_dump()) == solver
 
@@ -147,8 +156,8 @@ def test_shorter_steps_give_the_bars_where_longer_ones_fail(attempts) -> None:
     seen = attempts(outcome(error), failed, outcome(0.25 * error))
     scene = ring(**{"solver.error_bars": True})
     found = run(scene)
-    assert seen[1] == scene.solver.coarsened()
-    assert seen[2] == scene.solver.halved()
+    assert seen[1] == scene.solver.scaled(2.0)
+    assert seen[2] == scene.solver.scaled(0.5)
     of_steps = 3.0 * rules()["peak_tension"].safety * error * 10.0
     between = rules()["peak_tension"].between_readings * scene.solver.tolerance
     expected = of_steps + (rules()["peak_tension"].of_one_element + between) * 10.0
@@ -227,9 +236,9 @@ def test_budget_says_which_error_dominates() -> None:
     )
     campaign.status[0] = 2
     found = error_budget(campaign)
-    assert list(found.output.values) == ["deployment_time", "asynchrony_max"]
-    assert int(found.bars[0]) == 9
-    assert float(found.standard_error[0]) == pytest.approx(values[1:].std(ddof=1) / 99**0.5)
+    assert [budget.output for budget in found] == ["deployment_time", "asynchrony_max"]
+    assert found[0].bars == 9
+    assert found[0].standard_error == pytest.approx(values[1:].std(ddof=1) / 99**0.5)
     first, second = budget_lines(found)
     assert "sampling error dominates" in first
     assert "numerical error dominates" in second

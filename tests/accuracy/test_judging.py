@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import tomli_w
 import xarray as xr
 
 from ringsim.analysis.accuracy import NEEDED, Truth, judge
 from ringsim.analysis.accuracy_text import in_words, tables
-from ringsim.analysis.evidence import evidence_of, likest, read_evidence, to_toml
+from ringsim.analysis.evidence import evidence_for, evidence_of, read_evidence
 from ringsim.analysis.ladder import PATHS, ladder, references
 from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
@@ -31,7 +32,7 @@ def made_up() -> xr.Dataset:
     times = np.linspace(0.0, 12.0, 121)
     rows = []
     for number, rung in enumerate(RUNGS):
-        mood = 1.0 + 0.05 * (-1.0) ** number  # of the machine
+        scatter = 1.0 + 0.05 * (-1.0) ** number
         error = sum(errors_of(dict(rung.values)))
         angle = np.clip(90.0 + 9.0 * times * (1.0 + error), None, 180.0)
         known = times <= TRUE_TIME * (1.0 + error)
@@ -43,7 +44,7 @@ def made_up() -> xr.Dataset:
                 "asynchrony_max": TRUE_TIME * (1.0 + error),
                 "peak_rod_stress": TRUE_STRESS * (1.0 - error),
                 "energy_error": error,
-                "cpu_time": mood * float(rung.values["rods.elements"]) / np.sqrt(error),
+                "cpu_time": scatter * float(rung.values["rods.elements"]) / np.sqrt(error),
                 "steps": 100.0 / np.sqrt(error),
                 "jacobians": 100.0 / np.sqrt(error),
                 "newton_iterations": 300.0 / np.sqrt(error),
@@ -74,7 +75,7 @@ def test_the_extrapolated_reference_is_the_truth(study: xr.Dataset) -> None:
     expected = [sum(errors_of(dict(rung.values))) for rung in RUNGS]
     for output in ("deployment_time", "peak_rod_stress"):
         np.testing.assert_allclose(study.error.sel(output=output), expected, rtol=1e-3, atol=1e-9)
-    # What it corrects is what it may be wrong by: the errors of the finest steps and elements.
+    # Its uncertainty is the size of its correction: the errors of the finest steps and elements.
     in_time, in_space = references(RUNGS)
     finest = errors_of(dict(RUNGS[in_time[-1]].values))[0]
     finest += errors_of(dict(RUNGS[in_space[-1]].values))[1]
@@ -87,11 +88,15 @@ def test_orders(study: xr.Dataset) -> None:
     order = study.order.sel(output="deployment_time")
     assert float(order.sel(graded="constant step")) == pytest.approx(2.0, abs=0.1)
     assert float(order.sel(graded="steps")) == pytest.approx(2.0, abs=0.1)
-    assert np.isnan(order.sel(graded="formulation"))  # changes below what the steps are wrong by
+    assert np.isnan(order.sel(graded="formulation"))  # changes are below the errors of the steps
 
 
-def test_cost_is_free_of_the_machines_moods(study: xr.Dataset) -> None:
-    own = [k for k, r in enumerate(RUNGS) if r.stressed and r.values["rods.elements"] == 1]
+def test_cost_is_free_of_the_scatter_of_timings(study: xr.Dataset) -> None:
+    own = [
+        k
+        for k, r in enumerate(RUNGS)
+        if r.values["rods.kind"] != "ancf" and r.values["rods.elements"] == 1
+    ]
     steps = study.steps.to_numpy()[own]
     measured = study.cpu_time.to_numpy()[own] / steps
     assert measured.max() / measured.min() > 1.05
@@ -109,7 +114,7 @@ def test_the_frontier_holds_every_setting_that_is_worth_its_cost(study: xr.Datas
 
 
 def test_an_error_that_is_small_by_chance_recommends_nothing() -> None:
-    """One coarse setting happens upon the truth: it is worth what the finer ones are wrong by."""
+    """One coarse setting hits the truth by chance: it is good for the errors of the finer ones."""
     results = made_up()
     lucky = next(k for k, rung in enumerate(RUNGS) if rung.label == "x 2")
     results.deployment_time[lucky] = TRUE_TIME
@@ -160,7 +165,7 @@ def test_tables_name_settings_as_overrides(study: xr.Dataset) -> None:
 def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tmp_path) -> None:
     evidence = evidence_of(study)
     file = tmp_path / "settings.toml"
-    file.write_text(to_toml(evidence))
+    file.write_text(tomli_w.dumps(evidence.model_dump()))
     assert read_evidence(file) == evidence
     seconds = [s.seconds for s in evidence.settings]
     assert seconds == sorted(seconds)
@@ -174,14 +179,17 @@ def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tm
     assert (kept["rods.elements"], kept["solver.step"]) == (3, 0.1)
     with pytest.raises(InputError, match="best setting"):
         evidence.pick(1e-8)
-    good = to_toml(evidence)
-    wrong = ("settings = 3", good.replace("motion = ", "motion = 'a' #"), good[:40], "")
+    good = tomli_w.dumps(evidence.model_dump())
+    wrong = (
+        "settings = 3", good.replace("motion = ", "motion = 'a' #"), good[:40], "",
+        good.replace('"solver.step"', '"solver.stop"'),
+    )  # fmt: skip
     for text in wrong:
         file.write_text(text)
         with pytest.raises(InputError, match="not the settings"):
             read_evidence(file)
     file.write_bytes(b"\xff\xfe")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match=r"cannot be read|not a text file"):
         read_evidence(file)
     best = min(setting.errors["motion"] for setting in evidence.settings)
     with pytest.raises(InputError) as told:
@@ -202,4 +210,4 @@ def test_every_rung_of_every_scene_is_a_scene(name: str) -> None:
     for rung in rungs:
         assert set(rung.values) == set(PATHS)
         scene.with_values(dict(rung.values))
-    assert likest(scene) == name
+    assert evidence_for(scene).scene == name

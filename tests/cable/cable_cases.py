@@ -28,6 +28,17 @@ def cable(**fields):
     return Cable(**(defaults | fields))
 
 
+def eta(law, angles, radius=RADIUS):
+    """Ratio of the tension behind a pulley to the one before it."""
+    return np.exp(law.log_decay(angles, radius))
+
+
+def decays(state):
+    """Tension of each span over the tension of its rope's first span."""
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        return state.shares / state.shares[state.ropes.starts][state.ropes.of_span]
+
+
 @dataclass
 class Case:
     """A chain in motion; rope wound is counted from a rope as long as its path."""

@@ -11,7 +11,6 @@ from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.cable.bracket.bisector import BisectorBracket
 from ringsim.cable.bracket.family import Bracket
 from ringsim.cable.records import AnyBracket
-from ringsim.cable.section_path import path_slope, span_length
 from ringsim.choice import kinds_of
 
 BAR, REACH = 0.2889, 0.105
@@ -47,11 +46,14 @@ def test_rates_and_slopes_are_derivatives(bracket):
 
 
 def test_the_bisector_is_the_section_path():
+    """Paper 000, eq. 20: either span is L(phi); a winch moves a stowed ring ever faster."""
     bracket = BRACKETS["bisector"]
+    length = np.sqrt(BAR**2 + REACH**2 + 2.0 * BAR * REACH * np.sin(PHI))
     for span in bracket.spans(BAR, REACH, OPENING):
-        assert span == pytest.approx(span_length(BAR, REACH, OPENING), rel=1e-14)
-    expected = path_slope(BAR, REACH, OPENING)
-    assert bracket.path_slope(BAR, REACH, OPENING) == pytest.approx(expected, abs=1e-16)
+        assert span == pytest.approx(length, rel=1e-14)
+    slope = -BAR * REACH * np.cos(PHI) / length  # of 2 L after the opening angle pi - 2 phi
+    assert bracket.path_slope(BAR, REACH, OPENING) == pytest.approx(slope, abs=1e-16)
+    assert bracket.path_slope(BAR, REACH, 0.0) == pytest.approx(0.0, abs=1e-17)
 
 
 def element(opening, theta):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cable_cases import LAWS, RADIUS, Case, cable, random_case, still
+from cable_cases import LAWS, RADIUS, Case, cable, decays, eta, random_case, still
 from ringsim.cable import slack
 from ringsim.cable.chain import Chain
 from ringsim.cable.friction.bearing import BearingFriction
@@ -29,7 +29,7 @@ def test_without_friction_the_tension_is_uniform_and_that_of_paper_001():
     for k, rope in enumerate([state.tensions[:6], state.tensions[6:]]):
         natural = case.ropes.content[k] - 0.002
         assert rope == pytest.approx(1e4 * (state.paths[k] - natural) / natural, rel=1e-12)
-    assert state.decays == pytest.approx(1.0, abs=1e-15)
+    assert decays(state) == pytest.approx(1.0, abs=1e-15)
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
@@ -38,16 +38,16 @@ def test_tension_falls_by_the_product_of_the_decays(law, angle):
     # Fast rope: tanh(speed / slip_speed) is 1 to rounding at every pulley.
     state = still(zigzag(6, angle), 0.004, friction=law, slip_speed=1e-3, **TAUT).state()
     assert state.angles == pytest.approx(angle, rel=1e-12)
-    eta = law.decay(np.array([angle]), RADIUS)[0]
-    assert state.decays == pytest.approx(eta ** np.arange(6), rel=1e-12)
-    assert state.tensions / state.tensions[0] == pytest.approx(state.decays, rel=1e-12)
+    ratio = eta(law, np.array([angle]))[0]
+    assert decays(state) == pytest.approx(ratio ** np.arange(6), rel=1e-12)
+    assert state.tensions / state.tensions[0] == pytest.approx(decays(state), rel=1e-12)
 
 
 def test_winch_tension_is_the_corrected_sum_of_elongations():
     case = still(zigzag(6, 1.2), 0.003, friction=LAWS["bearing"], slip_speed=1e-3, **TAUT)
     state = case.state()
     elongation = 0.003
-    expected = 1e4 * elongation / np.sum(state.decays * state.lengths)
+    expected = 1e4 * elongation / np.sum(decays(state) * state.lengths)
     # Equal to first order of strain, which is 1e-3 here.
     assert state.tensions[0] == pytest.approx(expected, rel=2 * state.strains[0])
     assert np.sum(state.lengths - state.stored) == pytest.approx(elongation, rel=1e-12)
@@ -71,14 +71,14 @@ def test_symmetric_v_path():
     assert state.angles == pytest.approx([np.pi - slope, np.pi - 2 * slope, np.pi - slope])
     path = 1.0 + 2.0 * np.hypot(base, depth)
     assert state.paths[0] == pytest.approx(path, rel=1e-14)
-    one, two = LAWS["bearing"].decay(np.array([np.pi - slope, np.pi - 2 * slope]), RADIUS)
-    decays = [1.0, one, one * two, one * two * one]
-    assert state.decays == pytest.approx(decays, rel=1e-12)
+    one, two = eta(LAWS["bearing"], np.pi - slope * np.array([1.0, 2.0]))
+    falls = [1.0, one, one * two, one * two * one]
+    assert decays(state) == pytest.approx(falls, rel=1e-12)
     half = np.hypot(base, depth)
-    mean = (0.5 + one * half + one * two * half + 0.5 * decays[3]) / path
+    mean = (0.5 + one * half + one * two * half + 0.5 * falls[3]) / path
     tension = 1e4 * wound / (path - wound) / mean
     assert state.tensions[0] == pytest.approx(tension, rel=1e-12)
-    lift = (decays[1] + decays[2]) * tension * np.sin(slope)
+    lift = (falls[1] + falls[2]) * tension * np.sin(slope)
     assert state.point_forces[2, 2] == pytest.approx(lift, rel=1e-12)
 
 
@@ -94,8 +94,8 @@ def test_a_rope_that_runs_back_inverts_the_decay_and_one_at_rest_has_none():
     path = zigzag(4, 1.0)
     for rate, exponent in [(1.0, 1.0), (-1.0, -1.0), (0.0, 0.0)]:
         state = still(path, 0.002, (rate, 0.0), friction=LAWS["capstan"], slip_speed=1e-3).state()
-        eta = LAWS["capstan"].decay(state.angles, RADIUS)
-        assert state.tensions[1:] / state.tensions[:-1] == pytest.approx(eta**exponent, rel=1e-12)
+        ratio = eta(LAWS["capstan"], state.angles)
+        assert state.tensions[1:] / state.tensions[:-1] == pytest.approx(ratio**exponent, rel=1e-12)
 
 
 def test_two_winches_make_the_tension_lowest_in_the_middle():
@@ -190,7 +190,7 @@ def test_the_winch_pays_for_all_power(law, **motion):
         np.sum(state.point_forces * case.velocities),
         state.friction_loss.sum(),
         state.damping_loss.sum(),
-        state.drum_power.sum(),
+        (state.energy_density * state.wound_rates).sum(),
         (energy(step) - energy(-step)) / (2 * step),
     ]
     # The energy's rate is a central difference: the elastic force changes by up to 1e-2 of the

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from ringsim.engine.build import Built, build
 from ringsim.engine.cables import CableDrive
-from ringsim.engine.quaternions import product
+from ringsim.engine.rotations import turn_rates
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
 from ringsim.variables import Outcome
@@ -41,25 +42,20 @@ def outcome(scene: Scene) -> Outcome:
 
 def turned(turns: Array, rotations: Array) -> Array:
     """Unit quaternions turned by global rotation vectors (rad), shape (n, 4) and (n, 3)."""
-    found = np.empty_like(turns)
-    for k, (q, r) in enumerate(zip(turns, rotations, strict=True)):
-        angle = float(np.linalg.norm(r))
-        half = np.array([np.cos(0.5 * angle), *(0.5 * np.sinc(0.5 * angle / np.pi) * r)])
-        found[k] = product(half, q)
-    return found
+    found = Rotation.from_rotvec(rotations) * Rotation.from_quat(np.roll(turns, -1, axis=1))
+    after = np.roll(found.as_quat(), 1, axis=1)
+    # A rotation has two quaternions: stay near the one that was given.
+    return np.asarray(after * np.sign(np.sum(after * turns, axis=1))[:, None])
 
 
 def axis_of(turn: Array) -> Array:
     """Third axis of the frame of a unit quaternion."""
-    w, x, y, z = turn
-    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+    return np.asarray(Rotation.from_quat(np.roll(turn, -1)).as_matrix()[:, 2])
 
 
-def rates_of(turns: Array, spins: Array) -> Array:
-    """Rates of unit quaternions at global angular velocities (rad/s)."""
-    return np.array(
-        [0.5 * product(np.array([0.0, *w]), q) for q, w in zip(turns, spins, strict=True)]
-    )
+def write_all(drive: CableDrive) -> None:
+    """Let the cables write all entries of their Jacobian, also those that Newton does without."""
+    drive.pattern.steady, drive.pattern.negligible = np.inf, 0.0
 
 
 @dataclass(frozen=True)
@@ -85,15 +81,15 @@ class Bench:
         self.width = 7 * len(drive.path.nodes)
         self.reference = np.array(
             [
-                self.built.ring.assembly.system.GetNodeParameter(n, "referenceCoordinates")
+                self.built.model.assembly.system.GetNodeParameter(n, "referenceCoordinates")
                 for n in drive.path.nodes
             ]
         )
         number = {int(node): k for k, node in enumerate(drive.path.nodes)}
         self.pairs = [
-            (number[int(joint.gap[0])], number[int(joint.gap[1])])
-            for plane in self.built.ring.vjoints
-            for joint in plane
+            (number[int(joint.nodes[0])], number[int(joint.nodes[1])])
+            for plane in self.built.model.openings()
+            for joint, _ in plane
         ]
 
     def motion(self, rng: np.random.Generator, place: Array) -> Motion:
@@ -112,7 +108,7 @@ class Bench:
 
     def rates(self, place: Array, motion: Motion) -> Array:
         """Rates of the nodes' coordinates in a motion."""
-        return np.hstack([motion.moves, rates_of(place[:, 3:], motion.spins + motion.bends)])
+        return np.hstack([motion.moves, turn_rates(place[:, 3:], motion.spins + motion.bends)])
 
     def force(self, place: Array, rates: Array, time: float = 0.0) -> Array:
         """Generalised forces that the solver sees, (nodes * 7,)."""
@@ -121,19 +117,32 @@ class Bench:
         q_t = np.concatenate([rates.ravel(), still])
         return self.drive._force(None, time, 0, q, q_t)[: self.width]
 
+    def force_at(self, place: Array, velocities: Array, time: float = 0.0) -> Array:
+        """The same for given velocities of the points, (nodes * 7,)."""
+        path, drive = self.drive.path, self.drive
+        placed = path.place(place, np.zeros_like(place))
+        wound, rate = drive.winches.at(time, drive.ropes, None, None)
+        state = drive.chain.state(drive.ropes, placed.points, velocities, wound, rate)
+        return path.in_a_row(path.generalised(placed, state.point_forces))
+
     def strike(self, place: Array, rates: Array, time: float) -> None:
         """Let the scene's faults happen at a state."""
         state, _ = self.drive.evaluate(place, rates, time)
         angles = np.zeros((2, self.scene.structure.sections))
         assert self.built.faults.strike(time, angles, state)
 
-    def jacobian(self, place: Array, rates: Array, by_rate: float, *, exact: bool = True) -> Array:
-        """d(-force)/dq + by_rate * d(-force)/dq_t, auxiliary unknowns eliminated."""
+    def jacobian(self, place: Array, rates: Array, by_rate: float, *, whole: bool = True) -> Array:
+        """d(-force)/dq + by_rate * d(-force)/dq_t, auxiliary unknowns eliminated.
+
+        ``whole``: with all entries, also those that Newton does without.
+        """
         state, placed = self.drive.evaluate(place, rates, 0.0)
-        entries = self.drive.pattern.triplets(state, placed, 1.0, by_rate, exact=exact)
+        if whole:
+            write_all(self.drive)
+        entries = self.drive.pattern.triplets(state, placed, 1.0, by_rate)
         size = self.width + self.drive.auxiliary
-        whole = np.zeros((size, size))
-        np.add.at(whole, (entries[:, 0].astype(int), entries[:, 1].astype(int)), entries[:, 2])
+        matrix = np.zeros((size, size))
+        np.add.at(matrix, (entries[:, 0].astype(int), entries[:, 1].astype(int)), entries[:, 2])
         own, rest = slice(None, self.width), slice(self.width, None)
-        eliminated = np.linalg.solve(whole[rest, rest], whole[rest, own])
-        return np.asarray(whole[own, own] - whole[own, rest] @ eliminated)
+        eliminated = np.linalg.solve(matrix[rest, rest], matrix[rest, own])
+        return np.asarray(matrix[own, own] - matrix[own, rest] @ eliminated)

@@ -38,8 +38,9 @@ def test_points_of_the_model_are_those_of_the_bracket(half: str, end: str, openi
     _, placed = drive.evaluate(drive._reference, 0.0 * drive._reference, 0.0)
     mechanism = Mechanism(given)
     swings = np.zeros(mechanism.freedom - 1)
-    pose = mechanism.pose(np.append(given.structure.initial_phi, swings), np.append(0.0, swings))
-    expected = IdealCables(given, mechanism).points(pose)
+    start = np.append(given.structure.coordinate, swings)
+    now = mechanism.configuration(start, np.append(0.0, swings))
+    expected = IdealCables(given, mechanism).paths @ now.values
     assert placed.points == pytest.approx(expected, abs=1e-14)
 
 

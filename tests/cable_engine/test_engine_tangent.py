@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from driven import Bench, Motion, rates_of, truss
+from driven import Bench, Motion, truss
+from ringsim.engine.rotations import turn_rates
 
 Array = NDArray[np.float64]
 
@@ -43,8 +44,9 @@ def disturbed(bed: Bench, rng: np.random.Generator, rate: float) -> tuple[Array,
 
 
 def by_place(bed: Bench, place: Array, rates: Array, motion: Motion) -> Array:
-    """Derivative of the forces along a motion at fixed rates."""
-    return centrally(lambda s: bed.force(bed.moved(place, motion, s), rates), 1e-5)
+    """Derivative of the forces along a motion at fixed velocities of the points."""
+    moving = bed.drive.path.place(place, rates).velocities
+    return centrally(lambda s: bed.force_at(bed.moved(place, motion, s), moving), 1e-5)
 
 
 def by_rates(bed: Bench, place: Array, rates: Array, motion: Motion) -> Array:
@@ -100,7 +102,7 @@ def test_the_reduced_tangent_lacks_nothing_but_decay() -> None:
     for coefficient, most in ((0.0, 1e-12), (0.0004, 0.05)):
         bed = bench(0.02, 0.05, both__friction__coefficient=coefficient)
         place, rates = disturbed(bed, np.random.default_rng(3), 0.0)
-        exact, reduced = (bed.jacobian(place, rates, 0.0, exact=e) for e in (True, False))
+        reduced, exact = (bed.jacobian(place, rates, 0.0, whole=w) for w in (False, True))
         assert np.abs(exact - reduced).max() < most * np.abs(exact).max()
 
 
@@ -145,5 +147,5 @@ def test_forces_of_the_cables_are_internal() -> None:
     for axis in np.eye(3):
         spins = np.broadcast_to(axis, (len(place), 3))
         moves = np.cross(spins, place[:, :3])
-        turning = np.hstack([moves, rates_of(place[:, 3:], spins)])
+        turning = np.hstack([moves, turn_rates(place[:, 3:], spins)])
         assert force.ravel() @ turning.ravel() == pytest.approx(0.0, abs=1e-13 * scale)

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from ringsim.cable.cables import Cables
 from ringsim.cable.records import Cable, Winch
+from ringsim.cable.sheaves import FixedSheave
 from ringsim.cable.winding.constant import ConstantWinding
 from ringsim.engine.assembly import Assembly, Frame
-from ringsim.engine.cable_path import CablePath, FixedStop
+from ringsim.engine.cable_path import CablePath
 from ringsim.engine.cables import CableDrive
 
 Array = NDArray[np.float64]
@@ -69,8 +70,8 @@ class Swing:
             initial_slack=-STRETCH,
         )
         carrier: Any = SimpleNamespace(assembly=self.assembly, scene=SimpleNamespace(faults=()))
-        stops = [FixedStop(node, arm) for (_, node), arm in self.path]
-        drive = CableDrive(carrier, Cables(upper=cable), CablePath([stops]))
+        sheaves = [FixedSheave(node, arm) for (_, node), arm in self.path]
+        drive = CableDrive(carrier, Cables(upper=cable), CablePath([sheaves]))
         self.assembly.finish()
         drive.locate()
         return drive

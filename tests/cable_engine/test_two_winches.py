@@ -30,7 +30,7 @@ def bench(sections: int, **values: object) -> Bench:
 @pytest.mark.parametrize("sections", [1, 2, 3])
 def test_equal_winches_give_symmetric_tensions_and_speeds(sections: int) -> None:
     bed = bench(sections)
-    phi = bed.scene.structure.initial_phi
+    phi = bed.scene.structure.coordinate
     still = bed.reference
     bed.drive.winches.advance(0.0, bed.drive.evaluate(still, 0.0 * still, 0.0)[0], np.zeros(2))
     state, _ = bed.drive.evaluate(still, np.zeros_like(still), 3.0)

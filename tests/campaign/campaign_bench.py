@@ -10,12 +10,10 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
 import xarray as xr
 
 from ringsim.campaign.folder import open_folder
-from ringsim.storage.layout import NOT_RUN
-from ringsim.storage.store import survey
+from ringsim.storage.journal import Journal, read_journal
 
 HERE = Path(__file__).parent
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
@@ -148,12 +146,11 @@ def opened(path):
 
 
 def finished(out):
-    """Samples that have a result on file, in a shard or in a journal."""
+    """Samples that have a result on file."""
     if not (out / "design.nc").exists():
         return set()
     folder = open_folder(out)
-    found = survey(out, folder.identity, folder.table.samples, set_aside=False)
-    return set(np.flatnonzero(found.status != NOT_RUN).tolist())
+    return set(range(folder.table.samples)) - set(folder.survey().missing.tolist())
 
 
 def comparable(dataset):
@@ -161,7 +158,6 @@ def comparable(dataset):
     return dataset.drop_vars([n for n in NOT_COMPARED if n in dataset]).drop_attrs()
 
 
-SHARDS = "[output]\nshard_samples = 4\n"
 START = ("campaign", "small.toml", "--workers", 2, "--out", "out")
 """Runs the campaign of the fixtures ``whole`` and ``copied``."""
 
@@ -171,8 +167,27 @@ def assert_same(bench, other):
     xr.testing.assert_identical(comparable(bench.result("out")), comparable(other.result("out")))
 
 
-def shards(bench):
-    return sorted((bench.folder / "out" / "shards").iterdir())
+def journals(bench):
+    return sorted((bench.folder / "out" / "journals").iterdir())
+
+
+def lose(bench, samples):
+    """Take the results of some samples out of the journals, and the merged file away."""
+    folder = open_folder(bench.folder / "out")
+    paths, new = journals(bench), Journal(folder.path, folder.identity, "all-rank0")
+    for path in paths:
+        for _, result in read_journal(path, folder.identity):
+            if result.sample not in samples:
+                new.append(result)
+        path.unlink()
+    new.close()
+    (folder.path / "campaign.nc").unlink(missing_ok=True)
+
+
+def records(folder, writer="*"):
+    """Records in the journals of running writers; looking at them costs nothing."""
+    paths = (folder / "journals").glob(f"{writer}.journal")
+    return sum(path.read_bytes().count(b"ringsim2") for path in paths)
 
 
 def ranks_of(bench, number):

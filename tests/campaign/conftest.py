@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from campaign_bench import MPIEXEC, SHARDS, START, Bench
+from campaign_bench import MPIEXEC, START, Bench
 
 
 @pytest.fixture
@@ -24,9 +24,9 @@ def mpi():
 
 @pytest.fixture(scope="session")
 def whole(tmp_path_factory):
-    """A finished campaign with five shards; look, but do not change it."""
+    """A finished campaign; look, but do not change it."""
     bench = Bench(tmp_path_factory.mktemp("whole"))
-    bench.write(more=SHARDS)
+    bench.write()
     bench.run(*START)
     return bench
 

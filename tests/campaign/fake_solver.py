@@ -81,9 +81,6 @@ def poisoned(scene: Scene) -> Outcome:
         case 11:
             if "CURED" not in os.environ:
                 raise ZeroDivisionError("not cured")
-        case 10:
-            if scene.solver.step > 0.1:
-                return Outcome(Status.SOLVER_FAILED, "Newton does not converge: try a smaller step")
     return run(scene)
 
 

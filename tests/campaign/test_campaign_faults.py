@@ -85,19 +85,6 @@ def test_log_of_a_crash_and_of_a_hang_says_where(bench):
     assert logs[2] == ""
 
 
-def test_smaller_step_is_tried_and_recorded(bench):
-    file = bench.write_listed([30, 10, 9], more="[retry]\ntimes = 2\nstep_factor = 0.5\n")
-    bench.run("campaign", file, "--workers", 2, "--out", "out", solver="fake_solver:poisoned")
-    result = bench.result("out")
-    assert result.attempts.values.tolist() == [1, 2, 3]
-    assert result.status.values.tolist() == [Status.OK, Status.OK, Status.SOLVER_FAILED]
-    np.testing.assert_allclose(result.largest_step.values, [0.2, 0.1, 0.05])
-    assert "attempt 2, with a smaller step; first: Newton does not converge" in str(
-        result.reason.values[1]
-    )
-    assert "identical" in bench.run("replay", "out", 1)
-
-
 def test_too_many_failures_stop_the_campaign(bench):
     file = bench.write_listed([1] * 5 + [30] * 15, more="max_failed = 2")
     text = file.read_text().replace("max_failed = 2", "")
@@ -193,7 +180,7 @@ def test_much_that_is_printed_stays_with_its_own_sample(bench):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_results_that_do_not_fit_together_cost_only_themselves(workers, bench):
-    file = bench.write_listed([30] * 10, more="[output]\nshard_samples = 3\n")
+    file = bench.write_listed([30] * 10)
     start = ("campaign", file, "--workers", workers, "--out", "out")
     bench.run(*start, solver="fake_solver:shapeless")
     result = bench.result("out")

@@ -2,103 +2,92 @@
 
 from __future__ import annotations
 
-import pytest
+import re
 
-from campaign_bench import START, assert_same, finished, shards
+import pytest
+import xarray as xr
+
+from campaign_bench import START, assert_same, finished, journals, lose
 from ringsim.campaign.folder import open_folder
 from ringsim.execution.solve import load_solver, solve
 from ringsim.execution.work import Task
 from ringsim.refusal import InputError
-from ringsim.storage.files import reserved
-from ringsim.storage.journal import read_journal
-from ringsim.storage.record import Result
-from ringsim.storage.shards import write_shards
-from ringsim.storage.store import Store, create_folders, survey
+from ringsim.storage.journal import FOLDER, Journal, read_journal
+from ringsim.storage.locks import reserved
+from ringsim.storage.result import Result
+from ringsim.storage.survey import survey
 from ringsim.variables import Status
 
 
-def unseal(bench, writer, samples):
-    """Leave results of some samples in a journal, as a killed writer does."""
+def write_journal(bench, writer, samples):
+    """Leave a journal with results of some samples, as a killed writer does."""
     folder = open_folder(bench.folder / "out")
-    store = Store(folder.path, folder.identity, writer, 1000)
+    journal = Journal(folder.path, folder.identity, writer)
     solver = load_solver("fake_solver:run")
     for sample in samples:
-        store.keep(solve(solver, folder.scene, Task(sample, folder.table.values_of(sample))))
-    (path,) = (folder.path / "journals").glob(f"{writer}-*.journal")
-    assert len(list(read_journal(path))) == len(samples)
-    return path
+        journal.append(solve(solver, folder.scene, Task(sample, folder.table.values_of(sample))))
+    assert len(list(read_journal(journal.path, folder.identity))) == len(samples)
+    return journal.path
 
 
-@pytest.mark.parametrize("delete", ["the merged file", "half of the shards", "all shards"])
+@pytest.mark.parametrize("delete", ["the merged file", "half of the results", "all journals"])
 def test_what_is_deleted_is_made_again(delete, copied, whole):
-    (copied.folder / "out" / "campaign.nc").unlink()
-    gone = {"the merged file": 0, "half of the shards": 3, "all shards": 5}[delete]
-    for path in shards(copied)[:gone]:
-        path.unlink()
+    gone = {"the merged file": 0, "half of the results": 12, "all journals": 20}[delete]
+    lose(copied, range(gone))
     kept = finished(copied.folder / "out")
-    assert len(kept) == 20 - 4 * gone
+    assert len(kept) == 20 - gone
     assert f"{len(kept)} of 20 samples done" in copied.run(*START)
     assert_same(copied, whole)
 
 
 @pytest.mark.parametrize("writer", ["all-rank0", "part1of2-rank1", "part3of9-rank0"])
 @pytest.mark.parametrize("again", [("--workers", 2), ("--part", "1/1"), ("--part", "1/2")])
-def test_journal_of_any_dead_writer_is_taken_up(writer, again, copied, whole):
-    """Also by a run that divides the samples in another way."""
-    shards(copied)[0].unlink()
-    (copied.folder / "out" / "campaign.nc").unlink()
-    lost = sorted(set(range(20)) - finished(copied.folder / "out"))
-    unseal(copied, writer, lost)
+def test_journal_of_any_dead_writer_counts(writer, again, copied, whole):
+    """Also for a run that divides the samples in another way."""
+    lose(copied, range(3, 7))
+    write_journal(copied, writer, range(3, 7))
     assert len(finished(copied.folder / "out")) == 20
+    before = journals(copied)
     copied.run("campaign", "small.toml", "--out", "out", *again)
     assert_same(copied, whole)
-    assert not list((copied.folder / "out" / "journals").iterdir())
+    assert journals(copied) == before
 
 
-def test_part_waits_for_what_another_part_has_not_sealed(copied, whole):
-    """A sample in the journal of a running part is done, but cannot be merged yet."""
-    for path in shards(copied):
-        path.unlink()
-    (copied.folder / "out" / "campaign.nc").unlink()
-    journal = unseal(copied, "part2of2-rank0", range(1, 20, 2))
+def test_part_merges_what_another_part_that_runs_has_done(copied, whole):
+    lose(copied, range(20))
+    write_journal(copied, "part2of2-rank0", range(1, 11, 2))
     with reserved(copied.folder / "out", "part2of2", alone=False):
         printed = copied.run("campaign", "small.toml", "--out", "out", "--part", "1/2")
-        assert "this part is done; 10 samples of other parts are left" in printed
-        assert "10 not run" in copied.run("merge", "out")
-        assert journal.exists()
-        assert (copied.result("out").status.values[1::2] == -1).all()
-    assert "0 not run" in copied.run("merge", "out")
+        assert "this part is done; 5 samples of other parts are left" in printed
+        assert "5 not run" in copied.run("merge", "out")
+        assert (copied.result("out").status.values[11::2] == -1).all()
+        write_journal(copied, "part2of2-rank1", range(11, 20, 2))
+        assert "0 not run" in copied.run("merge", "out")
     assert_same(copied, whole)
 
 
-def test_records_are_read_back_though_the_file_is_gone(copied):
-    """As on a file system without locks, where two processes may take up one journal."""
-    folder = open_folder(copied.folder / "out")
-    for path in shards(copied):
-        path.unlink()
-    store = Store(folder.path, folder.identity, "all-rank0", 1000)
-    solver = load_solver("fake_solver:run")
-    for sample in (3, 1):
-        store.keep(solve(solver, folder.scene, Task(sample, folder.table.values_of(sample))))
-    (journal,) = (folder.path / "journals").iterdir()
-    journal.unlink()
-    store.close()
-    assert finished(folder.path) == {1, 3}
-
-
-def test_damaged_record_of_a_journal_costs_only_itself(copied):
-    for path in shards(copied):
-        path.unlink()
-    journal = unseal(copied, "all-rank0", range(10))
+@pytest.mark.parametrize("place", ["frame", "sizes", "header", "body"])
+def test_damaged_record_of_a_journal_costs_only_itself(place, copied):
+    (journal,) = journals(copied)
     content = bytearray(journal.read_bytes())
-    content[len(content) // 2 + 500] ^= 1
+    starts = [found.start() for found in re.finditer(b"ringsim2", content)]
+    content[starts[9] + {"frame": 3, "sizes": 19, "header": 60, "body": 1000}[place]] ^= 64
     journal.write_bytes(content)
-    assert "9 of 20 samples done" in copied.run(*START)
+    assert "19 of 20 samples done" in copied.run(*START)
+
+
+def test_journal_of_another_campaign_does_not_count(copied, caplog):
+    (copied.folder / "out" / "campaign.nc").unlink()
+    folder = open_folder(copied.folder / "out")
+    (path,) = journals(copied)
+    assert len(survey(folder.path, folder.identity, 20).missing) == 0
+    assert len(survey(folder.path, "another", 20).missing) == 20
+    assert f"{path.name} is damaged: 19 of its records" in caplog.text  # the last one may be torn
 
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_success_counts_before_failure_whatever_the_clock_said(order, tmp_path):
-    create_folders(tmp_path)
+    (tmp_path / FOLDER).mkdir()
     results = [
         Result(0, Status.ERROR, "later by a clock that was wrong", finished=2e9),
         Result(0, Status.OK, "fine", finished=1e9),
@@ -106,27 +95,30 @@ def test_success_counts_before_failure_whatever_the_clock_said(order, tmp_path):
         Result(1, Status.OK, "second", seconds=2.0, finished=2.0),
         Result(2, Status.ERROR, "never", finished=5.0),
     ]
+    journal = Journal(tmp_path, "me", "all-rank0")
     for result in results[::order]:
-        write_shards(tmp_path, [result], "me")
-    found = survey(tmp_path, "me", 3, set_aside=False)
+        journal.append(result)
+    found = survey(tmp_path, "me", 3)
     assert found.status.tolist() == [Status.OK, Status.OK, Status.ERROR]
     assert found.seconds[1] == 2.0
-    assert found.sealed.all()
+    assert {result.reason for result in found.results([0, 1, 2])} == {"fine", "second", "never"}
 
 
 def test_results_without_their_design_are_refused(copied):
     (copied.folder / "out" / "design.nc").unlink()
-    before = shards(copied)
+    before = journals(copied)
     (copied.folder / "out" / "campaign.nc").unlink()
     printed = copied.run(*START, code=2)
     assert "design.nc is gone" in printed
-    assert shards(copied) == before
+    assert journals(copied) == before
 
 
 def test_design_that_is_none_is_refused_in_one_line(copied):
     out = copied.folder / "out"
     merged = (out / "campaign.nc").read_bytes()
-    for content in (b"", b"no netCDF", merged[:5000], (shards(copied)[0]).read_bytes()):
+    xr.Dataset({"x": 1.0}).to_netcdf(copied.folder / "other.nc")
+    other = (copied.folder / "other.nc").read_bytes()
+    for content in (b"", b"no netCDF", merged[:5000], other):
         (out / "design.nc").write_bytes(content)
         with pytest.raises(InputError, match=r"design\.nc: .*choose another folder"):
             open_folder(out)

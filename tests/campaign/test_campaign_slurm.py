@@ -13,8 +13,7 @@ import pytest
 import xarray as xr
 
 import slurm_cluster
-from campaign_bench import MODULES, PATH, Bench, comparable, ranks_of
-from ringsim.storage.journal import read_journal
+from campaign_bench import MODULES, PATH, Bench, comparable, ranks_of, records
 
 SCRIPTS = Path(__file__).parents[2] / "slurm"
 SAMPLES = 60
@@ -56,12 +55,6 @@ def submit(cluster, bench, script, *options, seconds=0.3):
     return answer
 
 
-def done(bench, writer="*"):
-    """Samples in the journals of running jobs."""
-    journals = (bench.folder / "out" / "journals").glob(f"{writer}.journal")
-    return sum(1 for path in journals for _ in read_journal(path))
-
-
 def done_in_all(bench):
     return int(bench.run("status", "out").splitlines()[0].split(": ")[1].split()[0])
 
@@ -90,7 +83,7 @@ def finish(cluster, bench, job, seconds=120):
 
 def test_mpi_job_is_warned_leaves_is_requeued_and_completes(cluster, bench, local, mpi):
     job = submit(cluster, bench, "mpi.sbatch")
-    wait_for(lambda: done(bench) >= 4, "the first samples")
+    wait_for(lambda: records(bench.folder / "out") >= 4, "the first samples")
     cluster.ask("scancel", "--signal=USR1", "--batch", job)
     wait_for(lambda: "stopped by SIGUSR1" in printed(bench), "the job to stop")
     kept = done_in_all(bench)
@@ -103,7 +96,7 @@ def test_mpi_job_is_warned_leaves_is_requeued_and_completes(cluster, bench, loca
 
 def test_array_tasks_are_warned_leave_are_requeued_and_merge(cluster, bench, local):
     job = submit(cluster, bench, "array.sbatch", "--array=1-3")
-    wait_for(lambda: done(bench, "part2of3-*") >= 2, "the first samples")
+    wait_for(lambda: records(bench.folder / "out", "part2of3-*") >= 2, "the first samples")
     cluster.ask("scancel", "--signal=USR1", "--batch", f"{job}_2")
     wait_for(lambda: "stopped by SIGUSR1" in printed(bench), "a task to stop")
     finish(cluster, bench, job)
@@ -131,7 +124,7 @@ def test_job_at_its_time_limit_is_requeued_until_all_is_done(script, option, clu
 def test_job_that_loses_a_rank_ends_and_goes_on_when_submitted_again(cluster, bench, local, mpi):
     """Without its other half a rank would wait until the time limit."""
     job = submit(cluster, bench, "mpi.sbatch")
-    wait_for(lambda: done(bench, "all-rank1-*") >= 2, "the first samples")
+    wait_for(lambda: records(bench.folder / "out", "all-rank1-*") >= 2, "the first samples")
     (rank,) = ranks_of(bench, b"1")
     os.kill(rank, signal.SIGKILL)
     wait_for(lambda: set(cluster.states(job)) <= {"FAILED", "NODE_FAIL"}, "the job to end")

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from campaign_bench import SHARDS, START, assert_same, finished, opened, ranks_of, shards
+from campaign_bench import START, assert_same, finished, lose, opened, ranks_of
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.merging import merge
 from ringsim.campaign.run import Choices, run_campaign
 from ringsim.execution.serial import Serial
 from ringsim.execution.work import Limits
-from ringsim.storage.files import in_turn, locked
+from ringsim.storage.locks import locked
 
 
 def blocked(pid):
@@ -32,7 +32,7 @@ def test_stop_signal_interrupts_a_merge_and_the_next_run_merges(number, copied, 
     out = copied.folder / "out"
     (out / "campaign.nc").unlink()
     (out / ".campaign.nc.0123.draft").write_text("left by a merge that was killed")
-    with in_turn(out / "lock-merge"):
+    with locked(out / "lock-merge", wait=True):
         process = copied.start(*START)
         end = time.monotonic() + 60.0
         while not blocked(process.pid):
@@ -60,9 +60,8 @@ class SignalledAtTheEnd(Serial):
 
 def test_signal_after_the_last_sample_is_no_failure(copied, whole):
     out = copied.folder / "out"
-    shards(copied)[0].unlink()
-    (out / "campaign.nc").unlink()
-    assert run_campaign(out, Choices(SignalledAtTheEnd(), 1, Limits())) == 0
+    lose(copied, range(4))
+    assert run_campaign(out, Choices(SignalledAtTheEnd(), Limits())) == 0
     assert_same(copied, whole)
 
 
@@ -86,8 +85,8 @@ def test_signal_to_one_rank_stops_all_of_them(bench, mpi):
 
 def test_two_commands_at_once_share_nothing_and_lose_nothing(bench, whole):
     """The same campaign twice, and another one, begin in one new folder at the same moment."""
-    mine = bench.write(more=SHARDS)
-    other = bench.write(more=SHARDS, name="other.toml")
+    mine = bench.write()
+    other = bench.write(name="other.toml")
     other.write_text(other.read_text().replace("seed = 7", "seed = 8"))
     processes = {
         bench.start("campaign", file, "--out", "out"): file for file in (mine, mine, other)
@@ -109,7 +108,7 @@ def test_two_commands_at_once_share_nothing_and_lose_nothing(bench, whole):
 def test_growing_a_campaign_that_runs_is_refused(copied):
     with locked(copied.folder / "out" / "lock") as held:
         assert held
-        printed = copied.run("campaign", copied.write(30, more=SHARDS), "--out", "out", code=2)
+        printed = copied.run("campaign", copied.write(30), "--out", "out", code=2)
     assert "another process runs this campaign" in printed
     assert open_folder(copied.folder / "out").table.samples == 20
 
@@ -157,7 +156,7 @@ def test_folder_may_have_any_name(name, bench):
     out = bench.folder / name
     bench.run("campaign", bench.write(3), f"--out={name}")
     assert finished(out) == {0, 1, 2}
-    merged = merge(open_folder(out), execution="again", set_aside=True, partly=False)
+    merged = merge(open_folder(out), execution="again", partly=False)
     assert (merged.left, merged.failed) == (0, 0)
     # Not every library that only reads takes every name.
     (out / "campaign.nc").rename(bench.folder / "found.nc")

@@ -48,12 +48,13 @@ def test_nobody_passes_the_barrier_before_all_are_there(tmp_path):
         f"""
         import time
         from pathlib import Path
-        from ringsim.execution.launch import mpi_world, polite_barrier
+        from ringsim.execution.launch import mpi_world
+        from ringsim.execution.mpi import Mpi
         world, sign = mpi_world(), Path({str(tmp_path / "sign")!r})
         if world.Get_rank() == 1:
             time.sleep(0.3)
             sign.touch()
-        polite_barrier(world)
+        Mpi(world).wait()
         print(sign.exists())
         """
     )

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from ringsim.execution.slot import Slot
-from ringsim.execution.work import Limits, Retry, Task
+from ringsim.execution.work import Limits, Task
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 from ringsim.variables import Status
@@ -27,8 +27,8 @@ def slots(monkeypatch):
     monkeypatch.syspath_prepend(str(HERE))
     made = []
 
-    def make(solver="slot_solver:run", *, limits=None, retry=None):
-        made.append(Slot(solver, BASE.to_table(), limits or Limits(), retry or Retry()))
+    def make(solver="slot_solver:run", *, limits=None):
+        made.append(Slot(solver, BASE.to_table(), limits or Limits()))
         return made[-1]
 
     yield make
@@ -52,7 +52,7 @@ def awaited(slot, seconds=60.0):
 
 
 def process_of(result):
-    return int(result.unpack()["steps"])
+    return int(result.arrays()["steps"])
 
 
 def test_process_is_kept_for_the_next_sample(slots):
@@ -141,9 +141,9 @@ def test_solver_process_ends_with_its_parent():
         """
         import os, sys, time
         from ringsim.execution.slot import Slot
-        from ringsim.execution.work import Limits, Retry, Task
+        from ringsim.execution.work import Limits, Task
         from ringsim.scene import load_scene
-        slot = Slot("slot_solver:sleep", load_scene("ring18").to_table(), Limits(), Retry())
+        slot = Slot("slot_solver:sleep", load_scene("ring18").to_table(), Limits())
         slot.submit(Task(0, {}))
         while slot.poll() is None:
             pass

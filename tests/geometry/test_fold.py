@@ -4,12 +4,13 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from fold_rates import fold_rate
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from ringsim.geometry.ring import Fold, RingGeometry
 from ringsim.scene import load_scene
+from ringsim.structures.ring_geometry import Fold, RingGeometry
 
 Array = NDArray[np.float64]
 
@@ -129,7 +130,7 @@ def test_normals_are_fixed_unit_vectors_that_point_outwards(
 @given(rings(), st.floats(1.0, 179.0))
 def test_fold_rate_is_the_derivative_of_the_fold(ring: RingGeometry, opening: float) -> None:
     phi, step = bar_angle(opening), 1e-4
-    ahead, behind, rate = ring.fold(phi + step), ring.fold(phi - step), ring.fold_rate(phi)
+    ahead, behind, rate = ring.fold(phi + step), ring.fold(phi - step), fold_rate(ring, phi)
     size = np.abs(ahead.corners).max()
     for field in fields(Fold):
         central = (getattr(ahead, field.name) - getattr(behind, field.name)) / (2.0 * step)
@@ -144,7 +145,7 @@ def test_fold_rate_is_the_derivative_of_the_fold(ring: RingGeometry, opening: fl
 def test_fold_rate_keeps_rod_lengths(ring: RingGeometry, opening: float) -> None:
     """To first order: velocity differences along every rod vanish, without any step size."""
     phi = bar_angle(opening)
-    fold, rate = ring.fold(phi), ring.fold_rate(phi)
+    fold, rate = ring.fold(phi), fold_rate(ring, phi)
     for side in ("left", "right"):
         for middle in ("pivots", "vjoints"):
             along = getattr(fold, side) - getattr(fold, middle)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ringsim.outputs.family import Instant, Output, Run, Series, Values, Variable
+from ringsim.outputs.family import Output, Reading, Run, Series, Values, Variable
 from ringsim.simulation import run
 
 __all__ = ["run"]
@@ -19,7 +19,7 @@ class OpeningRate(Output):
         ),
     )  # fmt: skip
 
-    def read(self, now: Instant) -> float:
+    def read(self, now: Reading) -> float:
         """Deg/s."""
         return float(np.degrees(now.rates.mean()))
 

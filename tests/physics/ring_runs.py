@@ -13,11 +13,11 @@ from scipy.interpolate import CubicHermiteSpline
 
 from ringsim.engine.build import build
 from ringsim.engine.integrate import Integration
-from ringsim.outputs.recorder import History
-from ringsim.outputs.series import lock_times
+from ringsim.outputs.recorder import Recorder
 from ringsim.scene import Scene, load_scene
+from ringsim.stepping.locks import lock_times
 from ringsim.theory.energy_quadrature import opening_time
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Run:
     """A run at the engine's own steps."""
 
     scene: Scene
-    history: History
+    history: Recorder
 
     @cached_property
     def times(self) -> Array:
@@ -94,4 +94,4 @@ def run(scene: Scene) -> Run:
 def ideal_time(scene: Scene, angle: float = 180.0) -> float:
     """Time in s at which the ideal ring reaches an opening angle (deg), by quadrature."""
     end = 0.5 * (math.pi - math.radians(angle))
-    return opening_time(IdealRing.of(scene), scene.structure.initial_phi, end).time
+    return opening_time(OneCoordinate(scene), scene.structure.coordinate, end).time

@@ -5,7 +5,7 @@ import pytest
 from ring_runs import Run, ideal_time, ring, run
 
 AGREEMENT = 2e-4
-"""Step control at its default tolerance of 1e-4, and rods that give a little."""
+"""Error of the steps at the default tolerance of 3e-4, and elasticity of the rods."""
 
 QUICK = {(6, "free", "net"), (6, "fixed", "none")}
 

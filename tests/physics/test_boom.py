@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from ring_runs import Array, ring, run
-from ringsim.engine import quaternions
 from ringsim.engine.build import Built, build
 from ringsim.engine.integrate import Integration
+from ringsim.engine.rotations import turn_rates
 
 
 @pytest.mark.parametrize("base", ["free", "fixed"])
@@ -25,10 +25,10 @@ def test_the_lower_hinge_slides_from_element_to_element() -> None:
     built = build(scene)
     history = Integration(built).run()
     assert history.status.word == "unfinished"
-    element, place = built.ring.assembly.system.systemData.GetDataCoordinates()
+    element, place = built.model.assembly.system.systemData.GetDataCoordinates()
     height = scene.structure.geometry().height(0.5 * (np.pi - float(history.angles[-1].mean())))
     length = scene.boom.length / 8  # type: ignore[union-attr]
-    start = scene.structure.geometry().height(scene.structure.initial_phi)
+    start = scene.structure.geometry().height(scene.structure.coordinate)
     assert int(element) == int(height / length) < int(start / length)
     # The first corner's height, against that of the mean angle: sections differ by elasticity.
     assert place == pytest.approx(height, rel=2e-4)
@@ -36,7 +36,7 @@ def test_the_lower_hinge_slides_from_element_to_element() -> None:
 
 def momenta(built: Built) -> tuple[Array, Array]:
     """Momentum (kg m/s) and angular momentum (kg m^2/s) from exudyn's own mass matrix."""
-    assembly = built.ring.assembly
+    assembly = built.model.assembly
     system, data = assembly.system, assembly.system.systemData
     places = np.asarray(data.GetODE2Coordinates()) + np.asarray(
         data.GetODE2Coordinates(exu.ConfigurationType.Reference)
@@ -57,8 +57,7 @@ def momenta(built: Built) -> tuple[Array, Array]:
             shifts[axis, own[:3]] = unit
             turns[axis, own[:3]] = np.cross(unit, places[own[:3]])
             if len(own) == 7:
-                spin = np.concatenate([[0.0], unit])
-                turns[axis, own[3:]] = 0.5 * quaternions.product(spin, places[own[3:]])
+                turns[axis, own[3:]] = turn_rates(places[own[3:]][None], unit[None])[0]
             elif len(own) == 6:
                 turns[axis, own[3:]] = np.cross(unit, places[own[3:]])
     return shifts @ pushed, turns @ pushed

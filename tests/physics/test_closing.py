@@ -9,15 +9,13 @@ import pytest
 
 from ringsim.engine.build import build
 from ringsim.engine.integrate import Integration
-from ringsim.engine.planar_truss import build_truss
-from ringsim.engine.planar_truss_run import TrussIntegration
 from ringsim.scene import load_scene
 
 
 @pytest.mark.parametrize("name", ["truss2", "planar-truss"])
 def test_a_run_that_is_over_is_collected(name: str) -> None:
     scene = load_scene(name).with_values({"solver.end_time": 0.1})
-    run = TrussIntegration(build_truss(scene)) if name != "truss2" else Integration(build(scene))
+    run = Integration(build(scene))
     history = run.run()
     left = weakref.ref(run)
     del run

@@ -8,9 +8,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ring_runs import Array, ideal_time, ring, run
-from ringsim.parts.joints import JointFriction
+from ringsim.parts.joint_friction.viscous_coulomb import ViscousCoulombFriction
 from ringsim.scene import Scene
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 
 LAWS: dict[str, dict[str, Any]] = {
     "vjoint-viscous": {"vjoint": {"viscous": 5e-4}},
@@ -47,7 +47,7 @@ def friction(scene: Scene, phi: float, speed: float) -> float:
     """Generalised friction force on phi, J/rad."""
     total = 0.0
     for family, joints in joint_rates(scene, phi).items():
-        law: JointFriction | None = getattr(scene.joints, family)
+        law: ViscousCoulombFriction | None = getattr(scene.joints, family)
         if law is None:
             continue
         viscous, coulomb = float(law.viscous), float(law.coulomb)  # type: ignore[arg-type]
@@ -59,7 +59,7 @@ def friction(scene: Scene, phi: float, speed: float) -> float:
 
 def ideal_time_with_friction(scene: Scene, angle: float) -> float:
     """Time at which the ideal ring with friction reaches ``angle`` (deg)."""
-    ideal = IdealRing.of(scene)
+    ideal = OneCoordinate(scene)
 
     def change(time: float, state: Array) -> list[float]:
         phi, speed = state
@@ -73,7 +73,7 @@ def ideal_time_with_friction(scene: Scene, angle: float) -> float:
 
     there.terminal = True  # type: ignore[attr-defined]
     found = solve_ivp(
-        change, (0.0, 60.0), [scene.structure.initial_phi, 0.0], events=there, rtol=1e-8, atol=1e-10
+        change, (0.0, 60.0), [scene.structure.coordinate, 0.0], events=there, rtol=1e-8, atol=1e-10
     )
     return float(found.t_events[0][0])
 
@@ -107,8 +107,8 @@ def test_dry_friction_above_the_drive_holds_the_ring() -> None:
     """Regularised friction creeps: the rate stays where tanh balances the drive."""
     scene = ring(3, joints={"vjoint": {"coulomb": 0.1}}, solver__end_time=5.0)
     found = run(scene)
-    phi = scene.structure.initial_phi
-    drive = -IdealRing.of(scene).work_rate(phi)
+    phi = scene.structure.coordinate
+    drive = -OneCoordinate(scene).work_rate(phi)
     joints = 2 * scene.structure.sections
     creep = 0.5 * 0.01 * math.atanh(drive / (2.0 * joints * 0.1))
     assert found.history.status.word == "unfinished"

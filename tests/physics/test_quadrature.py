@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from ring_runs import ideal_time, ring
 from ringsim.scene import Scene, load_scene
 from ringsim.theory.energy_quadrature import opening_time
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 
 BARE = {"boom": "none", "rods__density": 1e-3}
 """Nothing but corners and V-joints: the rods weigh 1e-6 of them."""
@@ -42,14 +42,14 @@ def bare_work(scene: Scene, phi: float) -> float:
 def test_inertia_of_a_circle_of_point_masses(sections: int, phi: float) -> None:
     scene = ring(sections, **BARE)
     # The rods' share: their mass over the points' mass, below 3e-6 at this density.
-    assert IdealRing.of(scene).motion(phi).inertia == pytest.approx(
+    assert OneCoordinate(scene).motion(phi).inertia == pytest.approx(
         bare_inertia(scene, phi), rel=3e-6
     )
 
 
 def test_the_same_time_by_adaptive_quadrature_of_the_closed_form() -> None:
     scene = ring(6, **BARE)
-    start = scene.structure.initial_phi
+    start = scene.structure.coordinate
 
     def slowness(u: float) -> float:
         phi = start * (1.0 - u * u)
@@ -63,7 +63,7 @@ def test_the_same_time_by_adaptive_quadrature_of_the_closed_form() -> None:
 
 def test_panels_converge() -> None:
     scene = ring(6)
-    ideal, start = IdealRing.of(scene), scene.structure.initial_phi
+    ideal, start = OneCoordinate(scene), scene.structure.coordinate
     best = opening_time(ideal, start, panels=64).time
     errors = [abs(opening_time(ideal, start, panels=n).time / best - 1.0) for n in (2, 4, 8)]
     # Eight nodes a panel: a smooth integrand gains far more than a factor 30 by halving.
@@ -73,7 +73,7 @@ def test_panels_converge() -> None:
 
 def test_a_net_that_comes_taut_on_the_way_is_told_in_the_uncertainty() -> None:
     scene = load_scene("ring18")
-    ideal, start = IdealRing.of(scene), scene.structure.initial_phi
+    ideal, start = OneCoordinate(scene), scene.structure.coordinate
     found = opening_time(ideal, start)
     best = opening_time(ideal, start, panels=192)
     assert abs(found.time - best.time) <= found.uncertainty
@@ -111,7 +111,7 @@ def test_a_free_ring_is_quicker_than_a_fixed_one() -> None:
 
 
 def test_the_force_is_the_slope_of_the_work() -> None:
-    ideal = IdealRing.of(load_scene("ring18"))
+    ideal = OneCoordinate(load_scene("ring18"))
     for phi in np.linspace(0.05, 1.15, 7):
         slope = (ideal.work(phi + 1e-5) - ideal.work(phi - 1e-5)) / 2e-5
         # Central differences: their own error is about 1e-10 of the work over the step.

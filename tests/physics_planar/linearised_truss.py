@@ -32,7 +32,7 @@ class LinearisedTruss:
         self.rope_stiffness = cable.axial_stiffness / self.rope
         self.foot = np.array([0.0, truss.axis_length - truss.strut_foot])
         self.joint = np.array([0.0, truss.axis_length])
-        end = truss.geometry().points(truss.initial_angle).upper_end[:2]
+        end = truss.geometry().points(truss.coordinate).upper_end[:2]
         self.scale = np.concatenate([[1e-3, 1e-3, 1e-3, 1e-5], np.full(2 * MODES, 1e-4)])
         straight = np.concatenate([end, [0.0, 0.0], np.zeros(2 * MODES)]) / self.scale
         self.place = fsolve(self.gradient, straight, xtol=1e-13) * self.scale

@@ -69,7 +69,7 @@ def rigid_frequency(scene):
     truss, geometry, step = scene.structure, scene.structure.geometry(), 1e-3
     cable, density = scene.cables.upper, scene.rods.density
     natural = truss.cable_length + scene.cables.winch_distance + cable.initial_slack
-    angle = truss.initial_angle + step * np.array([-1.0, 0.0, 1.0])
+    angle = truss.coordinate + step * np.array([-1.0, 0.0, 1.0])
     rope = geometry.cable(angle) + scene.cables.winch_distance - natural
     energy = 0.5 * cable.axial_stiffness / natural * rope**2
     energy += 0.5 * truss.spring.stiffness * (geometry.strut(angle) - truss.spring.free_length) ** 2

@@ -9,9 +9,11 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from ringsim.plots.camera import Camera
-from ringsim.plots.ring import instants, ring
-from ringsim.plots.ring_parts import facing_azimuth, ring_parts
+from ringsim.plots.ring import facing_azimuth, instants, lines_at, ring
 from ringsim.variables import Status
+
+LEFT = [*range(6), *range(12, 18)]
+"""Left halves of the bars of six sections, upper plane first."""
 
 
 def lengths(lines: np.ndarray) -> np.ndarray:
@@ -22,12 +24,12 @@ def lengths(lines: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(("sections", "closed"), [(1, False), (2, False), (6, True), (18, True)])
 def test_rods_keep_their_lengths_while_the_ring_opens(sections, closed, angle, scene_of):
     scene = scene_of(sections, closed=closed)
-    parts = {p.name: p.lines for p in ring_parts(scene, np.full((2, sections), angle))}
+    parts = lines_at(scene, np.radians(np.full((2, sections), angle)))
     structure = scene.structure
     assert parts["diagonals"].shape == (4 * sections, 2, 3)
-    assert parts["folding bars"].shape == (4 * sections, 2, 3)
+    assert parts["bars"].shape == (4 * sections, 2, 3)
     np.testing.assert_allclose(lengths(parts["diagonals"]), structure.half_diagonal, rtol=1e-12)
-    np.testing.assert_allclose(lengths(parts["folding bars"]), structure.half_bar, rtol=1e-12)
+    np.testing.assert_allclose(lengths(parts["bars"]), structure.half_bar, rtol=1e-12)
     np.testing.assert_allclose(
         lengths(parts["hinge assemblies"]), structure.hinge_offset, rtol=1e-10
     )
@@ -37,11 +39,11 @@ def test_rods_keep_their_lengths_while_the_ring_opens(sections, closed, angle, s
 def test_a_section_that_is_ahead_is_drawn_ahead(scene_of):
     scene = scene_of(6)
     opening = np.full((2, 6), 100.0)
-    bars = {p.name: p.lines for p in ring_parts(scene, opening)}["folding bars"]
+    bars = lines_at(scene, np.radians(opening))["bars"]
     opening[0, 2] = 130.0
     opening[1, 4] = 70.0
-    shifted = {p.name: p.lines for p in ring_parts(scene, opening)}["folding bars"]
-    depth, moved = (np.abs(lines[:12, 0, 2] - lines[:12, 1, 2]) for lines in (bars, shifted))
+    shifted = lines_at(scene, np.radians(opening))["bars"]
+    depth, moved = (np.abs(np.diff(lines[LEFT, :, 2]))[:, 0] for lines in (bars, shifted))
     half = scene.structure.half_bar
     expected = half * np.sin(np.radians(90.0 - 0.5 * opening)).ravel()
     np.testing.assert_allclose(depth, half * np.sin(np.radians(40.0)), rtol=1e-12)
@@ -49,16 +51,17 @@ def test_a_section_that_is_ahead_is_drawn_ahead(scene_of):
 
 
 def test_parts_that_the_scene_leaves_out_are_not_drawn(scene_of):
-    parts = ring_parts(scene_of(6, parts=False), np.full((2, 6), 90.0))
-    assert {part.name for part in parts} == {"diagonals", "folding bars", "hinge assemblies"}
+    lines = lines_at(scene_of(6, parts=False), np.radians(np.full((2, 6), 90.0)))
+    assert set(lines) == {"diagonals", "bars", "hinge assemblies"}
 
 
 def test_springs_are_taut_beyond_their_neutral_length(scene_of):
     scene = scene_of(18)
-    stowed = {p.name: p.lines for p in ring_parts(scene, np.full((2, 18), 40.0))}
-    deployed = {p.name: p.lines for p in ring_parts(scene, np.full((2, 18), 180.0))}
-    assert (len(stowed["net, taut"]), len(stowed["net, slack"])) == (0, 18)
-    assert (len(deployed["net, taut"]), len(deployed["net, slack"])) == (18, 0)
+    stowed = lines_at(scene, np.radians(np.full((2, 18), 40.0)))
+    deployed = lines_at(scene, np.radians(np.full((2, 18), 180.0)))
+    assert "net, taut" not in stowed
+    assert "net, slack" not in deployed
+    assert len(stowed["net, slack"]) == len(deployed["net, taut"]) == 18
     assert lengths(deployed["net, taut"]).min() > scene.net.neutral_length
 
 
@@ -78,10 +81,10 @@ def test_camera_sees_up_as_up_and_near_as_near():
 
 
 def test_arcs_are_seen_from_outside(scene_of):
-    geometry = scene_of(5, closed=False).structure.geometry()
-    azimuth = np.radians(facing_azimuth(geometry))
+    scene = scene_of(5, closed=False)
+    azimuth = np.radians(facing_azimuth(scene))
     view = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    assert (geometry.normals @ view > 0.0).all()
+    assert (scene.structure.geometry().normals @ view > 0.0).all()
 
 
 def test_instants_are_first_middle_and_deployment(deployed):

@@ -12,7 +12,7 @@ from ringsim.choice import kinds_of
 from ringsim.refusal import InputError
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Design
-from ringsim.sampling.table import AnyDesign, AnyDistribution, draw, first_samples
+from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import load_scene
 
 DESIGN = TypeAdapter(AnyDesign)
@@ -176,12 +176,6 @@ def test_correlation_of_values_for_each_section_goes_section_by_section(base):
     modulus, force = (column.values for column in table.columns)
     matrix = np.corrcoef(modulus.T, force.T)[:6, 6:]
     np.testing.assert_allclose(matrix, -0.9 * np.eye(6), atol=0.1)
-
-
-def test_first_samples_cut_a_table(base):
-    table = drawn(base, {"kind": "random", "samples": 20})
-    assert table.starts_with(first_samples(table, 5))
-    assert first_samples(table, 5).samples == 5
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ import pytest
 from pydantic import TypeAdapter
 
 from ringsim.refusal import InputError
-from ringsim.sampling.table import AnyDesign, AnyDistribution, Table, draw
+from ringsim.sampling.columns import Table
+from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import Scene, load_scene
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ringsim.engine.build import build
 from ringsim.scene import Scene, load_scene
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 
 RING = load_scene("ring18")
 HEAVY = {"boom.length": 3.0, "boom.density": 18000.0}
@@ -18,8 +18,8 @@ HEAVY = {"boom.length": 3.0, "boom.density": 18000.0}
 
 def pitch(scene: Scene) -> float:
     """Turn of the ring's axis from start to deployed, deg: zero angular momentum, no moments."""
-    ring = IdealRing.of(scene)
-    angles = np.linspace(scene.structure.initial_phi, 0.0, 81)
+    ring = OneCoordinate(scene)
+    angles = np.linspace(scene.structure.coordinate, 0.0, 81)
     turned = Rotation.identity()
     for start, end in pairwise(angles):
         own = -ring.motion(0.5 * (start + end)).rotation * (end - start)

@@ -8,7 +8,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from bad_scenes import BAD_SCENES, Bad
-from ringsim.cli import EXIT_BAD_INPUT, cli
+from ringsim.cli import cli
+from ringsim.exit_codes import EXIT_BAD_INPUT
 
 
 def check(*arguments: str) -> Result:

@@ -12,14 +12,9 @@ from ringsim.analysis.restarts import restart_lines
 from ringsim.campaign import accuracy
 from ringsim.cli import cli
 from ringsim.dataset import to_dataset
-from ringsim.execution.serial import Serial
-from ringsim.execution.solve import solve
-from ringsim.execution.work import Limits, Retry, Task, Work
-from ringsim.outputs.effort import COUNTS
 from ringsim.parts.solver import Solver
-from ringsim.parts.structure.pantograph_ring import PantographRing
 from ringsim.scene import load_scene
-from ringsim.variables import Outcome, Status
+from ringsim.variables import COUNTS, Outcome, Status
 
 SCENE = load_scene("truss2")
 
@@ -44,7 +39,7 @@ class Endings:
 def endings(monkeypatch):
     def install(*statuses: Status, steps: int = 10) -> Endings:
         prepared = Endings(*statuses, steps=steps)
-        monkeypatch.setitem(simulation.SOLVERS, PantographRing, prepared)
+        monkeypatch.setattr(simulation, "solve", prepared)
         return prepared
 
     return install
@@ -97,32 +92,6 @@ def test_a_refined_solver_stays_within_its_bounds() -> None:
     least = Solver(step=1e-9, tolerance=1e-8, deviation_tolerance=1e-6)
     assert least.refined(5) == least
     assert Solver().refined(0) == Solver()
-
-
-@pytest.mark.parametrize(("times", "runs"), [(0, 3), (1, 2), (4, 5)])
-def test_a_campaign_that_repeats_samples_replaces_the_restarts(endings, times, runs) -> None:
-    """1 + times attempts, not (1 + times) (1 + restarts)."""
-    prepared, kept = endings(*[Status.DIVERGED] * 9), []
-    work = Work(
-        solver="ringsim.simulation:run",
-        scene=SCENE.to_table(),
-        values_of=lambda sample: {},
-        limits=Limits(),
-        retry=Retry(times=times),
-        keep=kept.append,
-        started=lambda sample: None,
-        finished=lambda result: None,
-        stop=lambda: "",
-    )
-    Serial().run([0], work)
-    assert len(prepared.solvers) == runs
-    assert kept[0].attempts == 1 + times
-
-
-def test_a_replayed_attempt_runs_as_the_campaign_ran_it(endings) -> None:
-    prepared = endings(Status.DIVERGED)
-    solve(simulation.run, SCENE, Task(0, {}, 0.5, restarts=False))
-    assert [solver.step for solver in prepared.solvers] == [0.5 * SCENE.solver.step]
 
 
 def test_the_counts_of_all_starts_are_kept_beside_those_of_the_last(endings) -> None:
@@ -184,8 +153,9 @@ def test_a_rung_of_an_accuracy_study_never_starts_anew(monkeypatch, tmp_path) ->
         raise KeyboardInterrupt
 
     monkeypatch.setattr(accuracy, "run_cases", refuse)
+    scene = SCENE.with_values({"solver.restarts": 5})
     with pytest.raises(KeyboardInterrupt):
-        accuracy.run_ladder(tmp_path, SCENE.with_values({"solver.restarts": 5}), workers=1)
+        accuracy.run_ladder(tmp_path, scene, workers=1, timeout=60.0)
     (cases,) = asked
     assert cases.scene.solver.restarts == 0
     assert not any("solver.restarts" in case for case in cases.cases)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -19,10 +23,7 @@ from ringsim.analysis.stability import (
     joined,
     judged,
 )
-from ringsim.analysis.stability_borders import borders
-from ringsim.analysis.stability_text import summary, to_markdown
-from ringsim.campaign.stability import _pieces
-from ringsim.campaign.stability_groups import GROUPS, QUICK
+from ringsim.analysis.stability_text import borders, summary, to_markdown
 from ringsim.parts.solver import Solver
 from ringsim.plots.stability import stability
 from ringsim.variables import Status
@@ -143,25 +144,15 @@ def test_borders_name_the_ranges_and_what_lies_beyond() -> None:
     group = cells(*ends, *ends[1:], GOOD)
     group["x"].values[:] = [1, 2, 3, 4, 5] * 2
     group["y"].values[:] = [7] * 5 + [8] * 5
-    ends_of = {row["axis"]: row for row in _rows(borders(joined([(WORDS, group)])))}
-    along = ends_of["x"]
-    assert (along["lowest_sure"], along["highest_sure"]) == (2.0, 3.0)
-    assert (along["lowest_ok"], along["highest_ok"]) == (1.0, 5.0)
-    assert (along["below"], along["above"]) == ("Newton", "end time")
-    assert np.isnan(ends_of["y"]["lowest_sure"])
-
-
-def _rows(table: xr.Dataset) -> list[dict]:
-    return [
-        {name: variable.values[k] for name, variable in table.items()}
-        for k in range(table.sizes["border"])
-    ]
+    along, across = borders(joined([(WORDS, group)]))
+    assert along == ["group", "stiffness (N)", "2 .. 3", "1 .. 5", "Newton", "end time"]
+    assert across == ["group", "speed (m/s)", "none", "7 .. 8", "-", "-"]
 
 
 def test_text_and_figure_tell_every_kind_of_cell() -> None:
     whole = joined([(WORDS, cells(*ENDS)), (WORDS | {"title": "other"}, cells(GOOD, restarts=[1]))])
     text = to_markdown(whole)
-    assert "7 cells in 2 groups: 3 ended, 2 ok, 2 wrong" in text
+    assert "7 cells in 2 panels: 3 ended, 2 ok, 2 wrong" in text
     assert "1 of the ok ones after a new start" in summary(whole)
     assert NEWTON in text
     figure = stability(whole)
@@ -171,8 +162,13 @@ def test_text_and_figure_tell_every_kind_of_cell() -> None:
     assert "Stiffness (N)" in [axes.get_xlabel() for axes in figure.axes]
 
 
-def test_the_map_is_large_and_its_scenes_are_valid() -> None:
-    sizes = [len(piece.cells) for group in GROUPS for piece in _pieces(group)]
-    assert sum(sizes) >= 500
-    assert 10 <= sum(len(piece.cells) for group in QUICK for piece in _pieces(group)) <= 14
-    assert len({group.name for group in GROUPS}) == len(GROUPS)
+def test_the_benchmarks_map_is_large_and_its_cells_are_valid() -> None:
+    """Every pair of ends of two axes is a scene."""
+    known = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "stability_map.py"))
+    panels, quick = known["PANELS"], known["QUICK"]
+    assert sum(len(list(panel.cells())) for panel in panels) == 520
+    assert sum(len(list(panel.cells())) for panel in quick) == 12
+    assert len({panel.name for panel in panels}) == len(panels)
+    for panel in (*panels, *quick):
+        for x, y in itertools.product(panel.x.values[:: len(panel.x.values) - 1], panel.y.values):
+            panel.scene.with_values(panel.x.at(x) | panel.y.at(y))

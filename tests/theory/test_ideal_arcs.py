@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from ringsim.layout.layout import Layout
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run, run_ideal
 from ringsim.theory.ideal_mechanism import Mechanism
@@ -84,7 +85,7 @@ def one_section_time(scene: Scene) -> float:
         return y[0]
 
     deployed.terminal = True
-    start = [shape.initial_phi, 0.0, 0.0, 0.0]
+    start = [shape.coordinate, 0.0, 0.0, 0.0]
     found = solve_ivp(
         rates, (0.0, 20.0), start, method="DOP853", rtol=1e-10, atol=1e-12, events=deployed
     )
@@ -132,36 +133,41 @@ def test_nothing_is_lost_or_won_without_forces(boom):
     q[0] = 1.0
 
     def kinetic(q, v):
-        pose = mechanism.pose(q, v)
-        matrix = mechanism.mass(pose)
-        rates = np.concatenate([mechanism.rigid_rates(pose, matrix), pose.rate])
-        return 0.5 * float(rates @ matrix @ rates)
+        now = mechanism.configuration(q, v)
+        rates = np.concatenate([mechanism.rigid_rates(now), now.rate])
+        return 0.5 * float(rates @ now.moments.matrix @ rates)
 
-    pose = mechanism.pose(q, v)
-    matrix = mechanism.mass(pose)
-    spin = mechanism.rigid_rates(pose, matrix)[3:]
-    pull, _ = mechanism.accelerations(pose, matrix, spin, np.zeros(3), np.zeros(len(pose.place)))
+    now = mechanism.configuration(q, v)
+    spin = mechanism.rigid_rates(now)[3:]
+    pull, _ = mechanism.accelerations(now, spin, np.zeros(3), np.zeros(len(now.place)))
     step = 1e-5
     gained = kinetic(q + step * v, v + step * pull) - kinetic(q - step * v, v - step * pull)
     # Central differences: third derivatives of order 1 times the step's square.
     assert abs(gained / (2.0 * step)) < 1e-7 * kinetic(q, v)
 
 
+def end_centres(layout: Layout) -> tuple[Any, Any]:
+    """Centres of the left and right assemblies, upper and lower, and their derivatives."""
+    poses = [layout.bodies[plane[end]].pose for end in (0, -1) for plane in layout.corners]
+    return np.array([p.place for p in poses]), np.array([p.rate for p in poses])
+
+
 @pytest.mark.parametrize("boom", ["none", {"kind": "rigid"}])
 def test_coordinates_of_the_ends_fit_their_rates(boom):
-    mechanism = Mechanism(arc(1, boom=boom, **HEAVY))
+    scene = arc(1, boom=boom, **HEAVY)
+    mechanism = Mechanism(scene)
     random = np.random.default_rng(1)
     q, v = random.normal(size=(2, mechanism.freedom))
     q[0] = 1.0
     step = 1e-6
-    here, before, after = (mechanism.pose(q + e * v, v) for e in (0.0, -step, step))
+    here, before, after = (mechanism.configuration(q + e * v, v) for e in (0.0, -step, step))
     near = {"rtol": 1e-7, "atol": 1e-8}  # differences: round-off over the step
     np.testing.assert_allclose((after.place - before.place) / (2 * step), here.rate, **near)
     np.testing.assert_allclose((after.rate - before.rate) / (2 * step), here.bias, **near)
-    assert here.reach is not None
     if boom != "none":
         # The lower assembly's centre lies on the boom: on the upper one's own vertical.
-        upper, lower = here.reach.places[:2]
-        angle, along = here.place[1], mechanism.geometry.directions[0]
+        centres = mechanism.points.swung(end_centres, mechanism.points.swinging)
+        upper, lower = (centres @ here.values)[:2]
+        angle, along = here.place[1], scene.structure.geometry().directions[0]
         across = math.cos(angle) * along + math.sin(angle) * np.array([0.0, 0.0, 1.0])
         assert abs(across @ (lower - upper)) < 1e-15

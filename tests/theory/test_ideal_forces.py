@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from fold_rates import fold_rate
 
 from ideal_cases import pulled, six
 from ringsim.cable.chain import Chain
-from ringsim.engine.joints import friction_torque, stop_torque
-from ringsim.engine.net import net_forces
+from ringsim.layout.free_hub import FreeHub
+from ringsim.parts.persection import at_section
 from ringsim.theory.ideal_cables import IdealCables
 from ringsim.theory.ideal_forces import Forces
 from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.theory.ideal_net import FreeHub
 from ringsim.theory.ideal_points import UP
 
 ARC = {"structure__closed": False, "boom": "none", "net": "none", "structure__hinge_offset": 0.05}
@@ -20,8 +20,8 @@ ARC = {"structure__closed": False, "boom": "none", "net": "none", "structure__hi
 
 def acting(scene, free, rates, *, latched=False):
     mechanism = Mechanism(scene)
-    pose = mechanism.pose(np.array(free), np.array(rates))
-    return Forces(scene, mechanism).act(pose, UP, latched), pose
+    now = mechanism.configuration(np.array(free), np.array(rates))
+    return Forces(scene, mechanism).act(now, UP, latched)
 
 
 def diagonal_rate(shape, phi: float) -> float:
@@ -43,11 +43,11 @@ def test_joint_friction_takes_the_power_of_all_its_joints(family):
         "vjoint": [2.0 * rate] * 2,
     }[family]
     exact = sum(
-        float(friction_torque(getattr(scene.joints, family), section, 6, speed) * speed)
+        float(at_section(getattr(scene.joints, family), section).torque(speed) * speed)
         for section in range(6)
         for speed in speeds
     )
-    found, _ = acting(scene, [phi], [rate])
+    found = acting(scene, [phi], [rate])
     assert -found.force[0] * rate == pytest.approx(exact, rel=1e-12)
     assert found.loss == pytest.approx(exact, rel=1e-12)
 
@@ -65,39 +65,38 @@ def test_hinges_of_swinging_ends_turn_against_their_assemblies():
             swing = rates[1 + k] if swings else 0.0
             for slope in (1.0, turn):
                 speed = sense * slope * rates[0] - swing
-                exact += float(friction_torque(scene.joints.hinge, section, 3, speed)) * speed
-    found, _ = acting(scene, [phi, 0.1, 0.2, 0.3, 0.4], rates)
+                exact += float(at_section(scene.joints.hinge, section).torque(speed)) * speed
+    found = acting(scene, [phi, 0.1, 0.2, 0.3, 0.4], rates)
     assert -found.force @ rates == pytest.approx(exact, rel=1e-12)
     assert found.loss == pytest.approx(exact, rel=1e-12)
 
 
 @pytest.mark.parametrize("latched", [False, True])
-def test_stops_are_the_engine_s(latched):
+def test_stops_of_all_joints_act_on_the_ring(latched):
     stop = {"stiffness": 150.0, "damping": 0.3, "stowed_angle": 10.0, "latch": True}
     scene = pulled(sections=6, stop=stop, net="none", loads__force=0.0)
     for phi in (-0.01, -2e-4, 0.3, 1.484, 1.55):
         for rate in (-2.0, 0.0, 2.0):
-            folded, turning = np.array(2.0 * phi), np.array(2.0 * rate)
-            opening = stop_torque(scene.stop, folded, turning, np.array(latched))
+            opening = scene.stop.torque(2.0 * phi, 2.0 * rate, latched).total
             # 12 joints; opening them is a negative change of phi, twice as fast.
-            found, _ = acting(scene, [phi], [rate], latched=latched)
+            found = acting(scene, [phi], [rate], latched=latched)
             assert found.force[0] == pytest.approx(-24.0 * float(opening), rel=1e-12, abs=1e-12)
 
 
-def test_damped_net_has_the_engine_s_law():
+def test_a_damped_net_acts_by_its_corners():
     net = {"stiffness": 0.5, "damping": 0.2, "neutral_length": 0.3}
     scene = pulled(sections=6, net=net, stop="none", loads__force=0.0)
     geometry = scene.structure.geometry()
     for phi, rate in ((0.2, -0.5), (0.2, 3.0), (1.3, 1.0)):
-        fold, by_phi = geometry.fold(phi).corners[0], geometry.fold_rate(phi).corners[0]
+        fold, by_phi = geometry.fold(phi).corners[0], fold_rate(geometry, phi).corners[0]
         arms, moving = fold - fold.mean(axis=0), by_phi - by_phi.mean(axis=0)
         lengths = np.linalg.norm(arms, axis=1)
         slope = np.sum(arms * moving, axis=1) / lengths
-        parts = net_forces(lengths - 0.3, slope * rate, np.full(6, 0.5), 0.2, two_sided=False)
-        found, _ = acting(scene, [phi], [rate])
-        exact = -float(np.sum(sum(parts) * slope))
+        tension = scene.net.tension(lengths - 0.3, slope * rate)
+        found = acting(scene, [phi], [rate])
+        exact = -float(np.sum(tension.total * slope))
         assert found.force[0] == pytest.approx(exact, rel=1e-12, abs=1e-15)
-        assert found.loss == pytest.approx(rate * float(parts[1] @ slope), rel=1e-12)
+        assert found.loss == pytest.approx(rate * float(tension.damping @ slope), rel=1e-12)
 
 
 @pytest.mark.parametrize("stiffness", [0.5, [0.5, 0.1, 0.5, 0.9, 0.2]])
@@ -114,8 +113,11 @@ def test_hub_of_an_odd_net_lies_where_its_strings_balance(stiffness):
     assert np.abs((pulls / lengths) @ arms).max() < 1e-13
     # By virtual work: the energy's slope is the generalised force, though the hub moves along.
     step = 1e-5
-    energy = [hub_net.energy(geometry.fold(0.9 + e).corners[0]) for e in (-step, step)]
-    force, _ = acting(scene.with_values({"loads.force": 0.0}), [0.9], [0.0])
+    energy = []
+    for phi in (0.9 - step, 0.9 + step):
+        corners = geometry.fold(phi).corners[0]
+        energy.append(hub_net.forces(corners, np.zeros((5, 3, 1)), np.zeros(1)).energy)
+    force = acting(scene.with_values({"loads.force": 0.0}), [0.9], [0.0])
     # Central differences: second order of the step.
     assert force.force[0] == pytest.approx(-(energy[1] - energy[0]) / (2.0 * step), rel=1e-8)
 
@@ -129,12 +131,12 @@ def test_cables_are_the_chain_on_the_fold_s_points(end):
     cables = IdealCables(scene, mechanism)
     geometry, cable = scene.structure.geometry(), scene.cables.upper
     for phi, rate, time in ((1.35, -0.3, 0.9), (0.8, -0.4, 8.0), (0.8, 0.4, 8.0)):
-        pose = mechanism.pose(np.array([phi]), np.array([rate]))
-        found = cables.pull(time, pose, np.zeros((2, 0)))
+        now = mechanism.configuration(np.array([phi]), np.array([rate]))
+        found = cables.pull(time, now, np.zeros((2, 0)))
         moved = float(found.chain.tensions @ found.chain.rates)
         # Both planes are alike, so one cable stands for two.
-        assert found.force * rate == pytest.approx(-2.0 * moved, rel=1e-12)
-        fold, by_phi = geometry.fold(phi), geometry.fold_rate(phi)
+        assert found.force[0] * rate == pytest.approx(-2.0 * moved, rel=1e-12)
+        fold, by_phi = geometry.fold(phi), fold_rate(geometry, phi)
         down = np.array([0.0, 0.0, -1.0])
         bar, h = geometry.half_bar, cable.block_offset
         drop = (bar * math.sin(phi) + h) * down

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fold_rates import fold_rate
 
 from ideal_cases import pulled
 from ringsim.scene import Scene
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 
 PIECES = 200
 
@@ -16,7 +17,7 @@ def summed(scene: Scene, phi: float, *, fixed: bool) -> float:
     """Sum of m |dr/dphi|^2, with translation and rotation taken out of a ring that floats."""
     shape, rods = scene.structure, scene.rods
     geometry = shape.geometry()
-    fold, rate = geometry.fold(phi), geometry.fold_rate(phi)
+    fold, rate = geometry.fold(phi), fold_rate(geometry, phi)
     parts = [
         (np.full(place[..., 0].size, mass), place, moving)
         for mass, place, moving in (
@@ -57,11 +58,11 @@ def test_inertia_is_that_of_its_pieces(sections, base, phi):
     expected = summed(scene, phi, fixed=base == "fixed")
     # The pieces leave out 1 / PIECES^2 of the rods' own turning, and their cross-sections: I / A
     # over length^2 is 1.6e-4 of it for the bars.
-    assert IdealRing.of(scene).motion(phi).inertia == pytest.approx(expected, rel=3e-4)
+    assert OneCoordinate(scene).motion(phi).inertia == pytest.approx(expected, rel=3e-4)
     wire = {"outer_diameter": 1e-3, "inner_diameter": 0.0}
     heavy = {"rods__diagonal": wire, "rods__bar": wire, "rods__density": 3e4}
     thin = pulled(sections, boom=boom, **heavy)
     # Cross-sections that turn next to nothing, 1e-5, and what the pieces leave out, 1 / PIECES^2.
-    assert IdealRing.of(thin).motion(phi).inertia == pytest.approx(
+    assert OneCoordinate(thin).motion(phi).inertia == pytest.approx(
         summed(thin, phi, fixed=base == "fixed"), rel=4e-5
     )

@@ -12,7 +12,7 @@ from ideal_cases import pulled, six
 from ringsim.outputs import VARIABLES
 from ringsim.simulation import run_ideal
 from ringsim.theory.energy_quadrature import opening_time
-from ringsim.theory.ideal_ring import IdealRing
+from ringsim.theory.one_coordinate import OneCoordinate
 from ringsim.variables import Status
 
 BALANCE = 1e-7
@@ -33,7 +33,7 @@ def test_without_cables_it_takes_the_time_of_the_energy_quadrature(sections, bas
         sections, boom={"kind": "rigid", "base": base} if base == "fixed" else "none", **extra
     )
     outcome = run_ideal(scene)
-    truth = opening_time(IdealRing.of(scene), scene.structure.initial_phi, panels=96)
+    truth = opening_time(OneCoordinate(scene), scene.structure.coordinate, panels=96)
     assert outcome.status == Status.OK
     assert value(outcome, "deployment_time") == pytest.approx(
         truth.time, rel=1e-7, abs=2.0 * truth.uncertainty
@@ -48,7 +48,7 @@ def test_loads_that_stay_vertical_open_a_pitching_ring_later():
     """
     scene = pulled(3, net="none", structure__aspect_ratio=1.0, boom__density=1e4)
     outcome = run_ideal(scene)
-    turning = opening_time(IdealRing.of(scene), scene.structure.initial_phi).time
+    turning = opening_time(OneCoordinate(scene), scene.structure.coordinate).time
     assert 1e-6 < value(outcome, "deployment_time") / turning - 1.0 < 1e-3
     assert value(outcome, "energy_error") < BALANCE
 
@@ -56,7 +56,7 @@ def test_loads_that_stay_vertical_open_a_pitching_ring_later():
 def test_an_odd_net_takes_the_time_of_the_energy_quadrature():
     net = {"stiffness": 0.05, "neutral_length": 0.15}
     scene = pulled(5, structure__aspect_ratio=0.8, net=net, boom="none", loads__force=0.05)
-    truth = opening_time(IdealRing.of(scene), scene.structure.initial_phi, panels=96)
+    truth = opening_time(OneCoordinate(scene), scene.structure.coordinate, panels=96)
     found = value(run_ideal(scene), "deployment_time")
     assert found == pytest.approx(truth.time, rel=1e-7, abs=2.0 * truth.uncertainty)
 
@@ -64,7 +64,7 @@ def test_an_odd_net_takes_the_time_of_the_energy_quadrature():
 def test_angle_between_the_steps_is_that_of_the_quadrature():
     scene = pulled(net="none", boom="none", record__interval=0.37)
     outcome = run_ideal(scene)
-    ring, start = IdealRing.of(scene), scene.structure.initial_phi
+    ring, start = OneCoordinate(scene), scene.structure.coordinate
     times = outcome.coordinates["time"]
     for k in (10, 25, 40):
         phi = 0.5 * (math.pi - math.radians(outcome.values["opening_angle"][0, 0, k]))
@@ -95,7 +95,7 @@ def test_one_section_follows_its_rope():
     def length(phi: float) -> float:
         return math.sqrt(bar**2 + offset**2 + 2.0 * bar * offset * math.sin(phi))
 
-    start = length(scene.structure.initial_phi)
+    start = length(scene.structure.coordinate)
     for k in (50, 100, 150):
         time = outcome.coordinates["time"][k]
         now = start - 0.5 * speed * time
@@ -105,7 +105,7 @@ def test_one_section_follows_its_rope():
         assert opening == pytest.approx(180.0 - 2.0 * math.degrees(phi), abs=1e-3)
         slope = bar * offset * math.cos(phi) / now
         rate = -0.5 * speed / slope
-        inertia = IdealRing.of(scene).motion(phi).inertia
+        inertia = OneCoordinate(scene).motion(phi).inertia
         tension = -4.0 * viscous * 2.0 * rate / (4.0 * slope)
         # Inertia is left out: I phi'^2 over the tension's work, about 1e-4 here.
         assert inertia * rate**2 < 1e-3 * tension * slope
@@ -123,7 +123,7 @@ def test_after_both_cables_are_cut_it_coasts_against_its_joints():
     outcome = run_ideal(scene)
     phi = 0.5 * (math.pi - np.radians(outcome.values["opening_angle"][0, 0]))
     kinetic = outcome.values["kinetic_energy"]
-    ring = IdealRing.of(scene)
+    ring = OneCoordinate(scene)
     momentum = -np.sqrt(2.0 * kinetic)
     resistance = 4.0 * 6 * viscous * 2.0
     for early, late in ((5, 7), (6, 8)):

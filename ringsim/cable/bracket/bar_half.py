@@ -21,8 +21,8 @@ class BarHalfBracket(Bracket):
         b = H sin((2 theta - delta) / 2),   a = +-H cos((2 theta - delta) / 2)
 
     (+ on the first half).  b is h of paper 000, eq. 21; "sin^-1" there is no arc sine, and theta
-    is the angle from the bar's normal.  The paper leaves out a and has both spans alike; a pulley
-    that is fixed to a half stands aside.  The span to that half's own hinge pulley then keeps its
+    is the angle from the bar's normal.  The paper neglects a and has equal spans; a pulley
+    fixed to a half is off the bisector.  The span to that half's own hinge pulley then keeps its
     length, and the other has
 
         L^2 = l^2 + H^2 + 2 l H sin(theta - delta),
@@ -33,7 +33,7 @@ class BarHalfBracket(Bracket):
 
     kind: Literal["bar-half"] = "bar-half"
     angle: Annotated[float, Field(ge=90.0, le=270.0), Unit("deg")]
-    """Theta."""
+    """Angle theta."""
     half: Literal["first", "second"] = "first"
     """The half towards the section's first or second corner, seen from the boom."""
 
@@ -49,7 +49,7 @@ class BarHalfBracket(Bracket):
         )
 
     def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
-        """A and b with theta - delta / 2 = theta - 90 deg + phi."""
+        """Offsets a and b with theta - delta / 2 = theta - 90 deg + phi."""
         turn = np.radians(self.angle - 90.0) + np.asarray(phi, dtype=float)
         return self._sign * distance * np.cos(turn), distance * np.sin(turn)
 

@@ -19,7 +19,7 @@ class BisectorBracket(Bracket):
     kind: Literal["bisector"] = "bisector"
 
     def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
-        """A = 0, b = h."""
+        """Offsets a = 0, b = h."""
         size = np.shape(phi)
         return np.zeros(size), np.full(size, distance)
 

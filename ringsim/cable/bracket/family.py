@@ -29,7 +29,7 @@ class Bracket(Model):
         return None
 
     def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
-        """A and b in m at bar angles (rad), of their shape."""
+        """Offsets a and b in m at bar angles (rad), of their shape."""
         raise NotImplementedError
 
     def rate(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:

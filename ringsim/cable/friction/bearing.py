@@ -11,27 +11,19 @@ from ringsim.parts.persection import PerSection
 from ringsim.units import MetreOrZero
 
 
-class BearingFriction(PulleyFriction):
-    """eta = (R - f cos(a/2)) / (R + f cos(a/2)), that is ln(eta) = -2 artanh((f/R) cos(a/2)).
+class Bearing(PulleyFriction):
+    """Any law of a pulley's bearing with the friction moment f times the radial force."""
 
-    f is the bearing's friction moment over its radial force: Palmgren's constant times the
-    pitch diameter.  Source: paper 000, eqs 11 and 19.  It follows from the exact balance
-    (kind "bearing-exact") with the radial force taken as 2 cos(a/2) times the mean of the two
-    tensions, and therefore lacks terms of third order: ln(eta) is too small in magnitude by
-    (f/R)^3 cos(a/2) sin(a/2)^2 + O((f/R)^5), at most 0.385 (f/R)^3.
-    """
-
-    kind: Literal["bearing"] = "bearing"
     coefficient: PerSection[MetreOrZero]
     """f in metre: one value for all pulleys, or one for each in order from the winch."""
 
     @property
     def coefficients(self) -> Array:
-        """F in metre, shape () or (pulleys,)."""
+        """Coefficient f in metre, shape () or (pulleys,)."""
         return np.asarray(self.coefficient, dtype=float)
 
     def refusal(self, radius: float) -> str | None:
-        """F must be below R, or a rope that turns back could not be pulled over the pulley."""
+        """Bound f < R: otherwise a rope that turns back could not be pulled over the pulley."""
         worst = float(np.max(self.coefficients))
         if worst < radius:
             return None
@@ -40,6 +32,23 @@ class BearingFriction(PulleyFriction):
             "the bearing would hold any tension where the rope turns back (lower it, or take "
             "a larger pulley)"
         )
+
+
+class BearingFriction(Bearing):
+    """eta = (R - f cos(a/2)) / (R + f cos(a/2)), that is ln(eta) = -2 artanh((f/R) cos(a/2)).
+
+    f is the bearing's friction moment over its radial force: Palmgren's constant times the
+    pitch diameter.  Source: paper 000, eqs 11 and 19.  It follows from the exact balance
+    (kind "bearing-exact") with the radial force taken as 2 cos(a/2) times the mean of the two
+    tensions, and therefore lacks terms of third order: ln(eta) is too small in magnitude by
+    (f/R)^3 cos(a/2) sin(a/2)^2 + O((f/R)^5), at most 0.385 (f/R)^3.
+
+    >>> law = BearingFriction(coefficient=0.0004)
+    >>> round(float(np.exp(law.log_decay(np.array([0.5 * np.pi]), 0.01))[0]), 6)
+    0.944987
+    """
+
+    kind: Literal["bearing"] = "bearing"
 
     def log_decay(self, angle: Array, radius: float) -> Array:
         """ln(eta) = -2 artanh((f/R) cos(a/2))."""

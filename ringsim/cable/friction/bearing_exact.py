@@ -6,13 +6,11 @@ from typing import Literal
 
 import numpy as np
 
-from ringsim.cable.friction.bearing import BearingFriction
-from ringsim.cable.friction.family import Array, PulleyFriction
-from ringsim.parts.persection import PerSection
-from ringsim.units import MetreOrZero
+from ringsim.cable.friction.bearing import Bearing
+from ringsim.cable.friction.family import Array
 
 
-class ExactBearingFriction(PulleyFriction):
+class ExactBearingFriction(Bearing):
     """The root below 1 of R (1 - eta) = f sqrt(1 + eta^2 + 2 eta cos a).
 
     With k = f/R the balance squared is (1 - k^2)(1 + eta^2) = 2 (1 + k^2 cos a) eta.  Its two
@@ -23,20 +21,13 @@ class ExactBearingFriction(PulleyFriction):
     because q^2 - k^2 cos(a/2)^2 = 1 - k^2 and (q + k cos(a/2))^2 = 1 + k^2 cos a
     + 2 q k cos(a/2).  The closed form (kind "bearing") is the case q = 1; both agree for
     a = 0 and a = pi.  Source of the balance: paper 000, eq. 18.
+
+    >>> law = ExactBearingFriction(coefficient=0.0004)
+    >>> round(float(np.exp(law.log_decay(np.array([0.5 * np.pi]), 0.01))[0]), 6)
+    0.944966
     """
 
     kind: Literal["bearing-exact"] = "bearing-exact"
-    coefficient: PerSection[MetreOrZero]
-    """f in metre: one value for all pulleys, or one for each in order from the winch."""
-
-    @property
-    def coefficients(self) -> Array:
-        """F in metre, shape () or (pulleys,)."""
-        return np.asarray(self.coefficient, dtype=float)
-
-    def refusal(self, radius: float) -> str | None:
-        """F must be below R, as for the closed form."""
-        return BearingFriction(coefficient=self.coefficient).refusal(radius)
 
     def log_decay(self, angle: Array, radius: float) -> Array:
         """ln(eta) = -2 artanh(k cos(a/2) / q)."""

@@ -14,7 +14,11 @@ from ringsim.units import FrictionCoefficient
 class CapstanFriction(PulleyFriction):
     """eta = exp(-mu (pi - a)): dry friction along the wrap angle pi - a.
 
-    Source: Euler-Eytelwein.  The radius of the sheave plays no part.
+    Source: Euler-Eytelwein.  Independent of the radius of the sheave.
+
+    >>> law = CapstanFriction(coefficient=0.25)
+    >>> float(law.log_decay(np.array([0.0]), 0.01)[0]) == -0.25 * np.pi
+    True
     """
 
     kind: Literal["capstan"] = "capstan"

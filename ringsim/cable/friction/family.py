@@ -1,4 +1,4 @@
-"""The family of friction laws: how much tension a rope loses on its way over a pulley."""
+"""The family of friction laws: the loss of tension over a pulley."""
 
 from __future__ import annotations
 
@@ -34,13 +34,5 @@ class PulleyFriction(Model):
         raise NotImplementedError
 
     def log_slope(self, angle: Array, radius: float) -> Array:
-        """D ln(eta) / d angle, in 1/rad; same shapes."""
+        """Derivative of ln(eta) after the angle, in 1/rad; same shapes."""
         raise NotImplementedError
-
-    def decay(self, angle: Array, radius: float) -> Array:
-        """Tension ratio eta, in (0, 1]."""
-        return np.exp(self.log_decay(angle, radius))
-
-    def slope(self, angle: Array, radius: float) -> Array:
-        """D eta / d angle, in 1/rad."""
-        return self.decay(angle, radius) * self.log_slope(angle, radius)

@@ -10,7 +10,11 @@ from ringsim.cable.friction.family import Array, PulleyFriction
 
 
 class Frictionless(PulleyFriction):
-    """eta = 1: one tension in the whole rope, the driving-cable element of paper 001."""
+    """eta = 1: one tension in the whole rope, the driving-cable element of paper 001.
+
+    >>> Frictionless().log_decay(np.array([0.0, 1.0]), 0.01)
+    array([0., 0.])
+    """
 
     kind: Literal["none"] = "none"
 

@@ -24,12 +24,10 @@ class WinchState:
 
 @dataclass(frozen=True)
 class WinchReading:
-    """What a winch can know of its rope at the beginning of a step.
+    """Readings of a winch at the beginning of a step.
 
     Attributes
     ----------
-    axial_stiffness, damping_time, slack_width
-        EA (N), Kelvin-Voigt time (s) and smoothing width (N) of the rope.
     tension_ratio
         Tension at the winch over the mean tension of the rope as a function of the winch's
         speed (m/s), not falling; 1 without friction.
@@ -42,9 +40,6 @@ class WinchReading:
 
     """
 
-    axial_stiffness: float
-    damping_time: float
-    slack_width: float
     tension_ratio: Callable[[float], float]
     path_rate: float = 0.0
     path_slope: float = 0.0
@@ -59,14 +54,14 @@ class Winding(Model):
     def usual_speed(self) -> float:
         """Speed at which the law winds, or pays out, for most of its time, m/s; 0 if it rests.
 
-        As far as the law can know it beforehand: the friction of the pulleys is regularised
+        As far as it is known beforehand: the friction of the pulleys is regularised
         below it, see ``ringsim.cable.regularisation``.
         """
         raise NotImplementedError
 
 
 class PrescribedWinding(Winding):
-    """A law that is known beforehand."""
+    """A prescribed law."""
 
     feedback: ClassVar[bool] = False
 
@@ -80,12 +75,12 @@ class PrescribedWinding(Winding):
 
 
 class FeedbackWinding(Winding):
-    """A law whose speed answers to the rope, within the step that it is chosen for.
+    """A law whose speed depends on the tension, solved within the step.
 
     The rope is so stiff that a speed chosen from the present tension would overshoot within
-    one step.  The law therefore answers to the tension at the end of the step, see
+    one step.  The law therefore uses the tension at the end of the step, see
     ``ringsim.cable.winches``: T grows with the speed and the command falls with T, so there is
-    one solution for any EA and step, and the loop cannot run away.
+    one solution for any EA and step, and the loop is stable.
     """
 
     feedback: ClassVar[bool] = True

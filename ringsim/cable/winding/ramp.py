@@ -15,6 +15,10 @@ class RampWinding(PrescribedWinding):
 
     cubic: p = 3 s^2 - 2 s^3 (acceleration continuous); quintic: p = 10 s^3 - 15 s^4 + 6 s^5
     (jerk continuous).  Either winds half of speed * duration during the ramp.
+
+    >>> winding = RampWinding(speed=0.1, duration=2.0)
+    >>> winding.wound(2.0), winding.wound_rate(2.0)
+    (0.1, 0.1)
     """
 
     kind: Literal["ramp"] = "ramp"

@@ -6,17 +6,11 @@ from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
+from scipy.interpolate import PchipInterpolator, PPoly
 
 from ringsim.cable.winding.family import PrescribedWinding
-from ringsim.units import SecondOrZero, SignedMetre
-
-Array = NDArray[np.float64]
-
-
-def _as_tuple(value: object) -> object:
-    return tuple(value) if isinstance(value, list) else value
+from ringsim.units import ListIn, SecondOrZero, SignedMetre
 
 
 class TableWinding(PrescribedWinding):
@@ -29,9 +23,9 @@ class TableWinding(PrescribedWinding):
     """
 
     kind: Literal["table"] = "table"
-    times: Annotated[tuple[SecondOrZero, ...], BeforeValidator(_as_tuple), Field(min_length=2)]
+    times: Annotated[tuple[SecondOrZero, ...], ListIn, Field(min_length=2)]
     """Increasing, in s after the start of the winch."""
-    lengths: Annotated[tuple[SignedMetre, ...], BeforeValidator(_as_tuple)]
+    lengths: Annotated[tuple[SignedMetre, ...], ListIn]
     """Rope wound at those times, in metre; the first is 0."""
 
     @model_validator(mode="after")
@@ -47,25 +41,17 @@ class TableWinding(PrescribedWinding):
         if self.lengths[0] != 0.0:
             raise ValueError(
                 f"lengths = {self.lengths[0]:g} m, ... must start at 0: the rope wound before "
-                "the start belongs into the cable's initial slack"
+                "the start belongs to the cable's initial slack"
             )
         return self
 
     @cached_property
-    def _cubics(self) -> tuple[Array, Array]:
-        """Times, and coefficients of (t - time)^0..3 in each interval, shape (intervals, 4)."""
-        time, length = np.array(self.times), np.array(self.lengths)
-        step, secant = np.diff(time), np.diff(length) / np.diff(time)
-        slope = np.empty_like(time)
-        if len(step) == 1:
-            slope[:] = secant[0]
-        else:
-            slope[1:-1] = _inner_slopes(step, secant)
-            slope[0] = _end_slope(step[0], step[1], secant[0], secant[1])
-            slope[-1] = _end_slope(step[-1], step[-2], secant[-1], secant[-2])
-        bend = (3.0 * secant - 2.0 * slope[:-1] - slope[1:]) / step
-        twist = (slope[:-1] + slope[1:] - 2.0 * secant) / step**2
-        return time, np.stack([length[:-1], slope[:-1], bend, twist], axis=-1)
+    def _curve(self) -> PchipInterpolator:
+        return PchipInterpolator(self.times, self.lengths)
+
+    @cached_property
+    def _speed(self) -> PPoly:
+        return self._curve.derivative()
 
     def usual_speed(self) -> float:
         """Median over time of the mean speeds between the table's times at which it moves, m/s."""
@@ -79,36 +65,9 @@ class TableWinding(PrescribedWinding):
 
     def wound(self, time: float) -> float:
         """Rope taken up, in metre."""
-        times, cubics = self._cubics
-        clipped = min(max(time, self.times[0]), self.times[-1])
-        k = min(int(np.searchsorted(times, clipped, side="right")) - 1, len(cubics) - 1)
-        s = clipped - self.times[k]
-        c = cubics[k]
-        return float(c[0] + s * (c[1] + s * (c[2] + s * c[3])))
+        return float(self._curve(min(max(time, self.times[0]), self.times[-1])))
 
     def wound_rate(self, time: float) -> float:
         """Its rate, in m/s; 0 outside the table."""
-        times, cubics = self._cubics
-        if not self.times[0] <= time < self.times[-1]:
-            return 0.0
-        k = int(np.searchsorted(times, time, side="right")) - 1
-        s = time - self.times[k]
-        c = cubics[k]
-        return float(c[1] + s * (2.0 * c[2] + s * 3.0 * c[3]))
-
-
-def _inner_slopes(step: Array, secant: Array) -> Array:
-    before, after = secant[:-1], secant[1:]
-    near, far = step[1:] + 2.0 * step[:-1], 2.0 * step[1:] + step[:-1]
-    same = before * after > 0.0
-    first, second = np.where(same, before, 1.0), np.where(same, after, 1.0)
-    return np.where(same, (near + far) / (far / first + near / second), 0.0)
-
-
-def _end_slope(near: float, far: float, secant: float, following: float) -> float:
-    slope = ((2.0 * near + far) * secant - near * following) / (near + far)
-    if slope * secant <= 0.0:
-        return 0.0
-    if secant * following <= 0.0 and abs(slope) > 3.0 * abs(secant):
-        return 3.0 * secant
-    return slope
+        inside = self.times[0] <= time < self.times[-1]
+        return float(self._speed(time)) if inside else 0.0

@@ -1,4 +1,4 @@
-"""Winding that keeps the rope near a wanted tension, from measured bar angles."""
+"""Winding that controls the tension of the rope, from measured bar angles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class TensionFeedbackWinding(FeedbackWinding):
     The measured angles give the path of the rope, hence its stretch and its tension, without
     a force sensor.  The take-up is -dS/d(delta) * opening_rate: the speed that lets the
     sections open at that rate, almost nothing at the stowed end where the path hardly depends
-    on the angle - a constant speed starts there with a jerk, throws the structure ahead and
+    on the angle; a constant speed starts there with a jerk, accelerates the structure ahead and
     lets the rope go slack.  Without an opening rate it is the measured -dS/dt: stretch then
     answers to the correction alone, d(stretch)/dt = gain * (target - T), and T settles at the
     target within a time of S / (EA * gain), whatever the structure does below max_speed.

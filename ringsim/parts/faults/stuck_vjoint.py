@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from ringsim.parts.faults.family import Fault
+from ringsim.parts.springs import Reaction, two_sided
 from ringsim.units import TorsionDamping, TorsionRate
 
 
@@ -19,3 +20,7 @@ class StuckVJoint(Fault):
     """Counted from 1 at the boom."""
     stiffness: TorsionRate = 1000.0
     damping: TorsionDamping = 1.0
+
+    def torque(self, turned: Any, rate: Any) -> Reaction:
+        """Against the angle (rad) by which the joint has turned since, and its rate (rad/s)."""
+        return two_sided(turned, rate, self.stiffness, self.damping)

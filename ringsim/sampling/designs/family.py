@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 from numpy.typing import NDArray
 from pydantic import Field
 
+from ringsim.refusal import InputError
 from ringsim.sampling.correlation import Correlation, correlate
 from ringsim.sampling.distributions.family import Array, Distribution
 from ringsim.units import Model
@@ -18,8 +19,11 @@ Samples = Annotated[int, Field(ge=1, le=10_000_000)]
 
 
 @dataclass(frozen=True)
-class Axis:
-    """One number (or word) to draw: a scene path with its distribution."""
+class Factor:
+    """One number (or word) to draw: a scene path with its distribution.
+
+    The word is that of the design of experiments: each factor is an axis of the unit cube.
+    """
 
     path: str
     distribution: Distribution
@@ -30,14 +34,16 @@ class Design(Model):
 
     extendable: ClassVar[bool] = False
     """Whether the first samples stay the same when more are asked for."""
+    correlated: ClassVar[bool] = True
+    """Whether factors may depend on each other."""
 
-    def points(self, axes: Sequence[Axis], seed: int) -> Array:
-        """Cumulative probabilities, shape (samples, axes)."""
+    def points(self, factors: Sequence[Factor], seed: int) -> Array:
+        """Cumulative probabilities, shape (samples, factors); there is at least one factor."""
         raise NotImplementedError
 
     def table(
         self,
-        axes: Sequence[Axis],
+        factors: Sequence[Factor],
         correlations: Sequence[Correlation],
         *,
         seed: int,
@@ -47,22 +53,23 @@ class Design(Model):
 
         Parameters
         ----------
-        axes
-            What to draw.
-        correlations
-            Pairs of axes that depend on each other.
-        seed
-            Seed of the campaign.
         folder
             Where files that the design names are looked up.
 
         Raises
         ------
         InputError
-            If the correlations contradict each other.
+            If the correlations contradict each other, or if the design has none.
         """
-        points = correlate(self.points(axes, seed), [axis.path for axis in axes], correlations)
+        if correlations and not self.correlated:
+            raise InputError(
+                "correlations: a grid has none, its inputs are crossed; use another design"
+            )
+        if not factors:
+            return {}
+        paths = [factor.path for factor in factors]
+        points = correlate(self.points(factors, seed), paths, correlations)
         return {
-            axis.path: axis.distribution.quantile(points[:, column])
-            for column, axis in enumerate(axes)
+            factor.path: factor.distribution.quantile(column)
+            for factor, column in zip(factors, points.T, strict=True)
         }

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from ringsim.refusal import InputError, known_or_nearest
-from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.designs.family import Axis, Design
+from ringsim.sampling.designs.family import Design, Factor
 from ringsim.sampling.distributions.family import Array
 
 Levels = Annotated[int, Field(ge=1, le=100_000)]
@@ -27,20 +24,24 @@ class Grid(Design):
     unbounded ones stand at the middles of intervals of equal probability.
     """
 
+    correlated: ClassVar[bool] = False
+
     kind: Literal["grid"] = "grid"
     levels: Levels | dict[str, Levels] = 3
     """Points of every continuous input, or a table with one entry per path."""
 
-    def points(self, axes: Sequence[Axis], seed: int) -> Array:
+    def points(self, factors: Sequence[Factor], seed: int) -> Array:
         """All combinations of the inputs' levels."""
         if isinstance(self.levels, dict):
-            known = [axis.path for axis in axes]
+            known = [factor.path for factor in factors]
             for path in self.levels:
                 if path not in known:
                     raise InputError(
                         f'design.levels."{path}" is not an input ({known_or_nearest(path, known)})'
                     )
-        lines = [axis.distribution.levels(self._count(axis.path)) for axis in axes]
+        counts = self.levels if isinstance(self.levels, dict) else {}
+        default = 3 if isinstance(self.levels, dict) else self.levels
+        lines = [f.distribution.levels(counts.get(f.path, default)) for f in factors]
         size = math.prod(len(line) for line in lines)
         if size > MOST_POINTS:
             raise InputError(
@@ -48,24 +49,4 @@ class Grid(Design):
                 "use fewer levels"
             )
         crossed = np.meshgrid(*lines, indexing="ij")
-        return (
-            np.stack([values.ravel() for values in crossed], axis=1) if lines else np.empty((1, 0))
-        )
-
-    def _count(self, path: str) -> int:
-        return self.levels if isinstance(self.levels, int) else self.levels.get(path, 3)
-
-    def table(
-        self,
-        axes: Sequence[Axis],
-        correlations: Sequence[Correlation],
-        *,
-        seed: int,
-        folder: Path,
-    ) -> dict[str, NDArray[Any]]:
-        """Values by path; see :meth:`Design.table`."""
-        if correlations:
-            raise InputError(
-                "correlations: a grid has none, its inputs are crossed; use another design"
-            )
-        return super().table(axes, (), seed=seed, folder=folder)
+        return np.stack([values.ravel() for values in crossed], axis=1)

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ringsim.sampling.designs.family import Axis, Design, Samples
+from ringsim.sampling.designs.family import Design, Factor, Samples
 from ringsim.sampling.distributions.family import Array, inside
 
 
@@ -20,11 +20,9 @@ class LatinHypercube(Design):
     kind: Literal["latin-hypercube"] = "latin-hypercube"
     samples: Samples
 
-    def points(self, axes: Sequence[Axis], seed: int) -> Array:
+    def points(self, factors: Sequence[Factor], seed: int) -> Array:
         """Random places within randomly permuted intervals."""
         from scipy.stats import qmc
 
-        if not axes:
-            return np.empty((self.samples, 0))
-        engine = qmc.LatinHypercube(d=len(axes), rng=np.random.default_rng(seed))
+        engine = qmc.LatinHypercube(d=len(factors), rng=np.random.default_rng(seed))
         return inside(engine.random(self.samples))

@@ -10,9 +10,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.files import read_text
 from ringsim.refusal import InputError
+from ringsim.sampling.columns import read_inputs
 from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.designs.family import Axis, Design
+from ringsim.sampling.designs.family import Design, Factor
 
 
 class Listed(Design):
@@ -28,14 +30,14 @@ class Listed(Design):
 
     def table(
         self,
-        axes: Sequence[Axis],
+        factors: Sequence[Factor],
         correlations: Sequence[Correlation],
         *,
         seed: int,
         folder: Path,
     ) -> dict[str, NDArray[Any]]:
         """Values by path; see :meth:`Design.table`."""
-        if axes or correlations:
+        if factors or correlations:
             raise InputError(
                 "inputs: a listed design takes them from its file; leave out inputs and "
                 "correlations"
@@ -50,32 +52,27 @@ class Listed(Design):
 
 
 def _from_csv(path: Path) -> dict[str, NDArray[Any]]:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"design.file = {path.name}: cannot be read: {error}") from None
-    rows = [row for row in csv.reader(text.splitlines()) if row]
+    lines = csv.reader(read_text(path).splitlines())
+    rows = [[word.strip() for word in row] for row in lines if row]
     if not rows:
         return {}
-    header = [name.strip() for name in rows[0]]
+    header, *rows = rows
     for name in header:
         if not name or header.count(name) > 1:
             raise InputError(
                 f"design.file = {path.name}: column name {name!r} must be a scene path, once"
             )
-    for number, row in enumerate(rows[1:], start=1):
+    for number, row in enumerate(rows, start=1):
         if len(row) != len(header):
             raise InputError(
                 f"design.file = {path.name}: row {number} has {len(row)} values and must have "
                 f"{len(header)}, one per column"
             )
-    return {
-        name: _typed([row[column].strip() for row in rows[1:]])
-        for column, name in enumerate(header)
-    }
+    columns = zip(*rows, strict=True) if rows else [()] * len(header)
+    return {name: _typed(words) for name, words in zip(header, columns, strict=True)}
 
 
-def _typed(words: list[str]) -> NDArray[Any]:
+def _typed(words: Sequence[str]) -> NDArray[Any]:
     """Whole numbers, numbers, true and false, or words: the narrowest that fits the column."""
     if words and all(word in ("true", "false") for word in words):
         return np.array([word == "true" for word in words])
@@ -90,21 +87,15 @@ def _typed(words: list[str]) -> NDArray[Any]:
 def _from_netcdf(path: Path) -> dict[str, NDArray[Any]]:
     import netCDF4
 
-    columns: dict[str, NDArray[Any]] = {}
     try:
         with netCDF4.Dataset(path) as file:
-            file.set_auto_mask(False)
-            for variable in file.variables.values():
-                if variable.dimensions[:1] != ("sample",) or "path" not in variable.ncattrs():
-                    continue
-                values = np.asarray(variable[:])
-                if "dtype" in variable.ncattrs() and variable.dtype.kind == "i":
-                    values = values.astype(variable.getncattr("dtype"))
-                name = variable.getncattr("path")
-                if values.ndim == 1:
-                    columns[name] = values if values.dtype.kind != "O" else values.astype(str)
-                else:
-                    columns |= {f"{name}[{k + 1}]": values[:, k] for k in range(values.shape[1])}
+            columns = read_inputs(file)
     except OSError as error:
         raise InputError(f"design.file = {path.name}: cannot be read: {error}") from None
-    return columns
+    found: dict[str, NDArray[Any]] = {}
+    for column in columns:
+        if column.dim:
+            found |= {f"{column.path}[{k + 1}]": each for k, each in enumerate(column.values.T)}
+        else:
+            found[column.path] = column.values
+    return found

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ringsim.sampling.designs.family import Axis, Design, Samples
+from ringsim.sampling.designs.family import Design, Factor, Samples
 from ringsim.sampling.distributions.family import Array, inside
 
 
@@ -19,10 +19,10 @@ class RandomDesign(Design):
     kind: Literal["random"] = "random"
     samples: Samples
 
-    def points(self, axes: Sequence[Axis], seed: int) -> Array:
-        """One stream of random numbers per sample, in the order of the axes."""
-        points = np.empty((self.samples, len(axes)))
+    def points(self, factors: Sequence[Factor], seed: int) -> Array:
+        """One stream of random numbers per sample, in the order of the factors."""
+        points = np.empty((self.samples, len(factors)))
         for sample in range(self.samples):
             stream = np.random.SeedSequence(seed, spawn_key=(sample,))
-            points[sample] = np.random.default_rng(stream).random(len(axes))
+            points[sample] = np.random.default_rng(stream).random(len(factors))
         return inside(points)

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from ringsim.refusal import InputError
-from ringsim.sampling.designs.family import Axis, Design, Samples
+from ringsim.sampling.designs.family import Design, Factor, Samples
 from ringsim.sampling.distributions.family import Array, inside
 
 
@@ -25,17 +25,15 @@ class Sobol(Design):
     kind: Literal["sobol"] = "sobol"
     samples: Samples
 
-    def points(self, axes: Sequence[Axis], seed: int) -> Array:
+    def points(self, factors: Sequence[Factor], seed: int) -> Array:
         """The first points of the sequence that belongs to the seed."""
         from scipy.stats import qmc
 
-        if not axes:
-            return np.empty((self.samples, 0))
-        if len(axes) > qmc.Sobol.MAXDIM:
+        if len(factors) > qmc.Sobol.MAXDIM:
             raise InputError(
-                f"design.kind = sobol has at most {qmc.Sobol.MAXDIM} inputs, not {len(axes)}: "
+                f"design.kind = sobol has at most {qmc.Sobol.MAXDIM} inputs, not {len(factors)}: "
                 'use kind = "random"'
             )
-        engine = qmc.Sobol(d=len(axes), scramble=True, rng=np.random.default_rng(seed), bits=30)
+        engine = qmc.Sobol(d=len(factors), scramble=True, rng=np.random.default_rng(seed), bits=30)
         power = max(0, math.ceil(math.log2(self.samples)))
         return inside(engine.random_base2(power)[: self.samples])

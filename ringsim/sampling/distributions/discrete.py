@@ -6,26 +6,25 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from ringsim.sampling.distributions.family import Array, Distribution
-
-
-def _as_tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+from ringsim.units import ListIn
 
 
 class Discrete(Distribution):
-    """Each of the values with its probability; all alike if none are given."""
+    """Each of the values with its probability; all alike if none are given.
+
+    >>> rods = Discrete(values=("soft", "stiff"), probabilities=(0.3, 0.7))
+    >>> rods.quantile(np.array([0.2, 0.4])).tolist()
+    ['soft', 'stiff']
+    """
 
     kind: Literal["discrete"] = "discrete"
     values: Annotated[
-        tuple[bool, ...] | tuple[int, ...] | tuple[float, ...] | tuple[str, ...],
-        BeforeValidator(_as_tuple),
+        tuple[bool, ...] | tuple[int, ...] | tuple[float, ...] | tuple[str, ...], ListIn
     ]
-    probabilities: Annotated[
-        tuple[Annotated[float, Field(gt=0.0)], ...] | None, BeforeValidator(_as_tuple)
-    ] = None
+    probabilities: Annotated[tuple[Annotated[float, Field(gt=0.0)], ...] | None, ListIn] = None
 
     @model_validator(mode="after")
     def _fitting(self) -> Discrete:

@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from ringsim.choice import load_package, one_of
+from ringsim.choice import OneOf
 from ringsim.sampling.distributions.family import Array, Continuous, Distribution
-
-load_package("ringsim.sampling.distributions.continuous")
-
-if TYPE_CHECKING:
-    AnyContinuous = Continuous
-else:
-    AnyContinuous = one_of(Continuous)
 
 LEAST_MASS = 1e-6
 """Probability between the bounds, at least: less is a mistake in the bounds."""
 
 
 class Truncated(Distribution):
-    """The distribution ``of``, given that its value lies between ``low`` and ``high``."""
+    """The distribution ``of``, given that its value lies between ``low`` and ``high``.
+
+    >>> from ringsim.sampling.distributions.continuous.normal import Normal
+    >>> force = Truncated(of=Normal(mean=0.015, standard_deviation=0.002), low=0.015)
+    >>> force.quantile(np.array([0.0])).tolist()
+    [0.015]
+    """
 
     bounded: ClassVar[bool] = False
 
     kind: Literal["truncated"] = "truncated"
-    of: AnyContinuous
+    of: Annotated[Continuous, OneOf()]
     low: float | None = None
     high: float | None = None
 

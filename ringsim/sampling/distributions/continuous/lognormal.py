@@ -17,6 +17,9 @@ class Lognormal(Continuous):
     """ln x is normal; mean and standard deviation are those of x itself.
 
     Variance of ln x: ln(1 + (s / mean)^2); mean of ln x: ln(mean) minus half of that.
+
+    >>> Lognormal(mean=1.0, standard_deviation=0.2).quantile([0.5]).round(4).tolist()
+    [0.9806]
     """
 
     kind: Literal["lognormal"] = "lognormal"

@@ -12,7 +12,11 @@ from ringsim.sampling.distributions.family import Array, Continuous
 
 
 class Normal(Continuous):
-    """Density exp(-(x - mean)^2 / (2 s^2)) / (s sqrt(2 pi)), s the standard deviation."""
+    """Density exp(-(x - mean)^2 / (2 s^2)) / (s sqrt(2 pi)), s the standard deviation.
+
+    >>> Normal(mean=120e9, standard_deviation=6e9).quantile([0.5]).tolist()
+    [120000000000.0]
+    """
 
     kind: Literal["normal"] = "normal"
     mean: float

@@ -12,7 +12,11 @@ from ringsim.sampling.distributions.family import Array, Continuous
 
 
 class Uniform(Continuous):
-    """Constant density between low and high."""
+    """Constant density between low and high.
+
+    >>> Uniform(low=1.0, high=3.0).quantile(np.array([0.0, 0.25, 1.0])).tolist()
+    [1.0, 1.5, 3.0]
+    """
 
     bounded: ClassVar[bool] = True
 

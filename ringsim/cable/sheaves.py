@@ -1,0 +1,62 @@
+"""What a cable's path runs over, in order from its winch; winch and far end are points as well.
+
+A node is whatever names a moving frame where the path is used: a number of a layout, or a node of
+an engine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FixedSheave:
+    """A sheave, winch or end of a rope fixed on the body of a node.
+
+    Attributes
+    ----------
+    arm
+        From the node to the point in the node's axes, m, shape (3,).
+    """
+
+    node: Any
+    arm: Array
+
+    @property
+    def nodes(self) -> tuple[Any, ...]:
+        """All nodes that carry it."""
+        return (self.node,)
+
+
+@dataclass(frozen=True)
+class BlockSheave:
+    """A V pulley on a block that stays on the bisector of two bar halves.
+
+    Attributes
+    ----------
+    left, right
+        Nodes of the halves at their V-joint.
+    sense
+        +1 in the upper plane, -1 in the lower: the block stands inside of the joint.
+    offset
+        Distance from the joint's axis, m.
+    """
+
+    left: Any
+    right: Any
+    sense: float
+    offset: float
+
+    @property
+    def nodes(self) -> tuple[Any, ...]:
+        """All nodes that carry it."""
+        return (self.left, self.right)
+
+
+Sheave = FixedSheave | BlockSheave

@@ -1,0 +1,198 @@
+"""What a stability map varies: panels of two axes, on a user's scene.
+
+``PATH=LOW..HIGH`` is an axis, ``cables.*.axial_stiffness`` that of all cables.  Where no axes are
+given, panels are chosen from what the scene holds, around its own values.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ringsim.refusal import InputError
+from ringsim.sampling.paths import field_at, refuse_fixed, unit_at
+from ringsim.scene import Scene
+from ringsim.variables import PLANES
+
+DECADE = 10.0
+"""HIGH over LOW from which on values are spaced geometrically."""
+_DEFAULTS = (
+    (
+        ("cables.*.axial_stiffness", "net.stiffness"),
+        ("cables.*.friction.coefficient", "joints.vjoint.viscous", "structure.spring.damping"),
+    ),
+    (("rods.damping",), ("solver.step",)),
+    (
+        ("cables.*.winch.winding.speed", "loads.force"),
+        ("stop.stiffness", "structure.rest.stiffness"),
+    ),
+)
+"""Panels where none are asked for: for each axis the first path at which the scene has a positive
+number.  A panel without one of its axes is left out."""
+_FACTOR, _STEP_FACTOR = 10.0, 5.0
+"""Ends of a default axis over the scene's own value, and below it; less for solver.step, because
+the cost of a run grows with 1 / step."""
+_SPREADS = (1.0, 0.3)
+"""Exponents on that factor, tried in turn: a bound of the field may be near."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One axis of a panel: values in rising order that all ``paths`` of a scene get."""
+
+    label: str
+    units: str
+    paths: tuple[str, ...]
+    values: tuple[float, ...]
+
+    def at(self, value: float) -> dict[str, float]:
+        """A value by scene path."""
+        return dict.fromkeys(self.paths, value)
+
+    def shapes(self, scene: Scene) -> bool:
+        """Whether the values change the shape of a result, so that each is a campaign."""
+        try:
+            for path in self.paths:
+                refuse_fixed(scene, path)
+        except InputError:
+            return True
+        return False
+
+
+@dataclass(frozen=True)
+class Panel:
+    """All pairs of the values of two axes, on one scene; ``name`` is that of its folder."""
+
+    name: str
+    title: str
+    scene: Scene
+    x: Sweep
+    y: Sweep
+
+    def cells(self) -> Iterator[tuple[float, float]]:
+        """Values of both axes for each cell."""
+        return itertools.product(self.x.values, self.y.values)
+
+
+def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
+    """Panels for axes ``PATH=LOW..HIGH``, two to a panel; default ones if there are none.
+
+    Raises
+    ------
+    InputError
+        If a text, a path, a bound or any pair of values is refused.
+    """
+    if len(over) % 2:
+        raise InputError(
+            f"--over {over[-1]}: has no partner, and a panel has two axes: give one more --over "
+            "PATH=LOW..HIGH, or leave this one out"
+        )
+    axes = [sweep_of(scene, text, points) for text in over] or _defaults(scene, points)
+    if not axes:
+        raise InputError(
+            f"--over is missing: {scene.name} holds none of the default pairs of axes: give two "
+            "--over PATH=LOW..HIGH"
+        )
+    found = []
+    for number, (x, y) in enumerate(zip(axes[::2], axes[1::2], strict=True), 1):
+        if twice := set(x.paths) & set(y.paths):
+            raise InputError(
+                f"--over {x.label}, --over {y.label}: both axes of panel {number} vary "
+                f"{min(twice)}: choose another path for one of them"
+            )
+        found.append(Panel(f"panel-{number}", f"panel {number}", scene, x, y))
+        for one, other in found[-1].cells():
+            try:
+                scene.with_values(x.at(one) | y.at(other))
+            except InputError as error:
+                raise InputError(
+                    f"--over {x.label} = {one:g} with --over {y.label} = {other:g}: {error}"
+                ) from None
+    return found
+
+
+def sweep_of(scene: Scene, text: str, points: int) -> Sweep:
+    """The axis ``PATH=LOW..HIGH``: geometric from a decade on, else linear; whole numbers stay so.
+
+    Raises
+    ------
+    InputError
+        If the text, the path or one of the bounds is refused.
+    """
+    path, _, extent = (part.strip() for part in text.partition("="))
+    try:
+        low, high = (float(end) for end in extent.split(".."))
+    except ValueError:
+        raise InputError(
+            f"--over {text}: must read PATH=LOW..HIGH with two numbers, for example "
+            "solver.step=0.01..0.2"
+        ) from None
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise InputError(
+            f"--over {text}: LOW = {low:g} must be below HIGH = {high:g}, and both finite: "
+            "exchange them, or give other bounds"
+        )
+    try:
+        return _sweep(scene, path, low, high, points)
+    except InputError as error:
+        raise InputError(f"--over {text}: {error}") from None
+
+
+def _sweep(scene: Scene, path: str, low: float, high: float, points: int) -> Sweep:
+    paths = _expanded(scene, path)
+    spaced = np.geomspace if low > 0.0 and high >= DECADE * low else np.linspace
+    values = spaced(low, high, points)
+    values[1:-1] = [float(f"{value:.6g}") for value in values[1:-1]]
+    if type(_own_value(scene, paths[0])) is int:
+        if not (low.is_integer() and high.is_integer()):
+            raise InputError(
+                f"{path} takes whole numbers only: give LOW and HIGH without fractions"
+            )
+        values = np.unique(np.rint(values).astype(int))
+    ends = [scene.with_values(dict.fromkeys(paths, end)) for end in values[[0, -1]].tolist()]
+    return Sweep(path, unit_at(ends[0], paths[0]), paths, tuple(values.tolist()))
+
+
+def _expanded(scene: Scene, path: str) -> tuple[str, ...]:
+    """A path, or for ``cables.*.name`` one for each cable that the scene has."""
+    head, star, tail = path.partition(".*.")
+    if not star:
+        return (path,)
+    present = [name for name in PLANES if getattr(scene.cables, name, None) is not None]
+    if head != "cables" or not present:
+        raise InputError(
+            f"* stands for each cable of a scene, and {scene.name} has none: name a path"
+        )
+    return tuple(f"{head}.{name}.{tail}" for name in present)
+
+
+def _own_value(scene: Scene, path: str) -> object:
+    """What a scene has at a path; None if it does not have it."""
+    try:
+        return field_at(scene, path)
+    except (AttributeError, IndexError):
+        return None
+
+
+def _defaults(scene: Scene, points: int) -> list[Sweep]:
+    """The axes of the default panels for which a scene has both."""
+    pairs = [[_around(scene, paths, points) for paths in pair] for pair in _DEFAULTS]
+    return [sweep for x, y in pairs if x and y for sweep in (x, y)]
+
+
+def _around(scene: Scene, alternatives: Sequence[str], points: int) -> Sweep | None:
+    """An axis around the scene's own value at the first of some paths that it has."""
+    for path, spread in itertools.product(alternatives, _SPREADS):
+        try:
+            own = _own_value(scene, _expanded(scene, path)[0])
+            if isinstance(own, float) and own > 0.0:
+                factor = (_STEP_FACTOR if path == "solver.step" else _FACTOR) ** spread
+                low, high = (float(f"{end:.3g}") for end in (own / factor, own * factor))
+                return _sweep(scene, path, low, high, points)
+        except InputError:
+            continue
+    return None

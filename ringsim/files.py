@@ -1,0 +1,136 @@
+"""Files: texts and TOML with refusals of one line, and files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import tomllib
+from collections.abc import Iterator
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any
+
+from ringsim.refusal import InputError
+
+DRAFT = ".draft"
+"""How names of files end that are still being written; nobody reads them."""
+
+
+def read_text(path: Path | Traversable) -> str:
+    """The text of a file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or is not UTF-8.
+    """
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path.name}: not a text file: byte {error.start + 1} is not UTF-8; "
+            "save it as UTF-8 text"
+        ) from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: this is a folder: give the name of a file") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read: {reason}") from None
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """The tables of a TOML text.
+
+    Raises
+    ------
+    InputError
+        One line that begins with ``source``.
+
+    Examples
+    --------
+    >>> parse_toml("loads.force = 0.02", "ring.toml")
+    {'loads': {'force': 0.02}}
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source}: not valid TOML: {error}; correct that line") from None
+    except RecursionError:
+        raise InputError(f"{source}: its lists or tables nest too deeply") from None
+    except ValueError as error:
+        raise InputError(f"{source}: a number cannot be read: {error}") from None
+
+
+def require_place(path: Path) -> None:
+    """Refuse a file that could not be written, before time is spent on its content.
+
+    Raises
+    ------
+    InputError
+        If it is a folder, or if there is no folder to write it to.
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: this is a folder: give the name of a file")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}: create it first")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path}: cannot be written to this folder: choose another one")
+
+
+@contextlib.contextmanager
+def writing(path: Path, cure: str = "make room or choose another folder") -> Iterator[None]:
+    """Refuse what goes wrong while a file is written, with the cure.
+
+    Raises
+    ------
+    InputError
+        For every OSError in the block, and for the RuntimeError by which netCDF4 tells of a full
+        disk.
+    """
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path}: cannot be written: {reason}; {cure}") from error
+
+
+@contextlib.contextmanager
+def whole(path: Path, *, lasting: bool = True) -> Iterator[Path]:
+    """A draft to write to; it replaces ``path`` once it is complete.
+
+    A lasting file is on the disk by then, so that it survives a power cut as well.
+    """
+    draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}{DRAFT}")
+    try:
+        draft.touch()  # tells why a folder refuses a file, in better words than HDF5
+        yield draft
+        if lasting:
+            sync(draft)
+        os.replace(draft, path)
+        if lasting:
+            sync(path.parent)
+    finally:
+        with contextlib.suppress(OSError):
+            draft.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    with writing(path), whole(path) as draft:
+        draft.write_text(text, encoding="utf-8")
+
+
+def sync(path: Path) -> None:
+    """Make the operating system write a file or folder to the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

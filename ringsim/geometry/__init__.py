@@ -1,1 +1,0 @@
-"""Where everything is: polygons, fold states and mobility; numpy only."""

@@ -1,0 +1,139 @@
+"""Rigid bodies and elastic rods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.layout.pose import Pose
+from ringsim.parts.tube import Tube
+
+Array = NDArray[np.float64]
+
+
+class Lump(NamedTuple):
+    """A mass that belongs to a body.
+
+    Attributes
+    ----------
+    group
+        What it is called where masses are listed: "hinges", "boom", ...
+    mass
+        kg.
+    centre, inertia
+        Centre of mass and inertia about the body's origin, in the body's axes; shapes (3,) and
+        (3, 3), m and kg m^2.
+    """
+
+    group: str
+    mass: float
+    centre: Array
+    inertia: Array
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body."""
+
+    pose: Pose
+    lumps: tuple[Lump, ...]
+
+    @property
+    def mass(self) -> float:
+        """Total mass, kg."""
+        return sum(lump.mass for lump in self.lumps)
+
+    @property
+    def centre(self) -> Array:
+        """Centre of mass in the body's axes, shape (3,), m."""
+        return np.asarray(sum(lump.mass * lump.centre for lump in self.lumps) / self.mass)
+
+    @property
+    def inertia(self) -> Array:
+        """Inertia about the body's origin in its axes, shape (3, 3), kg m^2."""
+        return np.asarray(sum(lump.inertia for lump in self.lumps))
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A straight elastic rod.
+
+    Attributes
+    ----------
+    name, section
+        Rods of one name, one a section, share a row of the results; sections count from 0.
+    group
+        What it is called where masses are listed and lines are drawn.
+    start, end
+        Poses of its ends, with the same axes: x along the rod, z along its joints' axis.
+    tube, young_modulus, density
+        Cross-section, Pa and kg/m^3.
+    stations
+        Shares of the length at which it has nodes, from 0 to 1; its elements lie between.
+    masses
+        Point masses on nodes: station and kg.
+    """
+
+    name: str
+    section: int
+    group: str
+    start: Pose
+    end: Pose
+    tube: Tube
+    young_modulus: float
+    density: float
+    stations: tuple[float, ...]
+    masses: tuple[tuple[int, float], ...] = ()
+
+    @property
+    def length(self) -> float:
+        """Distance of the ends, m."""
+        return float(np.linalg.norm(self.end.place - self.start.place))
+
+    @property
+    def mass(self) -> float:
+        """Without point masses, kg."""
+        return self.density * self.tube.area * self.length
+
+    @property
+    def shortest(self) -> float:
+        """Length of its shortest element, m."""
+        return float(np.diff(self.stations).min()) * self.length
+
+    def station(self, share: float) -> Pose:
+        """The pose at a share of the length."""
+        start, end = self.start, self.end
+        return Pose(
+            (1.0 - share) * start.place + share * end.place,
+            start.axes,
+            (1.0 - share) * start.rate + share * end.rate,
+            start.turn,
+        )
+
+
+class OnBody(NamedTuple):
+    """A place on a body: its number, and an arm and axes in the body's own axes."""
+
+    body: int
+    arm: Array
+    axes: Array
+
+
+class OnRod(NamedTuple):
+    """A node of a rod: the numbers of the rod and of its station."""
+
+    rod: int
+    station: int
+
+
+class InSpace(NamedTuple):
+    """A place that does not move, with its axes."""
+
+    place: Array
+    axes: Array
+
+
+Mount = OnBody | OnRod | InSpace

@@ -1,0 +1,103 @@
+"""The net of an ideal ring: springs from the upper corners to a massless hub.
+
+The hub lies where the springs' pulls balance, sum k_i s_i u_i = 0 (s_i the stretch, u_i the
+direction from the hub): the least of a convex energy while they only pull.  The springs' work is
+then that of the corners alone.  Where dampers act too, the hub is taken along as the corners
+move, dx_hub = A^-1 sum A_i dx_i, A_i = k_i (u_i u_i^T + (s_i / L_i) (1 - u_i u_i^T)).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.parts.net import Net
+from ringsim.parts.persection import at_section, spread
+from ringsim.parts.springs import Reaction
+
+Array = NDArray[np.float64]
+
+_MOST = 60
+"""Newton steps to the hub, each a tenth of the net's size long at most."""
+_BALANCED = 1e-14
+"""Pull on the hub over the largest string's, or its movement over the net's size, taken as zero."""
+
+
+class NetForces(NamedTuple):
+    """Generalised force of the net (N m), its energy (J) and the power lost in it (W)."""
+
+    force: Array
+    energy: float
+    loss: float
+
+
+class FreeHub:
+    """Springs from so many corners to a free hub."""
+
+    def __init__(self, net: Net, corners: int) -> None:
+        self._net = at_section(net, np.arange(corners))
+        self._stiffness = spread(net.stiffness, corners)
+
+    def hub(self, corners: Array) -> Array:
+        """Where the hub lies, shape (3,), m: in the middle while all strings are slack.
+
+        Parameters
+        ----------
+        corners
+            Upper corners, shape (corners, 3), m.
+        """
+        return self._balance(corners)[0]
+
+    def forces(self, corners: Array, slopes: Array, rates: Array) -> NetForces:
+        """Generalised forces on some coordinates.
+
+        Parameters
+        ----------
+        corners, slopes
+            Upper corners and their derivatives after the coordinates, shapes (corners, 3) and
+            (corners, 3, coordinates), m and m/rad.
+        rates
+            Of the coordinates, rad/s.
+        """
+        _, lengths, units, string = self._balance(corners)
+        longer = np.einsum("ia,iaj->ij", units, slopes)
+        if self._net.damping > 0.0:
+            matrices = self._rates(lengths, units, string)
+            carried = np.einsum("iab,ibj->aj", matrices, slopes)
+            longer -= units @ np.linalg.lstsq(matrices.sum(axis=0), carried, rcond=1e-9)[0]
+            string = self._net.tension(lengths - self._net.neutral_length, longer @ rates)
+        loss = float(np.sum(string.damping * (longer @ rates)))
+        return NetForces(-string.total @ longer, float(np.sum(string.stored)), loss)
+
+    def imbalance(self, corners: Array) -> float:
+        """Pull on a hub in the middle over the sum of the strings' pulls."""
+        arms = corners - corners.mean(axis=0)
+        units = arms / np.linalg.norm(arms, axis=1)[:, None]
+        return float(np.linalg.norm(self._stiffness @ units) / self._stiffness.sum())
+
+    def _balance(self, corners: Array) -> tuple[Array, Array, Array, Reaction]:
+        """The hub, and the strings' lengths, directions and reaction at rest there."""
+        hub, size, moved = corners.mean(axis=0), float(np.ptp(corners)), np.inf
+        for _ in range(_MOST):
+            arms = corners - hub
+            lengths = np.maximum(np.linalg.norm(arms, axis=1), 1e-300)
+            units = arms / lengths[:, None]
+            still = self._net.tension(lengths - self._net.neutral_length, 0.0)
+            pull = still.elastic @ units
+            balanced = np.abs(pull).max() <= _BALANCED * np.abs(still.elastic).max()
+            if balanced or moved < _BALANCED * size:
+                break
+            matrix = self._rates(lengths, units, still).sum(axis=0)
+            step = np.linalg.lstsq(matrix, pull, rcond=1e-9)[0]
+            moved = float(np.abs(step).max())
+            hub = hub + (step if moved <= 0.1 * size else step * (0.1 * size / moved))
+        return hub, lengths, units, still
+
+    def _rates(self, lengths: Array, units: Array, still: Reaction) -> Array:
+        """The matrices A_i, shape (corners, 3, 3), N/m."""
+        acting = self._stiffness * ((still.elastic > 0.0) | self._net.two_sided)
+        along = units[:, :, None] * units[:, None, :]
+        across = (still.elastic / lengths)[:, None, None]
+        return np.asarray(acting[:, None, None] * along + across * (np.eye(3) - along))

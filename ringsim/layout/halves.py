@@ -1,0 +1,37 @@
+"""Rods as rows of results: a rod with a joint inside is two, left and right of it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ringsim.layout.bodies import OnRod
+from ringsim.layout.layout import Layout
+
+
+class Half(NamedTuple):
+    """Elements ``first`` to ``last`` - 1 of a rod."""
+
+    rod: int
+    first: int
+    last: int
+
+
+def halves(layout: Layout) -> dict[str, list[Half]]:
+    """Row of every rod or half of one by name, in the order of the layout; a value a section."""
+    inside: dict[int, int] = {}
+    for joint in layout.joints:
+        for mount in (joint.first, joint.second):
+            if isinstance(mount, OnRod):
+                count = len(layout.rods[mount.rod].stations)
+                if 0 < mount.station < count - 1:
+                    inside[mount.rod] = mount.station
+    rows: dict[str, list[Half]] = {}
+    for number, rod in enumerate(layout.rods):
+        elements = len(rod.stations) - 1
+        if number not in inside:
+            rows.setdefault(rod.name, []).append(Half(number, 0, elements))
+            continue
+        middle = inside[number]
+        rows.setdefault(f"{rod.name}_left", []).append(Half(number, 0, middle))
+        rows.setdefault(f"{rod.name}_right", []).append(Half(number, middle, elements))
+    return rows

@@ -1,0 +1,63 @@
+"""What holds bodies and rods together, and which angles say how far a structure has opened."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.layout.bodies import Mount
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint between two places that coincide; its axes are those of its mounts.
+
+    Attributes
+    ----------
+    kind
+        "revolute" turns about z, "prismatic" slides along x, "sleeve" slides along z and turns
+        freely, "weld" holds everything.
+    family
+        By which a scene gives joints their friction: "pivot", "hinge", "vjoint", ...; empty for
+        joints that cannot have any.
+    section
+        Counted from 0.
+    """
+
+    kind: Literal["revolute", "prismatic", "sleeve", "weld"]
+    family: str
+    section: int
+    first: Mount
+    second: Mount
+
+
+@dataclass(frozen=True)
+class JointOpening:
+    """An opening angle at a revolute: pi less ``sense`` times the turn of the second part.
+
+    It is pi, and the joint locked, where both parts lie in line.  ``lift`` is the direction in
+    space of a load that opens it, shape (3,).
+    """
+
+    joint: int
+    sense: float
+    lift: Array
+
+
+@dataclass(frozen=True)
+class ChordOpening:
+    """The angle about z between the line from a point in space to a body's origin, and -y.
+
+    It has no lock.
+    """
+
+    body: int
+    centre: Array
+
+
+Opening = JointOpening | ChordOpening

@@ -1,0 +1,157 @@
+"""A structure at one value of its coordinate: the one description that every room reads."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.cable.sheaves import BlockSheave, Sheave
+from ringsim.layout.bodies import Body, InSpace, Mount, OnBody, Rod
+from ringsim.layout.joints import Joint, JointOpening, Opening
+from ringsim.layout.pose import Pose, cross
+from ringsim.layout.springs import BoomBeam, Contact, HubNet, Spring
+
+Array = NDArray[np.float64]
+
+
+class PointMasses(NamedTuple):
+    """Point masses of a layout.
+
+    Attributes
+    ----------
+    masses, bodies
+        Mass of each, kg, and number of its body, -1 for rods; shape (n,).
+    places, rates
+        Where they are and the derivatives of that after the coordinate, m, shape (n, 3).
+    """
+
+    masses: Array
+    bodies: NDArray[np.int_]
+    places: Array
+    rates: Array
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Everything that a structure consists of, with its rates; SI units throughout.
+
+    Attributes
+    ----------
+    bodies, rods, joints
+        Numbered by their place here.
+    openings
+        Opening angles by plane and section.
+    corners
+        Hinge assemblies by plane and corner, as numbers of bodies.
+    paths
+        Sheaves of each cable of the scene in order, from its first winch to its far end.
+    springs, contacts, net, boom
+        What else acts between bodies.
+    forces
+        Constant forces: number of the joint whose first mount they act on, and vector, N.
+    """
+
+    bodies: tuple[Body, ...]
+    rods: tuple[Rod, ...]
+    joints: tuple[Joint, ...]
+    openings: tuple[tuple[Opening, ...], ...]
+    corners: tuple[tuple[int, ...], ...]
+    paths: tuple[tuple[Sheave, ...], ...]
+    springs: tuple[Spring, ...]
+    contacts: tuple[Contact, ...]
+    net: HubNet | None
+    boom: BoomBeam | None
+    forces: tuple[tuple[int, Array], ...]
+
+    def pose(self, mount: Mount) -> Pose:
+        """The frame of a mount, with its own axes."""
+        if isinstance(mount, InSpace):
+            return Pose(mount.place, mount.axes, np.zeros(3), np.zeros(3))
+        if isinstance(mount, OnBody):
+            body = self.bodies[mount.body].pose
+            place, rate = body.at(mount.arm)
+            return Pose(place, body.axes @ mount.axes, rate, body.turn)
+        rod = self.rods[mount.rod]
+        return rod.station(rod.stations[mount.station])
+
+    def masses(self) -> dict[str, float]:
+        """Mass of each group of parts, kg."""
+        found: dict[str, float] = {}
+        for rod in self.rods:
+            found[rod.group] = found.get(rod.group, 0.0) + rod.mass
+        lumps = [lump for body in self.bodies for lump in body.lumps]
+        for group, mass in [(lump.group, lump.mass) for lump in lumps] + [
+            ("V-joints", mass) for rod in self.rods for _, mass in rod.masses
+        ]:
+            found[group] = found.get(group, 0.0) + mass
+        if self.boom is not None:
+            found["boom"] = self.boom.lump.mass
+        if self.net is not None:
+            found["hub"] = self.net.mass
+        return found
+
+    def point_masses(self) -> PointMasses:
+        """Point masses that move as the rigid parts do, with the same inertia.
+
+        A part of mass m is six of m / 6 at c +- r_k n_k about its centre of mass c, where
+        r_k^2 = 3 e_k / m with e_k, n_k the principal values and directions of its second moments
+        tr(J) / 2 - J about c; a rod so has two at its ends.  A flexible boom counts as rigid; the
+        net's hub is left out.
+        """
+        found: list[tuple[float, int, Array, Array]] = []
+        bodies = list(enumerate(self.bodies))
+        if self.boom is not None:
+            top = self.boom.top.body
+            bodies.append((top, Body(self.bodies[top].pose, (self.boom.lump,))))
+        for number, body in bodies:
+            mass, centre = body.mass, body.centre
+            seconds = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
+            values, axes = np.linalg.eigh(seconds - mass * np.outer(centre, centre))
+            arms = (axes * np.sqrt(3.0 * np.maximum(values, 0.0) / mass)).T
+            found += [(mass / 6.0, number, *body.pose.at(centre + r)) for r in (*arms, *-arms)]
+        for rod in self.rods:
+            middle, tube = rod.station(0.5), rod.tube
+            across = math.sqrt(3.0 * tube.second_moment / tube.area)
+            arms = np.diag([0.5 * rod.length, across, across])
+            found += [(rod.mass / 6.0, -1, *middle.at(r)) for r in (*arms, *-arms)]
+            for station, mass in rod.masses:
+                pose = rod.station(rod.stations[station])
+                found.append((mass, -1, pose.place, pose.rate))
+        return PointMasses(*map(np.array, zip(*found, strict=True)))
+
+    def sheave(self, sheave: Sheave) -> tuple[Array, Array]:
+        """Place of a sheave in space and its derivative after the coordinate, shape (3,), m."""
+        if not isinstance(sheave, BlockSheave):
+            return self.pose(sheave.node).at(sheave.arm)
+        left, right = self.pose(sheave.left), self.pose(sheave.right)
+        both = left.axes[:, 1] + right.axes[:, 1]
+        both = both + sheave.sense * (right.axes[:, 0] - left.axes[:, 0])
+        arm = -sheave.sense * sheave.offset * both / np.linalg.norm(both)
+        turn = 0.5 * (left.turn + right.turn)
+        return left.place + arm, left.rate + cross(turn, arm)
+
+    def opening_angles(self) -> tuple[Array, Array]:
+        """Opening angles, rad, and derivatives after the coordinate, shape (planes, sections)."""
+        found = np.array([[self._opening(one) for one in plane] for plane in self.openings])
+        return found[..., 0], found[..., 1]
+
+    def _opening(self, opening: Opening) -> tuple[float, float]:
+        if not isinstance(opening, JointOpening):
+            pose = self.bodies[opening.body].pose
+            (x, y, _), (by_x, by_y, _) = pose.place - opening.centre, pose.rate
+            return float(np.arctan2(x, -y)), float(x * by_y - y * by_x) / float(x * x + y * y)
+        joint = self.joints[opening.joint]
+        first, second = self.pose(joint.first), self.pose(joint.second)
+        y, other, z = first.axes[:, 1], second.axes[:, 1], first.axes[:, 2]
+        folded = opening.sense * float(np.arctan2(cross(y, other) @ z, y @ other))
+        folded += 2.0 * np.pi if folded < -0.5 * np.pi else 0.0
+        return np.pi - folded, -opening.sense * float((second.turn - first.turn) @ z)
+
+    @property
+    def supports(self) -> tuple[Joint, ...]:
+        """Joints to places in space."""
+        return tuple(j for j in self.joints if isinstance(j.first, InSpace))

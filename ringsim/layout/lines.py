@@ -1,0 +1,97 @@
+"""The straight lines that make up a drawing of a structure."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.layout.bodies import OnBody, OnRod
+from ringsim.layout.halves import halves
+from ringsim.layout.joints import JointOpening
+from ringsim.layout.layout import Layout
+
+Array = NDArray[np.float64]
+
+
+def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> dict[str, Array]:
+    """Lines by what they are, centred on the vertical axis.
+
+    Everything stands as the layout says but for the joints that open: each stands at the depth of
+    its own opening angle, aside of the line between the far ends of its two rods.
+
+    Parameters
+    ----------
+    layout
+        At the mean opening angle.
+    openings
+        Opening angles, shape (planes, sections), rad.
+    taut_beyond
+        Length from which a spring of the net is drawn as taut, m.
+
+    Returns
+    -------
+    dict of str to Array
+        End points, shape (lines, 2, 3), m, by group: those of the rods, "hinge assemblies", "boom",
+        "net, taut" and "net, slack".
+    """
+    ends: dict[tuple[int, int], Array] = {
+        (number, station): rod.station(rod.stations[station]).place
+        for number, rod in enumerate(layout.rods)
+        for station in range(len(rod.stations))
+    }
+    for plane, angles in zip(layout.openings, openings, strict=True):
+        for opening, angle in zip(plane, angles, strict=True):
+            if isinstance(opening, JointOpening):
+                _open(layout, ends, opening, float(angle))
+    found: dict[str, list[Any]] = {}
+    for row in halves(layout).values():
+        for half in row:
+            line = ends[half.rod, half.first], ends[half.rod, half.last]
+            found.setdefault(layout.rods[half.rod].group, []).append(line)
+    corners = {number for plane in layout.corners for number in plane}
+    pins = {}
+    for joint in layout.joints:
+        for mount in (joint.first, joint.second):
+            if isinstance(mount, OnBody) and mount.body in corners and joint.family:
+                place = layout.pose(mount).place
+                pins[mount.body, *np.round(place, 9)] = place  # two rods share a pin
+    found["hinge assemblies"] = [
+        (layout.bodies[key[0]].pose.place, place) for key, place in pins.items()
+    ]
+    lumps = [(body.pose, lump) for body in layout.bodies for lump in body.lumps]
+    if layout.boom is not None:
+        lumps.append((layout.pose(layout.boom.top), layout.boom.lump))
+    for pose, lump in lumps:
+        if lump.group == "boom":
+            found["boom"] = [(pose.place, pose.at(2.0 * lump.centre)[0])]
+    if layout.net is not None:
+        for number in layout.net.bodies:
+            line = layout.bodies[number].pose.place, layout.net.hub
+            taut = np.linalg.norm(line[0] - line[1]) > taut_beyond
+            found.setdefault("net, taut" if taut else "net, slack", []).append(line)
+    middle = _middle(np.array([body.pose.place for body in layout.bodies]))
+    return {name: np.array(lines) - middle for name, lines in found.items() if lines}
+
+
+def _open(
+    layout: Layout, ends: dict[tuple[int, int], Array], opening: JointOpening, angle: float
+) -> None:
+    """Move a joint between two rods of one length to where its opening angle puts it."""
+    joint = layout.joints[opening.joint]
+    first, second = joint.first, joint.second
+    assert isinstance(first, OnRod)
+    assert isinstance(second, OnRod)
+    rod = layout.rods[first.rod]
+    start, end = ends[first.rod, 0], ends[second.rod, len(layout.rods[second.rod].stations) - 1]
+    chord = (end - start) / np.linalg.norm(end - start)
+    aside = -opening.sense * np.cross(rod.start.axes[:, 2], chord)
+    at = 0.5 * (start + end) + rod.length * np.cos(0.5 * angle) * aside
+    ends[first.rod, first.station] = ends[second.rod, second.station] = at
+
+
+def _middle(places: Array) -> Array:
+    """Middle of the plan view, shape (3,), m."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    return np.array([0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.0])

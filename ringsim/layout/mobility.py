@@ -1,0 +1,125 @@
+"""How many ways a structure of rigid parts can move, counted and computed.
+
+The Kutzbach count 6 (bodies - 1) - constraints comes out far below zero for a ring (-7 N - 6 when
+closed): it takes all constraints for independent, which parallel axes and equal lengths are not.
+The true mobility at a fold state is the dimension of the null space of the constraint Jacobian.
+
+- A section of a pantograph ring has five internal freedoms: it folds, and each of its four hinge
+  assemblies tilts about the common axis of the two rods that it carries.
+- Where two sections meet, both share the upper and the lower hinge assembly.  Their normals
+  differ, so neither assembly can tilt about both: the tilt is gone, and what is left makes
+  both sections equally high.
+- An open arc therefore keeps five freedoms whatever its length (the fold, and the tilts of the
+  four assemblies at its ends; four if a boom joins two of them), and a closed ring has one.
+- At 180 deg exactly the state is singular: the bars lie straight, the sections' width is
+  stationary, and each of the 2 N V-joints can start to move by itself instead of with the fold.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.layout.bodies import InSpace, Mount, OnBody
+from ringsim.layout.joints import Joint
+from ringsim.layout.layout import Layout
+
+Array = NDArray[np.float64]
+
+RANK_TOLERANCE = 1e-9
+"""Singular values below this fraction of the largest are zeros.  Round-off leaves 1e-15; the
+smallest true one is 5e-4 half open and 6e-8 at 0.01 deg for a ring of 120 sections."""
+_HELD = {
+    "revolute": ((0, 1, 2), (0, 1)),
+    "prismatic": ((1, 2), (0, 1, 2)),
+    "sleeve": ((0, 1), ()),
+    "weld": ((0, 1, 2), (0, 1, 2)),
+}
+"""Translations and rotations that a joint of each kind holds, along its own axes."""
+
+
+def internal_mobility(layout: Layout) -> int:
+    """Degrees of freedom of a structure of rigid parts beyond its six as one rigid body.
+
+    First the motions of each section by itself are found, then those of all sections are joined at
+    the bodies that they share.  A boom counts as rigid; supports do not count.
+
+    Parameters
+    ----------
+    layout
+        At the state in question, whose joints say by ``section`` what belongs together.
+
+    Returns
+    -------
+    int
+        Of a pantograph ring 1, of an open arc 5; at 180 deg 2 N and 2 N + 4.
+    """
+    joints = [joint for joint in layout.joints if not isinstance(joint.first, InSpace)]
+    if layout.boom is not None:
+        joints.append(Joint("sleeve", "", 0, layout.boom.top, layout.boom.low))
+    size = max(rod.length for rod in layout.rods)
+    motions: dict[tuple[bool, int], list[tuple[int, Array]]] = {}
+    free: list[int] = []
+    for number in sorted({joint.section for joint in joints}):
+        own = [joint for joint in joints if joint.section == number]
+        parts = sorted({_part(mount) for joint in own for mount in (joint.first, joint.second)})
+        middle = np.mean([layout.pose(joint.first).place for joint in own], axis=0)
+        rows = np.concatenate([_row(layout, joint, parts, middle, size) for joint in own])
+        null = _null_space(rows).reshape(len(parts), 6, -1)
+        for part, twist in zip(parts, null, strict=True):
+            place = layout.bodies[part[1]].pose.place if part[0] else middle
+            arm = (place - middle) / size
+            at_part = np.concatenate([twist[:3] - _cross_matrix(arm) @ twist[3:], twist[3:]])
+            motions.setdefault(part, []).append((len(free), at_part))
+        free.append(null.shape[-1])
+    starts = np.concatenate([[0], np.cumsum(free)])
+    joined = []
+    for shared in motions.values():
+        for (one, first), (other, second) in pairwise(shared):
+            row = np.zeros((6, starts[-1]))
+            row[:, starts[one] : starts[one + 1]] += first
+            row[:, starts[other] : starts[other + 1]] -= second
+            joined.append(row)
+    rank = _rank(np.concatenate(joined)) if joined else 0
+    return int(starts[-1]) - rank - 6
+
+
+def _part(mount: Mount) -> tuple[bool, int]:
+    """Whether a body, and its number or that of the rod."""
+    if isinstance(mount, InSpace):
+        raise TypeError("a place in space is no part")
+    return (True, mount.body) if isinstance(mount, OnBody) else (False, mount.rod)
+
+
+def _row(
+    layout: Layout, joint: Joint, parts: list[tuple[bool, int]], at: Array, size: float
+) -> Array:
+    """What a joint holds, (constraints, 6 parts): on velocity at a point, and angular velocity."""
+    pose = layout.pose(joint.first)
+    arm = (pose.place - at) / size
+    whole = np.zeros((6, 6))
+    whole[:3, :3], whole[:3, 3:] = pose.axes.T, -pose.axes.T @ _cross_matrix(arm)
+    whole[3:, 3:] = pose.axes.T
+    moved, turned = _HELD[joint.kind]
+    held = whole[[*moved, *(3 + axis for axis in turned)]]
+    row = np.zeros((len(held), len(parts), 6))
+    row[:, parts.index(_part(joint.first))] += held
+    row[:, parts.index(_part(joint.second))] -= held
+    return row.reshape(len(held), -1)
+
+
+def _cross_matrix(r: Array) -> Array:
+    return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+
+
+def _null_space(matrix: Array) -> Array:
+    _, values, rows = np.linalg.svd(matrix)
+    rank = int(np.sum(values > RANK_TOLERANCE * values[0]))
+    return np.asarray(rows[rank:].T)
+
+
+def _rank(matrix: Array) -> int:
+    values = np.linalg.svd(matrix, compute_uv=False)
+    return int(np.sum(values > RANK_TOLERANCE * values[0]))

@@ -1,0 +1,1 @@
+"""Kinds of friction in the joints, one file each."""

@@ -1,0 +1,29 @@
+"""The family of friction laws of joints."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ringsim.units import Model
+
+
+class JointFriction(Model):
+    """Torque that resists a joint's relative rate.
+
+    Fields of a kind may be ``PerSection``; its methods are called on ``at_section`` of it.
+    """
+
+    def torque(self, rate: Any, xp: Any = np) -> Any:
+        """Torque in N m against a rate in rad/s, of the rate's sign; ``xp``: see ``springs``."""
+        raise NotImplementedError
+
+    def linear_damping(self) -> float | None:
+        """Torque over rate where that is one number for all rates, N m s/rad; else None."""
+        return None
+
+    def characteristic_rate(self) -> float:
+        """Smallest rate over which the torque changes its slope, rad/s; infinite if none."""
+        return math.inf

@@ -1,0 +1,36 @@
+"""Viscous and dry friction."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal
+
+import numpy as np
+
+from ringsim.parts.joint_friction.family import JointFriction
+from ringsim.parts.persection import PerSection
+from ringsim.units import AngularRate, Torque, TorsionDamping
+
+
+class ViscousCoulombFriction(JointFriction):
+    """Torque against the relative rate w: viscous * w + coulomb * tanh(w / rate)."""
+
+    kind: Literal["viscous-coulomb"] = "viscous-coulomb"
+    viscous: PerSection[TorsionDamping] = 0.0
+    """One value, or one per section."""
+    coulomb: PerSection[Torque] = 0.0
+    """One value, or one per section."""
+    rate: AngularRate = 0.01
+    """Rate that regularises the Coulomb torque: 76 % of it acts at this rate."""
+
+    def torque(self, rate: Any, xp: Any = np) -> Any:
+        """See ``JointFriction``."""
+        return self.viscous * rate + self.coulomb * xp.tanh(rate / self.rate)
+
+    def linear_damping(self) -> float | None:
+        """See ``JointFriction``."""
+        return None if np.any(self.coulomb) else float(np.max(self.viscous))
+
+    def characteristic_rate(self) -> float:
+        """See ``JointFriction``."""
+        return self.rate if np.any(self.coulomb) else math.inf

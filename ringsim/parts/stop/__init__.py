@@ -1,0 +1,1 @@
+"""Kinds of stops, one file each."""

@@ -1,0 +1,116 @@
+"""The inputs of all samples, and how they lie in netCDF files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Column:
+    """The values of one input over all samples."""
+
+    name: str
+    """Name in netCDF files: the path with underscores."""
+    path: str
+    """Scene path that the values are written to."""
+    dim: str
+    """Second dimension of ``values``, or empty: what there is a value for, "section", "corner"
+    "pulley" or "pulley_of_two_winches" (one more), or "place_k" for lists of any other length
+    k."""
+    units: str
+    """SI unit of the field."""
+    origin: str
+    """The distribution, in words."""
+    values: NDArray[Any]
+    """Shape (samples,), or (samples, k) with a value for each place."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """All inputs of all samples, with a seed for each sample."""
+
+    columns: tuple[Column, ...]
+    seeds: NDArray[np.int64]
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return len(self.seeds)
+
+    def values_of(self, sample: int) -> dict[str, Any]:
+        """Values by path of one sample, as :meth:`Scene.with_values` takes them."""
+        return {column.path: column.values[sample].tolist() for column in self.columns}
+
+    def starts_with(self, other: Table) -> bool:
+        """Whether the first samples are those of ``other``, bit by bit."""
+        count = other.samples
+        return (
+            count <= self.samples
+            and [c.path for c in self.columns] == [c.path for c in other.columns]
+            and np.array_equal(self.seeds[:count], other.seeds)
+            and all(
+                np.array_equal(mine.values[:count], old.values)
+                for mine, old in zip(self.columns, other.columns, strict=True)
+            )
+        )
+
+
+def add_inputs(file: Any, table: Table, *, compression: int) -> None:
+    """Create a variable for every input, and the samples' seeds, in an open netCDF4 dataset."""
+    for column in table.columns:
+        values, kind = column.values, cast(Any, column.values.dtype)
+        if column.dim and column.dim not in file.dimensions:
+            file.createDimension(column.dim, values.shape[1])
+        attributes = {
+            "long_name": f"input {column.path}",
+            "units": column.units,
+            "path": column.path,
+            "role": "input",
+            "distribution": column.origin,
+        }
+        options: dict[str, Any] = {}
+        if values.dtype.kind == "U":
+            kind, values = str, values.astype(object)
+            del attributes["units"]
+        elif compression:
+            options = {"compression": "zlib", "complevel": compression}
+        if values.dtype.kind == "b":
+            kind, values = "i1", values.astype("i1")
+            attributes["dtype"] = "bool"
+        dims = ("sample", column.dim) if column.dim else ("sample",)
+        variable = file.createVariable(column.name, kind, dims, **options)
+        variable.setncatts(attributes)
+        variable[:] = values
+    seeds = file.createVariable("sample_seed", "i8", ("sample",))
+    seeds.long_name = "seed of the sample, from the campaign's seed and the sample's index"
+    seeds.units = "1"
+    seeds[:] = table.seeds
+
+
+def read_inputs(file: Any) -> tuple[Column, ...]:
+    """The inputs in an open netCDF4 dataset: every variable over samples with a scene path."""
+    file.set_auto_maskandscale(False)
+    return tuple(
+        _column(variable)
+        for variable in file.variables.values()
+        if variable.dimensions[:1] == ("sample",) and "path" in variable.ncattrs()
+    )
+
+
+def _column(variable: Any) -> Column:
+    attributes = {name: variable.getncattr(name) for name in variable.ncattrs()}
+    values = np.asarray(variable[:])
+    if values.dtype.kind == "O":
+        values = values.astype(str)
+    return Column(
+        name=variable.name,
+        path=attributes["path"],
+        dim="".join(variable.dimensions[1:]),
+        units=attributes.get("units", "1"),
+        origin=attributes.get("distribution", ""),
+        values=values.astype(attributes.get("dtype", values.dtype)),
+    )

@@ -1,0 +1,5 @@
+"""Steps, care and guard of a run, for every engine: numbers in, decisions out.
+
+``RunControl`` (run_control.py) chooses the next step, has a bad one repeated and ends the run;
+``restarts.py`` starts a run anew that failed.
+"""

@@ -1,0 +1,116 @@
+"""Guards of a run: blow-up, energy growth and loss, joints that come apart, stops passed.
+
+They judge every accepted step and stop the run at the first that cannot be sound.  What they
+compare is the balance
+
+    B = kinetic + elastic - both at the start + lost - work of loads and winches
+
+with the energy X exchanged so far, the largest of |work| and of the changes of kinetic and
+elastic energy.  Generalised-alpha takes energy out of what it does not resolve (B < 0) and puts
+in none, so that growth (B > 0) means more than loss.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ringsim.parts.solver import Solver
+from ringsim.stepping.constant_steps import unresolved
+from ringsim.stepping.instant import Instant
+from ringsim.stepping.scales import Scales
+from ringsim.variables import Cause, Reason
+
+GAIN, LOSS = 2.0, 5.0
+"""B / X at which a run is stopped, over ``solver.energy_tolerance``.  Larger than at the end,
+since X still grows: an error made early may be small beside all that follows."""
+BLOW_UP = 10.0
+"""Kinetic and elastic energy over what start, loads and winches could give: a state so far beyond
+any balance tells nothing of when the energy came, so that its cause has a name of its own."""
+SLIGHT = 1e-3
+"""Share of the reference energy below which a whole run has done nothing worth judging."""
+GAP = 1e-4
+"""Largest gap of a joint over the length of a bar: joints that hold are closed to 1e-12 m."""
+OVERRUN = math.radians(30.0)
+"""Angle by which a V-joint may pass its stop: beyond it neither stop nor model mean anything."""
+_CURE = "reduce solver.step or solver.tolerance"
+
+
+class Guard:
+    """Watches one run from its first instant on."""
+
+    def __init__(self, solver: Solver, scales: Scales) -> None:
+        self._tolerance, self._scales = solver.energy_tolerance, scales
+        self._constant = solver.step_control == "constant"
+        self._run: list[Instant] = []
+        self._lost = self._driven = 0.0
+        self._low = self._high = np.zeros(3)
+        self._worst = (0.0, 0.0)
+
+    def judge(self, now: Instant, overrun: float = 0.0) -> Reason:
+        """Why the run must stop here: cause, measured value, bound and cure; empty if it may go on.
+
+        ``overrun`` is the largest angle by which a V-joint has passed its stops, rad.
+        """
+        self._run.append(now)
+        time, found, start = now.time, now.energies, self._run[0].energies
+        self._lost += found.lost
+        self._driven += found.driven
+        work = found.work + self._driven
+        stored = found.kinetic + found.elastic
+        balance = stored - start.kinetic - start.elastic + self._lost - work
+        changes = [found.kinetic - start.kinetic, found.elastic - start.elastic, work]
+        self._low, self._high = np.fmin(self._low, changes), np.fmax(self._high, changes)
+        if abs(balance) > abs(self._worst[1]):
+            self._worst = (time, balance)
+
+        available = max(abs(work), self._scales.energy) + start.kinetic + start.elastic
+        if stored > BLOW_UP * available:
+            return Reason(
+                Cause.BLOW_UP,
+                f"the motion blew up at {time:.6g} s: {found.kinetic:.3g} J of kinetic and "
+                f"{found.elastic:.3g} J of elastic energy, more than {BLOW_UP:g} times the "
+                f"{available:.3g} J that start, loads and winches have given: {_CURE}",
+            )
+        if now.gap > GAP * self._scales.length:
+            return Reason(
+                Cause.JOINT_GAP,
+                f"the joints came apart by {now.gap:.2g} m at {time:.6g} s, more than "
+                f"{GAP * self._scales.length:.2g} m: {_CURE}",
+            )
+        if overrun > OVERRUN:
+            return Reason(
+                Cause.STOP_PASSED,
+                f"a V-joint swung {math.degrees(overrun):.3g} deg past its stop at {time:.6g} s, "
+                f"more than {math.degrees(OVERRUN):.0f} deg: raise stop.stiffness, or lower what "
+                "drives it",
+            )
+        factor = GAIN if balance > 0.0 else LOSS
+        words = f"{factor:g} times solver.energy_tolerance"
+        return self._unbalanced(time, balance, self._scales.energy, factor, words)
+
+    def verdict(self) -> Reason:
+        """Why a run that ended by itself is not sound after all; empty if it is."""
+        least = SLIGHT * self._scales.energy
+        reason = self._unbalanced(*self._worst, least, 1.0, "solver.energy_tolerance")
+        if reason or not self._constant:
+            return reason
+        return unresolved(self._run, self._scales.slack_tension)
+
+    def _unbalanced(
+        self, time: float, balance: float, least: float, factor: float, bound: str
+    ) -> Reason:
+        """Why an imbalance B in J is too large; X counts as ``least`` (J) at least."""
+        work = max(self._high[2], -self._low[2])
+        exchanged = float(max(least, work, *(self._high - self._low)[:2]))
+        # Not <=: an unknown balance (NaN) stops nothing.
+        if not abs(balance) > factor * self._tolerance * exchanged:
+            return Reason()
+        share, limit = 100.0 * abs(balance) / exchanged, 100.0 * self._tolerance
+        return Reason(
+            Cause.ENERGY_GREW if balance > 0.0 else Cause.ENERGY_LOST,
+            f"time integration {'added' if balance > 0.0 else 'lost'} {abs(balance):.3g} J, "
+            f"{share:.3g} % of the energy exchanged, up to {time:.6g} s, more than {bound} "
+            f"({limit:g} %): {_CURE}",
+        )

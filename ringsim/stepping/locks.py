@@ -1,0 +1,98 @@
+"""Which V-joints have reached their stops, when, and how steps should meet them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from ringsim.stepping.instant import Array, Instant
+
+_NEAR = 0.1
+"""A V-joint that has reached a stop counts as resting on it within this angle of it, rad."""
+_APART = 1e-3
+"""A V-joint that starts closer to the stowed stop than this has not come to it, rad; the stop of
+``ring18`` gives 4e-5 under its load."""
+
+
+class StopContact(NamedTuple):
+    """Time (s) until the first free V-joint meets a stop at its present rate, and that rate
+    (rad/s); the largest rate of a V-joint that has locked and is near its stop.
+    """
+
+    time_to_next: float = math.inf
+    rate_of_next: float = 0.0
+    resting_rate: float = 0.0
+
+
+class Locks:
+    """The V-joints' memory of their stops.
+
+    A joint that bounces has still reached its stop: all joints need not lie in it at the same
+    instant.  One that starts on the stowed stop has to leave it before it can come back.
+
+    Attributes
+    ----------
+    deployed, stowed
+        Whether each V-joint has reached 180 deg, and the stowed stop, shape (planes, sections).
+    """
+
+    def __init__(self, angles: Array, stowed_angle: float | None) -> None:
+        """Begin with these opening angles (rad); the stowed stop's is None without stops."""
+        self.stops = stowed_angle is not None
+        self._stowed_angle = stowed_angle or 0.0
+        self.deployed, self.stowed = np.zeros((2, *angles.shape), dtype=bool)
+        self._away = angles > self._stowed_angle + _APART
+
+    def note(self, angles: Array) -> None:
+        """Remember the joints that have reached a stop; opening angles in rad."""
+        self.deployed |= angles >= math.pi
+        self.stowed |= self._away & (angles <= self._stowed_angle)
+        self._away |= angles > self._stowed_angle + _NEAR
+
+    def overrun(self, angles: Array) -> float:
+        """Largest angle by which a V-joint is past its stops, rad; 0 if none is."""
+        return max(float(angles.max()) - math.pi, self._stowed_angle - float(angles.min()), 0.0)
+
+    def contact(self, now: Instant) -> StopContact:
+        """V-joints that are about to meet a stop, and those that rest on one."""
+        angles, rates, low, high = now.angles, now.rates, self._stowed_angle, math.pi
+        folding = (rates < 0.0) & self._away & ~self.stowed & (angles > low)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            opening = np.where((rates > 0.0) & ~self.deployed, (high - angles) / rates, math.inf)
+            waiting = np.minimum(opening, np.where(folding, (low - angles) / rates, math.inf))
+        first = np.unravel_index(int(np.argmin(waiting)), waiting.shape)
+        resting = self.deployed & (angles > high - _NEAR)
+        if self.stops:
+            resting |= (self.stowed & (angles < low + _NEAR)) | (angles < low)
+        return StopContact(
+            time_to_next=float(waiting[first]),
+            rate_of_next=float(abs(rates[first])),
+            resting_rate=float(np.max(np.abs(rates), where=resting, initial=0.0)),
+        )
+
+
+def lock_times(times: Array, angles: Array, rates: Array) -> Array:
+    """First time at which each V-joint reaches 180 deg, shape (planes, sections), s; NaN if never.
+
+    The crossing is the root of the cubic that fits angles and rates at both ends of the step.
+
+    Parameters
+    ----------
+    times, angles, rates
+        Shapes (n,), (n, planes, sections) and the same; s, rad, rad/s.
+    """
+    found = np.full(angles.shape[1:], np.nan)
+    for place in np.ndindex(*found.shape):
+        past = angles[(slice(None), *place)] - math.pi
+        crossing = np.flatnonzero(past >= 0.0)
+        if len(crossing) == 0 or crossing[0] == 0:
+            continue
+        ends = slice(crossing[0] - 1, crossing[0] + 1)
+        cubic = CubicHermiteSpline(times[ends], past[ends], rates[(ends, *place)])
+        roots = cubic.roots(extrapolate=False)
+        inside = roots[(roots >= times[ends][0]) & (roots <= times[ends][1])]
+        found[place] = inside.min() if len(inside) else times[crossing[0]]
+    return found

@@ -1,0 +1,111 @@
+"""Steps that follow the mean opening angle, and how they meet the stops."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from ringsim.parts.solver import Solver
+from ringsim.stepping.instant import Instant
+from ringsim.stepping.locks import StopContact
+from ringsim.stepping.repeats import FALL, GROWTH, SHORTEST
+from ringsim.stepping.scales import Scales
+
+_LOCAL_ERROR = 0.1
+"""Local error constant C of the integrator, error = C h^3 d3(angle)/dt3.  Generalised-alpha has
+beta - (alpha_f - alpha_m) / 2 - 1/6: 0.086 at the spectral radius 0.8, 1/12 at 1, 1/3 at 0."""
+_FINEST = 400.0
+"""The motion alone asks for no step below ``solver.step`` over this: noise of the rates must not
+stop a run."""
+_AT = 1e-4
+"""Tolerance at which ``_DEPTH``, ``Scales.contact_step`` and the distance of readings hold; the
+first two go with its square root, as all steps do."""
+_DEPTH = math.radians(0.05)
+"""Angle by which a V-joint may pass its stop within one step, at the tolerance ``_AT``."""
+_FIRST = 20.0
+"""The first step is ``solver.step`` over this at most: generalised-alpha starts from rest without
+an acceleration, which delays the motion by a third of the first step."""
+_APPROACH = 0.02
+"""Largest first step over the time to the first stop, as it is chosen without knowing the motion: a
+winch may take a ring that is nearly open to its stops within it."""
+
+
+class MotionSteps:
+    """Steps that keep the relative error in time of the mean opening angle near a tolerance.
+
+    A local error C h^3 |a'''| in the angle a shifts the motion by C h^3 |a'''| / |a'| in time;
+    spread evenly over the run that gives h = sqrt(tolerance |a'| / (C |a'''|)).  The third
+    derivative comes from divided differences of three rates, far enough apart not to see the rods
+    vibrate; a rate below the reference rate counts as that much, or the tremor of a ring that
+    hardly moves yet would ask for tiny steps.  The ratio |a'''| / |a'| fades over its own time
+    scale, so that a passage of a''' through zero does not open the step.  Towards the end of the
+    travel the step shrinks so that a V-joint meets its stop with a small one, the smaller the
+    faster it comes, and so it stays until it rests.
+
+    Attributes
+    ----------
+    step
+        Wanted next, s.
+    """
+
+    def __init__(self, solver: Solver, scales: Scales) -> None:
+        self._solver, self._reference, self._bend = solver, scales.rate, 0.0
+        finer, contact = math.sqrt(solver.tolerance / _AT), scales.contact_step
+        contact = contact if math.isfinite(contact) else solver.step
+        self._contact, self._depth = min(contact * finer, solver.step), _DEPTH * finer
+        # Below ``_AT`` readings stay as far apart as at it: closer ones would see the rods vibrate.
+        self._stride = max(1.0, math.sqrt(_AT / solver.tolerance))
+        self._past: deque[tuple[float, float]] = deque()
+        self.step = min(solver.step / _FIRST, scales.first_step)
+
+    def advance(self, now: Instant, stops: StopContact) -> None:
+        """Choose the step after an accepted one."""
+        self._past.append((now.time, float(np.mean(now.rates))))
+        wanted = max(self._from_motion(), self._solver.step / _FINEST)
+        if stops.resting_rate > 0.0:
+            wanted = max(min(wanted, self._depth / stops.resting_rate), self._contact)
+        if math.isfinite(stops.time_to_next):
+            meeting = max(self._depth / stops.rate_of_next, self._contact)
+            wanted = min(wanted, max(0.5 * stops.time_to_next, meeting))
+        self.step = min(wanted, GROWTH * self.step, self._solver.step)
+
+    def towards(self, left: float) -> float:
+        """The next step in s if only so much time is left to an event.
+
+        It shares the rest with the one after it: behind a long step a tiny one would read
+        velocities that are still the long one's.
+        """
+        if left <= self.step or left >= 2.0 * self.step:
+            return min(self.step, left)
+        return 0.5 * left
+
+    def shorter_first(self, step: float, stops: StopContact) -> float | None:
+        """A smaller first step in s, where this one leads too close to a stop; else None."""
+        if self._past or step <= SHORTEST * self._solver.step:
+            return None
+        return FALL * step if step > _APPROACH * (step + stops.time_to_next) else None
+
+    def _from_motion(self) -> float:
+        t2, r2 = self._past[-1]
+        apart = (self._stride - 0.5) * self.step
+        middle = self._before(t2 - apart)
+        first = None if middle is None else self._before(middle[0] - apart)
+        if middle is None or first is None:
+            return self.step
+        (t0, r0), (t1, r1) = first, middle
+        while self._past[0][0] < t0:
+            self._past.popleft()
+        early, late = (r1 - r0) / (t1 - t0), (r2 - r1) / (t2 - t1)
+        third = abs(2.0 * (late - early) / (t2 - t0))
+        bend = third / max(abs(r2), self._reference)
+        fading = max(0.0, 1.0 - (t2 - t1) * math.sqrt(self._bend))
+        self._bend = max(bend, fading * self._bend)
+        if self._bend == 0.0:
+            return self._solver.step
+        return math.sqrt(self._solver.tolerance / _LOCAL_ERROR / self._bend)
+
+    def _before(self, time: float) -> tuple[float, float] | None:
+        """The latest reading not after ``time``."""
+        return next((past for past in reversed(self._past) if past[0] <= time), None)

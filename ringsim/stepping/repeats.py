@@ -1,0 +1,193 @@
+"""Steps across which an indicator exceeds its allowance are repeated with a smaller one.
+
+An indicator falls with the p-th power of the step where the step resolves the motion, so that a
+refused step is repeated with h (allowed / found)^(1/p), and the next one may be no larger than
+that: the standard controller of step sizes (Hairer, Norsett, Wanner, Solving Ordinary Differential
+Equations I, section II.4, where such a safety factor and bounds of the ratio stand, too).
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from ringsim.parts.solver import TENSION_BEND, Solver
+from ringsim.stepping.instant import Array, Instant
+from ringsim.stepping.scales import Scales
+
+GROWTH, FALL = 1.5, 0.2
+"""Largest and smallest ratio of successive steps: a step behind a much shorter one would see that
+one's vibrations, and what is found across a kink says little about the step that resolves it."""
+SHORTEST = 1e-4
+"""No step is repeated below this share of ``solver.step``: what is left then is a jump, which no
+step resolves, and exudyn ends a run whose steps fall below 1e-9 s."""
+_REFUSED = 2.0
+"""Indicator over its allowance from which on a step is repeated.  Between 1 and 2 it only shortens
+the next one: a repeated step costs as much as a new one."""
+_SAFETY = 0.8
+"""On the step that the power law asks for: half of the allowance at p = 3."""
+_ENERGY = 0.3
+"""Imbalance allowed in a step over the tolerance times the energy exchanged so far: three impacts
+may take all of the tolerance."""
+_ALIKE = 3e-4
+"""Tolerance (the default) at which ropes are allowed as much as impacts."""
+PATIENCE = 300
+"""Steps of a ring without cables that are repeated at the tolerance 1e-4; impacts need fewer."""
+
+
+class Indicator(ABC):
+    """Judges steps by a number that must not exceed its allowance.
+
+    Attributes
+    ----------
+    limit
+        Largest next step in s; infinite before the first.
+    """
+
+    def __init__(self, solver: Solver) -> None:
+        self.limit = math.inf
+        self._least = SHORTEST * solver.step
+
+    @abstractmethod
+    def ratio(self, before: Instant, after: Instant) -> float:
+        """Indicator of a step over its allowance; NaN where it is unknown."""
+
+    @abstractmethod
+    def share(self, ratio: float) -> float:
+        """The safety factor times ratio^(-1/p)."""
+
+    def shorter(self, before: Instant, after: Instant) -> float | None:
+        """A smaller step in s to repeat this one with, or None if it is good enough."""
+        step, ratio = after.time - before.time, self.ratio(before, after)
+        # A step comes back as a difference of times: a little more than what was asked for.
+        if not ratio > _REFUSED or step <= self._least * (1.0 + 1e-6):
+            return None
+        return max(step * max(FALL, self.share(ratio)), self._least)
+
+    def accept(self, before: Instant, after: Instant) -> None:
+        """Learn from a step that is taken."""
+        step, ratio = after.time - before.time, self.ratio(before, after)
+        # 1e-3 stands for 0: from 0.2 on down ``GROWTH`` bounds the step, whatever the ratio is.
+        growth = min(max(self.share(max(ratio, 1e-3)), FALL), GROWTH)
+        self.limit = max(step * growth, self._least) if math.isfinite(ratio) else math.inf
+
+    def note(self) -> str:
+        """What a run's reason must add about this; empty if every step was judged."""
+        return ""
+
+
+class EnergyBalance(Indicator):
+    """Steps that conjure up or swallow energy.
+
+    A rope becomes taut within a small part of the step that the motion asks for, and throws what it
+    pulls.  A step across that balances neither the work of the winch nor the energy of the rope:
+    the integrator swallows what it cannot resolve.  The imbalance of a step,
+
+        change of kinetic and elastic energy + lost - work of loads and winches,
+
+    is known from its two ends and falls with the third power of the step.
+
+    What is allowed goes with the tolerance where an impact or two are all that matters.  Ropes
+    catch all the time: N ~ 1/h steps with an imbalance of h^3 each add up to h^2, which is to go
+    with the tolerance, so that a step may lack tolerance^(3/2).  Ropes need any number of repeated
+    steps.  A structure without them that vibrates on and on, faster than anybody wants to resolve,
+    would be followed forever; after ``PATIENCE`` steps its energy error tells instead.
+    """
+
+    def __init__(self, solver: Solver, scales: Scales) -> None:
+        super().__init__(solver)
+        self._refused = 0
+        self._work, self._stored = 0.0, math.nan
+        if scales.slack_energy is None:
+            self._patience = PATIENCE * math.sqrt(max(1e-4 / solver.tolerance, 1.0))
+            self._allowed, self._exchanged = _ENERGY * solver.tolerance, scales.energy
+        else:
+            self._patience, self._exchanged = math.inf, scales.slack_energy
+            self._allowed = _ENERGY * solver.tolerance * math.sqrt(solver.tolerance / _ALIKE)
+
+    def ratio(self, before: Instant, after: Instant) -> float:
+        """Imbalance of a step over what is allowed; NaN where the balance is unknown."""
+        first, last = before.energies, after.energies
+        stored = last.kinetic - first.kinetic + last.elastic - first.elastic
+        imbalance = abs(stored + last.lost - (last.work - first.work + last.driven))
+        return imbalance / (self._allowed * self._exchange(before, after))
+
+    def share(self, ratio: float) -> float:
+        """Of third order."""
+        return _SAFETY * math.pow(ratio, -1.0 / 3.0)
+
+    def shorter(self, before: Instant, after: Instant) -> float | None:
+        """As of ``Indicator``; None once patience has ended."""
+        found = super().shorter(before, after) if self._refused < self._patience else None
+        self._refused += found is not None
+        return found
+
+    def accept(self, before: Instant, after: Instant) -> None:
+        """As of ``Indicator``; adds to the energy exchanged."""
+        super().accept(before, after)
+        if self._refused >= self._patience:
+            self.limit = math.inf
+        self._exchanged = self._exchange(before, after)
+        self._work += after.energies.work - before.energies.work + after.energies.driven
+
+    def note(self) -> str:
+        """See ``Indicator``."""
+        if self._refused < self._patience:
+            return ""
+        return (
+            f"; energy repeated a step {self._refused} times and was left alone after that: see "
+            "energy_error"
+        )
+
+    def _exchange(self, before: Instant, after: Instant) -> float:
+        """Largest energy exchanged up to the end of a step, J."""
+        first, last = before.energies, after.energies
+        work = self._work + last.work - first.work + last.driven
+        if math.isnan(self._stored):
+            self._stored = first.elastic
+        return max(self._exchanged, abs(work), last.kinetic, abs(last.elastic - self._stored))
+
+
+class TensionBend(Indicator):
+    """Steps across which a tension bends too far.
+
+    Within a step only the tensions T at its ends are known.  Against the straight line through the
+    step before, a tension bends over a step of length h2 behind one of length h1 by
+
+        b = |T2 - T1 - (T1 - T0) h2 / h1|.
+
+    A largest tension between two readings may be missed by b / 8, and where T kinks, because a
+    V-joint locks or a rope becomes taut, the step across the kink is wrong by up to b.  In the
+    energy balance that does not show where the joints' friction takes most of what the winch gives:
+    a slow ring came to its last lock with steps in which the tension doubled.  b falls with the
+    square of the step where T is smooth.
+    """
+
+    def __init__(self, solver: Solver, slack_tension: float) -> None:
+        super().__init__(solver)
+        self._allowed = TENSION_BEND * solver.tolerance
+        self._largest = slack_tension  # counts as reached, so that ropes may become taut
+        self._past: tuple[float, Array] | None = None
+
+    def ratio(self, before: Instant, after: Instant) -> float:
+        """Bend over the allowed one; 0 where it is not known yet."""
+        first, last = before.tensions, after.tensions
+        if self._past is None or first is None or last is None:
+            return 0.0
+        earlier, past = self._past
+        step = after.time - before.time
+        bend = np.abs(last - first - (first - past) * (step / earlier)).max()
+        return float(bend) / (self._allowed * max(self._largest, float(last.max())))
+
+    def share(self, ratio: float) -> float:
+        """Of second order."""
+        return _SAFETY / math.sqrt(ratio)
+
+    def accept(self, before: Instant, after: Instant) -> None:
+        """As of ``Indicator``; remembers the tensions."""
+        super().accept(before, after)
+        if before.tensions is not None and after.tensions is not None:
+            self._largest = max(self._largest, float(after.tensions.max()))
+            self._past = after.time - before.time, before.tensions

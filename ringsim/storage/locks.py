@@ -1,0 +1,99 @@
+"""Locks: which process may run which samples of a campaign's folder."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from ringsim.files import writing
+from ringsim.refusal import InputError
+
+GO_ON = (
+    "make room or choose another folder, then give the same command again: finished samples are "
+    "kept"
+)
+"""What to do when a campaign's folder cannot be written to."""
+
+_LOCK_TRIES, _LOCK_PAUSE = 10, 0.1
+
+
+@contextlib.contextmanager
+def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[bool]:
+    """Hold an advisory lock; gives False at once if another process holds it, or else waits.
+
+    The file that carries the lock is created if it is not there.  A shared lock may be held by
+    others at the same time, shared as well.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be created.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError:
+        if not path.exists():
+            raise
+        descriptor = os.open(path, os.O_RDONLY)  # does as well, in folders that are read-only
+    try:
+        kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+        held = True  # also on a file system without locks
+        try:
+            fcntl.flock(descriptor, kind if wait else kind | fcntl.LOCK_NB)
+        except BlockingIOError:
+            held = False
+        except OSError:
+            pass
+        yield held
+    finally:
+        os.close(descriptor)
+
+
+@contextlib.contextmanager
+def reserved(folder: Path, writer: str, *, alone: bool) -> Iterator[None]:
+    """Keep a second process from running the samples of the share ``writer``, or if ``alone`` any.
+
+    Raises
+    ------
+    InputError
+        If another process runs them already, or if the folder cannot be written to.
+    """
+    for _ in tries(folder):
+        with contextlib.ExitStack() as held:
+            with writing(folder / f"lock-{writer}", GO_ON):
+                free = held.enter_context(locked(folder / "lock", shared=not alone)) and (
+                    held.enter_context(locked(folder / f"lock-{writer}"))
+                )
+            if free:
+                yield
+                return
+
+
+def tries(folder: Path) -> Iterator[int]:
+    """Count up, with pauses, for as long as it pays to wait for a lock.
+
+    Raises
+    ------
+    InputError
+        After that, since another process runs the campaign.
+    """
+    for number in range(_LOCK_TRIES):
+        yield number
+        time.sleep(_LOCK_PAUSE)
+    raise InputError(
+        f"{folder}: another process runs this campaign just now: wait for it, or stop it (ringsim "
+        "status tells which it is)"
+    )
+
+
+def in_use(folder: Path, writer: str) -> bool:
+    """Whether a process runs a share of a campaign just now."""
+    path = folder / f"lock-{writer}"
+    if not path.exists():
+        return False
+    with locked(path, shared=True) as free:
+        return not free

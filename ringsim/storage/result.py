@@ -1,0 +1,155 @@
+"""One sample's result as bytes: a small header, and its arrays packed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.variables import Cause, Status
+
+MISSING_COUNT = -1
+"""Stands for a missing whole number."""
+
+_DIGITS = 12
+"""Coordinates are rounded to so many digits: the last bits would differ between samples."""
+_COMPRESSION = 1
+"""Higher levels of zlib take several times as long for a few percent."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """How one sample ended, and what it gave."""
+
+    sample: int
+    """Index of the sample."""
+    status: Status
+    """How the run ended."""
+    reason: str
+    """One sentence: why it ended so."""
+    cause: Cause = Cause.NONE
+    """The same as a code."""
+    log: str = ""
+    """The end of what a failed run printed."""
+    seconds: float = float("nan")
+    """Elapsed time of the run."""
+    finished: float = 0.0
+    """When it ended, as seconds since 1970."""
+    form: str = ""
+    """The same for results whose arrays have the same names, shapes and coordinates."""
+    body: bytes = field(default=b"", repr=False)
+    """The arrays, see :func:`pack`."""
+
+    def header(self) -> bytes:
+        """Everything but the body."""
+        table = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "body"}
+        return json.dumps(table, separators=(",", ":")).encode()
+
+    @classmethod
+    def from_header(cls, header: bytes, body: bytes) -> Result:
+        """The result whose :meth:`header` is given."""
+        table = json.loads(header)
+        codes = {"status": Status(table["status"]), "cause": Cause(table.get("cause", 0))}
+        return cls(**table | codes, body=body)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays by name."""
+        found: dict[str, NDArray[Any]] = {}
+        if not self.body:
+            return found
+        content = zlib.decompress(self.body)
+        start = content.index(b"\n") + 1
+        for name, dtype, shape in json.loads(content[:start]):
+            kind = np.dtype(dtype)
+            count = math.prod(shape)
+            planes = np.frombuffer(content, "u1", count * kind.itemsize, start)
+            values = np.ascontiguousarray(planes.reshape(kind.itemsize, count).T)
+            found[name] = values.view(kind).reshape(shape)
+            start += planes.size
+        return found
+
+
+def precedence(status: Any, finished: Any) -> Any:
+    """Which of several results of one sample counts: that with the greatest number.
+
+    A run that went well counts before one that failed, whatever the clocks said; otherwise the
+    later one does.
+
+    Parameters
+    ----------
+    status, finished
+        Of the results, numbers or arrays.
+    """
+    # No clock is 1e12 s (30,000 years) wrong.
+    return np.asarray(finished) + 1e12 * (np.asarray(status) < Status.SOLVER_FAILED)
+
+
+def plain(text: str) -> str:
+    r"""The text without what cannot be stored in a file: half characters and zero bytes.
+
+    >>> plain("no text: \udcff, a zero byte: \0")
+    'no text: ?, a zero byte:  '
+    """
+    return text.encode("utf-8", "replace").decode("utf-8").replace("\0", " ")
+
+
+def pack(arrays: Mapping[str, NDArray[Any]]) -> tuple[str, bytes]:
+    """Form and body of a run's values and coordinates, cast to their defined types.
+
+    The body is compressed: a line of JSON with name, type and shape of each array, then their
+    bytes, all first bytes of an array before all second ones (as in HDF5's shuffle filter),
+    since neighbouring numbers differ in their last bytes only.
+
+    Raises
+    ------
+    ValueError
+        If a name has no definition, or an array does not span its coordinates.
+    """
+    sizes = {name: np.shape(values) for name, values in arrays.items() if name in COORDINATES}
+    described, parts, same = [], [], []
+    for name, values in arrays.items():
+        wanted = COORDINATES.get(name) or VARIABLES.get(name)
+        if wanted is None:
+            raise ValueError(f"there is no variable {name}")
+        array = np.asarray(values)
+        if array.ndim != len(wanted.dims):
+            raise ValueError(
+                f"{name} has shape {array.shape}, but its dimensions are {wanted.dims}"
+            )
+        for dim, length in zip(wanted.dims, array.shape, strict=True):
+            if sizes.get(dim) != (length,):
+                raise ValueError(
+                    f"{name} has {length} values along {dim}, whose coordinate has the shape "
+                    f"{sizes.get(dim, 'of nothing: it is missing')}"
+                )
+        if wanted.dtype == "str":
+            array = array.astype(str)
+        elif np.dtype(wanted.dtype).kind in "iu" and array.dtype.kind == "f":
+            array = np.where(np.isfinite(array), array, MISSING_COUNT).astype(wanted.dtype)
+        else:
+            array = array.astype(wanted.dtype)
+            if name in COORDINATES and array.dtype.kind == "f":
+                array = _rounded(array)
+        described.append((name, array.dtype.str, array.shape))
+        planes = np.frombuffer(array.tobytes(), "u1").reshape(-1, array.itemsize).T.tobytes()
+        parts.append(planes)
+        if name in COORDINATES:
+            same.append(planes)
+    head = json.dumps(described, separators=(",", ":")).encode()
+    form = hashlib.blake2b(b"\n".join([head, *same]), digest_size=8).hexdigest()
+    return form, zlib.compress(b"".join([head, b"\n", *parts]), _COMPRESSION)
+
+
+def _rounded(values: NDArray[Any]) -> NDArray[Any]:
+    largest = float(np.abs(values).max(initial=0.0))
+    if not 0.0 < largest < np.inf:
+        return values
+    return np.round(values, _DIGITS - math.ceil(math.log10(largest)))

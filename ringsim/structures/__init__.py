@@ -1,0 +1,1 @@
+"""Kinds of structure, one file each: fields and ``layout(scene, coordinate)``."""

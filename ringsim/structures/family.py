@@ -1,0 +1,113 @@
+"""The family of structures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.layout.layout import Layout
+from ringsim.units import Model
+
+
+class Structure(Model):
+    """Any deployable structure that a scene can hold: one file, found by its ``kind``.
+
+    Its parts follow from one coordinate (a fold angle, rad).  A kind says, as fields, constants or
+    properties: ``sections`` and ``closed`` (how many values a list of a scene has), ``pulleys`` (of
+    each of its cables), ``coordinate`` at the start, and ``reach`` (a length in m, against which
+    gaps are measured).
+    """
+
+    if TYPE_CHECKING:
+
+        @property
+        def sections(self) -> int:
+            """Number of sections."""
+
+        @property
+        def closed(self) -> bool:
+            """Whether the last section meets the first."""
+
+        @property
+        def pulleys(self) -> int:
+            """Of a cable with one winch."""
+
+        @property
+        def coordinate(self) -> float:
+            """Value of the coordinate at the start, rad."""
+
+        @property
+        def reach(self) -> float:
+            """Length of a rod, m."""
+
+    locks: ClassVar[bool] = True
+    """Whether it has opened, and a run ended, when every opening angle has reached 180 deg."""
+
+    planes: ClassVar[tuple[str, ...]] = ("upper", "lower")
+    """Planes that a cable can run in."""
+    long_names: ClassVar[dict[str, str]] = {}
+    """What variables of a result mean for this kind, where it differs from the ring."""
+    gauge: ClassVar[str] = ""
+    """Name of the rod whose bending strain is recorded, if any."""
+    shaping: ClassVar[tuple[str, ...]] = ()
+    """Scene paths that decide where results are given: all samples of a campaign share them."""
+
+    @property
+    def push(self) -> float:
+        """Largest force of its own springs along the whole travel, N; 0 without springs."""
+        return 0.0
+
+    def layout(self, scene: Any, coordinate: Any) -> Layout:
+        """What it consists of at a value of the coordinate.
+
+        Parameters
+        ----------
+        scene
+            Whose rods, boom, net, loads and cables it holds (ringsim.layout.draft.Equipment).
+        coordinate
+            With the imaginary part ``ringsim.layout.pose.STEP``, which carries the derivatives:
+            compute places with functions that take complex numbers, without ``float`` and ``abs``.
+        """
+        raise NotImplementedError
+
+    def basis(self, coordinate: float) -> NDArray[np.float64] | None:
+        """Functions of the coordinate in which all points are linear, if there are a few.
+
+        Every place of the layout is then P s with constant P, so that theory need not build a
+        layout at each coordinate.
+
+        Returns
+        -------
+        Array or None
+            The functions s, the first of them 1, and their first and second derivatives, shape
+            (3, functions).
+        """
+        del coordinate
+        return None
+
+    def describe(self) -> dict[str, str]:
+        """Its shape and size in words, by label, for ``ringsim check``."""
+        return {"structure": str(type(self).model_fields["kind"].default)}
+
+    def path_slope(self, cable: Any, angles: Any) -> float:
+        """Derivative of the ideal path of a cable after the opening angle, m/rad.
+
+        Parameters
+        ----------
+        cable
+            One that can run in this structure.
+        angles
+            Opening angles along its path, shape (sections,), rad.
+        """
+        raise NotImplementedError
+
+    def check(self, scene: Any) -> None:
+        """Refuse a scene whose other parts do not go with this structure.
+
+        Raises
+        ------
+        ValueError
+            Naming the part, its value and the cure.
+        """

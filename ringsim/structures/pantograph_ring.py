@@ -1,0 +1,213 @@
+"""The pantograph ring: closed, or an open arc of the same polygon (two sections: the truss)."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from ringsim.choice import kind_of
+from ringsim.layout.bodies import Lump
+from ringsim.layout.draft import Draft
+from ringsim.layout.layout import Layout
+from ringsim.structures.family import Structure
+from ringsim.structures.pantograph_sections import add_sections
+from ringsim.structures.ring_geometry import RingGeometry
+from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
+
+LEAST_HINGE_OFFSET = 1e-6
+"""Metre; directions of the rope between two pulleys are then good to 1e-10 in doubles."""
+
+
+class PantographRing(Structure):
+    """Sections of two crossing diagonals and two folding bars between hinge assemblies.
+
+    The plan view is a polygon with equal chords on an ellipse; the hinge assemblies fix its
+    angles.  Source: paper 002 (18-section antenna), table 1; paper 000 (two-section truss).
+    """
+
+    kind: Literal["pantograph-ring"] = "pantograph-ring"
+    sections: Annotated[int, Field(ge=1, le=360)] = 18
+    closed: bool = True
+    polygon_sections: Annotated[int, Field(ge=3, le=720)] = 18
+    """Sides of the full polygon that an open arc is cut from; a closed ring is its own."""
+    aspect_ratio: Annotated[float, Field(ge=0.05, le=1.0), Unit("1")] = 3.2856 / 3.5184
+    """Minor over major axis of the ellipse."""
+    half_bar: Metre = 0.2889
+    half_diagonal: Metre = 0.4275
+    hinge_offset: MetreOrZero = 0.006554
+    """Distance of the pins from the vertical line of their hinge assembly."""
+    corner_mass: KilogramOrZero = 0.0198
+    vjoint_mass: KilogramOrZero = 0.0198
+    hinge_size: Metre = 0.0112
+    """Edge of the cube whose inertia a hinge assembly has (its density is 13 975 kg/m^3)."""
+    opening_angle: Degree = 46.0
+    """Initial angle between the bar halves: near 0 stowed, 180 deployed."""
+
+    @model_validator(mode="after")
+    def _possible(self) -> PantographRing:
+        if self.half_bar >= self.half_diagonal:
+            raise ValueError(
+                f"half_bar = {self.half_bar} m must be below half_diagonal = "
+                f"{self.half_diagonal} m: the diagonals could not span the deployed section"
+            )
+        if self.hinge_offset >= self.half_bar:
+            raise ValueError(
+                f"hinge_offset = {self.hinge_offset} m must be below half_bar = {self.half_bar} m: "
+                "shorten it, a hinge assembly is smaller than a section"
+            )
+        if self.closed and self.sections < 3:
+            raise ValueError(
+                f"sections = {self.sections} must be at least 3 for a closed ring "
+                "(or set closed = false)"
+            )
+        if not self.closed and self.sections >= self.polygon_sections:
+            raise ValueError(
+                f"sections = {self.sections} must be below polygon_sections = "
+                f"{self.polygon_sections} for an open arc (raise it, or set closed = true)"
+            )
+        if self.opening_angle > 179.9:
+            raise ValueError(
+                f"opening_angle = {self.opening_angle} deg must be at most 179.9: there is "
+                "nothing left to deploy"
+            )
+        if self.corner_mass == 0.0:
+            raise ValueError(
+                "corner_mass = 0.0 kg must be positive: a hinge assembly is a rigid body"
+            )
+        self.geometry()
+        return self
+
+    def check(self, scene: Any) -> None:
+        """See ``Structure``: rods longer than thick, a boom to slide on, stops out of the way."""
+        for rod, tube, longest in (
+            ("diagonal", scene.rods.diagonal, self.half_diagonal),
+            ("bar", scene.rods.bar, self.half_bar),
+        ):
+            if tube.outer_diameter >= longest:
+                raise ValueError(
+                    f"rods.{rod}.outer_diameter = {tube.outer_diameter} m must be below "
+                    f"structure.half_{rod} = {longest} m: a rod is longer than thick"
+                )
+        highest = 2.0 * self.half_diagonal
+        if scene.boom is not None and scene.boom.length < highest:
+            raise ValueError(
+                f"boom.length = {scene.boom.length} m must be at least {highest:.4g} m, the "
+                "height of the stowed ring: the sliding joint would leave the boom"
+            )
+        self._check_pulleys(scene)
+        if scene.stop is not None and scene.stop.stowed_angle >= self.opening_angle:
+            raise ValueError(
+                f"stop.stowed_angle = {scene.stop.stowed_angle} deg must be below "
+                f"structure.opening_angle = {self.opening_angle} deg"
+            )
+
+    def _check_pulleys(self, scene: Any) -> None:
+        """V pulleys that open the bars, and spans that have a length and a direction."""
+        present = [] if scene.cables is None else scene.cables.present()
+        for plane, cable in present:
+            reason = cable.bracket.refusal(self.opening_angle)
+            if reason is not None:
+                raise ValueError(f"cables.{self.planes[plane]}.{reason}")
+            if kind_of(cable.bracket) == "bar-half" and kind_of(scene.rods) == "ancf":
+                raise ValueError(
+                    f'cables.{self.planes[plane]}.bracket.kind = "bar-half" needs rods.kind = '
+                    '"geometrically-exact", not "ancf": choose one of both'
+                )
+        if not present or self.sections == 1:
+            return
+        if self.hinge_offset < LEAST_HINGE_OFFSET:
+            raise ValueError(
+                f"structure.hinge_offset = {self.hinge_offset} m must be at least "
+                f"{LEAST_HINGE_OFFSET:g} m with cables: the rope runs between the hinge pulleys of "
+                "neighbouring sections, which would coincide (set it to "
+                f"{LEAST_HINGE_OFFSET:g} for pulleys on one axis, or leave the cables out)"
+            )
+
+    @property
+    def pulleys(self) -> int:
+        """Pulleys of a cable with one winch: two hinges and a V-joint a section, less its end."""
+        return 3 * self.sections - 1
+
+    @property
+    def polygon(self) -> int:
+        """Sides of the full polygon."""
+        return self.sections if self.closed else self.polygon_sections
+
+    @property
+    def coordinate(self) -> float:
+        """Initial angle phi of the bar halves from the horizontal, rad."""
+        return 0.5 * (math.pi - math.radians(self.opening_angle))
+
+    @property
+    def reach(self) -> float:
+        """See ``Structure``: a bar half."""
+        return self.half_bar
+
+    def geometry(self) -> RingGeometry:
+        """The ideal ring."""
+        return RingGeometry.of_polygon(
+            self.sections,
+            closed=self.closed,
+            polygon_sections=self.polygon,
+            aspect_ratio=self.aspect_ratio,
+            half_bar=self.half_bar,
+            half_diagonal=self.half_diagonal,
+            hinge_offset=self.hinge_offset,
+        )
+
+    def describe(self) -> dict[str, str]:
+        """See ``Structure``."""
+        geometry = self.geometry()
+        shape = "closed ring" if self.closed else f"open arc of a {self.polygon}-gon"
+        count = f"{self.sections} section{'' if self.sections == 1 else 's'}"
+        # The first corner lies on the major axis of the ellipse.
+        major, (x, y) = float(geometry.plan[0, 0]), geometry.plan[1, :2]
+        minor = abs(y) / math.sqrt(1.0 - (x / major) ** 2)
+        chord = geometry.deployed_chord
+        return {
+            "structure": f"{kind_of(self)}, {shape}, {count}",
+            "polygon": f"equal chords of {chord:.4f} m on an ellipse with axes "
+            f"{2.0 * chord * major:.4f} m and {2.0 * chord * minor:.4f} m",
+            "deployed": _size(geometry, 0.0),
+            "initial": f"{_size(geometry, self.coordinate)} at {self.opening_angle} deg",
+        }
+
+    def path_slope(self, cable: Any, angles: Any) -> float:
+        """See ``Structure``."""
+        return float(np.sum(cable.path_slope(self.half_bar, angles)))
+
+    def basis(self, coordinate: float) -> NDArray[np.float64]:
+        """See ``Structure``: 1, cos(phi), sin(phi) and sin(theta), d cos(theta) = l cos(phi).
+
+        The distance of two corners 2 (l cos(phi) + a), half the height d sin(theta) and the
+        directions of all rods are linear in them.  NaN where the diagonals are too short.
+        """
+        ratio, c, s = (
+            (self.half_bar / self.half_diagonal) ** 2,
+            math.cos(coordinate),
+            math.sin(coordinate),
+        )
+        rest = 1.0 - ratio * c * c
+        h = math.sqrt(rest) if rest > 0.0 else math.nan
+        slope = ratio * c * s / h
+        bend = (ratio * (c * c - s * s) - slope * slope) / h
+        return np.array([[1.0, c, s, h], [0.0, -s, c, slope], [0.0, -c, -s, bend]])
+
+    def layout(self, scene: Any, coordinate: Any) -> Layout:
+        """See ``Structure``; the coordinate is phi, and every point that of ``RingGeometry``."""
+        draft, geometry = Draft(scene), self.geometry()
+        fold = geometry.fold(coordinate)
+        cube = self.corner_mass * self.hinge_size**2 / 6.0 * np.eye(3)
+        hinge = Lump("hinges", self.corner_mass, np.zeros(3), cube)
+        draft.corners = [[draft.body(at, [hinge]) for at in plane] for plane in fold.corners]
+        add_sections(draft, geometry, fold, draft.corners, self.vjoint_mass)
+        return draft.finish()
+
+
+def _size(geometry: RingGeometry, phi: float) -> str:
+    extent = np.ptp(geometry.fold(phi).corners.reshape(-1, 3), axis=0)
+    return " x ".join(f"{length:.3f}" for length in extent) + " m"

@@ -1,0 +1,306 @@
+"""The planar truss with a driving cable."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import model_validator
+
+from ringsim.choice import kind_of
+from ringsim.layout.bodies import Lump
+from ringsim.layout.draft import Draft, Track
+from ringsim.layout.layout import Layout
+from ringsim.layout.pose import axes_along
+from ringsim.layout.springs import Contact, Spring
+from ringsim.parts.springs import Reaction, one_sided, two_sided
+from ringsim.parts.tube import Tube
+from ringsim.structures.family import Structure
+from ringsim.structures.truss_geometry import TrussGeometry
+from ringsim.units import DampingRate, Metre, Model, SpringRate
+
+RING_PARTS = ("stop", "boom", "net", "loads")
+REST_ONSET = 1e-5
+"""Depth over which the rest's damper comes in, m: 1 N on the default spring, less than the 1.5 N
+that the cable holds where the rest is met."""
+
+
+class DeployingSpring(Model):
+    """Compression spring inside the telescopic strut, with its damping."""
+
+    stiffness: SpringRate = 2030.0
+    free_length: Metre = 0.316
+    """Length of the strut at which the spring is without force."""
+    damping: DampingRate = 5.0
+
+    def tension(self, length: Any, rate: Any = 0.0) -> Reaction:
+        """Of a strut of some length (m), at its rate (m/s); the spring pushes: negative."""
+        return two_sided(length - self.free_length, rate, self.stiffness, self.damping)
+
+
+class Rest(Model):
+    """One-sided contact that ends the contraction: buffers of the synchronising beam meet the
+    fixed axis and keep its upper joint at a distance.
+
+    Force stiffness * depth + damping * rate while positive.
+    """
+
+    buffer: Metre = 0.0118
+    """Between the fixed axis and the synchronising beam at the end of contraction."""
+    stiffness: SpringRate = 1e5
+    damping: DampingRate = 100.0
+
+    def push(self, depth: Any, rate: Any, xp: Any = np) -> Reaction:
+        """Against a depth (m) and its rate (m/s), none where it is negative."""
+        return one_sided(depth, rate, self.stiffness, self.damping, REST_ONSET, xp)
+
+
+class PlanarTruss(Structure):
+    """Fixed axis, two parallel beams, synchronising beam and sliding axis (telescopic strut).
+
+    The cable runs from a winch on the fixed axis over a pulley at the lower joint to the upper
+    outer joint.  ``rods`` gives the material and the tubes: ``rods.bar`` the upper and the lower
+    beam, ``rods.diagonal`` the outer tube of the strut, ``rods.elements`` half the elements of
+    the upper beam.
+
+    Paper 001 gives the parts and their sections (its fig. 4 and table 1), not where the strut
+    and the cable are attached, nor the spring.  They are chosen so that the ideal truss
+    (``ringsim.theory.planar_truss``) shows what its figs 8 and 9 show:
+
+    1. The cable has the published lengths.  If it ends at the outer joint of the upper beam,
+       0.9 m is reached at 90 deg or less from H = 0.646 m on, 0.1 m up to H = 0.727 m (then
+       folded flat).  H = 0.72 m puts 0.1 m at 3.1 deg and 0.9 m at 83.5 deg.  At 3.1 deg the
+       outer joint is 34 mm off the axis: half the axis' tube (15 mm), half the synchronising
+       beam (7.5 mm) and a buffer.  There the contraction ends on a rest, so winding further
+       only stretches the cable.
+    2. The gauge sits at the centre of the upper beam.  For a head q up to there the strain of
+       the gauge follows from the tension alone, M = T H sin(g) b / (2 c): 4e-4 is 4.7 N (0.48
+       kgf).  A head beyond it asks for more tension and strains the beam more elsewhere: 13.6 N
+       and 6.6e-4 at q = 0.45 m, 57 N (above the published 2 kgf) and 14e-4 at 0.54 m; one before
+       it, 0.2 m, has 5.4e-4 at the head.  So q = b / 2: the gauge sits where the beam bends most.
+    3. In time the strain is small when folded (sin g) and when deployed (spring nearly relaxed).
+       It is largest at 0.40 m of cable with the strut's foot at the lower joint, 0.46 m with
+       p = 0.08 m, 0.48 m with p = 0.05 m, 0.50 m with 0.03 m, but then the spring needs 180 N for
+       5 N of tension.  p = 0.05 m takes 106 N and stays near the published 500 mm.
+    4. 2030 N/m and 0.316 m give 4e-4; 0.12 of that is left at 0.1 m and 0.14 at 0.9 m.  Zero
+       would need a truss folded flat there, and here a spring without force, so a slack cable:
+       0.8 N are left to it.  The tension is 1.4 N where the rest is met; the published 2 kgf is
+       the rise at the end of contraction.
+    """
+
+    planes: ClassVar[tuple[str, ...]] = ("upper",)
+    sections: ClassVar[int] = 1
+    closed: ClassVar[bool] = False
+    pulleys: ClassVar[int] = 1
+    locks: ClassVar[bool] = False
+    gauge: ClassVar[str] = "upper_beam"
+    long_names: ClassVar[dict[str, str]] = {
+        "opening_angle": "angle between the beams and the fixed axis",
+    }
+    shaping: ClassVar[tuple[str, ...]] = ("structure.beam_length", "rods.elements")
+
+    kind: Literal["planar-truss"] = "planar-truss"
+    beam_length: Metre = 0.627
+    axis_length: Metre = 0.72
+    """Distance of the two joints on the fixed axis."""
+    strut_foot: Metre = 0.05
+    """Distance of the strut's joint on the fixed axis from the upper joint."""
+    strut_head: Metre = 0.3135
+    """Distance of the strut's joint on the upper beam from the upper joint."""
+    strut_tube_length: Metre = 0.23
+    """Length of the strut's outer tube, and of its inner one."""
+    cable_length: Metre = 0.9
+    """Initial distance from the lower joint to the upper outer joint: 0.9 m deployed."""
+    axis: Tube = Tube(outer_diameter=0.030, inner_diameter=0.028)
+    strut_inner: Tube = Tube(outer_diameter=0.029, inner_diameter=0.027)
+    bar_width: Metre = 0.015
+    """Synchronising beam, in the plane of the truss."""
+    bar_depth: Metre = 0.008
+    """Synchronising beam, across the plane of the truss."""
+    spring: DeployingSpring = DeployingSpring()
+    rest: Rest = Rest()
+
+    @model_validator(mode="after")
+    def _possible(self) -> PlanarTruss:
+        for name, most, limit in (
+            ("strut_head", "beam_length", self.beam_length),
+            ("strut_foot", "axis_length", self.axis_length),
+        ):
+            if getattr(self, name) >= limit:
+                raise ValueError(
+                    f"{name} = {getattr(self, name)} m must be below {most} = {limit} m"
+                )
+        if self.rest_distance >= self.beam_length:
+            raise ValueError(
+                f"rest.buffer = {self.rest.buffer} m must leave the beams room to fold: the rest "
+                f"stands {self.rest_distance:.4g} m off the axis"
+            )
+        least, most_cable = self.stowed_cable_length, self.axis_length + self.beam_length
+        if not least < self.cable_length < most_cable:
+            raise ValueError(
+                f"cable_length = {self.cable_length} m must be above {least:.4g} m (at the rest) "
+                f"and below {most_cable:.4g} m (beams and axis in line)"
+            )
+        shortest, longest = self.geometry().strut(
+            [self.stowed_angle, max(self.coordinate, self.stowed_angle)]
+        )
+        if not shortest >= self.strut_tube_length > 0.5 * longest:
+            raise ValueError(
+                f"strut_tube_length = {self.strut_tube_length} m must be above "
+                f"{0.5 * longest:.4g} m and at most {shortest:.4g} m: the tubes would part, or "
+                "meet each other's ends"
+            )
+        return self
+
+    def check(self, scene: Any) -> None:
+        """See ``Structure``: parts of rings are refused, the cable is needed."""
+        for name in RING_PARTS:
+            if getattr(scene, name) is not None:
+                raise ValueError(
+                    f'{name} is a part of rings: leave it out of a planar truss ({name} = "none")'
+                )
+        if scene.joints.model_dump():
+            raise ValueError("joints: a planar truss has no joint friction yet: leave it out")
+        if scene.faults:
+            raise ValueError("faults: a planar truss has no faults yet: leave them out")
+        if scene.cables is None or scene.cables.upper is None or scene.cables.lower is not None:
+            raise ValueError("cables must hold the one driving cable, as cables.upper")
+        if scene.cables.upper.end != "first":
+            raise ValueError(
+                f'cables.upper.end = "{scene.cables.upper.end}" must be "first": the winch '
+                "stands on the fixed axis"
+            )
+        if kind_of(scene.rods) != "geometrically-exact":
+            raise ValueError(
+                f'rods.kind = "{kind_of(scene.rods)}" must be "geometrically-exact": the cable '
+                "of a planar truss runs to a node with an orientation"
+            )
+        if scene.solver.step_control != "constant":
+            raise ValueError('solver.step_control = "motion" must be "constant" for a planar truss')
+        outer, inner = scene.rods.diagonal, self.strut_inner
+        if inner.outer_diameter > outer.inner_diameter:
+            raise ValueError(
+                f"structure.strut_inner.outer_diameter = {inner.outer_diameter} m must be at "
+                f"most rods.diagonal.inner_diameter = {outer.inner_diameter} m: the tubes slide"
+            )
+
+    @property
+    def rest_distance(self) -> float:
+        """Distance of the upper outer joint from the axis at the end of contraction, m."""
+        return 0.5 * (self.axis.outer_diameter + self.bar_width) + self.rest.buffer
+
+    @property
+    def stowed_angle(self) -> float:
+        """Angle at the end of contraction, rad."""
+        return math.asin(self.rest_distance / self.beam_length)
+
+    @property
+    def stowed_cable_length(self) -> float:
+        """Cable length at the end of contraction, m."""
+        return float(self.geometry().cable(self.stowed_angle))
+
+    @property
+    def coordinate(self) -> float:
+        """Angle between the beams and the axis at the start, rad."""
+        return float(self.geometry().angle(self.cable_length))
+
+    @property
+    def reach(self) -> float:
+        """See ``Structure``: a beam."""
+        return self.beam_length
+
+    @property
+    def push(self) -> float:
+        """See ``Structure``: of the deploying spring, folded."""
+        shortest = float(self.geometry().strut(self.stowed_angle))
+        return self.spring.stiffness * abs(self.spring.free_length - shortest)
+
+    def geometry(self) -> TrussGeometry:
+        """The ideal truss."""
+        return TrussGeometry(self.beam_length, self.axis_length, self.strut_foot, self.strut_head)
+
+    def describe(self) -> dict[str, str]:
+        """See ``Structure``."""
+        geometry, ends = self.geometry(), [self.coordinate, self.stowed_angle]
+        found = {"structure": f"{kind_of(self)}, two beams of {self.beam_length} m"}
+        for label, angle, cable, strut in zip(
+            ("initial", "at its rest"), ends, geometry.cable(ends), geometry.strut(ends),
+            strict=True,
+        ):  # fmt: skip
+            found[label] = (
+                f"{math.degrees(angle):.4g} deg, {cable:.4g} m of cable, strut {strut:.4g} m"
+            )
+        return found
+
+    def path_slope(self, cable: Any, angles: Any) -> float:
+        """See ``Structure``."""
+        del cable
+        return float(np.sum(self.geometry().cable_rate(angles)))
+
+    def layout(self, scene: Any, coordinate: Any) -> Layout:
+        """See ``Structure``; the coordinate is the beams' angle from the axis.
+
+        Everything moves in the plane x (outward), y (along the axis).  The beams are elastic; the
+        axis, 40 times stiffer in bending than they, the synchronising beam and the tubes of the
+        strut are rigid bodies.
+        """
+        draft, points, rods = Draft(scene), self.geometry().points(coordinate), scene.rods
+        height, down = self.axis_length, np.array([0.0, -self.axis_length, 0.0])
+        mass = rods.density * self.axis.area * height
+        axis = draft.body(points.lower, [_slender("axis", mass, -0.5 * down)])
+        mass = rods.density * self.bar_width * self.bar_depth * height
+        bar = draft.body(points.upper_end, [_slender("synchronising beam", mass, 0.5 * down)])
+        draft.joint("weld", "", 0, (None, axis), points.lower)
+
+        head = self.strut_head / self.beam_length
+        count = 2 * rods.elements
+        inside = min(max(round(head * count), 1), count - 1)
+        beyond = np.linspace(head, 1.0, count - inside + 1)[1:]
+        shares = [*np.linspace(0.0, head, inside + 1), *beyond]
+        young, across = float(np.max(rods.young_modulus)), np.array([0.0, 0.0, 1.0])
+        upper = draft.rod("upper_beam", 0, "beams", (points.upper, points.upper_end), across,
+                          rods.bar, shares, young)  # fmt: skip
+        lower = draft.rod("lower_beam", 0, "beams", (points.lower, points.lower_end), across,
+                          rods.bar, [0.0, 0.5, 1.0], young)  # fmt: skip
+        for body, beam, at in (
+            (axis, upper, points.upper),
+            (axis, lower, points.lower),
+            (bar, upper, points.upper_end),
+            (bar, lower, points.lower_end),
+        ):
+            draft.joint("revolute", "", 0, (body, beam), at)
+
+        along = axes_along(points.foot, points.head, across)
+        half = np.array([0.5 * self.strut_tube_length, 0.0, 0.0])
+        outer, inner = (
+            draft.body(at, [_slender("strut", self._tube_mass(rods.density, tube), centre)], along)
+            for at, centre, tube in (
+                (points.foot, half, rods.diagonal),
+                (points.head, -half, self.strut_inner),
+            )
+        )
+        draft.joint("revolute", "", 0, (axis, outer), points.foot, np.eye(3))
+        draft.joint("revolute", "", 0, (upper, inner), points.head)
+        draft.slide(outer, inner, along)
+        draft.springs.append(Spring(outer.number, inner.number, self.spring))
+        draft.contacts.append(Contact(bar.number, 0, self.rest_distance, self.rest))
+        draft.chord_opening(0, bar, points.upper)
+        ends = [draft.on(axis, points.lower), draft.on(bar, points.upper_end)]
+        draft.tracks[0] = Track(ends, np.array([0.0, 1.0, 0.0]))
+        return draft.finish()
+
+    def _tube_mass(self, density: float, tube: Tube) -> float:
+        return density * tube.area * self.strut_tube_length
+
+
+def _slender(group: str, mass: float, centre: NDArray[np.float64]) -> Lump:
+    """A slender rod from the body's origin to twice ``centre``; about its own line it has little
+    inertia.
+    """
+    length = 2.0 * float(np.linalg.norm(centre))
+    along = 2.0 * centre / length
+    across = np.eye(3) - np.outer(along, along)
+    inertia = mass * length**2 * (across / 3.0 + 1e-4 * np.outer(along, along))
+    return Lump(group, mass, centre, inertia)

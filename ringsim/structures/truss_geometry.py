@@ -1,0 +1,109 @@
+"""The planar truss: a parallelogram with a telescopic strut and a cable along its diagonal.
+
+The fixed axis stands along y with the lower joint at the origin and the upper joint a distance H
+above.  Both beams, of length b, make the angle g with it: g = 0 folded down along the axis,
+90 deg square to it.  The synchronising beam joins their outer ends parallel to the axis.
+
+    upper outer joint   C = (b sin g, H - b cos g)
+    cable, lower joint to C        c^2 = b^2 + H^2 - 2 b H cos g,      dc/dg = b H sin g / c
+    strut, from a foot on the axis p below the upper joint to a head on the upper beam q from it
+                                   s^2 = q^2 + p^2 - 2 q p cos g,      ds/dg = q p sin g / s
+
+The ratio (ds/dg) / (dc/dg) = q p c / (b H s) has no singularity at g = 0: the cable keeps its hold
+on the folded truss although neither length changes there.  Source: paper 001, figs 4 and 7.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+class TrussPoints(NamedTuple):
+    """Points of the truss at one or many angles, shape (..., 3) each, in metre.
+
+    Joints of the fixed axis (``lower``, ``upper``) and of the outer ends of the beams
+    (``lower_end``, ``upper_end``); ``foot`` and ``head`` of the strut.
+    """
+
+    lower: Array
+    upper: Array
+    lower_end: Array
+    upper_end: Array
+    foot: Array
+    head: Array
+
+
+@dataclass(frozen=True)
+class TrussGeometry:
+    """An ideal planar truss with rigid beams; lengths in metre, angles in rad.
+
+    Attributes
+    ----------
+    beam
+        Length b of the upper and the lower beam.
+    axis
+        Distance H of the two joints on the fixed axis.
+    foot, head
+        Distances p and q of the strut's joints from the upper joint.
+    """
+
+    beam: float
+    axis: float
+    foot: float
+    head: float
+
+    def cable(self, angle: ArrayLike) -> Array:
+        """Distance c from the lower joint to the upper outer joint."""
+        return _third_side(self.beam, self.axis, angle)
+
+    def cable_rate(self, angle: ArrayLike) -> Array:
+        """Its derivative dc/dg, m/rad."""
+        return np.asarray(self.beam * self.axis * np.sin(angle) / self.cable(angle))
+
+    def strut(self, angle: ArrayLike) -> Array:
+        """Length s of the strut between its joints."""
+        return _third_side(self.head, self.foot, angle)
+
+    def strut_rate(self, angle: ArrayLike) -> Array:
+        """Its derivative ds/dg, m/rad."""
+        return np.asarray(self.head * self.foot * np.sin(angle) / self.strut(angle))
+
+    def strut_over_cable(self, angle: ArrayLike) -> Array:
+        """Ratio (ds/dg) / (dc/dg) = q p c / (b H s), finite at every angle."""
+        sides = self.head * self.foot / (self.beam * self.axis)
+        return np.asarray(sides * self.cable(angle) / self.strut(angle))
+
+    def angle(self, cable: ArrayLike) -> Array:
+        """Angle g in [0, pi] at which the cable has a length; NaN out of reach."""
+        c = np.asarray(cable, dtype=float)
+        cosine = (self.beam**2 + self.axis**2 - c**2) / (2.0 * self.beam * self.axis)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.arccos(cosine))
+
+    def points(self, angle: Any) -> TrussPoints:
+        """All points, at angles of any shape."""
+        g = np.asarray(angle)  # of any type: a complex angle carries derivatives
+        zero = np.zeros_like(g)
+        along = np.stack([np.sin(g), -np.cos(g), zero], axis=-1)
+        up = np.stack([zero, zero + 1.0, zero], axis=-1)
+        lower, upper = 0.0 * up, self.axis * up
+        return TrussPoints(
+            lower=lower,
+            upper=upper,
+            lower_end=self.beam * along,
+            upper_end=upper + self.beam * along,
+            foot=upper - self.foot * up,
+            head=upper + self.head * along,
+        )
+
+
+def _third_side(a: float, b: float, angle: ArrayLike) -> Array:
+    """Law of cosines, written so that it keeps its digits at small angles."""
+    half = np.sin(0.5 * np.asarray(angle, dtype=float))
+    return np.asarray(np.sqrt((a - b) ** 2 + 4.0 * a * b * half**2))

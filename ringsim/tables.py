@@ -1,0 +1,31 @@
+"""Tables in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from tabulate import DataRow, TableFormat, tabulate
+
+_ROW = DataRow("|", "|", "|")
+# tabulate's own Markdown pads every cell to its column's width, and one long cell widens all lines.
+_NARROW = TableFormat(
+    lineabove=None, linebelowheader=lambda widths, aligns: "|" + "---|" * len(widths),
+    linebetweenrows=None, linebelow=None, headerrow=_ROW, datarow=_ROW, padding=1,
+    with_header_hide=None,
+)  # fmt: skip
+
+
+def markdown_table(head: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
+    """A table as GitHub reads it; cells are text or numbers, and written as they are.
+
+    Parameters
+    ----------
+    head
+        Names of the columns.
+    rows
+        One cell for each column; a ``|`` or a line break in a cell is masked.
+    """
+    cells = [[" ".join(str(cell).split()).replace("|", "\\|") for cell in row] for row in rows]
+    names = [str(name) for name in head]
+    table: str = tabulate(cells, names, _NARROW, disable_numparse=True, stralign=None)
+    return table

@@ -1,0 +1,35 @@
+"""Every example runs as a user would run it, and leaves the files that it says it wrote."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+
+
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs(script: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(script)],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) >= 3
+    for name in re.findall(r"^wrote (\S+)$", done.stdout, re.MULTILINE):
+        assert (tmp_path / name).stat().st_size > 0
+
+
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_is_short_and_says_what_it_shows(script: Path) -> None:
+    text = script.read_text(encoding="utf-8")
+    assert 20 <= len(text.splitlines()) <= 50
+    assert ast.get_docstring(ast.parse(text))

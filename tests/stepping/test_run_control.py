@@ -1,0 +1,218 @@
+"""The control of a run, driven by motions with closed forms instead of an engine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ringsim.parts.solver import Solver
+from ringsim.stepping.instant import Energies, Instant
+from ringsim.stepping.locks import Locks
+from ringsim.stepping.run_control import RunControl
+from ringsim.stepping.scales import Scales
+from ringsim.variables import Status
+
+INERTIA, TORQUE, BEGIN = 0.2, 0.01, math.radians(20.0)
+"""Of each of six V-joints, kg m^2 and N m, and the opening angle that they start from."""
+SCALES = Scales(rate=0.2, energy=1e-3, travel=math.pi - BEGIN, length=0.3, contact_step=1e-3)
+Law = Callable[[float], tuple[float, float]]
+
+
+def falling(time: float) -> tuple[float, float]:
+    """Angle and rate under a constant torque."""
+    acceleration = TORQUE / INERTIA
+    return BEGIN + 0.5 * acceleration * time**2, acceleration * time
+
+
+def lifted(time: float) -> tuple[float, float]:
+    """A rate that grows exponentially, as that of a toggle."""
+    return BEGIN + 0.01 * (math.exp(2.0 * time) - 1.0), 0.02 * math.exp(2.0 * time)
+
+
+class Motion:
+    """What an engine would read of six joints that move alike by a law, without any loss."""
+
+    def __init__(self, law: Law = falling) -> None:
+        self.law = law
+        self.swallowed = 0.0
+
+    def at(self, time: float) -> Instant:
+        angle, rate = self.law(time)
+        kinetic = 6.0 * 0.5 * INERTIA * rate**2
+        energies = Energies(kinetic - self.swallowed, 0.0, kinetic, 0.0)
+        return Instant(time, np.full((2, 3), angle), np.full((2, 3), rate), energies)
+
+
+def control_of(motion: Motion, solver: Solver, *, locking: bool = True, **more) -> RunControl:
+    start = motion.at(0.0)
+    locks = Locks(start.angles, BEGIN - 0.1) if locking else None
+    return RunControl(solver, SCALES, start, locks, **more)
+
+
+def follow(motion: Motion, control: RunControl, event: float = math.inf) -> np.ndarray:
+    """Run to the end; the times of all instants."""
+    times = [0.0]
+    while control.goes_on:
+        step = control.next_step(event if times[-1] < event else math.inf)
+        found = motion.at(times[-1] + step)
+        while control.shorter(found) is not None:
+            step = control.retry(0.5 * step)
+            found = motion.at(times[-1] + step)
+        control.accept(found)
+        times.append(found.time)
+    control.conclude()
+    return np.array(times)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-3 / 16.0])
+def test_steps_are_those_of_a_relative_error_in_time(tolerance: float) -> None:
+    """h = sqrt(tolerance a' / (C a''')) with C = 0.1 and a''' = 4 a', whatever the rate.
+
+    It holds from the reference rate on, 1.15 s.  The third derivative over two steps is that of
+    their middle, where the rate, and with it a''', was smaller by exp(-2 h).
+    """
+    solver = Solver(tolerance=tolerance, step=0.2, end_time=2.0)
+    times = follow(motion := Motion(lifted), control_of(motion, solver))
+    steps = np.diff(times[(times > 1.3) & (times < 1.9)])
+    assert len(steps) >= 10
+    assert steps * np.exp(-steps) == pytest.approx(math.sqrt(tolerance / 0.4), rel=2e-3)
+
+
+def test_the_run_ends_settled_after_the_exact_time_of_the_last_lock() -> None:
+    solver = Solver(settling_time=0.05)
+    control = control_of(motion := Motion(), solver)
+    times = follow(motion, control)
+    exact = math.sqrt(2.0 * (math.pi - BEGIN) * INERTIA / TORQUE)
+    assert (control.status, control.reason) == (Status.OK, "all V-joints have reached 180 deg")
+    assert times[-1] == pytest.approx(exact + 0.05, abs=1e-12)
+    assert control.repeats == 0
+    # The joint that comes at 0.5 rad/s goes no deeper than 0.05 deg sqrt(3) in a step.
+    meeting = np.diff(times)[np.searchsorted(times, exact) - 1]
+    # The step was chosen for the rate at its beginning.
+    rate = falling(exact - meeting)[1]
+    assert meeting <= math.radians(0.05) * math.sqrt(3.0) / rate
+
+
+def test_no_step_passes_an_event_and_the_last_two_share_the_way() -> None:
+    event = 2.345
+    times = follow(motion := Motion(), control_of(motion, Solver(tolerance=0.1)), event)
+    before = np.diff(times[times <= event])
+    assert event in times
+    assert before[-1] == pytest.approx(before[-2], rel=1e-9)
+
+
+def test_a_step_that_swallows_energy_is_repeated_until_it_does_not() -> None:
+    """What is missing goes with the third power of the step."""
+    motion = Motion()
+    control = control_of(motion, Solver(tolerance=1e-3))
+    for _ in range(30):
+        control.accept(motion.at(control.now.time + control.next_step()))
+    now, step = control.now, control.next_step()
+    asked = []
+    while True:
+        motion.swallowed = 0.05 * (step / 0.2) ** 3
+        shorter = control.shorter(motion.at(now.time + step))
+        if shorter is None:
+            break
+        asked.append((step, shorter, motion.swallowed))
+        assert control.retry(math.nan) == shorter
+        step = shorter
+    assert control.repeats == len(asked) >= 1
+    tried, shorter, missing = asked[-1]
+    exchanged = motion.at(now.time + tried).energies.work
+    allowed = 0.3 * 1e-3 * exchanged
+    assert shorter == pytest.approx(0.8 * tried * (allowed / missing) ** (1.0 / 3.0), rel=1e-9)
+    assert control.accept(motion.at(now.time + step))
+    assert control.next_step() <= 1.5 * step
+
+
+def test_a_failed_newton_halves_the_step_and_a_solver_that_gives_up_says_so() -> None:
+    control = control_of(Motion(), Solver())
+    step = control.next_step()
+    assert control.retry(0.5 * step) == 0.5 * step
+    control.fail("no convergence")
+    control.conclude()
+    assert control.status is Status.SOLVER_FAILED
+    assert "after 1 reductions of the step" in control.reason
+    assert control.reason.endswith("(no convergence)")
+    assert not control.goes_on
+
+
+@pytest.mark.parametrize(
+    ("solver", "status", "words"),
+    [
+        (Solver(end_time=1.0), Status.UNFINISHED, "reached with 0 of 6 V-joints locked"),
+        (Solver(step_limit=30), Status.SOLVER_FAILED, "solver.step_limit = 30 steps"),
+    ],
+)
+def test_a_run_that_does_not_reach_its_goal_says_why(solver, status, words) -> None:
+    times = follow(motion := Motion(), control := control_of(motion, solver))
+    assert control.status is status
+    assert words in control.reason
+    assert times[-1] <= 1.0 or len(times) == 31
+
+
+def test_the_guard_ends_a_run_whose_energy_gets_lost() -> None:
+    control = control_of(motion := Motion(), Solver(step_control="constant", step=0.02))
+    while control.goes_on:
+        motion.swallowed = 0.6 * motion.at(control.now.time).energies.work
+        control.accept(motion.at(control.now.time + control.next_step()))
+    assert control.status is Status.DIVERGED
+    assert "solver.energy_tolerance" in control.reason
+
+
+def test_constant_steps_without_locks_run_to_the_end_time() -> None:
+    """A structure whose joints do not lock; the last step is what is left."""
+    solver = Solver(step_control="constant", step=0.3, end_time=4.0)
+    control = control_of(motion := Motion(), solver, locking=False)
+    times = follow(motion, control)
+    assert times == pytest.approx([*(0.3 * np.arange(14)), 4.0])
+    assert control.status is Status.OK
+    assert control.reason == "the cable was wound until solver.end_time = 4 s"
+
+
+@pytest.mark.parametrize(("locking", "grown"), [(False, [0.2, 0.4]), (True, [0.1, 0.1])])
+def test_a_shortened_constant_step_grows_again_where_no_stop_is_ahead(locking, grown) -> None:
+    solver = Solver(step_control="constant", step=0.4)
+    control = control_of(motion := Motion(), solver, locking=locking)
+    assert control.next_step() == 0.4
+    steps = [control.retry(0.1)]
+    for _ in range(20):
+        control.accept(motion.at(control.now.time + steps[-1]))
+        steps.append(control.next_step())
+    assert steps[:10] == [0.1] * 10
+    assert [steps[10], steps[20]] == pytest.approx(grown)
+
+
+def test_the_next_step_starts_from_what_a_fault_has_left() -> None:
+    motion = Motion()
+    control = control_of(motion, Solver())
+    found = motion.at(control.next_step())
+    struck = found._replace(energies=found.energies._replace(elastic=-0.5, lost=0.5))
+    control.accept(found, struck)
+    assert control.now is struck
+    later = motion.at(found.time + control.next_step())
+    balanced = later._replace(energies=later.energies._replace(elastic=-0.5))
+    assert control.shorter(balanced) is None
+    assert control.shorter(later) is not None
+
+
+def test_tensions_are_judged_until_the_last_lock() -> None:
+    """A tension that jumps by 10 N, below the energy that matters."""
+    roped = Scales(**{**SCALES.__dict__, "slack_tension": 0.01, "slack_energy": 1e3})
+    solver = Solver(settling_time=1.0)
+    for locked in (False, True):
+        motion = Motion()
+        start = motion.at(0.0)._replace(tensions=np.zeros(2))
+        control = RunControl(solver, roped, start, Locks(start.angles, 0.1))
+        exact = math.sqrt(2.0 * (math.pi - BEGIN) * INERTIA / TORQUE)
+        until = exact if locked else 0.5 * exact
+        while control.now.time < until:
+            found = motion.at(control.now.time + control.next_step())
+            control.accept(found._replace(tensions=np.ones(2)))
+        found = motion.at(control.now.time + control.next_step())
+        jumped = found._replace(tensions=np.full(2, 11.0))
+        assert (control.shorter(jumped) is None) is locked
