@@ -97,14 +97,9 @@ def writing(path: Path, cure: str = "make room or choose another folder") -> Ite
 
 @contextlib.contextmanager
 def whole(path: Path, *, lasting: bool = True) -> Iterator[Path]:
-    """A draft to write to; it gets its name once it is complete and on the disk.
+    """A draft to write to; it replaces ``path`` once it is complete.
 
-    Parameters
-    ----------
-    path
-        The final name; an older file of that name is replaced.
-    lasting
-        Wait for the disk, so that the file survives a power cut as well.
+    A lasting file is on the disk by then, so that it survives a power cut as well.
     """
     draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}{DRAFT}")
     try:

@@ -233,8 +233,8 @@ def builtin_scenes() -> dict[str, str]:
     return {f.name.removesuffix(".toml"): f.read_text(encoding="utf-8") for f in files}
 
 
-def load_scene(name_or_path: str | Path) -> Scene:
-    """A built-in scene by name, or a scene file.
+def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
+    """A built-in scene by name, or a scene file; paths may be relative to the folder of a file.
 
     Raises
     ------
@@ -254,7 +254,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
     builtin = builtin_scenes()
     if str(name_or_path) in builtin:
         return scene_from_toml(builtin[str(name_or_path)], source=f"scene {name_or_path}")
-    path = Path(name_or_path)
+    path = beside.parent / name_or_path
     if not os.path.exists(path):  # Path.exists raises for names that are too long
         hint = known_or_nearest(str(name_or_path), builtin)
         raise InputError(f"{path}: no such file, and no built-in scene of that name ({hint})")

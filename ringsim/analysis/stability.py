@@ -15,8 +15,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.errors import held
+from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
-from ringsim.variables import VARIABLES, Status
+from ringsim.variables import Status
 
 Array = NDArray[np.float64]
 
@@ -24,8 +25,8 @@ OK, ENDED, WRONG = "ok", "ended", "wrong"
 OUT_OF_STEPS = "step limit"
 CAUSES = (
     (OUT_OF_STEPS, "solver.step_limit = "),
-    ("energy grew", "energy from nothing"),
-    ("energy lost", "energy got lost"),
+    ("energy grew", "time integration added"),
+    ("energy lost", "time integration lost"),
     ("blow-up", "blew up"),
     ("blow-up", "not finite"),
     ("stop passed", "past its stop"),

@@ -18,22 +18,19 @@ from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.design_file import NAME, read_design, write_design
 from ringsim.storage.journal import FOLDER
 from ringsim.storage.locks import GO_ON, locked, tries
-from ringsim.storage.netcdf import Output
 from ringsim.storage.provenance import provenance
 from ringsim.storage.survey import Survey, survey
 
 
 @dataclass(frozen=True)
 class Folder:
-    """A prepared campaign folder."""
+    """A prepared campaign folder: the inputs of all samples, and the scene that they vary."""
 
     path: Path
     identity: str
     """Digest of everything that decides about the results."""
     table: Table
-    """Inputs of all samples."""
     scene: Scene
-    """Scene that they vary."""
     solver: str
     """``module:function`` that runs one sample."""
     attributes: dict[str, Any]
@@ -42,11 +39,6 @@ class Folder:
     def survey(self) -> Survey:
         """What it holds of every sample."""
         return survey(self.path, self.identity, self.table.samples)
-
-    @property
-    def output(self) -> Output:
-        """How the merged file is stored."""
-        return Output.model_validate_json(self.attributes["output"])
 
 
 def open_folder(path: Path) -> Folder:

@@ -9,6 +9,7 @@ from ringsim.campaign.folder import Folder
 from ringsim.files import DRAFT, writing
 from ringsim.storage.locks import GO_ON, locked
 from ringsim.storage.merge import NAME, write_merged
+from ringsim.storage.netcdf import Output
 from ringsim.storage.provenance import provenance
 
 _KEPT = ("identity", "seed", "solver", "campaign", "campaign_name", "scene", "output")
@@ -27,12 +28,7 @@ class Merged(NamedTuple):
 def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
     """Write ``campaign.nc``, one process at a time, so that it never loses samples it had.
 
-    Parameters
-    ----------
-    execution
-        Who computed it, in words.
-    partly
-        Write the file also if samples are left.
+    It says in words who computed it, and is written ``partly`` if samples are left.
 
     Raises
     ------
@@ -51,5 +47,6 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
         made = provenance(name=design["campaign_name"], title=design["title"], action="merged")
         attributes = made | {name: design[name] for name in _KEPT} | {"execution": execution}
         attributes["history"] += f"\n{design['history']}"
-        failed += write_merged(campaign.path, found, campaign.table, campaign.output, attributes)
+        output = Output.model_validate_json(design["output"])
+        failed += write_merged(campaign.path, found, campaign.table, output, attributes)
     return Merged(left, failed, path)

@@ -28,15 +28,11 @@ class Choices:
     """How a campaign is to be run this time."""
 
     scheduler: Scheduler
-    """Who computes."""
     limits: Limits
-    """Bounds on each run."""
     max_failed: int | None = None
     """Failures that are put up with, in the whole campaign; None for any number."""
     share: Share = WHOLE
-    """The samples of this process."""
     retry_failed: bool = False
-    """Run the failed samples again."""
 
 
 def run_campaign(folder: Path, choices: Choices) -> int:

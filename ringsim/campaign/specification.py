@@ -10,11 +10,11 @@ from pydantic import BeforeValidator, Field, ValidationError
 
 from ringsim.execution.work import Limits
 from ringsim.files import parse_toml, read_text
-from ringsim.refusal import InputError, explain, known_or_nearest
+from ringsim.refusal import InputError, explain
 from ringsim.sampling.columns import Table
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
-from ringsim.scene import Scene, builtin_scenes, load_scene
+from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import Output
 from ringsim.units import Model
 
@@ -109,16 +109,11 @@ def load_campaign(path: Path) -> Campaign:
         specification = Specification.model_validate(parse_toml(text, path.name))
     except ValidationError as error:
         raise InputError(explain(error, Specification, path.name)) from None
-    name, builtin = specification.scene, builtin_scenes()
-    beside = path.parent / name
-    if name not in builtin and not beside.is_file():
-        raise InputError(
-            f"{path.name}: scene = {name!r}: there is no file {beside}, and no built-in scene of "
-            f"that name ({known_or_nearest(name, builtin)})"
-        )
-    base = load_scene(name if name in builtin else beside)
+    key = "scene"
     try:
+        base = load_scene(specification.scene, beside=path)
+        key = "set"
         scene = base.with_values(specification.set)
     except InputError as error:
-        raise InputError(f"{path.name}: set: {error}") from None
+        raise InputError(f"{path.name}: {key}: {error}") from None
     return Campaign(path, text, specification, scene)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from pathlib import Path
-from typing import Any
 
 from ringsim.campaign.folder import Folder
 from ringsim.storage.locks import in_use
@@ -48,8 +46,11 @@ def status_lines(campaign: Folder) -> list[str]:
     running: dict[int, float] = {}
     rate = 0.0
     for path in sorted(campaign.path.glob("progress-*.json")):
-        told = _read(path)
-        if told is None:
+        try:
+            told = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        if not isinstance(told, dict) or not told.keys() >= _TOLD:  # of another version
             continue
         state, writer = told["state"], path.stem.removeprefix("progress-")
         if state == "running" and not in_use(campaign.path, writer):
@@ -74,12 +75,3 @@ def status_lines(campaign: Folder) -> list[str]:
         lines.append(f"  rate           {rate:.3g} samples/s")
         lines.append(f"  time left      about {in_words(left / rate)}")
     return lines
-
-
-def _read(path: Path) -> Any:
-    """Content of a progress file; None if it cannot be read or is of another version."""
-    try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return told if isinstance(told, dict) and told.keys() >= _TOLD else None

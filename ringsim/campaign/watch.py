@@ -29,7 +29,6 @@ class StopRequest:
     """Whether the campaign is to stop, and why; falsy text means go on."""
 
     reason: str = ""
-    """Why."""
     signalled: bool = False
     """Whether a signal asked for it."""
     at_once: bool = False
@@ -68,7 +67,6 @@ class Progress:
     path: Path
     """The progress file."""
     name: str
-    """Of the campaign."""
     total: int
     done: int
     failed: int

@@ -52,7 +52,6 @@ def command(
     130 stopped by a signal.
     """
     logging.basicConfig(format="%(message)s")
-
     size = launched_size()
 
     def asked_for() -> tuple[Campaign, Path, str, Share]:

@@ -1,4 +1,4 @@
-"""Reference numbers of a structure, as its run's control needs them."""
+"""Reference numbers of a scene's structure, as its run's control needs them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ringsim.engine.build import Built
+from ringsim.engine.model import Model
 from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.layout.bodies import OnRod
 from ringsim.layout.joints import JointOpening
-from ringsim.layout.layout import Layout
 from ringsim.stepping import scales
 from ringsim.theory.one_coordinate import OneCoordinate
 
@@ -20,48 +20,46 @@ _SLIGHT = 1e-3
 
 
 def scales_of(built: Built) -> scales.Scales:
-    """What the structure with rigid rods, its stops and its cables say before the run."""
-    scene, layout = built.model.scene, built.model.layout
-    structure, ideal = scene.structure, OneCoordinate(scene)
-    angles, rates = layout.opening_angles()
-    travel, turn = math.pi - float(angles.mean()), abs(float(rates.mean()))
-    acceleration = turn * ideal.acceleration_from_rest(structure.coordinate)
-    inertia = ideal.motion(structure.coordinate).inertia / turn**2
+    """What the ideal structure, as stowed, the stops and the cables say before a run."""
+    model, scene, structure = built.model, built.model.scene, built.model.scene.structure
+    angles, rates = model.layout.opening_angles()
+    travel, per_angle = math.pi - float(angles.mean()), float(rates.mean())
+    ideal = OneCoordinate(scene)
+    acceleration = per_angle * ideal.acceleration_from_rest(structure.coordinate)
+    inertia = ideal.motion(structure.coordinate).inertia / per_angle**2
     rate = scales.reference_rate(acceleration, travel, scene.solver.end_time)
-    # Springs of its own set a scale of their own: what they would do along a rod.
-    energy = _SLIGHT * structure.push * structure.reach or 0.5 * inertia * rate**2
-    found = scales.Scales(rate, energy, travel, structure.reach)
-    if scene.stop is not None:
-        step = scales.contact_step(_bouncing(layout), scene.stop.stiffness)
-        found = replace(found, contact_step=step)
-    if built.cables is not None and scene.cables is not None:
-        cables, lengths = scene.cables.present(), np.abs(built.cables.ropes.content)
-        widths = np.array([cable.slack_width for _, cable in cables])
-        stiffness = sum(
-            cable.axial_stiffness / float(length) * structure.path_slope(cable, angles[plane]) ** 2
-            for (plane, cable), length in zip(cables, lengths, strict=True)
-        )
-        found = replace(
-            found,
-            first_step=scales.rope_step(inertia, stiffness),
-            slack_tension=float(widths.max()),
-            slack_energy=0.1 * float(np.sum(widths * lengths)),  # a tenth of it along every path
-        )
-    return found
+    # Springs of its own set their own scale: what they would do along a rod.
+    pushed = _SLIGHT * structure.push * structure.reach
+    energy = pushed or 0.5 * inertia * rate**2
+    found = scales.Scales(rate, energy, travel, structure.reach, contact_step=_contact_step(model))
+    if built.cables is None or scene.cables is None:
+        return found
+    cables, lengths = scene.cables.present(), np.abs(built.cables.ropes.content)
+    widths = np.array([cable.slack_width for _, cable in cables])
+    stiffness = sum(
+        cable.axial_stiffness / float(length) * structure.path_slope(cable, angles[plane]) ** 2
+        for (plane, cable), length in zip(cables, lengths, strict=True)
+    )
+    return replace(
+        found,
+        first_step=scales.swing_step(inertia, stiffness, 50),
+        slack_tension=float(widths.max()),
+        slack_energy=0.1 * float(np.sum(widths * lengths)),
+    )
 
 
-def _bouncing(layout: Layout) -> float:
-    """Inertia of the two rods of the first joint that opens, about it, kg m^2."""
-    opening = layout.openings[0][0]
-    if not isinstance(opening, JointOpening):
+def _contact_step(model: Model) -> float:
+    """Of the first V-joint with its two rods; infinite without stops or V-joints."""
+    opening, stop = model.layout.openings[0][0], model.scene.stop
+    if stop is None or not isinstance(opening, JointOpening):
         return math.inf
-    joint, inertia = layout.joints[opening.joint], 0.0
+    joint, inertia = model.layout.joints[opening.joint], 0.0
     for mount in (joint.first, joint.second):
         if isinstance(mount, OnRod):
-            rod = layout.rods[mount.rod]
+            rod = model.layout.rods[mount.rod]
             ends = sum(mass for _, mass in rod.masses)
             inertia += (rod.mass / 3.0 + ends) * rod.length**2
-    return inertia
+    return scales.swing_step(inertia, stop.stiffness, 20)
 
 
 def residual_tolerance(built: Built) -> float:
@@ -74,4 +72,4 @@ def residual_tolerance(built: Built) -> float:
     if scene.rods.damping > 0.0:
         stiffest *= STIFFENING
     size = built.model.assembly.system.systemData.ODE2Size()
-    return scales.residual_tolerance(scene.solver.newton_tolerance, drive, stiffest, size)
+    return scales.residual_tolerance(scene.solver.newton_tolerance, drive, float(stiffest), size)

@@ -16,13 +16,13 @@ OF_MPI = ("PMI", "PMIX", "OMPI", "OPAL", "PRTE", "HYDRA", "HYDI", "MPI", "I_MPI"
 """How names of variables begin by which launchers and libraries speak to each other."""
 
 _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
-_OPEN_MPI = "Open MPI"
 _LIBRARY = """
 import mpi4py
 mpi4py.rc.initialize = False
 from mpi4py import MPI
 print(MPI.Get_library_version())
 """
+"""Tells the version of the MPI library without starting it; nothing if it cannot be loaded."""
 
 
 def launched_size() -> int:
@@ -45,8 +45,12 @@ def mpi_world() -> Any:
     expected = launched_size()
     if "OMPI_COMM_WORLD_SIZE" in os.environ:
         # Other libraries do not even start under this launcher: they end the process.
-        library = _library()
-        if library and not library.startswith(_OPEN_MPI):
+        environment = {k: v for k, v in os.environ.items() if not k.startswith(OF_MPI)}
+        library = subprocess.run(
+            [sys.executable, "-c", _LIBRARY], env=environment, capture_output=True, text=True,
+            check=False,
+        ).stdout.strip()  # fmt: skip
+        if library and not library.startswith("Open MPI"):
             raise _stranger(expected, library)
     try:
         from mpi4py import MPI
@@ -59,16 +63,6 @@ def mpi_world() -> Any:
     if world.Get_size() != expected:
         raise _stranger(expected, MPI.Get_library_version())
     return world
-
-
-def _library() -> str:
-    """Version of the MPI library, which is not started for that; empty if it cannot be loaded."""
-    environment = {name: v for name, v in os.environ.items() if not name.startswith(OF_MPI)}
-    told = subprocess.run(
-        [sys.executable, "-c", _LIBRARY], env=environment, capture_output=True, text=True,
-        check=False,
-    )  # fmt: skip
-    return told.stdout.strip()
 
 
 def _stranger(expected: int, library: str) -> InputError:

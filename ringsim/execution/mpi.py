@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from ringsim.execution.slot import Slot
 from ringsim.execution.work import Scheduler, Work
@@ -37,14 +37,12 @@ class Mpi(Scheduler):
 
     def from_first(self, value: _T) -> _T:
         """See :meth:`Scheduler.from_first`."""
-        found: _T = self.communicator.bcast(value)
-        return found
+        return cast(_T, self.communicator.bcast(value))
 
     def from_all(self, value: _T) -> list[_T]:
         """See :meth:`Scheduler.from_all`."""
         self.wait()
-        found: list[_T] = self.communicator.allgather(value)
-        return found
+        return cast(list[_T], self.communicator.allgather(value))
 
     def wait(self) -> None:
         """Wait for all ranks without spinning."""

@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from ringsim.storage.result import plain
 
 _ADDRESS = re.compile(r"0x[0-9a-fA-F]+")
 _END_SECONDS = 10.0
+_PRINTING_SECONDS = 0.05
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -43,26 +45,24 @@ class SolverProcess:
         environment |= dict.fromkeys(_ONE_THREAD, "1")
         environment["PYTHONPATH"] = os.pathsep.join(os.path.abspath(path) for path in sys.path)
         command = [sys.executable, "-P", "-m", "ringsim.execution.child"]
+        scratch = ""
         try:
-            self._scratch = Path(tempfile.mkdtemp(prefix="ringsim-"))
-            with other, (self._scratch / "log").open("ab") as log:
+            scratch = tempfile.mkdtemp(prefix="ringsim-")
+            with other, open(f"{scratch}/log", "ab") as log:
                 self._process = subprocess.Popen(
                     [*command, str(other.fileno()), str(os.getpid())],
-                    stdin=subprocess.DEVNULL,
-                    stdout=log,
-                    stderr=log,
-                    cwd=self._scratch,
-                    env=environment,
-                    pass_fds=[other.fileno()],
-                    start_new_session=True,
-                )
+                    stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=scratch, env=environment,
+                    pass_fds=[other.fileno()], start_new_session=True,
+                )  # fmt: skip
         except OSError as error:
             self.pipe.close()
+            other.close()
+            shutil.rmtree(scratch, ignore_errors=True)
             raise InputError(
                 f"the solver process cannot be started: {error}; use fewer workers, or make "
                 f"room in {tempfile.gettempdir()} (TMPDIR)"
             ) from error
-        self.pid = self._process.pid
+        self._scratch, self.pid = Path(scratch), self._process.pid
         self.send(setup)
 
     def send(self, message: Any) -> None:
@@ -76,10 +76,11 @@ class SolverProcess:
             return self._process.wait(seconds)
         return None
 
-    def signal(self, number: int) -> None:
-        """Send a signal."""
+    def tell_where_it_is(self) -> None:
+        """Let it print where it is just now."""
         with contextlib.suppress(ProcessLookupError):
-            self._process.send_signal(number)
+            self._process.send_signal(signal.SIGUSR2)
+        time.sleep(_PRINTING_SECONDS)
 
     def memory(self) -> int:
         """Bytes of memory that it holds; 0 where the system does not tell."""

@@ -41,11 +41,9 @@ class Work:
     solver: str
     """``module:function`` that maps a scene to an outcome."""
     scene: dict[str, Any]
-    """Base scene as nested tables."""
     values_of: Callable[[int], dict[str, Any]]
     """Inputs of a sample by scene path."""
     limits: Limits
-    """Bounds on one run."""
     keep: Callable[[Result], None]
     """Stores a result; called in the process that supervised the run."""
     stop: Callable[[], str]
@@ -64,20 +62,14 @@ class Scheduler:
 
     Every process that takes part has one and calls the same methods in the same order; what
     stands here is for a process that is alone.
-
-    Attributes
-    ----------
-    rank
-        Number of this process among those that run the campaign together.
-    workers
-        Samples that run at the same time.
-    description
-        Who computes, in words.
     """
 
     rank = 0
+    """Number of this process among those that run the campaign together."""
     workers = 1
+    """Samples that run at the same time."""
     description = ""
+    """Who computes, in words."""
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """Run samples, first ones first; returns the reason if it stopped before the end.

@@ -43,21 +43,19 @@ def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correl
     InputError
         If a pair names what is not drawn, or if the pairs contradict each other.
     """
-    pairs = {
-        (first, second): pair.coefficient
+    pairs = [
+        (first, second, pair.coefficient)
         for pair in correlations
         for first, second in _columns(paths, pair)
-    }
-    moved = sorted({axis for axes in pairs for axis in axes})
+    ]
+    moved = sorted({axis for first, second, _ in pairs for axis in (first, second)})
     if not moved:
         return points
-    place = {axis: k for k, axis in enumerate(moved)}
-    matrix = np.eye(len(moved))
-    for (one, other), coefficient in pairs.items():
-        first, second = place[one], place[other]
+    matrix = np.eye(len(paths))
+    for first, second, coefficient in pairs:
         matrix[first, second] = matrix[second, first] = coefficient
     try:
-        lower = np.linalg.cholesky(matrix)
+        lower = np.linalg.cholesky(matrix[np.ix_(moved, moved)])
     except np.linalg.LinAlgError:
         raise InputError(
             "correlations: the coefficients contradict each other (their matrix is not positive "

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.choice import OneOf
+from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.correlation import Correlation
@@ -18,7 +19,6 @@ from ringsim.sampling.designs.family import Design, Factor
 from ringsim.sampling.distributions.family import Distribution
 from ringsim.sampling.paths import each_of, field_at, refuse_fixed, unit_at
 from ringsim.scene import Scene, place_of
-from ringsim.variables import COORDINATES, VARIABLES
 
 AnyDistribution = Annotated[Distribution, OneOf()]
 AnyDesign = Annotated[Design, OneOf()]
@@ -68,7 +68,7 @@ def draw(
     drawn = design.table(factors, correlations, seed=seed, folder=folder)
     samples = len(next(iter(drawn.values()))) if drawn else getattr(design, "samples", 1)
     columns: list[Column] = []
-    taken = set(VARIABLES) | {c.name for c in COORDINATES}
+    taken = {*VARIABLES, *COORDINATES}
     for path in inputs or drawn:
         refuse_fixed(base, path)
         grouped = path in inputs and inputs[path].each_section
@@ -79,8 +79,12 @@ def draw(
             raise InputError(f"inputs: {path} would be named {column.name}, which is taken")
         taken.add(column.name)
         columns.append(column)
-    if error_bars_every:
-        columns.append(_error_bars(columns, samples, error_bars_every))
+    if every := error_bars_every:
+        path = "solver.error_bars"
+        if any(column.path == path for column in columns):
+            raise InputError(f"error_bars_every = {every}: {path} is an input, too: leave out one")
+        chosen = np.arange(samples) % every == 0
+        columns.append(Column("solver_error_bars", path, "", "1", f"one sample in {every}", chosen))
     table = Table(tuple(columns), _seeds(seed, samples))
     _check_extremes(base, table)
     return table
@@ -98,15 +102,6 @@ def _column(base: Scene, path: str, values: NDArray[Any], origin: Distribution |
     if values.dtype.kind in "iu" and isinstance(field_at(scene, path), float):
         values = values.astype(float)
     return Column(name, path, dim, unit_at(scene, path), words, values)
-
-
-def _error_bars(columns: Sequence[Column], samples: int, every: int) -> Column:
-    """The input that has one sample in ``every`` state its error bars."""
-    path = "solver.error_bars"
-    if any(column.path == path for column in columns):
-        raise InputError(f"error_bars_every = {every}: {path} is an input already: leave out one")
-    chosen = np.arange(samples) % every == 0
-    return Column(path.replace(".", "_"), path, "", "1", f"one sample in {every}", chosen)
 
 
 def _seeds(seed: int, samples: int) -> NDArray[np.int64]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import StopContact
+from ringsim.variables import Cause, Reason
 
 BEND, PEAK_BEND = 0.05, 0.4
 """Bend of a tension over the largest tension, its root mean square over the run and its value at
@@ -17,6 +18,10 @@ the largest reading)."""
 STEPS = 50
 """Constant steps until the first V-joint locks, at least.  The integrator starts from rest without
 an acceleration, which delays the motion by a third of the first step: by 2/3 % of so many."""
+
+_RECOVERY = 10
+"""Steps after which one that Newton had to shorten doubles, where no stop is ahead: enough for what
+has made Newton fail to pass.  Before stops it stays as it is, or it would fail at the next."""
 
 
 class ConstantSteps:
@@ -28,10 +33,10 @@ class ConstantSteps:
         Wanted next, s.
     """
 
-    def __init__(self, step: float, recovery: float) -> None:
-        """Steps of this length (s); one that was shortened doubles after ``recovery`` steps."""
+    def __init__(self, step: float, recover: bool) -> None:
+        """Steps of this length (s), which may recover it after they were shortened."""
         self.step = self._full = self._last = step
-        self._recovery, self._since = recovery, 0
+        self._since, self._recovery = 0, _RECOVERY if recover else math.inf
 
     def advance(self, now: Instant, stops: StopContact) -> None:
         """Let a shortened step grow again."""
@@ -45,7 +50,7 @@ class ConstantSteps:
         return min(self.step, left)
 
 
-def unresolved(run: list[Instant], slack_tension: float | None) -> str:
+def unresolved(run: list[Instant], slack_tension: float | None) -> Reason:
     """Why constant steps have not resolved a run; empty if they have.  Bends below the slack
     tension (N; None without cables) do not matter.
 
@@ -61,13 +66,14 @@ def unresolved(run: list[Instant], slack_tension: float | None) -> str:
     times, angles = np.array([(one.time, one.angles.max()) for one in run]).T
     first = int(np.argmax(angles >= math.pi))
     if 0 < first < STEPS:
-        return (
+        return Reason(
+            Cause.FEW_STEPS,
             f"the first V-joint locked within {first} steps, at {times[first]:.3g} s, fewer than "
             f"{STEPS} of constant length: reduce solver.step, or let it follow the motion "
-            '(solver.step_control = "motion")'
+            '(solver.step_control = "motion")',
         )
     if len(times) < 3 or slack_tension is None:
-        return ""
+        return Reason()
     tensions = np.array([one.tensions for one in run])
     steps = np.diff(times)[:, None]
     bends = np.abs(np.diff(np.diff(tensions, axis=0) / steps, axis=0))
@@ -80,10 +86,11 @@ def unresolved(run: list[Instant], slack_tension: float | None) -> str:
         (there, PEAK_BEND, f"at {times[peak]:.6g} s, where it is largest"),
     ):
         if bend > max(share * largest, slack_tension):
-            return (
+            return Reason(
+                Cause.TENSION_BENDS,
                 f"a tension bends by {bend:.3g} N within a step {where}, "
                 f"{100.0 * bend / largest:.3g} % of its largest value and more than "
                 f"{100.0 * share:g} %: the steps do not resolve how the rope swings: "
-                "reduce solver.step"
+                "reduce solver.step",
             )
-    return ""
+    return Reason()

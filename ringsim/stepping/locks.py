@@ -18,15 +18,8 @@ _APART = 1e-3
 
 
 class StopContact(NamedTuple):
-    """V-joints at their stops: what is coming and what is there.
-
-    Attributes
-    ----------
-    time_to_next, rate_of_next
-        Time until the first free V-joint meets a stop at its present rate, and that rate; s
-        (infinite if none will) and rad/s.
-    resting_rate
-        Largest rate of a V-joint that has locked and is near its stop, rad/s; 0 if none is.
+    """Time (s) until the first free V-joint meets a stop at its present rate, and that rate
+    (rad/s); the largest rate of a V-joint that has locked and is near its stop.
     """
 
     time_to_next: float = math.inf
@@ -47,9 +40,7 @@ class Locks:
     """
 
     def __init__(self, angles: Array, stowed_angle: float | None) -> None:
-        """Begin with these opening angles (rad, shape (planes, sections)); the stowed stop is at
-        ``stowed_angle`` (rad), None without stops.
-        """
+        """Begin with these opening angles (rad); the stowed stop's is None without stops."""
         self.stops = stowed_angle is not None
         self._stowed_angle = stowed_angle or 0.0
         self.deployed, self.stowed = np.zeros((2, *angles.shape), dtype=bool)

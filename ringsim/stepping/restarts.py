@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,25 +10,18 @@ import numpy as np
 
 from ringsim.parts.solver import Solver
 from ringsim.stepping.instant import Array
-from ringsim.variables import COUNTS, TIMINGS, Outcome, Status
+from ringsim.variables import COUNTS, TIMINGS, Cause, Outcome, Status
+
+Solve = Callable[[Solver], Outcome]
+"""Runs a scene with these settings; it never raises."""
+ErrorBars = Callable[..., dict[str, Array]]
+"""As ``ringsim.outputs.error_bars``: of a run and another with steps half or twice as long, its
+``tolerance`` and the ``scale`` of their differences; empty if one did not reach its goal."""
 
 
-def run_with_restarts(
-    solve: Callable[[Solver], Outcome],
-    solver: Solver,
-    error_bars: Callable[..., dict[str, Array]],
-) -> Outcome:
-    """A run that starts anew with smaller steps while that may help.
-
-    Parameters
-    ----------
-    solve
-        Runs the scene with these settings; it never raises.
-    solver
-        The scene's settings: ``restarts`` new starts at most, ``error_bars`` if wanted.
-    error_bars
-        As ``ringsim.theory.error_bars``: those of a run from another with steps half or twice as
-        long, its ``tolerance`` and the ``scale`` of their differences.
+def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Outcome:
+    """A run that starts anew with smaller steps while that may help, at most ``solver.restarts``
+    times, and has error bars where ``solver.error_bars`` asks for them.
 
     Returns
     -------
@@ -37,58 +31,54 @@ def run_with_restarts(
         ``total_steps``, ... count those of all starts.
     """
     used, outcome, restarts = solver, solve(solver), 0
-    first, totals = outcome.reason, _counts(outcome)
+    first, totals = outcome, _counts(outcome)
     while restarts < solver.restarts and _curable(outcome, solver):
         restarts += 1
         used = solver.refined(restarts)
         outcome = solve(used)
-        totals = {name: totals[name] + count for name, count in _counts(outcome).items()}
+        totals.update(_counts(outcome))
         how = f"start {restarts + 1} with solver.step = {used.step:.3g} s"
         if used.step_control != "constant":
             how += f" and solver.tolerance = {used.tolerance:.2g}"
-        outcome = replace(outcome, reason=f"{outcome.reason} ({how}; start 1: {first})")
+        # A start that only ran out of its smaller steps does not say what is wrong.
+        cause = first.cause if outcome.cause is Cause.STEP_LIMIT else outcome.cause
+        reason = f"{outcome.reason} ({how}; start 1: {first.reason})"
+        outcome = replace(outcome, reason=reason, cause=cause)
     if solver.error_bars and outcome.status == Status.OK:
         outcome = _with_bars(outcome, solve, used, error_bars)
     found = {
         "restarts": restarts,
         "step_used": used.step,
         "tolerance_used": used.tolerance if used.step_control == "motion" else np.nan,
-        **{f"total_{name}": count for name, count in totals.items()},
+        **{f"total_{name}": totals[name] for name in COUNTS},
     }
     outcome.values.update({name: np.array(value) for name, value in found.items()})
     return outcome
 
 
-def _with_bars(
-    outcome: Outcome,
-    solve: Callable[[Solver], Outcome],
-    solver: Solver,
-    error_bars: Callable[..., dict[str, Array]],
-) -> Outcome:
+def _with_bars(outcome: Outcome, solve: Solve, used: Solver, error_bars: ErrorBars) -> Outcome:
     """The outcome of a run at these settings with its error bars, or why it has none."""
     reasons = []
     # Runs of second order with steps twice as long are apart by (4 - 1) of the error, with steps
     # half as long by (1 - 1/4) of it: a difference that counts four times.
     for words, factor, scale in (("twice as long", 2.0, 1.0), ("half as long", 0.5, 4.0)):
-        found = solve(solver.scaled(factor))
+        found = solve(used.scaled(factor))
         # Times count from the beginning: those of the last run hold for all.
-        spent = {name: found.values[name] for name in TIMINGS if name in found.values}
-        outcome.values.update(spent)
-        added = error_bars(outcome, found, tolerance=solver.tolerance, scale=scale)
-        if added:
-            outcome.values.update(added)
+        outcome.values.update({n: found.values[n] for n in TIMINGS if n in found.values})
+        bars = error_bars(outcome, found, tolerance=used.tolerance, scale=scale)
+        if bars:
+            outcome.values.update(bars)
             return outcome
         reasons.append(f"with steps {words} it ended as {found.status.word}: {found.reason}")
     return replace(outcome, reason=f"{outcome.reason}; no error bars, since {'; '.join(reasons)}")
 
 
-def _counts(outcome: Outcome) -> dict[str, int]:
+def _counts(outcome: Outcome) -> Counter[str]:
     """What one start of a run took; 0 where it ended too early to tell."""
-    return {name: int(outcome.values.get(name, np.array(0))) for name in COUNTS}
+    return Counter({name: int(outcome.values.get(name, 0)) for name in COUNTS})
 
 
 def _curable(outcome: Outcome, solver: Solver) -> bool:
     """Whether smaller steps may help: not where there were too many of them already."""
-    if outcome.status not in (Status.SOLVER_FAILED, Status.DIVERGED):
-        return False
-    return int(outcome.values.get("steps", np.array(0))) < solver.step_limit
+    failed = outcome.status in (Status.SOLVER_FAILED, Status.DIVERGED)
+    return failed and _counts(outcome)["steps"] < solver.step_limit

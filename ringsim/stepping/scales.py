@@ -43,21 +43,14 @@ def reference_rate(acceleration: float, travel: float, end_time: float) -> float
     return max(math.sqrt(0.5 * abs(acceleration) * travel), travel / end_time)
 
 
-def contact_step(inertia: float, stiffness: float) -> float:
-    """A twentieth of the period in s of two halves (kg m^2) on the spring of a stop (N m/rad): a
-    bounce takes half a period, and its length is right to (w h)^2 / 12 = 0.8 %.
+def swing_step(inertia: float, stiffness: float, steps: int) -> float:
+    """Step in s that takes so many to the period 2 pi sqrt(I / k) of a swing (kg m^2, N m/rad).
+
+    20 for a bounce on a stop: the period is right to (w h)^2 / 12 = 0.8 %.  50 for ropes: a winch
+    that starts at once throws the structure into its swing on them, often with the largest tension
+    of the run, and the first V-joint moves before the others, that is faster than the period says.
     """
-    return 2.0 * math.pi * math.sqrt(inertia / stiffness) / 20.0
-
-
-def rope_step(inertia: float, stiffness: float) -> float:
-    """A fiftieth of the period in s of the stowed structure on its taut ropes; inertia and
-    stiffness after the opening angle, kg m^2 and N m/rad.
-
-    A winch that starts at once throws the structure into that swing, often with the largest tension
-    of the run; the first V-joint moves before the others, so that it is faster than this period.
-    """
-    return 2.0 * math.pi * math.sqrt(inertia / stiffness) / 50.0
+    return 2.0 * math.pi * math.sqrt(inertia / stiffness) / steps
 
 
 def residual_tolerance(share: float, drive: float, stiffest: float, unknowns: int) -> float:

@@ -27,15 +27,8 @@ class Journal:
     """An append-only file with one writer.
 
     A record is complete or, if the writer was killed within it, recognised as torn and ignored.
-
-    Parameters
-    ----------
-    folder
-        The campaign's folder.
-    campaign
-        Identity of the campaign: its checksums are right for this campaign only.
-    writer
-        Share of the samples that this process runs, and its number among those that run it.
+    Its checksum is right for this campaign only.  The writer is named after its share of the
+    samples, and its number among the processes that run it.
     """
 
     def __init__(self, folder: Path, campaign: str, writer: str) -> None:

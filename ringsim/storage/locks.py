@@ -23,16 +23,10 @@ _LOCK_TRIES, _LOCK_PAUSE = 10, 0.1
 
 @contextlib.contextmanager
 def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[bool]:
-    """Hold an advisory lock; gives False at once if another process holds it.
+    """Hold an advisory lock; gives False at once if another process holds it, or else waits.
 
-    Parameters
-    ----------
-    path
-        The file that carries the lock; created if it is not there.
-    shared
-        Whether others may hold it at the same time, shared as well.
-    wait
-        Wait until nobody else holds it.
+    The file that carries the lock is created if it is not there.  A shared lock may be held by
+    others at the same time, shared as well.
 
     Raises
     ------

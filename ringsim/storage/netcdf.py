@@ -9,33 +9,30 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import known_or_nearest
 from ringsim.storage.result import MISSING_COUNT
 from ringsim.units import Model
-from ringsim.variables import COORDINATES, VARIABLES, Status, Variable
+from ringsim.variables import Variable, flags_of
 
 NOT_RUN = -1
-"""Value of ``status`` for samples that have not been run."""
+"""Value of ``status`` for samples that have not been run, and of codes that are missing."""
 
 CHUNK_BYTES = 1 << 20
 """Size of what is compressed at once, about."""
 
-COORDINATE = {
-    v.name: v
-    for v in (Variable("sample", ("sample",), "1", "sample of the campaign", "i8"), *COORDINATES)
-}
+SAMPLE = Variable("sample", ("sample",), "1", "sample of the campaign", "i8")
 
 PER_SAMPLE = {
     v.name: v
     for v in (
         VARIABLES["status"],
+        VARIABLES["cause"],
         Variable("reason", (), "1", "why the run ended so", "str"),
         Variable("log", (), "1", "end of what a failed run printed", "str"),
     )
 }
 """What is known of every sample beside its outputs."""
-
-Digits = Annotated[int, Field(ge=1, le=15)]
 
 
 class Output(Model):
@@ -47,7 +44,7 @@ class Output(Model):
 
     compression: Annotated[int, Field(ge=0, le=9)] = 4
     """Level of zlib; 0 stores plain numbers."""
-    significant_digits: dict[str, Digits] = Field(default_factory=dict)
+    significant_digits: dict[str, Annotated[int, Field(ge=1, le=15)]] = Field(default_factory=dict)
     """Decimal digits that are kept, by variable; the rest is rounded away before compression."""
     leave_out: list[str] = Field(default_factory=list)
     """Output variables that the merged file does not hold."""
@@ -63,65 +60,55 @@ class Output(Model):
 
 def add_coordinate(file: Any, name: str, values: NDArray[Any]) -> None:
     """Create a dimension with its coordinate variable in an open netCDF4 dataset."""
-    definition = COORDINATE[name]
     file.createDimension(name, len(values))
-    text = definition.dtype == "str"
-    variable = file.createVariable(name, str if text else definition.dtype, (name,))
-    variable.long_name = definition.long_name
-    if not text:
-        variable.units = definition.units
+    variable = _create(file, COORDINATES.get(name, SAMPLE), (name,))
     if name == "sample":
         variable.standard_name = "realization"
-    variable[:] = values.astype(object) if text else values
+    variable[:] = values.astype(object) if values.dtype.kind == "U" else values
 
 
 def add_variable(
     file: Any, definition: Variable, *, compression: int, digits: int | None = None
 ) -> None:
-    """Create a variable over ``sample`` and its own dimensions.
+    """Create a variable over ``sample`` and its own dimensions, which the file has.
 
-    Parameters
-    ----------
-    file
-        An open netCDF4 dataset that has the dimensions.
-    definition
-        Name, dimensions, units and meaning.
-    compression
-        Level of zlib (with shuffle); 0 for none.
-    digits
-        Significant decimal digits to keep.
+    Compression is a level of zlib, 0 for none; digits are the significant decimal ones to keep.
     """
     dims = ("sample", *definition.dims)
-    shape = tuple(file.dimensions[dim].size for dim in dims)
-    text = definition.dtype == "str"
     options: dict[str, Any] = {}
-    if not text:
-        row = math.prod(shape[1:]) * np.dtype(definition.dtype).itemsize
-        rows = max(1, min(shape[0], CHUNK_BYTES // max(1, row)))
-        options["chunksizes"] = (rows, *(max(1, n) for n in shape[1:]))
-        if definition.name != "status":  # whose "not_run" is a value like others
+    if definition.dtype != "str":
+        samples, *shape = (file.dimensions[dim].size for dim in dims)
+        row = max(1, math.prod(shape) * np.dtype(definition.dtype).itemsize)
+        rows = max(1, min(samples, CHUNK_BYTES // row))
+        options["chunksizes"] = (rows, *(max(1, n) for n in shape))
+        if definition.flags is None:  # a missing code has a word like others
             options["fill_value"] = blank(definition, ())[()]
         if compression:
             options |= {"compression": "zlib", "complevel": compression, "shuffle": True}
         if definition.dtype.startswith("f") and digits is not None:
             options |= {"significant_digits": digits, "quantize_mode": "GranularBitRound"}
-    variable = file.createVariable(
-        definition.name, str if text else definition.dtype, dims, **options
-    )
+    variable = _create(file, definition, dims, **options)
     variable.set_auto_maskandscale(False)
+    if definition.flags is not None:
+        flags = flags_of(definition.flags)
+        missing = "not_run" if definition.name == "status" else "unknown"
+        variable.flag_values = np.append(np.int8(NOT_RUN), flags["flag_values"])
+        variable.flag_meanings = f"{missing} {flags['flag_meanings']}"
+
+
+def _create(file: Any, definition: Variable, dims: tuple[str, ...], **options: Any) -> Any:
+    text = definition.dtype == "str"
+    kind = str if text else definition.dtype
+    variable = file.createVariable(definition.name, kind, dims, **options)
     variable.long_name = definition.long_name
     if not text:
         variable.units = definition.units
-    if definition.name == "status":
-        variable.flag_values = np.array([NOT_RUN, *Status], dtype="i1")
-        variable.flag_meanings = " ".join(["not_run", *(s.word for s in Status)])
+    return variable
 
 
 def blank(definition: Variable, shape: tuple[int, ...]) -> NDArray[Any]:
     """An array of missing values."""
     if definition.dtype == "str":
         return np.full(shape, "", dtype=object)
-    if definition.name == "status":
-        return np.full(shape, NOT_RUN, dtype="i1")
     kind = np.dtype(definition.dtype)
     return np.full(shape, np.nan if kind.kind == "f" else MISSING_COUNT, dtype=kind)

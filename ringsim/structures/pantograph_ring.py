@@ -11,11 +11,11 @@ from pydantic import Field, model_validator
 
 from ringsim.choice import kind_of
 from ringsim.layout.bodies import Lump
-from ringsim.layout.draft import BodyRef, Draft, RodRef, Track
+from ringsim.layout.draft import Draft
 from ringsim.layout.layout import Layout
-from ringsim.parts.persection import spread
 from ringsim.structures.family import Structure
-from ringsim.structures.ring_geometry import Fold, RingGeometry
+from ringsim.structures.pantograph_sections import add_sections
+from ringsim.structures.ring_geometry import RingGeometry
 from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
 
 LEAST_HINGE_OFFSET = 1e-6
@@ -147,6 +147,18 @@ class PantographRing(Structure):
         """See ``Structure``: a bar half."""
         return self.half_bar
 
+    def geometry(self) -> RingGeometry:
+        """The ideal ring."""
+        return RingGeometry.of_polygon(
+            self.sections,
+            closed=self.closed,
+            polygon_sections=self.polygon,
+            aspect_ratio=self.aspect_ratio,
+            half_bar=self.half_bar,
+            half_diagonal=self.half_diagonal,
+            hinge_offset=self.hinge_offset,
+        )
+
     def describe(self) -> dict[str, str]:
         """See ``Structure``."""
         geometry = self.geometry()
@@ -192,94 +204,8 @@ class PantographRing(Structure):
         cube = self.corner_mass * self.hinge_size**2 / 6.0 * np.eye(3)
         hinge = Lump("hinges", self.corner_mass, np.zeros(3), cube)
         draft.corners = [[draft.body(at, [hinge]) for at in plane] for plane in fold.corners]
-        self.add_sections(draft, geometry, fold, draft.corners)
+        add_sections(draft, geometry, fold, draft.corners, self.vjoint_mass)
         return draft.finish()
-
-    def add_sections(
-        self,
-        draft: Draft,
-        geometry: RingGeometry,
-        fold: Fold,
-        corners: list[list[BodyRef]],
-        first_plane: int = 0,
-    ) -> None:
-        """Rods, joints and cable tracks of every section, between hinge assemblies.
-
-        Parameters
-        ----------
-        fold
-            Where they are, at a complex coordinate.
-        corners
-            Hinge assemblies by plane and corner.
-        first_plane
-            Number of the upper plane; the lower one follows it.
-        """
-        up = np.array([0.0, 0.0, 1.0])
-        young = spread(draft.scene.rods.young_modulus, geometry.sections)
-        tracks: tuple[list[Any], list[Any]] = ([], [])
-        for section in range(geometry.sections):
-            self._add_section(draft, geometry, fold, corners, section, float(young[section]),
-                              first_plane, tracks)  # fmt: skip
-        for plane, sense in enumerate((1.0, -1.0)):
-            draft.tracks[first_plane + plane] = Track(tracks[plane], -sense * up)
-
-    def _add_section(
-        self,
-        draft: Draft,
-        geometry: RingGeometry,
-        fold: Fold,
-        corners: list[list[BodyRef]],
-        section: int,
-        young: float,
-        first_plane: int,
-        tracks: tuple[list[Any], list[Any]],
-    ) -> None:
-        rods, normal = draft.scene.rods, geometry.normals[section]
-        left, right = fold.left[:, section], fold.right[:, section]
-        following = (section + 1) % len(corners[0])
-
-        def rod(name: str, ends: tuple[Any, Any], halves: int) -> RodRef:
-            stations = [k / (halves * rods.elements) for k in range(halves * rods.elements + 1)]
-            group, tube = ("diagonals", rods.diagonal) if halves == 2 else ("bars", rods.bar)
-            return draft.rod(name, section, group, ends, normal, tube, stations, young)
-
-        def hinge(part: RodRef, plane: int, corner: int, at: Any) -> None:
-            draft.joint("revolute", "hinge", section, (part, corners[plane][corner]), at)
-
-        rising = rod("diagonal_rising", (left[1], right[0]), 2)
-        falling = rod("diagonal_falling", (left[0], right[1]), 2)
-        hinge(rising, 1, section, left[1])
-        hinge(rising, 0, following, right[0])
-        hinge(falling, 0, section, left[0])
-        hinge(falling, 1, following, right[1])
-        draft.joint("revolute", "pivot", section, (rising, falling), fold.pivots[section])
-        for plane, (name, sense) in enumerate((("upper", 1.0), ("lower", -1.0))):
-            at = fold.vjoints[plane, section]
-            first = rod(f"bar_{name}_left", (left[plane], at), 1)
-            second = rod(f"bar_{name}_right", (at, right[plane]), 1)
-            hinge(first, plane, section, left[plane])
-            hinge(second, plane, following, right[plane])
-            joint = draft.joint("revolute", "vjoint", section, (first, second), at)
-            draft.opening(first_plane + plane, joint, sense, [0.0, 0.0, sense])
-            if self.vjoint_mass > 0.0:
-                draft.add_mass(first, -1, self.vjoint_mass)
-            tracks[plane].extend([
-                draft.on(corners[plane][section], left[plane]),
-                section,
-                draft.on(corners[plane][following], right[plane]),
-            ])  # fmt: skip
-
-    def geometry(self) -> RingGeometry:
-        """The ideal ring."""
-        return RingGeometry.of_polygon(
-            self.sections,
-            closed=self.closed,
-            polygon_sections=self.polygon,
-            aspect_ratio=self.aspect_ratio,
-            half_bar=self.half_bar,
-            half_diagonal=self.half_diagonal,
-            hinge_offset=self.hinge_offset,
-        )
 
 
 def _size(geometry: RingGeometry, phi: float) -> str:

@@ -19,7 +19,7 @@ from scipy.interpolate import BPoly
 from ringsim.cable.ropes import Ropes
 from ringsim.scene import Scene
 from ringsim.theory.ideal_motion import IdealMotion
-from ringsim.variables import Status
+from ringsim.variables import Cause, Status
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,8 @@ class Course:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self.motion = scene, IdealMotion(scene)
-        self.status, self.reason, self.lock_time = Status.UNFINISHED, "", math.nan
+        self.status, self.cause, self.reason = Status.UNFINISHED, Cause.NONE, ""
+        self.lock_time = math.nan
         self.pieces: list[Piece] = []
         self.evaluations, self.jacobians = 0, 0
         self._time, self._state = 0.0, self.motion.start()
@@ -108,10 +109,13 @@ class Course:
                 for fault in (fault for fault in faults if fault.time == mark):
                     self._state = self.motion.strike(fault, self._time, self._state)
         except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+            too_long = self.evaluations > MOST_EVALUATIONS
             self.status = Status.SOLVER_FAILED
+            self.cause = Cause.STEP_LIMIT if too_long else Cause.NEWTON
             self.reason = f"the ideal ring's solver gave up at {self._time:.6g} s: {error}"
         if self.status == Status.UNFINISHED:
             joints = 2 * self._scene.structure.sections
+            self.cause = Cause.END_TIME
             self.reason = (
                 f"solver.end_time = {self._scene.solver.end_time:g} s was reached with 0 of "
                 f"{joints} V-joints locked"

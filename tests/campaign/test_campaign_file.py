@@ -68,7 +68,7 @@ def test_example_in_the_readme_can_be_drawn(tmp_path):
         ("seed = 3", "seed = -3", "seed = -3 must be at least 0"),
         ("seed = 3", "seed = 3.5", "whole number"),
         ('name = "good"', 'name = "a/b"', "name"),
-        ('"ring18"', '"ring19"', "there is no file.*did you mean ring18"),
+        ('"ring18"', '"ring19"', r"scene: .*ring19: no such file.*did you mean ring18"),
         ('kind = "random"', 'kind = "randon"', "did you mean random"),
         ("samples = 4", "samples = 0", r"design\.samples = 0 must be at least 1"),
         ("samples = 4", "sample = 4", "sample"),
@@ -82,6 +82,7 @@ def test_example_in_the_readme_can_be_drawn(tmp_path):
         ("[inputs]", "[limits]\nmemory = 1\n[inputs]", r"limits\.memory"),
         ("[inputs]", "[retry]\ntimes = 2\n[inputs]", "retry is not a known key .*solver.restarts"),
         ("[inputs]", "[output]\ncompression = 10\n[inputs]", "compression = 10"),
+        ("[inputs]", "[output]\nshard_samples = 8\n[inputs]", "shard_samples is not.*journals"),
         ("seed = 3", "seed = 3\nmax_failed = -1", "max_failed = -1"),
         (
             "[inputs]",

@@ -36,7 +36,7 @@ def guard() -> Watching:
 
 
 def after(work: float, created: float) -> Energies:
-    """Everything that the loads put in moves, and what came from nothing besides."""
+    """Everything that the loads put in moves, and what time integration added besides."""
     return Energies(work + created, 0.0, work, 0.0)
 
 
@@ -50,7 +50,7 @@ def test_a_balanced_motion_goes_on_and_is_sound() -> None:
 
 @pytest.mark.parametrize(("factor", "sign"), [(GAIN, 1.0), (LOSS, -1.0)])
 def test_energy_that_comes_or_goes_stops_the_run_at_its_bound(factor, sign) -> None:
-    """X is the work where energy is lost, and the kinetic energy where it came from nothing."""
+    """X is the work where energy is lost, and the kinetic energy where it was added."""
     share = sign * factor * TOLERANCE
     exact = share / (1.0 - share) if sign > 0.0 else share
     assert guard().judge(1.0, after(1.0, 0.999 * exact), 0.0) == ""
@@ -67,7 +67,7 @@ def test_a_run_that_ends_with_too_large_an_imbalance_is_not_sound(created) -> No
     assert watching.judge(1.0, after(1.0, created), 0.0) == ""
     assert watching.judge(2.0, after(1.0, 0.0), 0.0) == ""
     assert cause_of(watching.verdict()) == ("energy grew" if created > 0.0 else "energy lost")
-    assert "until 1 s" in watching.verdict()
+    assert "up to 1 s" in watching.verdict()
 
 
 def test_an_early_imbalance_is_small_beside_all_that_follows() -> None:

@@ -174,17 +174,17 @@ def test_constant_steps_without_locks_run_to_the_end_time() -> None:
     assert control.reason == "the cable was wound until solver.end_time = 4 s"
 
 
-@pytest.mark.parametrize(("recovery", "grown"), [(3, [2, 4]), (math.inf, [1, 1])])
-def test_a_shortened_constant_step_grows_again_if_it_may(recovery: float, grown: list) -> None:
+@pytest.mark.parametrize(("locking", "grown"), [(False, [0.2, 0.4]), (True, [0.1, 0.1])])
+def test_a_shortened_constant_step_grows_again_where_no_stop_is_ahead(locking, grown) -> None:
     solver = Solver(step_control="constant", step=0.4)
-    control = control_of(motion := Motion(), solver, locking=False, recovery=recovery)
+    control = control_of(motion := Motion(), solver, locking=locking)
     assert control.next_step() == 0.4
     steps = [control.retry(0.1)]
-    for _ in range(7):
+    for _ in range(20):
         control.accept(motion.at(control.now.time + steps[-1]))
         steps.append(control.next_step())
-    assert steps[:3] == [0.1] * 3
-    assert [steps[3], steps[6]] == pytest.approx([0.1 * factor for factor in grown])
+    assert steps[:10] == [0.1] * 10
+    assert [steps[10], steps[20]] == pytest.approx(grown)
 
 
 def test_the_next_step_starts_from_what_a_fault_has_left() -> None:

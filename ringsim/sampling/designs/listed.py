@@ -52,28 +52,27 @@ class Listed(Design):
 
 
 def _from_csv(path: Path) -> dict[str, NDArray[Any]]:
-    rows = [row for row in csv.reader(read_text(path).splitlines()) if row]
+    lines = csv.reader(read_text(path).splitlines())
+    rows = [[word.strip() for word in row] for row in lines if row]
     if not rows:
         return {}
-    header = [name.strip() for name in rows[0]]
+    header, *rows = rows
     for name in header:
         if not name or header.count(name) > 1:
             raise InputError(
                 f"design.file = {path.name}: column name {name!r} must be a scene path, once"
             )
-    for number, row in enumerate(rows[1:], start=1):
+    for number, row in enumerate(rows, start=1):
         if len(row) != len(header):
             raise InputError(
                 f"design.file = {path.name}: row {number} has {len(row)} values and must have "
                 f"{len(header)}, one per column"
             )
-    return {
-        name: _typed([row[column].strip() for row in rows[1:]])
-        for column, name in enumerate(header)
-    }
+    columns = zip(*rows, strict=True) if rows else [()] * len(header)
+    return {name: _typed(words) for name, words in zip(header, columns, strict=True)}
 
 
-def _typed(words: list[str]) -> NDArray[Any]:
+def _typed(words: Sequence[str]) -> NDArray[Any]:
     """Whole numbers, numbers, true and false, or words: the narrowest that fits the column."""
     if words and all(word in ("true", "false") for word in words):
         return np.array([word == "true" for word in words])

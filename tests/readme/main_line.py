@@ -1,0 +1,32 @@
+"""The commands of the README's main line, run in a folder as a user would run them."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def commands() -> list[list[str]]:
+    """What the line calls ringsim with, once it is installed."""
+    block = re.search(r"<!-- main -->\n```sh\n(.*?)```", README, re.DOTALL)
+    assert block is not None
+    parts = [shlex.split(command) for command in block[1].split("&&")]
+    return [part[1:] for part in parts if part[0].endswith("bin/ringsim")]
+
+
+def run(arguments: list[str], folder: Path) -> str:
+    """Run ringsim in a folder; returns what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-m", "ringsim", *arguments],
+        cwd=folder, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout

@@ -1,0 +1,110 @@
+"""The README's main line does what it says: a simulation with figures, then a small campaign.
+
+The simulation runs as it stands: half a minute at most, for a whole ring of 18 sections and its
+figures.  Of the campaign's samples two are run, which differ by their inputs alone.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+from matplotlib.lines import Line2D
+
+from main_line import ROOT, commands, run
+from ringsim.plots.asynchrony import asynchrony
+from ringsim.plots.opening_angles import opening_angles
+
+FIGURES = {"opening_angles", "asynchrony", "ring", "energy"}
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the first command."""
+    folder: Path = tmp_path_factory.mktemp("main")
+    verb, *arguments = commands()[0]
+    assert (verb, arguments) == ("run", ["ring18", "--plot"])
+    printed = run([verb, *arguments], folder)
+    written = re.findall(r"^wrote (.+)$", printed, re.MULTILINE)
+    assert {(folder / name).is_file() for name in written} == {True}
+    return folder
+
+
+@pytest.fixture(scope="module")
+def dataset(ran: Path) -> xr.Dataset:
+    (file,) = ran.rglob("*.nc")
+    with xr.open_dataset(file) as found:
+        return found.load()
+
+
+def test_the_ring_of_18_sections_deploys_when_the_paper_says(dataset: xr.Dataset) -> None:
+    assert int(dataset["status"]) == 0
+    assert dataset.sizes["section"] == 18
+    # Paper 002, case 1; the stowed angle was calibrated on it with rigid rods.
+    assert float(dataset["deployment_time"]) == pytest.approx(17.58, abs=0.01)
+    assert float(dataset["energy_error"]) < 1e-2
+    assert float(dataset["constraint_error"]) < 1e-6
+
+
+def test_every_figure_is_drawn_and_not_blank(ran: Path) -> None:
+    pictures = list(ran.rglob("*.png"))
+    names = {path.stem for path in pictures}
+    assert {figure for figure in FIGURES if any(figure in name for name in names)} == FIGURES
+    for path in pictures:
+        pixels = imread(path)[..., :3]
+        assert min(pixels.shape[:2]) > 300
+        inked = np.any(pixels != pixels[0, 0], axis=-1)
+        assert 0.01 < inked.mean() < 0.9, path.name
+        # Axes, curves and words reach across the picture, and are of several colours.
+        rows, columns = np.flatnonzero(inked.any(axis=1)), np.flatnonzero(inked.any(axis=0))
+        assert np.ptp(rows) > 0.7 * pixels.shape[0], path.name
+        assert np.ptp(columns) > 0.7 * pixels.shape[1], path.name
+        assert len(np.unique((pixels * 7.0).astype(int).reshape(-1, 3), axis=0)) > 5, path.name
+
+
+def curves(figure: Figure) -> list[np.ndarray]:
+    """All that is drawn as a curve: points of shape (number, 2)."""
+    lines = [line.get_xydata() for line in figure.findobj(Line2D)]
+    bundles = [bundle.get_segments() for bundle in figure.findobj(LineCollection)]
+    found = [np.asarray(curve) for curve in [*lines, *(c for bundle in bundles for c in bundle)]]
+    return [curve for curve in found if len(curve) > 9]
+
+
+def shows(figure: Figure, series: xr.DataArray) -> bool:
+    """Whether one of the curves is the series, as far as it is drawn: to the deployment."""
+    points = np.stack([series["time"].values, series.values], axis=-1)
+    return any(
+        len(curve) > 0.9 * np.isfinite(series).sum()
+        and np.allclose(curve, points[: len(curve)], equal_nan=True)
+        for curve in curves(figure)
+    )
+
+
+def test_figures_show_the_curves_of_the_run(dataset: xr.Dataset) -> None:
+    angles = opening_angles(dataset)
+    for plane in dataset["plane"].values:
+        for section in dataset["section"].values:
+            assert shows(angles, dataset["opening_angle"].sel(plane=plane, section=section))
+    assert shows(asynchrony(dataset), dataset["asynchrony"])
+
+
+def test_the_campaign_of_the_main_line_runs(tmp_path: Path) -> None:
+    verb, file, *options = commands()[1]
+    text = (ROOT / file).read_text(encoding="utf-8")
+    reduced = re.sub(r"samples = \d+", "samples = 2", text)
+    assert reduced != text
+    (tmp_path / Path(file).name).write_text(reduced, encoding="utf-8")
+    run([verb, Path(file).name, *options], tmp_path)
+    (merged,) = tmp_path.rglob("campaign.nc")
+    with xr.open_dataset(merged) as campaign:
+        assert campaign.sizes["sample"] == 2
+        assert (campaign["status"] == 0).all()
+        assert (campaign["asynchrony_max"] > 0.0).all()
+        one, two = campaign["asynchrony_max"].values
+        assert one != two
