@@ -59,8 +59,6 @@ class IdealCables:
         (points, 3, functions), m.
     ropes
         Which spans form one rope; ``strike`` changes them.
-    spans
-        Of the longest cable.
     answering
         Cable and end (0 first, 1 far) of the winches with feedback: their rope and speed are
         states of the motion.
@@ -81,7 +79,6 @@ class IdealCables:
         released = np.eye(mechanism.freedom)[0] * scene.structure.coordinate
         start = mechanism.configuration(released, 0.0 * released)
         self.ropes = self._chain.start(self.paths @ start.values)
-        self.spans = scene.spans
         self._slip = min(cable.slip_speed_over(scene.pulleys_of(cable)) for cable in self._cables)
         self._winches = {
             (number, end): winch

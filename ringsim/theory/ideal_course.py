@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from scipy.interpolate import BPoly
 
 from ringsim.cable.ropes import Ropes
 from ringsim.scene import Scene
@@ -187,7 +186,7 @@ class Course:
 
     def _judge(self) -> None:
         """Locks and ends."""
-        phi, rate = float(self._state[0]), float(self._state[self.motion.rate_of_phi])
+        phi, rate = float(self._state[0]), float(self._state[self.motion.mechanism.freedom])
         stop = self._scene.stop
         if math.isnan(self.lock_time) and phi <= 0.0 and rate < 0.0:
             self.lock_time = self._time - phi / rate
@@ -210,19 +209,3 @@ class Course:
         if pull is not None and pull.chain.strains.max() > 1.0:
             return "a winch has wound up its whole rope (limit its winding law, or stop it)"
         return "the step became too small"
-
-
-def quintic(times: Array, values: Array, bends: Array) -> BPoly:
-    """Curve through values with their first two derivatives at times.
-
-    Parameters
-    ----------
-    times
-        Shape (n,).
-    values
-        Value and first derivative, shape (n, 2, ...).
-    bends
-        Second derivative, shape (n, ...).
-    """
-    known = np.concatenate([values, np.expand_dims(bends, 1)], axis=1)
-    return BPoly.from_derivatives(times, known)

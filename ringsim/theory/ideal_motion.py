@@ -101,11 +101,6 @@ class IdealMotion:
             state[self._up] = UP
         return state
 
-    @property
-    def rate_of_phi(self) -> int:
-        """Place of phi' in a state."""
-        return self.mechanism.freedom
-
     def instant(self, time: float, state: Array) -> Instant:
         """Evaluate everything at a state.
 

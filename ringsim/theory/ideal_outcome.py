@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import BPoly, CubicHermiteSpline
 
 from ringsim.cable.state import ChainState
 from ringsim.outputs.cable_tension import CableTension
@@ -18,7 +18,7 @@ from ringsim.outputs.recorder import outputs_of, reduced, spanned
 from ringsim.outputs.series import Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
-from ringsim.theory.ideal_course import Course, Piece, quintic
+from ringsim.theory.ideal_course import Course, Piece
 from ringsim.variables import COUNTS, Fidelity, Outcome
 
 Array = NDArray[np.float64]
@@ -124,14 +124,12 @@ class _IdealRun:
             motion.cables.ropes = piece.ropes
         times, states = np.array(piece.times), np.array(piece.states)
         found = np.repeat(states[:1], len(where), axis=0)
-        keep = np.append(True, np.diff(times) > 0.0)
-        if keep.sum() > 1 and len(where):
-            times, states, rates = times[keep], states[keep], np.array(piece.rates)[keep]
-            turn = motion.rate_of_phi
+        if len(times) > 1 and len(where):
+            rates, n = np.array(piece.rates), motion.mechanism.freedom
             found = CubicHermiteSpline(times, states, rates)(where)
-            both = np.stack([states[:, :turn], states[:, turn : 2 * turn]], axis=1)
-            curve = quintic(times, both, rates[:, turn : 2 * turn])
-            found[:, :turn], found[:, turn : 2 * turn] = curve(where), curve.derivative()(where)
+            known = np.stack([states[:, :n], states[:, n : 2 * n], rates[:, n : 2 * n]], axis=1)
+            quintic = BPoly.from_derivatives(times, known)
+            found[:, :n], found[:, n : 2 * n] = quintic(where), quintic.derivative()(where)
         return [self._told(float(t), y) for t, y in zip(where, found, strict=True)]
 
     def _told(self, time: float, state: Array) -> Reading:
@@ -139,7 +137,7 @@ class _IdealRun:
         motion = self._course.motion
         now = motion.instant(time, state)
         work = now.acting.work - self._lifted + state[-1]
-        opening, rate = math.pi - 2.0 * state[0], -2.0 * state[motion.rate_of_phi]
+        opening, rate = math.pi - 2.0 * state[0], -2.0 * state[motion.mechanism.freedom]
         return Reading(
             time,
             np.full(self._shape, opening),
