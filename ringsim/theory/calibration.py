@@ -59,8 +59,7 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         if high == _WIDEST:
             raise InputError(
                 f"a deployment time of {time:g} s is too short: from {_WIDEST:g} deg the ideal "
-                "ring takes longer, or it does not open at all: check loads, cables, net and "
-                "friction"
+                "ring takes longer or never opens: check loads, cables, net and friction"
             )
         low, slow, high = high, fast, min(0.5 * (high + 180.0), _WIDEST)
         fast = excess(high)

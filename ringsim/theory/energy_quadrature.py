@@ -44,29 +44,22 @@ def opening_time(
     ------
     ValueError
         If the ring does not reach ``phi_end`` because the work done turns negative before.
-
     """
-    fine = _integrate(ring, phi_start, phi_end, panels)
-    coarse = _integrate(ring, phi_start, phi_end, panels // 2)
+    fine, coarse = (_integrate(ring, phi_start, phi_end, n) for n in (panels, panels // 2))
     return OpeningTime(fine, abs(fine - coarse))
 
 
 def _integrate(ring: OneCoordinate, phi_start: float, phi_end: float, panels: int) -> float:
-    span = phi_start - phi_end
-    work_start = ring.work(phi_start)
-    total = 0.0
-    for panel in range(panels):
-        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-            u = (panel + 0.5 + 0.5 * node) / panels
-            phi = phi_start - span * u**2
-            gained = ring.work(phi) - work_start
-            if gained <= 0.0:
-                raise ValueError(
-                    f"the ring does not open: at an opening angle of "
-                    f"{180.0 - 2.0 * np.degrees(phi):.2f} deg the work done is {gained:.3g} J"
-                )
-            slope = 2.0 * abs(span) * u
-            total += (
-                0.5 * weight / panels * slope * np.sqrt(ring.motion(phi).inertia / 2.0 / gained)
+    span, work_start, total = phi_start - phi_end, ring.work(phi_start), 0.0
+    places = (np.arange(panels)[:, None] + 0.5 + 0.5 * _NODES) / panels
+    for u, weight in zip(places.ravel(), np.tile(0.5 * _WEIGHTS / panels, panels), strict=True):
+        phi = phi_start - span * u**2
+        gained = ring.work(phi) - work_start
+        if gained <= 0.0:
+            raise ValueError(
+                f"the ring does not open: at an opening angle of "
+                f"{180.0 - 2.0 * np.degrees(phi):.2f} deg the work done is {gained:.3g} J"
             )
+        slowness = np.sqrt(ring.motion(phi).inertia / 2.0 / gained)
+        total += weight * 2.0 * abs(span) * u * slowness
     return float(total)

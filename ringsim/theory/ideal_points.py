@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ringsim.cable.sheaves import FixedSheave
 from ringsim.layout.bodies import Mount, OnBody
@@ -56,7 +56,7 @@ class Points:
     """
 
     def __init__(self, scene: Scene, at: float | None = None) -> None:
-        self.basis = scene.structure.basis if at is None else _alone
+        self.basis = scene.structure.basis if at is None else lambda _: np.eye(3, 2)
         nodes = NODES if at is None else (at,)
         self._layouts = [layout_of(scene, q) for q in nodes]
         self._known = np.concatenate([self.basis(q)[:2] for q in nodes])
@@ -90,7 +90,7 @@ class Points:
         return np.moveaxis(found.reshape(len(found), *values.shape[1:]), 0, -1)
 
     def swung(self, read: Callable[[Layout], Pairs], bodies: Iterable[int]) -> Array:
-        """Coefficients of points, those on swinging bodies with their swings.
+        """Coefficients of points that are read, with the swings of their bodies.
 
         Parameters
         ----------
@@ -114,34 +114,25 @@ class Points:
             more[own, :, 2 * number], more[own, :, 2 * number + 1] = across, ahead
         return np.concatenate([rigid, more], axis=-1)
 
-    def functions(self, place: ArrayLike, rate: ArrayLike) -> Array:
-        """The functions s, their derivatives after p = (q, psi), and two more columns.
-
-        These are ds/dt at the rates p', and d^2s/dt^2 where the rates are constant.
-
-        Parameters
-        ----------
-        place, rate
-            p and p', shape (1 + swinging,), rad and rad/s.
+    def functions(self, p: Array, w: Array) -> Array:
+        """The functions s at p = (q, psi) with its rates w, both of shape (n,), rad and rad/s.
 
         Returns
         -------
         Array
-            Shape (functions, 1 + len(p) + 2).
+            s, its n derivatives after p, ds/dt, and d^2s/dt^2 with these rates constant; shape
+            (functions, n + 3).
         """
-        p, w = np.asarray(place, dtype=float), np.asarray(rate, dtype=float)
         s = self.basis(float(p[0]))
         first, swings = s.shape[1], np.arange(len(self.swinging))
         found = np.zeros((first + 2 * len(swings), len(p) + 3))
         found[:first, :2] = s[:2].T
-        found[:first, -2:] = (s[1:].T) * [w[0], w[0] ** 2]
-        cosine, sine, spin = np.cos(p[1:]), np.sin(p[1:]), w[1:]
-        for rows, value, slope in (
-            (first + 2 * swings, cosine, -sine),
-            (first + 2 * swings + 1, sine, cosine),
-        ):
+        found[:first, -2:] = s[1:].T * [w[0], w[0] ** 2]
+        cosine, sine = np.cos(p[1:]), np.sin(p[1:])
+        for k, value, slope in ((first, cosine, -sine), (first + 1, sine, cosine)):
+            rows = k + 2 * swings
             found[rows, 0], found[rows, 2 + swings] = value, slope
-            found[rows, -2], found[rows, -1] = spin * slope, -(spin**2) * value
+            found[rows, -2], found[rows, -1] = w[1:] * slope, -(w[1:] ** 2) * value
         return found
 
     def masses(self) -> tuple[Array, Array]:
@@ -196,11 +187,6 @@ class Points:
 def body_of(mount: Mount) -> int:
     """Number of a mount's body; -1 on rods and in space."""
     return mount.body if isinstance(mount, OnBody) else -1
-
-
-def _alone(q: float) -> Array:
-    del q
-    return np.eye(3, 2)
 
 
 def _stacked(pairs: Iterable[Sequence[Array]]) -> Pairs:
