@@ -15,8 +15,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.errors import held
+from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
-from ringsim.variables import VARIABLES, Status
+from ringsim.variables import Status
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -150,20 +149,6 @@ class IdealCables:
     def strike(self, fault: CableFault, state: ChainState) -> None:
         """Let a fault change the ropes."""
         self.ropes = fault.strike(self.ropes, state)
-
-    def tensions(self, state: ChainState) -> Array:
-        """Tensions by cable and span, N, shape (cables, spans); NaN beyond a cable's last span."""
-        found = np.full((len(self.planes), self.spans), np.nan)
-        edges = self.ropes.cable_starts
-        for number, (first, end) in enumerate(pairwise(edges)):
-            found[number, : end - first] = state.tensions[first:end]
-        return found
-
-    def stretches(self, state: ChainState) -> Array:
-        """Path less natural length of the rope at each cable's first winch, m; -1 if it is cut."""
-        first = self.ropes.first
-        alive = self.ropes.alive[first]
-        return np.where(alive, (state.paths - state.natural)[first], -1.0)
 
     def _wind(self, time: float, points: Array, velocities: Array, motors: Array) -> ChainState:
         """The chain with its winches' ropes and speeds."""

@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from ringsim.cable.ropes import Ropes
 from ringsim.scene import Scene
 from ringsim.theory.ideal_motion import IdealMotion
-from ringsim.variables import Status
+from ringsim.variables import Cause, Status
 
 Array = NDArray[np.float64]
 
@@ -76,6 +76,7 @@ class Course:
     motion: IdealMotion
     status: Status = Status.UNFINISHED
     reason: str = ""
+    cause: Cause = Cause.NONE
     lock_time: float = math.nan
     pieces: list[Piece] = field(default_factory=list)
     evaluations: int = 0
@@ -113,11 +114,12 @@ class Integration:
                 for fault in (fault for fault in faults if fault.time == mark):
                     self._state = self._motion.strike(fault, self._time, self._state)
         except _TooLongError:
-            self._fail(f"it took more than {MOST_EVALUATIONS} evaluations")
+            self._fail(f"it took more than {MOST_EVALUATIONS} evaluations", Cause.STEP_LIMIT)
         except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
             self._fail(str(error))
         if self.course.status == Status.UNFINISHED:
             joints = 2 * self._scene.structure.sections
+            self.course.cause = Cause.END_TIME
             self.course.reason = (
                 f"solver.end_time = {self._scene.solver.end_time:g} s was reached with 0 of "
                 f"{joints} V-joints locked"
@@ -252,9 +254,9 @@ class Integration:
             return "a winch has wound up its whole rope (limit its winding law, or stop it)"
         return "the step became too small"
 
-    def _fail(self, cause: str) -> None:
-        self.course.status = Status.SOLVER_FAILED
-        self.course.reason = f"the ideal ring's solver gave up at {self._time:.6g} s: {cause}"
+    def _fail(self, why: str, cause: Cause = Cause.NEWTON) -> None:
+        self.course.status, self.course.cause = Status.SOLVER_FAILED, cause
+        self.course.reason = f"the ideal ring's solver gave up at {self._time:.6g} s: {why}"
 
 
 def _above(curve: BPoly, level: float, time: float) -> float:

@@ -21,7 +21,7 @@ from ringsim.scene import Scene
 from ringsim.theory.faded_friction import with_remark
 from ringsim.theory.ideal_course import Integration
 from ringsim.theory.ideal_outcome import to_outcome
-from ringsim.variables import Outcome, Status
+from ringsim.variables import Cause, Outcome, Status
 
 _LIGHT_HUB = 1e-3
 """Largest mass of the net's hub over the ring's."""
@@ -95,9 +95,10 @@ def run_ideal(scene: Scene) -> Outcome:
     wall, cpu = time.perf_counter(), time.process_time()
     with np.errstate(all="ignore"):
         try:
-            outcome = to_outcome(Integration(scene).run(), scene, wall_time=0.0, cpu_time=0.0)
+            outcome = to_outcome(Integration(scene).run(), scene)
         except ValueError as error:  # the cables have no answer at the very start
-            outcome = Outcome(Status.SOLVER_FAILED, f"the ideal ring has no answer: {error}")
+            reason = f"the ideal ring has no answer: {error}"
+            outcome = Outcome(Status.SOLVER_FAILED, reason, cause=Cause.REFUSED)
     outcome.values["wall_time"] = np.array(time.perf_counter() - wall)
     outcome.values["cpu_time"] = np.array(time.process_time() - cpu)
     return with_remark(outcome, scene)
