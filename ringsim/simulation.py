@@ -31,22 +31,15 @@ __all__ = ["FIDELITIES", "run", "run_ideal", "simulate"]
 
 
 def run(scene: Scene) -> Outcome:
-    """Build and integrate a scene.
-
-    Parameters
-    ----------
-    scene
-        What to simulate.  A run that fails or diverges starts anew with smaller steps, at most
-        ``solver.restarts`` times.
+    """Build and integrate a scene; one that fails or diverges starts anew with smaller steps.
 
     Returns
     -------
     Outcome
         Arrays on the scene's output grid, of the last start, and what
-        ``ringsim.stepping.restarts`` adds on the starts.  Times are those of all starts.  A solve
-        that fails or does not reach its goal has a status other than OK and the reason; it never
-        raises.  With ``solver.error_bars`` it holds the error bars of its main numbers, and the
-        times (not the counts) of both runs.
+        :func:`ringsim.stepping.restarts.run_with_restarts` adds on the starts; times are those of
+        all of them and of the second run for error bars.  A solve that fails or does not reach its
+        goal has a status other than OK and the reason; it never raises.
     """
     begin = (time.perf_counter(), time.process_time())
 

@@ -102,9 +102,11 @@ class Integration:
         if self._fresh:
             solver.it.currentStepSize = control.next_step(self._built.faults.next_time)
             self._fresh = False
-            if cables is not None and self._chain is not None:
-                now = control.now
-                cables.advance(now.time, self._chain, self._path_slopes(now.angles))
+            if cables is not None and self._chain is not None and self._scene.cables is not None:
+                now, present = control.now, self._scene.cables.present()
+                slope = self._scene.structure.path_slope
+                slopes = [slope(cable, now.angles[plane]) for plane, cable in present]
+                cables.advance(now.time, self._chain, np.array(slopes))
         else:
             solver.it.currentStepSize = control.retry(solver.it.currentStepSize)
         self._weighed, self._refused = None, False
@@ -175,12 +177,6 @@ class Integration:
         gap = max(float(group.gaps(state).max()) for group in self._gaps)
         tensions = None if self._chain is None else self._chain.tensions
         return Instant(time, angles, rates, energies, gap, tensions)
-
-    def _path_slopes(self, angles: Array) -> Array:
-        """Derivative of each cable's ideal path length after the opening angle, m/rad."""
-        cables, structure = self._scene.cables, self._scene.structure
-        present = [] if cables is None else cables.present()
-        return np.array([structure.path_slope(cable, angles[plane]) for plane, cable in present])
 
     def _refusal(self) -> str:
         """What the cables could not answer, if that is why a step failed."""

@@ -25,13 +25,7 @@ has made Newton fail to pass.  Before stops it stays as it is, or it would fail 
 
 
 class ConstantSteps:
-    """Steps of one length, shortened only where Newton fails.
-
-    Attributes
-    ----------
-    step
-        Wanted next, s.
-    """
+    """Steps of one length, shortened only where Newton fails; ``step`` is the next wanted, s."""
 
     def __init__(self, step: float, recover: bool) -> None:
         """Steps of this length (s), which may recover it after they were shortened."""

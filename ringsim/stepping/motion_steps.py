@@ -10,7 +10,7 @@ import numpy as np
 from ringsim.parts.solver import Solver
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import StopContact
-from ringsim.stepping.repeats import FALL, GROWTH, SHORTEST
+from ringsim.stepping.repeats import GROWTH
 from ringsim.stepping.scales import Scales
 
 _LOCAL_ERROR = 0.1
@@ -23,13 +23,12 @@ _AT = 1e-4
 """Tolerance at which ``_DEPTH``, ``Scales.contact_step`` and the distance of readings hold; the
 first two go with its square root, as all steps do."""
 _DEPTH = math.radians(0.05)
-"""Angle by which a V-joint may pass its stop within one step, at the tolerance ``_AT``."""
+"""Angle by which a V-joint may pass its stop within one step, at the tolerance ``_AT``.  On a ring
+of 6 sections with cables four times as much moves the largest asynchrony by 2 % and trebles the
+energy error; a quarter of it moves the asynchrony by 0.5 %."""
 _FIRST = 20.0
 """The first step is ``solver.step`` over this at most: generalised-alpha starts from rest without
 an acceleration, which delays the motion by a third of the first step."""
-_APPROACH = 0.02
-"""Largest first step over the time to the first stop, as it is chosen without knowing the motion: a
-winch may take a ring that is nearly open to its stops within it."""
 
 
 class MotionSteps:
@@ -42,12 +41,7 @@ class MotionSteps:
     hardly moves yet would ask for tiny steps.  The ratio |a'''| / |a'| fades over its own time
     scale, so that a passage of a''' through zero does not open the step.  Towards the end of the
     travel the step shrinks so that a V-joint meets its stop with a small one, the smaller the
-    faster it comes, and so it stays until it rests.
-
-    Attributes
-    ----------
-    step
-        Wanted next, s.
+    faster it comes, and so it stays until it rests.  ``step`` is the one wanted next, s.
     """
 
     def __init__(self, solver: Solver, scales: Scales) -> None:
@@ -80,12 +74,6 @@ class MotionSteps:
         if left <= self.step or left >= 2.0 * self.step:
             return min(self.step, left)
         return 0.5 * left
-
-    def shorter_first(self, step: float, stops: StopContact) -> float | None:
-        """A smaller first step in s, where this one leads too close to a stop; else None."""
-        if self._past or step <= SHORTEST * self._solver.step:
-            return None
-        return FALL * step if step > _APPROACH * (step + stops.time_to_next) else None
 
     def _from_motion(self) -> float:
         t2, r2 = self._past[-1]
