@@ -21,18 +21,13 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
-import os
 import pickle
-import resource
-import signal
 import statistics
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from checkout import Checkout
 from random_scenes import random_scene
 
 BUILT_IN = ("ring18", "ring18-cable", "truss2", "planar-truss")
@@ -49,73 +44,6 @@ FLOORS = {"degree": 1e-6, "N": 1e-6, "J": 1e-9, "m": 1e-9, "s": 1e-6, "Pa": 1.0,
 """Least scale of a relative difference by unit: what is smaller is round-off throughout."""
 BARS = {"lock_time": "deployment_time_error"}
 """Error bars of outputs whose bar does not bear their name."""
-
-
-def answer() -> None:
-    """Read a scene a line on standard input, write what it gave: what a checkout's process does."""
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what the solver prints must not mix with the answers
-    import ringsim
-
-    for line in sys.stdin:
-        entry, begin = json.loads(line), time.process_time()
-        if "limit" in entry:  # above it the system ends this process
-            limit = int(begin + entry["limit"]) + 1
-            resource.setrlimit(resource.RLIMIT_CPU, (limit, resource.RLIM_INFINITY))
-        found: dict[str, Any] = {"home": str(Path(str(ringsim.__file__)).parents[1])}
-        try:
-            scene = ringsim.load_scene(entry["scene"]).with_values(entry["values"])
-            dataset = ringsim.simulate(scene, entry["fidelity"])
-            found["cpu"] = time.process_time() - begin
-            status = int(dataset["status"])
-            found["status"] = str(dataset["status"].attrs["flag_meanings"]).split()[status]
-            found["reason"] = dataset.attrs["reason"]
-            found["values"] = {str(n): (v.dims, v.values) for n, v in dataset.data_vars.items()}
-            found["units"] = {str(n): v.attrs.get("units") for n, v in dataset.data_vars.items()}
-            found["times"] = dataset["time"].values if "time" in dataset else np.zeros(0)
-        except Exception as error:
-            found |= {"status": "refused", "reason": f"{type(error).__name__}: {error}"}
-            found |= {"values": {}, "units": {}, "cpu": time.process_time() - begin}
-        pickle.dump(found, answers)
-        answers.flush()
-
-
-class Checkout:
-    """A process that solves scenes with the ringsim of one checkout."""
-
-    def __init__(self, tree: Path) -> None:
-        self.tree = tree.resolve()
-        self.start()
-
-    def start(self) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, __file__, "answer"],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-            env=os.environ | {"PYTHONPATH": str(self.tree)}, cwd=self.tree,
-        )  # fmt: skip
-        for fidelity in ("full", "ideal"):  # imports are no part of the first scene's time
-            short = {"solver.end_time": 0.1, "record.interval": 0.1}
-            found = self.solve({"scene": "truss2", "values": short, "fidelity": fidelity})
-        if Path(found["home"]) != self.tree:
-            raise SystemExit(f"{self.tree}: its process found ringsim in {found['home']}")
-
-    def solve(self, entry: dict[str, Any]) -> dict[str, Any]:
-        stdin, stdout = self.process.stdin, self.process.stdout
-        assert stdin is not None and stdout is not None  # noqa: PT018
-        try:
-            stdin.write(json.dumps(entry).encode() + b"\n")
-            stdin.flush()
-            found: dict[str, Any] = pickle.load(stdout)
-            return found
-        except (EOFError, BrokenPipeError):
-            code = self.process.wait()
-            self.start()
-            status = "too dear" if code == -signal.SIGXCPU else "crashed"
-            return {"status": status, "reason": f"exit code {code}", "values": {}, "units": {},
-                    "cpu": float("nan")}  # fmt: skip
-
-    def close(self) -> None:
-        self.process.communicate()
 
 
 def built_in() -> list[dict[str, Any]]:
@@ -279,7 +207,6 @@ def compare_times(asked: argparse.Namespace) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     verbs = parser.add_subparsers(dest="verb", required=True)
-    verbs.add_parser("answer", help="used by the other verbs")
     one = verbs.add_parser("run", help="solve scenes with one checkout")
     one.add_argument("--tree", type=Path, required=True)
     one.add_argument("--out", type=Path, required=True)
@@ -297,10 +224,7 @@ def main() -> None:
         verb.add_argument("--scenes-from", type=Path, required=verb is times)
         verb.add_argument("--only", default="", help="scenes whose name holds this word")
     asked = parser.parse_args()
-    if asked.verb == "answer":
-        answer()
-    else:
-        {"run": run, "compare": compare, "compare-times": compare_times}[asked.verb](asked)
+    {"run": run, "compare": compare, "compare-times": compare_times}[asked.verb](asked)
 
 
 if __name__ == "__main__":

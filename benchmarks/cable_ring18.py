@@ -19,8 +19,8 @@ import numpy as np
 
 from ringsim.engine.build import build
 from ringsim.engine.cables import CableDrive
-from ringsim.engine.history import History
 from ringsim.engine.integrate import Integration
+from ringsim.outputs.recorder import Recorder
 from ringsim.scene import Scene, load_scene
 
 
@@ -64,7 +64,7 @@ class Clock:
             self.spent += time.thread_time_ns() - start
 
 
-def timed(scene: Scene, *, dense: bool) -> tuple[float, float, History]:
+def timed(scene: Scene, *, dense: bool) -> tuple[float, float, Recorder]:
     """Processor time per second of motion, share of the cable's Python part, and the run."""
     force, jacobian = Clock(CableDrive._force), Clock(CableDrive._jacobian)
     if dense:
@@ -81,7 +81,7 @@ def timed(scene: Scene, *, dense: bool) -> tuple[float, float, History]:
     return spent / history.times[-1], (force.spent + jacobian.spent) * 1e-9 / spent, history
 
 
-def mean_angle(history: History) -> float:
+def mean_angle(history: Recorder) -> float:
     """Mean opening angle at the end, deg."""
     return float(np.degrees(np.mean(history.angles[-1])))
 
@@ -89,7 +89,7 @@ def mean_angle(history: History) -> float:
 def main(seconds: float, repetitions: int = 2) -> None:
     scene = load_scene("ring18-cable").with_values({"solver.end_time": seconds})
     plain = scene.with_values({"solver.step_control": "constant", "solver.step": 0.04})
-    runs: dict[str, list[tuple[float, float, History]]] = {"ours": [], "plain": []}
+    runs: dict[str, list[tuple[float, float, Recorder]]] = {"ours": [], "plain": []}
     for _ in range(repetitions):
         runs["ours"].append(timed(scene, dense=False))
         runs["plain"].append(timed(plain, dense=True))

@@ -11,7 +11,7 @@ output: how often the bar covers the error, and the ratios of bar to error; of t
 time, at the output time where its bar is worst.
 
 What every scene gave is kept in the file (runs/error-bars-FIRST.json) as it comes; scenes that are
-there are not run again, so that other factors (ringsim/theory/error_bars.py) are judged at once.
+there are not run again, so that other factors (``ErrorBar`` in ringsim/outputs) are judged at once.
 ``--fit`` prints the factors that suit these scenes; judge them by scenes that they have not seen.
 """
 
@@ -28,9 +28,9 @@ from typing import Any
 
 import numpy as np
 
+from ringsim.outputs.error_bars import bar, differences, largest, rules
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
-from ringsim.theory.error_bars import SAFETY, bar, differences, largest
 from ringsim.variables import Outcome, Status
 
 TRUTHS = ((100.0, 2), (36.0, 2), (36.0, 1), (9.0, 1))
@@ -214,7 +214,7 @@ def summarise(rows: list[dict[str, Any]]) -> None:
     print("\n| output | scenes | median error | covered | bar over error, median | within 10 |")
     print("|---|---|---|---|---|---|")
     every = []
-    for name in SAFETY:
+    for name in rules():
         table = columns(good, name)
         if table.size == 0:
             print(f"| {name} | 0 | | | | |")
@@ -232,11 +232,11 @@ def fit(rows: list[dict[str, Any]]) -> None:
     """Print the factors that cover enough errors and exceed them the least (log mean).
 
     Besides the difference of two runs a bar may hold a share of the value: that of one element,
-    which falls with their square (``OF_ONE_ELEMENT``), or one that goes with the tolerance.
+    which falls with their square (``of_one_element``), or one that goes with the tolerance.
     """
     print("\n| output | safety | share of the value | covered | median | within 10 | log excess |")
     print("|---|---|---|---|---|---|---|")
-    for name in SAFETY:
+    for name in rules():
         table = columns(rows, name)
         if table.size == 0:
             continue

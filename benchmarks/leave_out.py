@@ -19,10 +19,10 @@ import numpy as np
 
 from ringsim.choice import kind_of
 from ringsim.engine.build import build
+from ringsim.outputs.error_bars import differences, error_bars
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
-from ringsim.theory.error_bars import differences, error_bars
 from ringsim.variables import Outcome, Status
 
 PATIENCE = 4

@@ -53,17 +53,20 @@ def kind_of(record: Model) -> str:
 
 
 def leaves_of(family: type[Model]) -> list[type[Model]]:
-    """The kinds of a family in the order of their classes' names; one may extend another."""
+    """The kinds of a family in the order of their classes' names; the class itself if none.
+
+    A kind has a ``kind`` of its own, so that one may extend another.
+    """
     package, _, file = family.__module__.rpartition(".")
     if file == "family":
-        _load(package)
+        load_package(package)
     own = [family] if "kind" in family.__annotations__ else []
     below = [kind for sub in family.__subclasses__() for kind in leaves_of(sub)]
-    return sorted(own + below, key=lambda kind: kind.__name__)
+    return sorted(own + below, key=lambda kind: kind.__name__) or [family]
 
 
 @functools.cache
-def _load(package: str) -> None:
+def load_package(package: str) -> None:
     """Import every module of a package, so that all kinds that it holds are known."""
     inside = importlib.import_module(package).__path__
     for module in pkgutil.walk_packages(inside, f"{package}."):

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ringsim.choice import kind_of
 from ringsim.files import require_place, whole, writing
+from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.outputs.family import axes, holds
 from ringsim.scene import Scene
-from ringsim.variables import COORDINATES, RODS, VARIABLES, Fidelity, Outcome, Status, Variable
+from ringsim.variables import Fidelity, Outcome, Variable, flags_of
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
 _MISSING_COUNT = -1
@@ -37,31 +38,32 @@ def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
     Returns
     -------
     xr.Dataset
-        Variables of ``ringsim.variables`` with ``units`` and ``long_name``; ``status`` is an
-        int8 with CF flags; the global attribute ``reason`` says in words how the run ended.
+        Variables of ``ringsim.outputs`` with ``units`` and ``long_name``; ``status`` and ``cause``
+        are int8 with CF flags; the global attribute ``reason`` says in words how the run ended.
 
     Raises
     ------
     ValueError
-        If the outcome holds a name that ``ringsim.variables`` does not know, or an array whose
-        shape does not fit its dimensions.
+        If the outcome holds a name that no output declares, or an array whose shape does not fit
+        its dimensions.
     """
     unknown = sorted(set(outcome.values) - set(VARIABLES))
     if unknown:
         raise ValueError(f"variables without a definition: {', '.join(unknown)}")
-    axes = _axes(outcome, scene)
+    known, held = axes(scene) | outcome.coordinates, holds(scene)
+    found = outcome.values | {"status": np.array(outcome.status), "cause": np.array(outcome.cause)}
     arrays: dict[str, xr.DataArray] = {}
     for name, variable in VARIABLES.items():
-        if name == "status":
-            arrays[name] = _status(outcome.status)
-        elif name in outcome.values:
-            arrays[name] = _array(variable, outcome.values[name])
-            arrays[name].attrs.update(_meaning(name, scene))
-        elif "time" not in variable.dims and _wanted(variable, scene):
-            shape = tuple(len(axes[dim]) for dim in variable.dims)
+        if name in found:
+            arrays[name] = _array(variable, found[name])
+            # Of another structure a variable may mean something else than of a ring.
+            words = scene.structure.long_names.get(name, variable.long_name)
+            arrays[name].attrs["long_name"] = words
+        elif "time" not in variable.dims and held.issuperset(variable.needs):
+            shape = tuple(len(known.get(dim, ())) for dim in variable.dims)
             arrays[name] = _array(variable, np.full(shape, np.nan))
     used = {dim for array in arrays.values() for dim in array.dims}
-    coordinates = {v.name: _array(v, axes[v.name]) for v in COORDINATES if v.name in used}
+    coordinates = {n: _array(v, known[n]) for n, v in COORDINATES.items() if n in used & set(known)}
     return xr.Dataset(arrays, coords=coordinates, attrs=_attributes(outcome, scene))
 
 
@@ -95,36 +97,9 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
         )
 
 
-def _wanted(variable: Variable, scene: Scene) -> bool:
-    """Whether a scene asks for what a variable says."""
-    holds = {"": True, "stress": scene.record.stress, "cables": scene.cables is not None}
-    bars = scene.solver.error_bars
-    holds |= {f"error bars of {part}": bars and there for part, there in holds.items() if part}
-    holds["error bars"] = bars
-    holds[kind_of(scene.structure)] = True
-    return holds.get(variable.needs, False)
-
-
-def _meaning(name: str, scene: Scene) -> dict[str, str]:
-    """Attributes by which a variable of this structure differs from the ring's."""
-    words = scene.structure.long_names.get(name)
-    return {} if words is None else {"long_name": words}
-
-
-def _axes(outcome: Outcome, scene: Scene) -> dict[str, np.ndarray[Any, Any]]:
-    """Values of every dimension; the outcome's own where it has them."""
-    known: dict[str, np.ndarray[Any, Any]] = {
-        "plane": np.array(scene.structure.planes),
-        "section": np.arange(1, scene.structure.sections + 1),
-        "rod": np.array(RODS),
-        "time": np.empty(0),
-    }
-    return known | outcome.coordinates
-
-
 def _array(variable: Variable, values: np.ndarray[Any, Any]) -> xr.DataArray:
     values = np.asarray(values)
-    attributes = {"long_name": variable.long_name}
+    attributes: dict[str, Any] = {"long_name": variable.long_name}
     if variable.dtype != "str":
         attributes["units"] = variable.units
         whole = np.issubdtype(np.dtype(variable.dtype), np.integer)
@@ -134,14 +109,9 @@ def _array(variable: Variable, values: np.ndarray[Any, Any]) -> xr.DataArray:
         raise ValueError(
             f"{variable.name} has shape {values.shape}, but its dimensions are {variable.dims}"
         )
+    if variable.flags is not None:
+        attributes |= flags_of(variable.flags)
     return xr.DataArray(values, dims=variable.dims, attrs=attributes)
-
-
-def _status(status: Status) -> xr.DataArray:
-    array = _array(VARIABLES["status"], np.array(int(status)))
-    array.attrs["flag_values"] = np.array([int(s) for s in Status], dtype="i1")
-    array.attrs["flag_meanings"] = " ".join(s.word for s in Status)
-    return array
 
 
 def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:

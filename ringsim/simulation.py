@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ringsim.engine.solve import solve
+from ringsim.outputs.error_bars import error_bars
 from ringsim.parts.solver import Solver
+from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.stepping.restarts import run_with_restarts
-from ringsim.theory.error_bars import error_bars
 from ringsim.theory.faded_friction import with_remark
 from ringsim.theory.ideal_fidelity import run_ideal
-from ringsim.variables import Fidelity, Outcome, Status
+from ringsim.variables import Cause, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +62,8 @@ def _attempt(scene: Scene, begin: tuple[float, float]) -> Outcome:
         return outcome
     except Exception as error:  # whatever broke, a campaign goes on and the user learns of it
         traceback.print_exc()  # a campaign keeps it in the sample's log
-        return Outcome(Status.ERROR, f"{type(error).__name__}: {error}")
+        cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
+        return Outcome(Status.ERROR, f"{type(error).__name__}: {error}", cause=cause)
 
 
 FIDELITIES: dict[str, Callable[[Scene], Outcome]] = {"full": run, "ideal": run_ideal}

@@ -1,15 +1,48 @@
-"""The variables of a result: dimensions, units and meaning, in one place."""
+"""What a result is made of: variables with their meaning, and how and why a run ended."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
 
+PLANES = ("upper", "lower")
+RODS = (
+    "diagonal_rising_left", "diagonal_rising_right",
+    "diagonal_falling_left", "diagonal_falling_right",
+    "bar_upper_left", "bar_upper_right", "bar_lower_left", "bar_lower_right",
+)  # fmt: skip
 
-class Status(IntEnum):
+
+COUNTS = ("steps", "newton_iterations", "jacobians")
+"""What a start of a run takes; "total_" before the name counts all starts."""
+
+TIMINGS = ("wall_time", "cpu_time")
+"""The only variables that differ between repetitions of one run."""
+
+
+class Code(IntEnum):
+    """A number in files that stands for a word."""
+
+    @property
+    def word(self) -> str:
+        """Lower-case name, as in the attribute ``flag_meanings``."""
+        return self.name.lower()
+
+
+def flags_of(codes: Iterable[Code]) -> dict[str, Any]:
+    """The CF attributes that tell what codes mean."""
+    words = {int(code): code.word for code in codes}
+    return {
+        "flag_values": np.array(list(words), dtype="i1"),
+        "flag_meanings": " ".join(words.values()),
+    }
+
+
+class Status(Code):
     """How a run ended; negative codes never occur, 0 is the only success."""
 
     OK = 0
@@ -22,14 +55,48 @@ class Status(IntEnum):
     MEMORY = 7
 
     @property
-    def word(self) -> str:
-        """Lower-case name, as in the dataset's flag_meanings."""
-        return self.name.lower()
-
-    @property
     def failed(self) -> bool:
         """Whether the run gave no usable result."""
         return self >= Status.SOLVER_FAILED
+
+
+class Cause(Code):
+    """Why a run did not end well; ``reason`` says it in a sentence, with numbers and the cure."""
+
+    NONE = 0
+    END_TIME = 1
+    BLOW_UP = 2
+    ENERGY_GREW = 3
+    ENERGY_LOST = 4
+    JOINT_GAP = 5
+    STOP_PASSED = 6
+    FEW_STEPS = 7
+    TENSION_BENDS = 8
+    NEWTON = 9
+    STEP_LIMIT = 10
+    NOT_FINITE = 11
+    REFUSED = 12
+    EXCEPTION = 13
+    CRASH = 14
+    TIME_LIMIT = 15
+    MEMORY = 16
+    UNFIT = 17
+
+
+class Reason(str):
+    """A sentence that says why a run ended, with the code of the cause."""
+
+    cause: Cause
+
+    def __new__(cls, cause: Cause = Cause.NONE, text: str = "") -> Reason:
+        """Attach the code to the text."""
+        made = super().__new__(cls, text)
+        made.cause = cause
+        return made
+
+    def __add__(self, more: str) -> Reason:
+        """The same cause with more words."""
+        return Reason(self.cause, f"{self}{more}")
 
 
 class Fidelity(IntEnum):
@@ -40,148 +107,51 @@ class Fidelity(IntEnum):
 
 
 @dataclass(frozen=True)
+class ErrorBar:
+    """How a variable's error bar follows from a second run; see ``ringsim.outputs.error_bars``."""
+
+    words: str
+    """What may be wrong, for the bar's ``long_name``."""
+    safety: float
+    """Bar over the difference of the two runs."""
+    of_one_element: float = 0.0
+    """Share of the value that one element per rod half makes uncertain."""
+    between_readings: float = 0.0
+    """Share of the value over ``solver.tolerance`` that both runs may miss alike."""
+    judged_by: str = ""
+    """Variable whose largest difference counts; the variable itself if empty."""
+
+
+@dataclass(frozen=True)
 class Variable:
-    """Name, dimensions, SI unit (or degree where said) and meaning of one variable."""
+    """One variable of a result: all that files, summaries, figures and messages say of it."""
 
     name: str
     dims: tuple[str, ...]
     units: str
+    """SI, or degree."""
     long_name: str
     dtype: str = "f8"
-    needs: str = ""
-    """What a scene must hold for it: "stress" output, "cables", "error bars" (of one of these), a
-    kind of structure, or nothing."""
-
-
-PLANES = ("upper", "lower")
-RODS = (
-    "diagonal_rising_left", "diagonal_rising_right",
-    "diagonal_falling_left", "diagonal_falling_right",
-    "bar_upper_left", "bar_upper_right", "bar_lower_left", "bar_lower_right",
-)  # fmt: skip
-
-COORDINATES = (
-    Variable("plane", ("plane",), "1", "plane of the ring", "str"),
-    Variable("section", ("section",), "1", "section number, counted from the boom", "i4"),
-    Variable("time", ("time",), "s", "time since the start of the run"),
-    Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
-    Variable("rod", ("rod",), "1", "rod half of a section", "str"),
-    Variable("station", ("station",), "m", "distance along the upper beam from the fixed axis"),
-)
-
-_ALL = (
-    Variable("deployment_time", (), "s", "time at which the last V-joint reached 180 deg"),
-    Variable(
-        "opening_angle", ("plane", "section", "time"), "degree", "angle between the bar halves"
-    ),
-    Variable("lock_time", ("plane", "section"), "s", "time at which the V-joint reached 180 deg"),
-    Variable(
-        "asynchrony", ("time",), "degree", "largest difference of opening angles between V-joints"
-    ),
-    Variable("asynchrony_max", (), "degree", "largest asynchrony up to the deployment time"),
-    Variable(
-        "rod_stress",
-        ("rod", "section", "time"),
-        "Pa",
-        "axial + bending stress of a rod, elastic + viscous",
-    ),
-    Variable(
-        "peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod", needs="stress"
-    ),
-    Variable("cable_tension", ("plane", "span", "time"), "N", "tension of a cable's span"),
-    Variable(
-        "peak_tension",
-        (),
-        "N",
-        "largest tension of any span of any cable up to the deployment time",
-        needs="cables",
-    ),
-    Variable("peak_tension_time", (), "s", "time of the largest tension", needs="cables"),
-    Variable(
-        "slack_duration",
-        ("plane",),
-        "s",
-        "time for which the cable is slack at its winch",
-        needs="cables",
-    ),
-    Variable("wound_length", ("plane", "time"), "m", "rope wound up by the cable's winches"),
-    Variable("cable_length", ("plane", "time"), "m", "length of the driving cable"),
-    Variable(
-        "bending_strain", ("station", "time"), "1", "bending strain of the upper beam's fibre"
-    ),
-    Variable(
-        "peak_bending_strain",
-        (),
-        "1",
-        "largest bending strain of the upper beam at any step",
-        needs="planar-truss",
-    ),
-    Variable("kinetic_energy", ("time",), "J", "kinetic energy"),
-    Variable("elastic_energy", ("time",), "J", "energy stored in rods, net and stops"),
-    Variable("work", ("time",), "J", "work done on the structure by forces and winches"),
-    Variable("dissipation", ("time",), "J", "energy lost in joints, dampers and stops"),
-    Variable("energy_error", (), "1", "largest energy imbalance over the largest energy exchanged"),
-    *(
-        Variable(f"{name}_error", (), units, f"what the {words} may be wrong by", needs=needs)
-        for name, units, words, needs in (
-            ("deployment_time", "s", "deployment time", "error bars"),
-            ("opening_angle", "degree", "opening angles", "error bars"),
-            ("asynchrony_max", "degree", "largest asynchrony", "error bars"),
-            ("peak_tension", "N", "largest tension", "error bars of cables"),
-            ("peak_rod_stress", "Pa", "largest stress", "error bars of stress"),
-        )
-    ),
-    Variable(
-        "asynchrony_error",
-        ("time",),
-        "degree",
-        "what the asynchrony may be wrong by at any time up to then",
-    ),
-    Variable("constraint_violation", ("time",), "m", "largest gap in any joint"),
-    Variable("constraint_error", (), "m", "largest gap in any joint at any step"),
-    Variable("steps", (), "1", "time steps of the start that counts", "i4"),
-    Variable("repeated_steps", (), "1", "steps that were repeated with a smaller one", "i4"),
-    Variable("newton_iterations", (), "1", "Newton iterations of the start that counts", "i4"),
-    Variable("jacobians", (), "1", "Jacobian factorisations of the start that counts", "i4"),
-    Variable("restarts", (), "1", "new starts with a smaller step after a run that failed", "i4"),
-    Variable("total_steps", (), "1", "time steps of all starts of the run", "i4"),
-    Variable("total_newton_iterations", (), "1", "Newton iterations of all starts", "i4"),
-    Variable("total_jacobians", (), "1", "Jacobian factorisations of all starts", "i4"),
-    Variable("step_used", (), "s", "largest step allowed, solver.step, of the start that counts"),
-    Variable("tolerance_used", (), "1", "solver.tolerance of the start that counts"),
-    Variable("final_time", (), "s", "time at which the run ended"),
-    Variable("fidelity", (), "1", "model: 0 full multibody, 1 ideal ring of rigid rods", "i4"),
-    Variable("status", (), "1", "how the run ended", "i1"),
-    Variable("wall_time", (), "s", "elapsed time of the run"),
-    Variable("cpu_time", (), "s", "processor time of the run"),
-)
-VARIABLES = {variable.name: variable for variable in _ALL}
-
-COUNTS = ("steps", "newton_iterations", "jacobians")
-"""What a start of a run takes; "total_" before the name counts all starts."""
-
-TIMINGS = ("wall_time", "cpu_time")
-"""The only variables that differ between repetitions of one run."""
+    needs: tuple[str, ...] = ()
+    """What a scene must hold for it, all of: names of parts ("cables", "net", ...), "stress"
+    output, "error bars", a structure's "gauge" or kind."""
+    flags: type[Code] | None = None
+    """What the values mean where they are codes."""
+    error_bar: ErrorBar | None = None
+    summary: tuple[str, str] | None = None
+    """Label and number format in what ``ringsim run`` prints, if it stands there."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of one run, as plain arrays.
-
-    Attributes
-    ----------
-    status
-        How the run ended.
-    reason
-        One sentence: why it ended, and for a failure what to change.
-    coordinates
-        Values of the dimensions that occur in ``values``.
-    values
-        Arrays by variable name; shapes follow ``VARIABLES`` and ``coordinates``.  A failed run
-        has what was recorded until then, NaN elsewhere.
-    """
+    """The result of one run, as plain arrays."""
 
     status: Status
     reason: str
+    """One sentence: why it ended, and for a failure what to change."""
     coordinates: dict[str, np.ndarray[Any, Any]] = field(default_factory=dict)
+    """Values of the dimensions that occur in ``values``."""
     values: dict[str, np.ndarray[Any, Any]] = field(default_factory=dict)
+    """Arrays by name; shapes follow ``ringsim.outputs.VARIABLES`` and ``coordinates``.  A failed
+    run has what was recorded until then, NaN elsewhere."""
+    cause: Cause = Cause.NONE

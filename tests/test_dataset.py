@@ -10,9 +10,10 @@ import pytest
 import xarray as xr
 
 from ringsim.dataset import save, to_dataset
+from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_table, scene_from_toml
-from ringsim.variables import COORDINATES, RODS, VARIABLES, Outcome, Status
+from ringsim.variables import RODS, Cause, Outcome, Status
 
 TIMES = np.array([0.0, 0.1, 0.25])
 
@@ -42,7 +43,7 @@ def full_outcome(sections: int = 4) -> Outcome:
             values[name] = random.normal(size=shape)
             if variable.dims:
                 values[name][..., -1] = np.nan
-    del values["status"]
+    del values["status"], values["cause"]
     coordinates = {
         "plane": np.array(["upper", "lower"]),
         "section": np.arange(1, sections + 1),
@@ -81,8 +82,8 @@ def test_every_variable_carries_dimensions_units_and_meaning():
         assert dataset[name].dims == variable.dims
         assert dataset[name].attrs["units"] == variable.units
         assert dataset[name].attrs["long_name"] == variable.long_name
-    for coordinate in COORDINATES:
-        assert dataset[coordinate.name].attrs["long_name"] == coordinate.long_name
+    for name, coordinate in COORDINATES.items():
+        assert dataset[name].attrs["long_name"] == coordinate.long_name
     assert dataset.time.attrs["units"] == "s"
     assert dataset.plane.values.tolist() == ["upper", "lower"]
     assert dataset.section.values.tolist() == [1, 2, 3, 4]
@@ -96,7 +97,7 @@ def test_time_stays_a_number_of_seconds(tmp_path):
 
 @pytest.mark.parametrize("status", list(Status))
 def test_status_is_a_flag_with_a_reason(status, tmp_path):
-    dataset = to_dataset(Outcome(status, "because"), scene_of())
+    dataset = to_dataset(Outcome(status, "because", cause=Cause.NEWTON), scene_of())
     read = reopened(dataset, tmp_path / "run.nc")
     flags = read.status.attrs["flag_values"]
     words = read.status.attrs["flag_meanings"].split()
@@ -104,6 +105,8 @@ def test_status_is_a_flag_with_a_reason(status, tmp_path):
     assert flags.dtype == np.int8
     assert words[flags.tolist().index(int(read.status))] == status.word
     assert read.attrs["reason"] == "because"
+    words = dict(zip(read.cause.flag_values, read.cause.flag_meanings.split(), strict=True))
+    assert words[read.cause.item()] == "newton"
 
 
 def test_scene_comes_back_equal_from_the_file(tmp_path):
@@ -130,7 +133,7 @@ def test_crashed_run_has_the_same_scalars_all_missing(tmp_path):
     timeless = {n for n, v in VARIABLES.items() if "time" not in v.dims and not v.needs}
     assert set(read.data_vars) == timeless
     assert read.lock_time.shape == (2, 4)
-    for name in timeless - {"status"}:
+    for name in timeless - {"status", "cause"}:
         assert np.isnan(read[name]).all(), name
     assert np.isnan(read.steps)
 

@@ -15,30 +15,17 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.errors import held
+from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
-from ringsim.variables import VARIABLES, Status
+from ringsim.variables import Cause, Status
 
 Array = NDArray[np.float64]
 
 OK, ENDED, WRONG = "ok", "ended", "wrong"
-OUT_OF_STEPS = "step limit"
-CAUSES = (
-    (OUT_OF_STEPS, "solver.step_limit = "),
-    ("energy grew", "time integration added"),
-    ("energy lost", "time integration lost"),
-    ("blow-up", "blew up"),
-    ("blow-up", "not finite"),
-    ("stop passed", "past its stop"),
-    ("few steps", "the first V-joint locked within"),
-    ("tension bends", "a tension bends by"),
-    ("joint gap", "joints came apart"),
-    ("Newton", "the solver gave up"),
-    ("end time", "solver.end_time = "),
-    ("time limit", "limits.timeout = "),
-    ("memory", "limits.memory = "),
-    ("refused", "InputError"),
-)
-"""Word of a cause, and the words by which a reason names it; the first that occurs counts."""
+_NAMELESS = {Cause.NONE, Cause.EXCEPTION, Cause.CRASH, Cause.UNFIT}
+"""Ends for which ringsim itself is to blame, and none at all: the status says what there is."""
+_WORDS = {Cause.NEWTON: "Newton", Cause.BLOW_UP: "blow-up", Cause.NOT_FINITE: "blow-up"}
+"""Words for causes where their names are not."""
 
 PROMISES = TIME_PROMISE, ANGLE_PROMISE, TENSION_PROMISE = 0.01, 0.5, 0.05
 """What an ok cell promises: relative error of the deployment time, error in degree of the mean
@@ -71,18 +58,9 @@ _MEANING = {name: (VARIABLES[name].units, VARIABLES[name].long_name) for name in
 """Unit and meaning by variable; words have no unit."""
 
 
-def cause_of(reason: str) -> str:
-    """The word for a run's reason; empty if it names none of ``CAUSES``.
-
-    Of a run that started anew the last start counts, unless it only ran out of the steps that it
-    made smaller: then what ended the first one is the cause.
-    """
-    last, _, before = reason.partition(" (start ")
-    found, first = (
-        next((word for word, phrase in CAUSES if phrase in text), "")
-        for text in (last, before.partition("start 1: ")[2])
-    )
-    return (first or found) if found == OUT_OF_STEPS else found
+def word_of(cause: Cause) -> str:
+    """What a map calls a cause: "energy grew"; empty if it is none."""
+    return "" if cause in _NAMELESS else _WORDS.get(cause, cause.word.replace("_", " "))
 
 
 def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr.Dataset:
@@ -95,17 +73,16 @@ def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr
         opening angle at the last output time that was reached, degree) and the run's numbers.
     """
     unknown = np.full(campaign.sizes["sample"], np.nan)
-    reasons = [str(reason) for reason in campaign["reason"].values]
     status = campaign["status"].values.astype(int)
     causes = [
-        "" if code == Status.OK else cause_of(reason) or Status(code).word
-        for code, reason in zip(status, reasons, strict=True)
+        "" if code == Status.OK else word_of(Cause(cause)) or Status(code).word
+        for code, cause in zip(status, campaign["cause"].values.astype(int), strict=True)
     ]
     found: dict[str, Array] = {
         "x": np.asarray(x, dtype=float),
         "y": np.asarray(y, dtype=float),
         "status": status,
-        "reason": np.array(reasons, dtype=object),
+        "reason": campaign["reason"].values.astype(str).astype(object),
         "cause": np.array(causes),
         "final_angle": unknown,
     }

@@ -21,6 +21,7 @@ from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.execution.local import Local
 from ringsim.exit_codes import EXIT_INTERRUPTED
 from ringsim.files import write_text, writing
+from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.storage.merge import NAME as MERGED
 
@@ -82,7 +83,12 @@ def write_cases(folder: Path, cases: Cases) -> Path:
     listed = io.StringIO()
     writer = csv.DictWriter(listed, list(cases.cases[0]), lineterminator="\n")
     writer.writeheader()
-    for case in cases.cases:
+    for number, case in enumerate(cases.cases):
+        if case.keys() != cases.cases[0].keys():
+            raise InputError(
+                f"case {number} has values for {', '.join(case)}, and must have them for "
+                f"{', '.join(cases.cases[0])}"
+            )
         writer.writerow({k: str(v).lower() if isinstance(v, bool) else v for k, v in case.items()})
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)

@@ -12,8 +12,9 @@ from ringsim.campaign.folder import open_folder
 from ringsim.execution.solve import load_solver, solve
 from ringsim.execution.work import Task
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
+from ringsim.outputs import COORDINATES
 from ringsim.refusal import InputError
-from ringsim.storage.result import COORDINATE, Result
+from ringsim.storage.result import Result
 from ringsim.variables import TIMINGS, Outcome
 
 
@@ -51,8 +52,8 @@ def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
         from ringsim.dataset import to_dataset
 
         arrays = result.arrays()
-        coordinates = {name: arrays.pop(name) for name in COORDINATE if name in arrays}
-        outcome = Outcome(result.status, result.reason, coordinates, arrays)
+        coordinates = {name: arrays.pop(name) for name in COORDINATES if name in arrays}
+        outcome = Outcome(result.status, result.reason, coordinates, arrays, result.cause)
         write(to_dataset(outcome, exact), save)
         click.echo(f"{save}: written")
     if before is None:

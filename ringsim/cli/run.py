@@ -73,6 +73,7 @@ def command(
     target = out if out is not None else Path(f"{chosen.name}.nc")
 
     from ringsim.dataset import save, to_dataset
+    from ringsim.outputs import VARIABLES
     from ringsim.simulation import FIDELITIES
     from ringsim.variables import Status
 
@@ -80,26 +81,17 @@ def command(
     outcome = FIDELITIES[fidelity](chosen)
     values = outcome.values
     click.echo(f"{chosen.name}: {outcome.status.word}: {outcome.reason}")
-    rows = [
-        ("deployment time", "deployment_time", "s", "10.4f"),
-        ("largest asynchrony", "asynchrony_max", "deg", "10.4f"),
-        ("largest rod stress", "peak_rod_stress", "Pa", "10.3e"),
-        ("largest tension", "peak_tension", "N", "10.3f"),
-        ("largest strain", "peak_bending_strain", "", "10.2e"),
-        ("energy error", "energy_error", "", "10.1e"),
-        ("constraint error", "constraint_error", "m", "10.1e"),
-        ("steps", "steps", "", "10d"),
-        ("steps of all starts", "total_steps", "", "10d"),
-        ("wall time", "wall_time", "s", "10.2f"),
-    ]
     anew = restarted(values, chosen.solver)
     if anew:
         click.echo(f"  {anew}")
-    else:
-        rows = [row for row in rows if row[1] != "total_steps"]
-    for label, name, unit, style in rows:
-        if name in values and np.isfinite(values[name].item()):
-            line = f"  {label:20s}{format(values[name].item(), style)} {unit}".rstrip()
+    for name, variable in VARIABLES.items():
+        if variable.summary is None or (name == "total_steps" and not anew):
+            continue
+        number = float(values.get(name, np.nan))
+        if np.isfinite(number):
+            label, style = variable.summary
+            unit = {"degree": "deg", "1": ""}.get(variable.units, variable.units)
+            line = f"  {label:20s}{values[name].item():{style}} {unit}".rstrip()
             bar = values.get(f"{name}_error")
             click.echo(line if bar is None else f"{line} +- {bar.item():.2g}")
     dataset = to_dataset(outcome, chosen)

@@ -7,17 +7,12 @@ system behind (10 MB for a ring of 18 sections, 20 MB with cables).
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
+
+from ringsim.outputs.recorder import Recorder
 
 
-class Counts(Protocol):
-    """What a history knows of the solver's work."""
-
-    newton_iterations: int
-    jacobians: int
-
-
-def close(history: Counts, system: Any, solver: Any) -> None:
+def close(history: Recorder, system: Any, solver: Any) -> None:
     """Note in a history what the solver has done, and take its callbacks away."""
     history.newton_iterations = int(solver.it.newtonStepsCount)
     history.jacobians = int(solver.it.newtonJacobiCount)

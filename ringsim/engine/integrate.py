@@ -15,15 +15,18 @@ from ringsim.cable.state import ChainState
 from ringsim.engine.build import Built
 from ringsim.engine.closing import close
 from ringsim.engine.energy import EnergyMeter
-from ringsim.engine.history import History
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import Openings, State, joint_groups
 from ringsim.engine.scales import residual_tolerance, scales_of
 from ringsim.engine.settings import raise_own, solver_settings
 from ringsim.engine.stress import BendingMeter, StressMeter
+from ringsim.layout.halves import halves
+from ringsim.outputs.reading import Reading
+from ringsim.outputs.recorder import Recorder
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
+from ringsim.variables import Cause, Reason
 
 Array = NDArray[np.float64]
 _REFUSE = 10.0
@@ -44,7 +47,11 @@ class Integration:
         self._energy = EnergyMeter(built)
         self._stress = StressMeter(model) if scene.record.stress else None
         structure = scene.structure
-        self._bending = BendingMeter(model, structure.gauge) if structure.gauge else None
+        coordinates = {"rod": np.array(list(halves(model.layout)))}
+        self._bending: BendingMeter | None = None
+        if structure.gauge:
+            self._bending = BendingMeter(model, structure.gauge)
+            coordinates["station"] = self._bending.stations
         self._gaps = joint_groups(model)
         self._state.refresh()
         angles = self._openings.read(self._state)[0]
@@ -54,7 +61,7 @@ class Integration:
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
-        self.history = History()
+        self.history = Recorder(scene, coordinates)
         self._control = RunControl(
             scene.solver,
             scales_of(built),
@@ -63,7 +70,7 @@ class Integration:
             follow_deviations=scene.record.stress,
         )
 
-    def run(self) -> History:
+    def run(self) -> Recorder:
         """Integrate until all V-joints have locked and settled, or to the end time."""
         history, solver, control = self.history, self._solver, self._control
         predictor = Predictor(self._built.model.assembly, solver)
@@ -84,7 +91,7 @@ class Integration:
             control.fail(self._refusal() or cause)
         control.conclude()
         history.status, history.reason = control.status, control.reason + self._energy.note()
-        history.halvings = control.repeats
+        history.repeats = control.repeats
         close(history, self._system, solver)
         return history
 
@@ -122,7 +129,8 @@ class Integration:
         self._state.refresh()
         if not self._state.finite():
             cure = "reduce solver.step or solver.tolerance"
-            self._control.diverge(f"the state is not finite at {time:.6g} s: {cure}")
+            reason = f"the state is not finite at {time:.6g} s: {cure}"
+            self._control.diverge(Reason(Cause.NOT_FINITE, reason))
             return False
         found = self._weighed or self._measure(time)
         goes_on = self._control.accept(found, self._read(found))
@@ -135,7 +143,6 @@ class Integration:
 
         ``self._chain`` holds the cables at the state that was measured last, which is this one.
         """
-        history = self.history
         if self._built.faults.strike(now.time, now.angles, self._chain):
             after = self._measure(now.time)
             # What a fault lets go is lost; nothing moves while it strikes.
@@ -143,20 +150,17 @@ class Integration:
             energies = after.energies._replace(lost=lost, driven=now.energies.driven)
             now = after._replace(energies=energies)
         self._energy.keep()
-        history.times.append(now.time)
-        history.angles.append(now.angles)
-        history.rates.append(now.rates)
-        history.energies.append(now.energies)
-        history.gaps.append(now.gap)
-        if self._chain is not None:
-            history.tensions.append(self._chain.tensions)
-            history.slack.append(self._chain.is_slack[self._chain.ropes.first].astype(float))
-            history.wound.append(self._chain.wound.sum(axis=1))
-            history.lengths.append(self._chain.lengths)
-        if self._stress is not None:
-            history.stresses.append(self._stress.read())
-        if self._bending is not None:
-            history.strains.append(self._bending.read())
+        cables = self._scene.cables
+        self.history.note(
+            Reading(
+                *now[:5],
+                latched=self._latched,
+                chain=self._chain,
+                planes=() if cables is None else tuple((plane,) for plane, _ in cables.present()),
+                stress=None if self._stress is None else self._stress.read(),
+                strain=None if self._bending is None else self._bending.read(),
+            )
+        )
         return now
 
     def _measure(self, time: float) -> Instant:

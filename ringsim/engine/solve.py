@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ringsim.engine.build import build
 from ringsim.engine.integrate import Integration
-from ringsim.engine.outcome import to_outcome
 from ringsim.scene import Scene
 from ringsim.variables import Outcome
 
@@ -13,6 +12,5 @@ def solve(scene: Scene) -> Outcome:
     """Run a scene.  A solve that fails is a status, not an exception."""
     built = build(scene)
     history = Integration(built).run()
-    layout = built.model.layout
     built.model.assembly.container.Reset()
-    return to_outcome(history, scene, layout)
+    return history.outcome()

@@ -55,12 +55,14 @@ class BendingMeter:
     """Bending strain of a rod's outer fibre at its nodes, on the side of its y axis's negative.
 
     Where two elements meet their moments differ by what turns the node alone; their mean counts.
+    ``stations`` are the nodes' distances from the rod's first end, m.
     """
 
     def __init__(self, model: Model, name: str) -> None:
         number = next(k for k, rod in enumerate(model.layout.rods) if rod.name == name)
         rod, self._elements = model.layout.rods[number], model.rods[number].elements
         self._lengths = rod.lengths
+        self.stations = np.array(rod.stations) * rod.length
         self._output = model.assembly.system.GetObjectOutputBody
         self._per_moment = (
             0.5 * rod.tube.outer_diameter / (rod.young_modulus * rod.tube.second_moment)

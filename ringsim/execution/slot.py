@@ -14,7 +14,7 @@ from ringsim.execution.solve import LOG_CHARACTERS
 from ringsim.execution.work import Limits, Task, Work
 from ringsim.refusal import InputError
 from ringsim.storage.result import Result
-from ringsim.variables import Status
+from ringsim.variables import Cause, Status
 
 TICK = 0.2
 """Seconds between two looks at a process that says nothing."""
@@ -23,6 +23,9 @@ _START_SECONDS = 120.0
 _PAUSE_SECONDS = 1.0
 """Nobody looked for so long: a batch system suspended the job, or the machine is overloaded."""
 _MOST_DEATHS_FROM_OUTSIDE = 2
+_CAUSES = {
+    Status.CRASHED: Cause.CRASH, Status.TIMEOUT: Cause.TIME_LIMIT, Status.MEMORY: Cause.MEMORY,
+}  # fmt: skip
 _FROM_OUTSIDE = (
     -signal.SIGKILL, -signal.SIGTERM, -signal.SIGHUP, -signal.SIGINT, -signal.SIGUSR1,
 )  # fmt: skip
@@ -173,7 +176,7 @@ class Slot:
 
     def _give_up(self, status: Status, reason: str) -> Result:
         process, task = self._running()
-        result = Result(task.sample, status, reason, finished=time.time())
+        result = Result(task.sample, status, reason, _CAUSES[status], finished=time.time())
         result = self._with_log(result, process.printed())
         self.close()
         return result

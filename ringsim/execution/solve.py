@@ -10,10 +10,11 @@ from collections.abc import Callable
 import numpy as np
 
 from ringsim.execution.work import Task
+from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.storage.result import Result, pack, plain
-from ringsim.variables import VARIABLES, Outcome, Status
+from ringsim.variables import Cause, Outcome, Status
 
 Run = Callable[[Scene], Outcome]
 LOG_CHARACTERS = 4000
@@ -45,20 +46,22 @@ def solve(solver: Run, base: Scene, task: Task) -> Result:
     try:
         outcome = solver(base.with_values(task.values))
         form, body = pack(outcome.coordinates | outcome.values)
-        status, reason = Status(outcome.status), str(outcome.reason)
+        status, reason, cause = Status(outcome.status), str(outcome.reason), outcome.cause
         fault = not_finite(outcome) if not status.failed else ""
         if fault:
-            status, reason = Status.DIVERGED, fault
+            status, reason, cause = Status.DIVERGED, fault, Cause.NOT_FINITE
     except MemoryError:
         status, reason = Status.MEMORY, "the run needed more memory than allowed"
-        log = traceback.format_exc()
+        log, cause = traceback.format_exc(), Cause.MEMORY
     except (Exception, SystemExit) as error:
         status, log = Status.ERROR, traceback.format_exc()
         reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
     return Result(
         sample=task.sample,
         status=status,
         reason=plain(" ".join(reason.split())[:1000]),
+        cause=cause,
         log=plain(log[-LOG_CHARACTERS:]),
         seconds=time.monotonic() - begin,
         finished=time.time(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -114,12 +115,16 @@ class Rod:
         )
 
 
+SPACE = np.eye(3)
+"""The axes of space."""
+
+
 class OnBody(NamedTuple):
     """A place on a body: its number, and an arm and axes in the body's own axes."""
 
     body: int
-    arm: Array
-    axes: Array
+    arm: Array = np.zeros(3)
+    axes: Array = SPACE
 
 
 class OnRod(NamedTuple):
@@ -137,3 +142,15 @@ class InSpace(NamedTuple):
 
 
 Mount = OnBody | OnRod | InSpace
+
+
+def pose_of(mount: Mount, bodies: Sequence[Body], rods: Sequence[Rod]) -> Pose:
+    """The frame of a mount, with its own axes."""
+    if isinstance(mount, InSpace):
+        return Pose(mount.place, mount.axes, np.zeros(3), np.zeros(3))
+    if isinstance(mount, OnBody):
+        body = bodies[mount.body].pose
+        place, rate = body.at(mount.arm)
+        return Pose(place, body.axes @ mount.axes, rate, body.turn)
+    rod = rods[mount.rod]
+    return rod.station(rod.stations[mount.station])

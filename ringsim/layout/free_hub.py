@@ -41,25 +41,14 @@ class FreeHub:
         self._stiffness = spread(net.stiffness, corners)
 
     def hub(self, corners: Array) -> Array:
-        """Where the hub lies, shape (3,), m: in the middle while all strings are slack.
-
-        Parameters
-        ----------
-        corners
-            Upper corners, shape (corners, 3), m.
-        """
+        """Where it lies under upper corners, shape (corners, 3), m: midway while all is slack."""
         return self._balance(corners)[0]
 
     def forces(self, corners: Array, slopes: Array, rates: Array) -> NetForces:
-        """Generalised forces on some coordinates.
+        """Generalised forces on coordinates with rates in rad/s.
 
-        Parameters
-        ----------
-        corners, slopes
-            Upper corners and their derivatives after the coordinates, shapes (corners, 3) and
-            (corners, 3, coordinates), m and m/rad.
-        rates
-            Of the coordinates, rad/s.
+        ``slopes`` are the corners' derivatives after the coordinates, shape (corners, 3,
+        coordinates), m/rad.
         """
         _, lengths, units, string = self._balance(corners)
         longer = np.einsum("ia,iaj->ij", units, slopes)

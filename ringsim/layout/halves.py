@@ -18,20 +18,18 @@ class Half(NamedTuple):
 
 def halves(layout: Layout) -> dict[str, list[Half]]:
     """Row of every rod or half of one by name, in the order of the layout; a value a section."""
-    inside: dict[int, int] = {}
-    for joint in layout.joints:
-        for mount in (joint.first, joint.second):
-            if isinstance(mount, OnRod):
-                count = len(layout.rods[mount.rod].stations)
-                if 0 < mount.station < count - 1:
-                    inside[mount.rod] = mount.station
+    inside = {
+        mount.rod: mount.station
+        for joint in layout.joints
+        for mount in (joint.first, joint.second)
+        if isinstance(mount, OnRod) and 0 < mount.station < len(layout.rods[mount.rod].stations) - 1
+    }
     rows: dict[str, list[Half]] = {}
     for number, rod in enumerate(layout.rods):
-        elements = len(rod.stations) - 1
-        if number not in inside:
-            rows.setdefault(rod.name, []).append(Half(number, 0, elements))
-            continue
-        middle = inside[number]
-        rows.setdefault(f"{rod.name}_left", []).append(Half(number, 0, middle))
-        rows.setdefault(f"{rod.name}_right", []).append(Half(number, middle, elements))
+        last, middle = len(rod.stations) - 1, inside.get(number)
+        if middle is None:
+            rows.setdefault(rod.name, []).append(Half(number, 0, last))
+        else:
+            rows.setdefault(f"{rod.name}_left", []).append(Half(number, 0, middle))
+            rows.setdefault(f"{rod.name}_right", []).append(Half(number, middle, last))
     return rows

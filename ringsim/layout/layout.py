@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.sheaves import BlockSheave, Sheave
-from ringsim.layout.bodies import Body, InSpace, Mount, OnBody, Rod
+from ringsim.layout.bodies import Body, InSpace, Mount, Rod, pose_of
 from ringsim.layout.joints import Joint, JointOpening, Opening
 from ringsim.layout.pose import Pose, cross
 from ringsim.layout.springs import BoomBeam, Contact, HubNet, Spring
@@ -69,29 +69,20 @@ class Layout:
 
     def pose(self, mount: Mount) -> Pose:
         """The frame of a mount, with its own axes."""
-        if isinstance(mount, InSpace):
-            return Pose(mount.place, mount.axes, np.zeros(3), np.zeros(3))
-        if isinstance(mount, OnBody):
-            body = self.bodies[mount.body].pose
-            place, rate = body.at(mount.arm)
-            return Pose(place, body.axes @ mount.axes, rate, body.turn)
-        rod = self.rods[mount.rod]
-        return rod.station(rod.stations[mount.station])
+        return pose_of(mount, self.bodies, self.rods)
 
     def masses(self) -> dict[str, float]:
         """Mass of each group of parts, kg."""
-        found: dict[str, float] = {}
-        for rod in self.rods:
-            found[rod.group] = found.get(rod.group, 0.0) + rod.mass
-        lumps = [lump for body in self.bodies for lump in body.lumps]
-        for group, mass in [(lump.group, lump.mass) for lump in lumps] + [
-            ("V-joints", mass) for rod in self.rods for _, mass in rod.masses
-        ]:
-            found[group] = found.get(group, 0.0) + mass
+        parts = [(rod.group, rod.mass) for rod in self.rods]
+        parts += [(lump.group, lump.mass) for body in self.bodies for lump in body.lumps]
+        parts += [("V-joints", mass) for rod in self.rods for _, mass in rod.masses]
         if self.boom is not None:
-            found["boom"] = self.boom.lump.mass
+            parts.append(("boom", self.boom.lump.mass))
         if self.net is not None:
-            found["hub"] = self.net.mass
+            parts.append(("hub", self.net.mass))
+        found: dict[str, float] = {}
+        for group, mass in parts:
+            found[group] = found.get(group, 0.0) + mass
         return found
 
     def point_masses(self) -> PointMasses:

@@ -36,30 +36,28 @@ def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> di
         End points, shape (lines, 2, 3), m, by group: those of the rods, "hinge assemblies", "boom",
         "net, taut" and "net, slack".
     """
-    ends: dict[tuple[int, int], Array] = {
-        (number, station): rod.station(rod.stations[station]).place
+    ends = {
+        (number, station): rod.station(share).place
         for number, rod in enumerate(layout.rods)
-        for station in range(len(rod.stations))
+        for station, share in enumerate(rod.stations)
     }
     for plane, angles in zip(layout.openings, openings, strict=True):
         for opening, angle in zip(plane, angles, strict=True):
             if isinstance(opening, JointOpening):
                 _open(layout, ends, opening, float(angle))
     found: dict[str, list[Any]] = {}
-    for row in halves(layout).values():
-        for half in row:
-            line = ends[half.rod, half.first], ends[half.rod, half.last]
-            found.setdefault(layout.rods[half.rod].group, []).append(line)
+    for half in (half for row in halves(layout).values() for half in row):
+        line = ends[half.rod, half.first], ends[half.rod, half.last]
+        found.setdefault(layout.rods[half.rod].group, []).append(line)
     corners = {number for plane in layout.corners for number in plane}
     pins = {}
     for joint in layout.joints:
         for mount in (joint.first, joint.second):
             if isinstance(mount, OnBody) and mount.body in corners and joint.family:
                 place = layout.pose(mount).place
-                pins[mount.body, *np.round(place, 9)] = place  # two rods share a pin
-    found["hinge assemblies"] = [
-        (layout.bodies[key[0]].pose.place, place) for key, place in pins.items()
-    ]
+                # Two rods share a pin.
+                pins[mount.body, *np.round(place, 9)] = layout.bodies[mount.body].pose.place, place
+    found["hinge assemblies"] = list(pins.values())
     lumps = [(body.pose, lump) for body in layout.bodies for lump in body.lumps]
     if layout.boom is not None:
         lumps.append((layout.pose(layout.boom.top), layout.boom.lump))
@@ -71,7 +69,8 @@ def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> di
             line = layout.bodies[number].pose.place, layout.net.hub
             taut = np.linalg.norm(line[0] - line[1]) > taut_beyond
             found.setdefault("net, taut" if taut else "net, slack", []).append(line)
-    middle = _middle(np.array([body.pose.place for body in layout.bodies]))
+    places = np.array([body.pose.place for body in layout.bodies])
+    middle = 0.5 * (places.min(axis=0) + places.max(axis=0)) * [1.0, 1.0, 0.0]
     return {name: np.array(lines) - middle for name, lines in found.items() if lines}
 
 
@@ -89,9 +88,3 @@ def _open(
     aside = -opening.sense * np.cross(rod.start.axes[:, 2], chord)
     at = 0.5 * (start + end) + rod.length * np.cos(0.5 * angle) * aside
     ends[first.rod, first.station] = ends[second.rod, second.station] = at
-
-
-def _middle(places: Array) -> Array:
-    """Middle of the plan view, shape (3,), m."""
-    low, high = places.min(axis=0), places.max(axis=0)
-    return np.array([0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.0])

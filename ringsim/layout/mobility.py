@@ -32,19 +32,19 @@ RANK_TOLERANCE = 1e-9
 """Singular values below this fraction of the largest are zeros.  Round-off leaves 1e-15; the
 smallest true one is 5e-4 half open and 6e-8 at 0.01 deg for a ring of 120 sections."""
 _HELD = {
-    "revolute": ((0, 1, 2), (0, 1)),
-    "prismatic": ((1, 2), (0, 1, 2)),
-    "sleeve": ((0, 1), ()),
-    "weld": ((0, 1, 2), (0, 1, 2)),
+    "revolute": [0, 1, 2, 3, 4],
+    "prismatic": [1, 2, 3, 4, 5],
+    "sleeve": [0, 1],
+    "weld": [0, 1, 2, 3, 4, 5],
 }
-"""Translations and rotations that a joint of each kind holds, along its own axes."""
+"""Translations and, from 3, rotations that a joint of each kind holds, along its own axes."""
 
 
 def internal_mobility(layout: Layout) -> int:
     """Degrees of freedom of a structure of rigid parts beyond its six as one rigid body.
 
-    First the motions of each section by itself are found, then those of all sections are joined at
-    the bodies that they share.  A boom counts as rigid; supports do not count.
+    The motions of each section by itself are joined at the bodies that sections share.  A boom
+    counts as rigid; supports do not count.
 
     Parameters
     ----------
@@ -60,36 +60,34 @@ def internal_mobility(layout: Layout) -> int:
     if layout.boom is not None:
         joints.append(Joint("sleeve", "", 0, layout.boom.top, layout.boom.low))
     size = max(rod.length for rod in layout.rods)
-    motions: dict[tuple[bool, int], list[tuple[int, Array]]] = {}
-    free: list[int] = []
+    motions: dict[tuple[bool, int], list[tuple[int, Array]]] = {}  # of a part: first column, twists
+    columns = 0
     for number in sorted({joint.section for joint in joints}):
         own = [joint for joint in joints if joint.section == number]
         parts = sorted({_part(mount) for joint in own for mount in (joint.first, joint.second)})
         middle = np.mean([layout.pose(joint.first).place for joint in own], axis=0)
         rows = np.concatenate([_row(layout, joint, parts, middle, size) for joint in own])
-        null = _null_space(rows).reshape(len(parts), 6, -1)
-        for part, twist in zip(parts, null, strict=True):
+        _, values, shapes = np.linalg.svd(rows)
+        free = shapes[_rank(values) :].T.reshape(len(parts), 6, -1)
+        for part, twist in zip(parts, free, strict=True):
             place = layout.bodies[part[1]].pose.place if part[0] else middle
-            arm = (place - middle) / size
-            at_part = np.concatenate([twist[:3] - _cross_matrix(arm) @ twist[3:], twist[3:]])
-            motions.setdefault(part, []).append((len(free), at_part))
-        free.append(null.shape[-1])
-    starts = np.concatenate([[0], np.cumsum(free)])
-    joined = []
+            arm = _cross_matrix((place - middle) / size)
+            at_part = np.concatenate([twist[:3] - arm @ twist[3:], twist[3:]])
+            motions.setdefault(part, []).append((columns, at_part))
+        columns += free.shape[-1]
+    joined = [np.zeros((0, columns))]
     for shared in motions.values():
-        for (one, first), (other, second) in pairwise(shared):
-            row = np.zeros((6, starts[-1]))
-            row[:, starts[one] : starts[one + 1]] += first
-            row[:, starts[other] : starts[other + 1]] -= second
-            joined.append(row)
-    rank = _rank(np.concatenate(joined)) if joined else 0
-    return int(starts[-1]) - rank - 6
+        for pair in pairwise(shared):
+            joined.append(np.zeros((6, columns)))
+            for sign, (start, twist) in zip((1.0, -1.0), pair, strict=True):
+                joined[-1][:, start : start + twist.shape[1]] += sign * twist
+    rank = _rank(np.linalg.svd(np.concatenate(joined), compute_uv=False))
+    return columns - rank - 6
 
 
 def _part(mount: Mount) -> tuple[bool, int]:
     """Whether a body, and its number or that of the rod."""
-    if isinstance(mount, InSpace):
-        raise TypeError("a place in space is no part")
+    assert not isinstance(mount, InSpace)
     return (True, mount.body) if isinstance(mount, OnBody) else (False, mount.rod)
 
 
@@ -98,12 +96,9 @@ def _row(
 ) -> Array:
     """What a joint holds, (constraints, 6 parts): on velocity at a point, and angular velocity."""
     pose = layout.pose(joint.first)
-    arm = (pose.place - at) / size
-    whole = np.zeros((6, 6))
-    whole[:3, :3], whole[:3, 3:] = pose.axes.T, -pose.axes.T @ _cross_matrix(arm)
-    whole[3:, 3:] = pose.axes.T
-    moved, turned = _HELD[joint.kind]
-    held = whole[[*moved, *(3 + axis for axis in turned)]]
+    turned = pose.axes.T @ _cross_matrix((pose.place - at) / size)
+    whole = np.block([[pose.axes.T, -turned], [np.zeros((3, 3)), pose.axes.T]])
+    held = whole[_HELD[joint.kind]]
     row = np.zeros((len(held), len(parts), 6))
     row[:, parts.index(_part(joint.first))] += held
     row[:, parts.index(_part(joint.second))] -= held
@@ -114,12 +109,6 @@ def _cross_matrix(r: Array) -> Array:
     return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
 
 
-def _null_space(matrix: Array) -> Array:
-    _, values, rows = np.linalg.svd(matrix)
-    rank = int(np.sum(values > RANK_TOLERANCE * values[0]))
-    return np.asarray(rows[rank:].T)
-
-
-def _rank(matrix: Array) -> int:
-    values = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(values > RANK_TOLERANCE * values[0]))
+def _rank(values: Array) -> int:
+    """From singular values."""
+    return int(np.sum(values > RANK_TOLERANCE * values.max(initial=0.0)))

@@ -17,12 +17,12 @@ small as it likes and the derivative is good to round-off."""
 
 def rate_of(values: Any) -> Array:
     """Derivative after the coordinate of something that was computed at q + i ``STEP``."""
-    return np.asarray(np.imag(values) / STEP, dtype=float)
+    return np.asarray(values).imag / STEP
 
 
 def real_of(values: Any) -> Array:
     """Its value at q."""
-    return np.asarray(np.real(values), dtype=float)
+    return np.array(np.asarray(values).real, dtype=float)
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,6 @@ class Pose:
             [spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]
         )
         return cls(real_of(place), frame, rate_of(place), turn)
-
-    def inside(self, point: Any) -> Array:
-        """A point in space, in this frame's own coordinates, m."""
-        return np.asarray(self.axes.T @ (real_of(point) - self.place))
 
     def at(self, arm: Array) -> tuple[Array, Array]:
         """A point fixed in this frame: its place, m, and derivative, m per unit of q."""

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator
 
 from ringsim.analysis.errors import OUTPUTS
 from ringsim.plots import style
@@ -33,11 +33,8 @@ def accuracy(found: xr.Dataset) -> Figure:
     """
     titles = {**OUTPUTS, "energy": "energy balance"}
     outputs = [name for name in titles if name in found.output.values]
-    columns = min(3, len(outputs))
-    rows = -(-len(outputs) // columns)
-    figure = style.new_figure(3.6 * columns, 3.0 * rows + 0.9)
-    panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
-    for k, (panel, name) in enumerate(zip(panels, outputs, strict=False)):
+    figure, panels, columns = style.new_panels(len(outputs), 3.6, 3.0, 0.9, sharex=True)
+    for k, (panel, name) in enumerate(zip(panels, outputs, strict=True)):
         _panel(panel, found.sel(output=name))
         style.name_panel(panel, titles[name].capitalize())
         if k % columns == 0:
@@ -45,11 +42,9 @@ def accuracy(found: xr.Dataset) -> Figure:
         if k + columns >= len(outputs):
             panel.set_xlabel("Processor time of the run (s)")
             panel.tick_params(labelbottom=True)
-    for panel in panels[len(outputs) :]:
-        panel.set_visible(False)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
-    figure.suptitle(str(found.attrs.get("title", "Accuracy")), x=0.012, ha="left")
+    style.title(figure, str(found.attrs.get("title", "Accuracy")))
     return figure
 
 
@@ -58,8 +53,7 @@ def _panel(axes: Axes, found: xr.Dataset) -> None:
     drawn = np.isfinite(error) & (error > 0.0)
     axes.loglog()
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    style.plain_numbers(axes.xaxis)
     for name, (colour, marker) in _LOOKS.items():
         own = (ladder == name) & drawn
         if (ladder == name).any():

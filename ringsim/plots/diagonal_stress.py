@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -18,12 +17,12 @@ _HALVES: dict[str, Any] = {"left": "-", "right": (0, (4, 1.6))}
 
 @style.styled
 def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) -> Figure:
-    """Stress in both diagonals, one colour a section, as in figs 11-13 of paper 002.
+    """``rod_stress`` (rod, section, time) of both diagonals, as in figs 11-13 of paper 002.
 
     Parameters
     ----------
     dataset
-        A run with ``rod_stress`` (rod, section, time).
+        A run with stress.
     sections
         Section numbers, at most six; by default the first one in black and the one half-way
         around the structure in red (1 and 9 of 18).
@@ -39,20 +38,21 @@ def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) 
         If the run has no such section, or for more than six.
     """
     chosen = default_sections(dataset.sizes["section"]) if sections is None else tuple(sections)
-    missing = sorted(set(chosen) - set(dataset["section"].values.tolist()))
+    missing = set(chosen) - set(dataset["section"].values.tolist())
     if missing or not 0 < len(chosen) <= len(_COLOURS):
         raise ValueError(
             f"sections = {list(chosen)} must be one to {len(_COLOURS)} of the sections "
             f"1..{dataset.sizes['section']}"
         )
     stress = dataset["rod_stress"].sel(section=list(chosen))
-    stress = stress.sel(rod=[r for r in stress["rod"].values if str(r).startswith("diagonal_")])
+    stress = stress.sel(rod=stress["rod"].str.startswith("diagonal_"))
     factor, units = wording.readable_units(stress)
-    diagonals = list(dict.fromkeys(str(rod).split("_")[1] for rod in stress["rod"].values))
+    diagonals = list(dict.fromkeys(rod.split("_")[1] for rod in stress["rod"].values.tolist()))
     figure = style.new_figure(8.6, 2.9 * len(diagonals) + 0.9)
     grid = figure.subplots(len(diagonals), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    coloured = list(zip(chosen, _COLOURS, strict=False))
     for axes, diagonal in zip(grid, diagonals, strict=True):
-        for section, colour in zip(chosen, _COLOURS, strict=False):
+        for section, colour in coloured:
             for half, dashes in _HALVES.items():
                 values = stress.sel(rod=f"diagonal_{diagonal}_{half}", section=section)
                 axes.plot(
@@ -61,10 +61,15 @@ def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) 
         style.span_time(axes, stress)
         style.name_panel(axes, f"{diagonal} diagonal")
     style.span_sizes(grid[0], factor * stress.values)
-    _mark_deployment(dataset, grid)
+    style.mark_deployment(dataset, *grid)
     grid[-1].set_xlabel(wording.label(dataset["time"]))
     figure.supylabel(wording.label(stress, units), fontsize=10.5)
-    _legend(figure, chosen)
+    entries = [Line2D([], [], color=colour, label=f"section {n}") for n, colour in coloured]
+    entries += [
+        Line2D([], [], color=style.GREY, linestyle=dashes, linewidth=1.2, label=f"{half} half")
+        for half, dashes in _HALVES.items()
+    ]
+    figure.legend(handles=entries, loc="outside lower center", ncols=len(entries))
     wording.head(figure, grid[0], dataset, "Diagonal stress")
     return figure
 
@@ -72,22 +77,3 @@ def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) 
 def default_sections(sections: int) -> tuple[int, ...]:
     """The section at the boom and the one opposite: 1 and 9 of 18."""
     return tuple(dict.fromkeys((1, max(sections // 2, min(2, sections)))))
-
-
-def _mark_deployment(dataset: xr.Dataset, grid: np.ndarray) -> None:
-    moment = wording.deployment_time(dataset)
-    if np.isfinite(moment):
-        for axes, text in zip(grid, [f"all locked at {moment:.2f} s", *[""] * 9], strict=False):
-            style.mark_moment(axes, moment, text)
-
-
-def _legend(figure: Figure, chosen: Sequence[int]) -> None:
-    entries = [
-        Line2D([], [], color=colour, label=f"section {section}")
-        for section, colour in zip(chosen, _COLOURS, strict=False)
-    ]
-    entries += [
-        Line2D([], [], color=style.GREY, linestyle=dashes, linewidth=1.2, label=f"{half} half")
-        for half, dashes in _HALVES.items()
-    ]
-    figure.legend(handles=entries, loc="outside lower center", ncols=len(entries))

@@ -19,26 +19,16 @@ _LOOKS = {
 
 @style.styled
 def energy(dataset: xr.Dataset) -> Figure:
-    """Energies over time, and the imbalance.
+    """``work``, ``kinetic_energy``, ``elastic_energy`` and ``dissipation`` (time) of a run.
 
-    Parameters
-    ----------
-    dataset
-        A run with ``work``, ``kinetic_energy``, ``elastic_energy`` and ``dissipation`` (time);
-        ``energy_error`` is stated where it is known.
-
-    Returns
-    -------
-    Figure
-        Above the four energies, below their imbalance, each in a unit of its own size.
+    Below them is their imbalance, each in a unit of its own size; ``energy_error`` is stated where
+    it is known.
     """
-    shown = [dataset[name] for name in _LOOKS]
-    lack = imbalance(dataset)
     figure = style.new_figure(8.0, 5.8)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(5, 2))
-    factor, units = wording.readable_units(*shown)
-    for values in shown:
-        colour, dashes = _LOOKS[str(values.name)]
+    factor, units = wording.readable_units(*(dataset[name] for name in _LOOKS))
+    for name, (colour, dashes) in _LOOKS.items():
+        values = dataset[name]
         upper.plot(
             values["time"], factor * values, color=colour, linestyle=dashes,
             label=values.attrs["long_name"],
@@ -47,18 +37,16 @@ def energy(dataset: xr.Dataset) -> Figure:
     upper.margins(y=0.08)
     upper.set_ylabel(f"Energy ({units})")
     upper.legend(loc="best")
+    lack = imbalance(dataset)
     factor, units = wording.readable_units(lack)
     lower.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1.2)
     lower.plot(lack["time"], factor * lack, color=style.PURPLE)
     lower.set_ylabel(f"Imbalance ({units})")
     lower.set_xlabel(wording.label(dataset["time"]))
-    error = float(dataset["energy_error"]) if "energy_error" in dataset else math.nan
+    error = float(dataset.get("energy_error", math.nan))
     if math.isfinite(error):
         lower.set_title(f"{wording.label(dataset['energy_error'])}: {error:.1e}")
-    moment = wording.deployment_time(dataset)
-    if math.isfinite(moment):
-        style.mark_moment(upper, moment, f"all locked at {moment:.2f} s")
-        style.mark_moment(lower, moment)
+    style.mark_deployment(dataset, upper, lower)
     wording.head(figure, upper, dataset, "Energy")
     return figure
 

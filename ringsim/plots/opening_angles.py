@@ -20,42 +20,31 @@ _LEAST_SPAN = 0.01
 
 @style.styled
 def opening_angles(dataset: xr.Dataset) -> Figure:
-    """Opening angle and its deviation from the mean, a column for each plane.
+    """``opening_angle`` (plane, section, time) and its deviation from the mean.
 
-    Parameters
-    ----------
-    dataset
-        A run with ``opening_angle`` (plane, section, time); ``lock_time`` and
-        ``deployment_time`` are marked where they are known.
-
-    Returns
-    -------
-    Figure
-        Colour counts the sections.
+    Each plane has a column, and colour counts the sections; ``lock_time`` and ``deployment_time``
+    are marked where they are known.
     """
     angle = dataset["opening_angle"].dropna("time", how="all")
     deviation = angle - angle.mean(("plane", "section"), skipna=True)
-    planes = list(dataset["plane"].values)
+    planes = dataset["plane"].values.tolist()
     figure = style.new_figure(5.2 * len(planes) + 0.6, 6.4)
     grid = figure.subplots(
         2, len(planes), sharex=True, sharey="row", squeeze=False, height_ratios=(3, 2)
     )
-    lines = None
-    for column, plane in enumerate(planes):
-        upper, lower = grid[:, column]
+    for (upper, lower), plane in zip(grid.T, planes, strict=True):
         _draw_lines(upper, angle.sel(plane=plane))
         lines = _draw_lines(lower, deviation.sel(plane=plane))
         _mark_locks(upper, dataset, plane)
         style.name_panel(upper, f"{plane} plane", height=0.91)
         lower.set_xlabel(wording.label(dataset["time"]))
         style.span_time(upper, angle)
-        _mark_deployment(dataset, upper, lower)
-    _limits(grid, angle, deviation, wording.deployment_time(dataset))
+        style.mark_deployment(dataset, upper, lower)
+    _limits(grid, angle, deviation, style.deployment_time(dataset))
     grid[0, 0].set_ylabel(wording.label(angle))
-    units = angle.attrs.get("units", "")
-    grid[1, 0].set_ylabel(f"Deviation from\nthe mean ({units})")
+    grid[1, 0].set_ylabel(f"Deviation from\nthe mean ({angle.attrs.get('units', '')})")
     figure.align_ylabels(grid[:, 0])
-    if dataset.sizes["section"] > 1 and lines is not None:
+    if dataset.sizes["section"] > 1:
         bar = figure.colorbar(lines, ax=grid, aspect=40, pad=0.015)
         bar.set_label(wording.label(dataset["section"]))
         bar.set_ticks(_section_ticks(dataset["section"].values))
@@ -84,40 +73,29 @@ def _mark_locks(axes: Axes, dataset: xr.Dataset, plane: str) -> None:
     axes.axhline(180.0, color=style.GREY, linewidth=0.8, zorder=1.4)
     if "lock_time" not in dataset:
         return
-    sections = dataset["section"].values
     moments = dataset["lock_time"].sel(plane=plane).values
-    locked = np.isfinite(moments)
-    colours = style.section_colours(len(sections))(np.arange(len(sections)))
+    locked = np.flatnonzero(np.isfinite(moments))
     axes.scatter(
-        moments[locked], np.full(locked.sum(), 180.0), s=22, c=colours[locked], zorder=3,
-        edgecolors="white", linewidths=0.5, clip_on=False, label="locked",
+        moments[locked], np.full(len(locked), 180.0), s=22,
+        c=style.section_colours(len(moments))(locked), zorder=3, edgecolors="white",
+        linewidths=0.5, clip_on=False, label="locked",
     )  # fmt: skip
-
-
-def _mark_deployment(dataset: xr.Dataset, upper: Axes, lower: Axes) -> None:
-    moment = wording.deployment_time(dataset)
-    if math.isfinite(moment):
-        style.mark_moment(upper, moment, f"all locked at {moment:.2f} s")
-        style.mark_moment(lower, moment)
 
 
 def _limits(grid: np.ndarray, angle: xr.DataArray, deviation: xr.DataArray, moment: float) -> None:
     """Room for all angles; for the deviations until all have locked (the rebound may leave)."""
-    lowest = float(angle.min()) if angle.size else 0.0
-    highest = float(angle.max()) if angle.size else 180.0
+    lowest, highest = (float(angle.min()), float(angle.max())) if angle.size else (0.0, 180.0)
+    grid[0, 0].set_ylim(30.0 * math.floor(lowest / 30.0), max(188.0, highest + 4.0))
     for axes in grid[0]:
-        axes.set_ylim(30.0 * math.floor(lowest / 30.0), max(188.0, highest + 4.0))
         axes.yaxis.set_major_locator(MultipleLocator(30.0))
     moving = deviation.where(deviation["time"] <= moment) if math.isfinite(moment) else deviation
     span = max(1.15 * wording.largest_magnitude(moving), _LEAST_SPAN)
-    for axes in grid[1]:
-        axes.set_ylim(-span, span)
+    grid[1, 0].set_ylim(-span, span)
 
 
 def _section_ticks(sections: np.ndarray) -> list[int]:
-    step = next(
-        s for s in (1, 2, 3, 5, 6, 10, 12, 20, 30, 60) if len(sections) / s <= 12 or s == 60
-    )
+    """At most about twelve, at multiples of a round number, and the first section."""
+    step = next((s for s in (1, 2, 3, 5, 6, 10, 12, 20, 30) if len(sections) <= 12 * s), 60)
     inner = sections[sections % step == 0]
     ticks: list[int] = np.unique([*sections[:1], *inner[inner > step // 2]]).tolist()
     return ticks

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -21,31 +19,32 @@ _SHOWN = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 @style.styled
 def tension_over_length(dataset: xr.Dataset) -> Figure:
-    """Tension over the cable's length, as paper 001's fig. 8.
+    """``cable_tension`` (plane, span, time) over ``cable_length`` (plane, time).
 
-    Parameters
-    ----------
-    dataset
-        A run with ``cable_tension`` (plane, span, time) and ``cable_length`` (plane, time).
-
-    Returns
-    -------
-    Figure
-        Tension in N and kgf of the span whose length changes, while reeled in and out.
+    As paper 001's fig. 8: in N and kgf, of the span whose length changes, while reeled in and out.
     """
     tension = dataset["cable_tension"].isel(plane=0, span=-1)
     figure = style.new_figure(8.0, 4.8)
     axes = figure.subplots()
-    for values, (name, colour, dashes) in zip(_split(dataset, tension), _PASSAGES, strict=True):
-        axes.plot(_millimetres(dataset, values), values, color=colour, linestyle=dashes, label=name)
+    for (lengths, values), (name, colour, dashes) in zip(
+        _split(dataset, tension), _PASSAGES, strict=True
+    ):
+        axes.plot(lengths, values, color=colour, linestyle=dashes, label=name)
     _length_axis(axes, dataset)
     axes.set_ylim(0.0, 1.12 * float(tension.max()))
     axes.set_ylabel(wording.label(tension))
-    weight = axes.secondary_yaxis("right", functions=(_to_weight, _from_weight))
+    both_ways = (lambda n: np.divide(n, KILOGRAM_FORCE), lambda w: np.multiply(w, KILOGRAM_FORCE))
+    weight = axes.secondary_yaxis("right", functions=both_ways)
     weight.set_ylabel("Tension (kgf)")
     weight.spines["right"].set_visible(True)
     weight.yaxis.set_major_locator(MultipleLocator(0.5))
-    _mark_end(axes, dataset, tension)
+    length, peak = 1e3 * dataset["cable_length"].isel(plane=0), float(tension.max())
+    if float(tension.isel(time=int(np.nanargmin(length.values)))) >= 0.9 * peak:
+        axes.annotate(
+            "contraction ends:\nwinding only stretches\nthe cable",
+            (float(length.min()), 0.9 * peak), xytext=(10, 0), textcoords="offset points",
+            va="center", color=style.GREY, bbox=style.PAPER,
+        )  # fmt: skip
     axes.legend(loc="upper right")
     wording.head(figure, axes, dataset, "Cable tension")
     return figure
@@ -53,18 +52,10 @@ def tension_over_length(dataset: xr.Dataset) -> Figure:
 
 @style.styled
 def strain_over_length(dataset: xr.Dataset) -> Figure:
-    """Bending strain of the upper beam, as paper 001's fig. 9, and along the beam.
+    """``bending_strain`` (station, time) of the upper beam, as paper 001's fig. 9.
 
-    Parameters
-    ----------
-    dataset
-        A run with ``bending_strain`` (station, time) and ``cable_length`` (plane, time).
-
-    Returns
-    -------
-    Figure
-        Left over the cable's length, at the station with the largest strain and in the middle of
-        the beam; right along the beam at some lengths while reeled in.
+    Left over ``cable_length`` (plane, time), at the station with the largest strain and in the
+    middle of the beam; right along the beam at some lengths while reeled in.
     """
     strain = dataset["bending_strain"]
     figure = style.new_figure(11.0, 4.8)
@@ -73,9 +64,9 @@ def strain_over_length(dataset: xr.Dataset) -> Figure:
     middle = int(np.abs(station - 0.5 * (station[0] + station[-1])).argmin())
     largest = int(np.nanargmax(strain.max("time").values))
     for place, colour in ((largest, style.VERMILLION), (middle, style.GREEN)):
-        along = strain.isel(station=place)
-        for values, (_, _, dashes) in zip(_split(dataset, along), _PASSAGES, strict=True):
-            left.plot(_millimetres(dataset, values), values, color=colour, linestyle=dashes)
+        passages = _split(dataset, strain.isel(station=place))
+        for (lengths, values), (_, _, dashes) in zip(passages, _PASSAGES, strict=True):
+            left.plot(lengths, values, color=colour, linestyle=dashes)
         left.plot([], [], color=colour, label=f"{1e3 * station[place]:.0f} mm along the beam")
     for name, _, dashes in _PASSAGES:
         left.plot([], [], color=style.GREY, linestyle=dashes, label=name)
@@ -86,59 +77,34 @@ def strain_over_length(dataset: xr.Dataset) -> Figure:
     formatter = ScalarFormatter(useMathText=True)
     formatter.set_powerlimits((0, 0))
     left.yaxis.set_major_formatter(formatter)
-    _draw_along(right, dataset, strain)
+    _draw_along(right, *_split(dataset, strain)[0])
     wording.head(figure, left, dataset, "Bending of the upper beam", pad=18.0)
     return figure
 
 
-def _to_weight(newton: Any) -> Any:
-    return newton / KILOGRAM_FORCE
-
-
-def _from_weight(weight: Any) -> Any:
-    return weight * KILOGRAM_FORCE
-
-
-def _draw_along(axes: Axes, dataset: xr.Dataset, strain: xr.DataArray) -> None:
-    inwards = _split(dataset, strain)[0]
-    length = dataset["cable_length"].isel(plane=0).sel(time=inwards["time"])
+def _draw_along(axes: Axes, lengths: xr.DataArray, strain: xr.DataArray) -> None:
     colours = style.section_colours(len(_SHOWN))
     for number, share in enumerate(_SHOWN):
-        moment = int(np.abs(length.values - share / _SHOWN[-1] * float(length.max())).argmin())
+        wanted = share / _SHOWN[-1] * float(lengths.max())
+        moment = int(np.abs(lengths.values - wanted).argmin())
         axes.plot(
-            1e3 * strain["station"], inwards.isel(time=moment), "o-", markersize=3.5,
-            color=colours(number), label=f"{1e3 * float(length[moment]):.0f} mm of cable",
+            1e3 * strain["station"], strain.isel(time=moment), "o-", markersize=3.5,
+            color=colours(number), label=f"{float(lengths[moment]):.0f} mm of cable",
         )  # fmt: skip
     axes.set_xlim(left=0.0)
     axes.set_xlabel(wording.label(strain["station"], "mm", width=40))
     axes.legend(loc="upper left")
 
 
-def _split(dataset: xr.Dataset, values: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-    """What was recorded until most rope was wound, and from then on."""
+def _split(dataset: xr.Dataset, values: xr.DataArray) -> list[tuple[xr.DataArray, xr.DataArray]]:
+    """Cable lengths in mm and values until most rope was wound, and from then on."""
     recorded = dataset["wound_length"].isel(plane=0).dropna("time")
     turn = int(recorded.values.argmax())
-    kept = values.sel(time=recorded["time"])
-    return kept.isel(time=slice(0, turn + 1)), kept.isel(time=slice(turn, None))
-
-
-def _millimetres(dataset: xr.Dataset, values: xr.DataArray) -> xr.DataArray:
-    return 1e3 * dataset["cable_length"].isel(plane=0).sel(time=values["time"])
+    lengths = 1e3 * dataset["cable_length"].isel(plane=0)
+    inwards, outwards = recorded["time"][: turn + 1], recorded["time"][turn:]
+    return [(lengths.sel(time=part), values.sel(time=part)) for part in (inwards, outwards)]
 
 
 def _length_axis(axes: Axes, dataset: xr.Dataset) -> None:
     axes.set_xlim(0.0, 1100.0 * float(dataset["cable_length"].max()))
     axes.set_xlabel(wording.label(dataset["cable_length"], "mm"))
-
-
-def _mark_end(axes: Axes, dataset: xr.Dataset, tension: xr.DataArray) -> None:
-    """Annotate the rise at the shortest length, if there is one."""
-    length = dataset["cable_length"].isel(plane=0)
-    at, peak = 1e3 * float(length.min()), float(tension.max())
-    if float(tension.isel(time=int(np.nanargmin(length.values)))) < 0.9 * peak:
-        return
-    axes.annotate(
-        "contraction ends:\nwinding only stretches\nthe cable", (at, 0.9 * peak),
-        xytext=(10, 0), textcoords="offset points", va="center", color=style.GREY,
-        bbox=style.PAPER,
-    )  # fmt: skip

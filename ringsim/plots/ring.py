@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,6 @@ from numpy.typing import NDArray
 from ringsim.layout.lines import lines_of
 from ringsim.layout.of_scene import layout_at_opening, layout_of
 from ringsim.plots import style, wording
-from ringsim.plots.camera import Camera
 from ringsim.scene import Scene, scene_from_toml
 
 Array = NDArray[np.float64]
@@ -29,51 +27,49 @@ _BELOW, _ABOVE, _BAR, _CAPTION = 1.2, 1.12, 0.46, 2.4
 """Room on the sheet, in inch: the drawing; beside, below and above it; a caption's width."""
 _FADE = 0.6
 """Share of white in the farthest line."""
-
-
-@dataclass(frozen=True)
-class _Look:
-    colour: str
-    width: float
-    dashes: Any = "solid"
-
-
-_LOOKS = {
-    "diagonals": _Look(style.BLUE, 1.5),
-    "bars": _Look(style.VERMILLION, 1.5),
-    "hinge assemblies": _Look(style.INK, 3.0),
-    "boom": _Look(style.GREY, 5.0),
-    "net, taut": _Look(style.GREEN, 0.9),
-    "net, slack": _Look(style.GREEN, 0.9, (0, (1.5, 2.5))),
+_LOOKS: dict[str, dict[str, Any]] = {
+    "diagonals": {"color": style.BLUE, "linewidth": 1.5},
+    "bars": {"color": style.VERMILLION, "linewidth": 1.5, "label": "folding bars"},
+    "hinge assemblies": {"color": style.INK, "linewidth": 3.0},
+    "boom": {"color": style.GREY, "linewidth": 5.0},
+    "net, taut": {"color": style.GREEN, "linewidth": 0.9},
+    "net, slack": {"color": style.GREEN, "linewidth": 0.9, "linestyle": (0, (1.5, 2.5))},
 }
-
-_NAMES = {"bars": "folding bars"}
-"""Words of the legend, where they differ from the layout's."""
 
 
 @style.styled
 def ring(dataset: xr.Dataset) -> Figure:
-    """Three instants of a run side by side, all to one scale.
+    """Three instants of a run side by side, all to one scale, with a scale bar in metre.
 
-    Parameters
-    ----------
-    dataset
-        A run of a pantograph ring with ``opening_angle`` (plane, section, time), its scene as
-        TOML in the attribute ``scene``.
-
-    Returns
-    -------
-    Figure
-        Orthographic views with a scale bar in metre; nearer lines are darker.
+    Orthographic views in which nearer lines are darker.  ``dataset`` is a run with
+    ``opening_angle`` (plane, section, time), its scene as TOML in the attribute ``scene``.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
-    camera = Camera(facing_azimuth(scene), _ELEVATION)
+    azimuth = facing_azimuth(scene)
     moments = instants(dataset)
     shots = []
     for _, angles in moments:
         lines = lines_at(scene, np.radians(angles.transpose("plane", "section").values))
-        shots.append({name: camera.view(ends) for name, ends in lines.items()})
-    return _compose(dataset, moments, shots)
+        shots.append({name: view(ends, azimuth, _ELEVATION) for name, ends in lines.items()})
+    points = [np.concatenate([xy.reshape(-1, 2) for xy, _ in shot.values()]) for shot in shots]
+    low = np.array([p.min(axis=0) for p in points])
+    sizes = np.array([p.max(axis=0) for p in points]) - low
+    height = float(sizes[:, 1].max())
+    scale, cells = _fit(sizes[:, 0], height)
+    figure, axes = _sheet(scale, height)
+    middles = (np.cumsum(cells + _GAP) - 0.5 * cells - _GAP) / scale
+    lefts = np.column_stack([middles - 0.5 * sizes[:, 0], np.zeros(len(shots))])
+    for moment, shot, shift, middle in zip(moments, shots, lefts - low, middles, strict=True):
+        _draw(axes, shot, shift, scale)
+        _caption(axes, middle, *moment)
+    _scale_bar(axes, _WIDTH / scale, height)
+    drawn = {name for shot in shots for name, (xy, _) in shot.items() if len(xy)}
+    entries = [
+        Line2D([], [], **({"label": name} | look)) for name, look in _LOOKS.items() if name in drawn
+    ]
+    figure.legend(handles=entries, loc="lower center", ncols=len(entries))
+    wording.head(figure, axes, dataset, "Deployment", pad=72.0 * _BAR)
+    return figure
 
 
 def lines_at(scene: Scene, openings: Array) -> dict[str, Array]:
@@ -91,6 +87,28 @@ def facing_azimuth(scene: Scene) -> float:
     return float(np.degrees(np.arctan2(outward[1], outward[0]))) + 35.0
 
 
+def view(points: Array, azimuth: float, elevation: float) -> tuple[Array, Array]:
+    """Orthographic projection for a far observer, true to scale.
+
+    Parameters
+    ----------
+    points
+        Positions, shape (..., 3), m, z up.
+    azimuth, elevation
+        Where the observer stands, degree: from +x towards +y, and above the horizon.
+
+    Returns
+    -------
+    tuple[Array, Array]
+        Right and up on the paper, shape (..., 2), and nearness to the observer, shape (...,), m.
+    """
+    a, e = np.radians([azimuth, elevation])
+    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    up = np.cross(towards, right)
+    return points @ np.stack([right, up], axis=-1), points @ towards
+
+
 def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
     """Name and opening angles (plane, section) of the three recorded instants to draw.
 
@@ -100,41 +118,17 @@ def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
     """
     angle = dataset["opening_angle"].dropna("time", how="any")
     mean = angle.mean(("plane", "section")).values
-    deployed = wording.deployment_time(dataset)
+    deployed = style.deployment_time(dataset)
     done = math.isfinite(deployed)
     last = int(np.abs(angle["time"].values - deployed).argmin()) if done else len(mean) - 1
     middle = int(np.abs(mean[: last + 1] - 0.5 * (mean[0] + mean[last])).argmin())
     opens = mean[last] >= mean[0]
     names = ("stowed" if opens else "start", "half-way", "deployed" if done else "end of the run")
-    moments = [(n, angle.isel(time=i)) for n, i in zip(names, (0, middle, last), strict=True)]
+    angles = [angle.isel(time=k) for k in (0, middle, last)]
     if done:
-        locked = xr.full_like(moments[2][1], 180.0)
-        locked["time"] = locked["time"].copy(data=deployed)
-        moments[2] = (names[2], locked)
-    return moments
-
-
-def _compose(
-    dataset: xr.Dataset,
-    moments: list[tuple[str, xr.DataArray]],
-    shots: list[dict[str, tuple[Array, Array]]],
-) -> Figure:
-    points = [np.concatenate([xy.reshape(-1, 2) for xy, _ in shot.values()]) for shot in shots]
-    low = np.array([p.min(axis=0) for p in points])
-    sizes = np.array([p.max(axis=0) for p in points]) - low
-    height = float(sizes[:, 1].max())
-    scale, cells = _fit(sizes[:, 0], height)
-    figure, axes = _sheet(scale, height)
-    middles = (np.cumsum(cells + _GAP) - 0.5 * cells - _GAP) / scale
-    for (name, angles), shot, corner, size, middle in zip(
-        moments, shots, low, sizes, middles, strict=True
-    ):
-        _draw(axes, shot, np.array([middle - 0.5 * size[0], 0.0]) - corner, scale)
-        _caption(axes, middle, name, angles)
-    _scale_bar(axes, _WIDTH / scale, height)
-    _legend(figure, {name for shot in shots for name, (xy, _) in shot.items() if len(xy)})
-    wording.head(figure, axes, dataset, "Deployment", pad=72.0 * _BAR)
-    return figure
+        angles[2] = xr.full_like(angles[2], 180.0)
+        angles[2]["time"] = angles[2]["time"].copy(data=deployed)
+    return list(zip(names, angles, strict=True))
 
 
 def _fit(widths: Array, height: float) -> tuple[float, Array]:
@@ -160,9 +154,7 @@ def _sheet(scale: float, height: float) -> tuple[Figure, Axes]:
     figure.set_layout_engine("none")
     axes = figure.add_axes((_SIDE / wide, _BELOW / high, _WIDTH / wide, sheet / high))
     axes.set_axis_off()
-    axes.set_aspect("equal")
-    axes.set_xlim(0.0, _WIDTH / scale)
-    axes.set_ylim(0.0, height)
+    axes.set(aspect="equal", xlim=(0.0, _WIDTH / scale), ylim=(0.0, height))
     return figure, axes
 
 
@@ -182,25 +174,20 @@ def _caption(axes: Axes, middle: float, name: str, angles: xr.DataArray) -> None
 def _draw(axes: Axes, shot: dict[str, tuple[Array, Array]], shift: Array, scale: float) -> None:
     """Lines from far to near, the far ones paler; thinner where a metre is short."""
     thin = float(np.clip(scale / 1.3, 0.45, 1.0))
-    looks = [_LOOKS[name] for name, (xy, _) in shot.items() for _ in xy]
     lines = np.concatenate([xy for xy, _ in shot.values()]) + shift
     near = np.concatenate([depth.mean(axis=-1) for _, depth in shot.values()])
     order = np.argsort(near, kind="stable")
+    every = [_LOOKS[name] for name, (xy, _) in shot.items() for _ in xy]
+    looks = [every[k] for k in order]
     depth = max(float(np.ptp(near)), 0.8 * float(np.ptp(lines[..., 0])))
-    fade = _FADE * (near.max() - near) / depth
-    colours = np.array([to_rgb(look.colour) for look in looks])
-    colours += fade[:, None] * (1.0 - colours)
-    axes.add_collection(
-        LineCollection(
-            list(lines[order]),
-            colors=colours[order],
-            linewidths=[thin * looks[k].width for k in order],
-            linestyles=[looks[k].dashes for k in order],
-            capstyle="round",
-            clip_on=False,
-        ),
-        autolim=False,
-    )
+    fade = (_FADE * (near.max() - near) / depth)[order, None]
+    colours = np.array([to_rgb(look["color"]) for look in looks])
+    drawn = LineCollection(
+        list(lines[order]), colors=colours + fade * (1.0 - colours), capstyle="round",
+        linewidths=[thin * look["linewidth"] for look in looks],
+        linestyles=[look.get("linestyle", "solid") for look in looks], clip_on=False,
+    )  # fmt: skip
+    axes.add_collection(drawn, autolim=False)
 
 
 def _scale_bar(axes: Axes, length: float, top: float) -> None:
@@ -208,30 +195,10 @@ def _scale_bar(axes: Axes, length: float, top: float) -> None:
     power = 10.0 ** math.floor(math.log10(raw))
     metres = power * max(step for step in (1, 2, 5) if step * power <= raw)
     axes.plot(
-        [0.0, metres],
-        [above, above],
-        color=style.INK,
-        linewidth=2.5,
-        solid_capstyle="butt",
+        [0.0, metres], [above, above], color=style.INK, linewidth=2.5, solid_capstyle="butt",
         clip_on=False,
-    )
+    )  # fmt: skip
     axes.annotate(
         f"{metres:g} m", (0.5 * metres, above), xytext=(0, 4), textcoords="offset points",
         ha="center", va="bottom", annotation_clip=False,
     )  # fmt: skip
-
-
-def _legend(figure: Figure, drawn: set[str]) -> None:
-    entries = [
-        Line2D(
-            [],
-            [],
-            color=look.colour,
-            linewidth=look.width,
-            linestyle=look.dashes,
-            label=_NAMES.get(name, name),
-        )
-        for name, look in _LOOKS.items()
-        if name in drawn
-    ]
-    figure.legend(handles=entries, loc="lower center", ncols=len(entries))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from ringsim.files import writing
 from ringsim.plots import style
 from ringsim.plots.asynchrony import asynchrony
 from ringsim.plots.cables import cables
@@ -18,13 +19,11 @@ from ringsim.plots.energy import energy
 from ringsim.plots.opening_angles import opening_angles
 from ringsim.plots.planar_truss import strain_over_length, tension_over_length
 from ringsim.plots.ring import ring
-from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
 from ringsim.structures.pantograph_ring import PantographRing
 
 
-@dataclass(frozen=True)
-class _Picture:
+class _Picture(NamedTuple):
     name: str
     draw: Callable[[xr.Dataset], Figure]
     needs: tuple[str, ...]
@@ -33,7 +32,7 @@ class _Picture:
 
 
 PICTURES = (
-    _Picture("opening_angles", opening_angles, ("opening_angle", "lock_time")),
+    _Picture("opening_angles", opening_angles, ("opening_angle", "asynchrony")),
     _Picture("asynchrony", asynchrony, ("asynchrony",)),
     _Picture("diagonal_stress", diagonal_stress, ("rod_stress",), ring_only=True),
     _Picture("ring", ring, ("opening_angle", "asynchrony")),
@@ -67,30 +66,16 @@ def draw_run(dataset: xr.Dataset, folder: str | Path, prefix: str = "") -> list[
         If the folder or a file cannot be written.
     """
     folder = Path(folder)
-    written = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for picture in _pictures(dataset):
-            path = folder / f"{prefix}{picture.name}.png"
-            style.write(picture.draw(dataset), path)
-            written.append(path)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from error
-    return written
-
-
-def _pictures(dataset: xr.Dataset) -> tuple[_Picture, ...]:
-    """The pictures for which something was recorded, and whose rods or cables are those of a ring
-    where they draw these alone.
-    """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
     is_ring = isinstance(scene.structure, PantographRing)
-    return tuple(
-        picture
-        for picture in PICTURES
-        if _recorded(picture, dataset) and (is_ring or not picture.ring_only)
-    )
-
-
-def _recorded(picture: _Picture, dataset: xr.Dataset) -> bool:
-    return all(name in dataset and bool(np.isfinite(dataset[name]).any()) for name in picture.needs)
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, draw, needs, ring_only in PICTURES:
+        recorded = all(n in dataset and bool(np.isfinite(dataset[n]).any()) for n in needs)
+        if recorded and (is_ring or not ring_only):
+            figure = draw(dataset)
+            written.append(folder / f"{prefix}{name}.png")
+            with writing(folder):
+                style.write(figure, written[-1])
+    return written

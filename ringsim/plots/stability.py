@@ -33,7 +33,6 @@ _LOOKS: dict[str, tuple[str, str]] = {
 }
 """Colour and letter of each kind of cell; the letter tells what the colour may not."""
 _OTHER = ("#5e5e5e", "?")
-_COLUMNS = 3
 
 
 @style.styled
@@ -42,30 +41,21 @@ def stability(whole: xr.Dataset) -> Figure:
 
     ``whole`` is a judged map (``ringsim.analysis.stability.joined``).
     """
-    groups = whole.sizes["group"]
-    columns = min(_COLUMNS, groups)
-    rows = -(-groups // columns)
-    figure = style.new_figure(4.5 * columns, 3.5 * rows + 1.0)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    figure, panels, columns = style.new_panels(whole.sizes["group"], 4.5, 3.5, 1.0)
     seen: set[str] = set()
-    for number, axes in enumerate(panels[:groups]):
+    for number, axes in enumerate(panels):
         cells = whole.isel(cell=(whole["of_group"] == number).values, group=number)
         kinds = [_kind(cells.isel(cell=k)) for k in range(cells.sizes["cell"])]
         _panel(axes, cells, kinds)
         seen |= set(kinds)
-    for axes in panels[groups:]:
-        axes.set_axis_off()
+    words = [word for word in [*_LOOKS, *sorted(seen - set(_LOOKS))] if word in seen]
     handles = [
         Patch(facecolor=colour, edgecolor=style.GREY, label=f"{letter}  {word}".strip())
-        for word in [*_LOOKS, *sorted(seen - set(_LOOKS))]
-        for colour, letter in [_LOOKS.get(word, _OTHER)]
-        if word in seen
+        for word, (colour, letter) in ((word, _LOOKS.get(word, _OTHER)) for word in words)
     ]
     most = min(len(handles), 2 * columns + 1)
     figure.legend(handles=handles, loc="outside lower center", ncols=most)
-    figure.suptitle(
-        f"Stability map: {whole.sizes['cell']} runs and how they ended", x=0.012, ha="left"
-    )
+    style.title(figure, f"Stability map: {whole.sizes['cell']} runs and how they ended")
     return figure
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
+import math
 from pathlib import Path
-from typing import Any, ParamSpec
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.axis import Axis
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -59,33 +58,37 @@ _SETTINGS: Any = {
     "ytick.labelsize": 9.5,
 }
 
-_Arguments = ParamSpec("_Arguments")
-
-
-def styled(draw: Callable[_Arguments, Figure]) -> Callable[_Arguments, Figure]:
-    """Draw with the shared style, and leave matplotlib's global settings as they were."""
-
-    @functools.wraps(draw)
-    def drawn(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> Figure:
-        with mpl.rc_context(_SETTINGS):
-            return draw(*args, **kwargs)
-
-    return drawn
+styled = mpl.rc_context(_SETTINGS)
+"""Decorator: draw with the shared style, and leave matplotlib's global settings as they were."""
 
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure (size in inch) with constrained layout; needs no display."""
     layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08)
-    figure = Figure(figsize=(width, height), layout=layout, facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
+    return Figure(figsize=(width, height), layout=layout, facecolor="white")
+
+
+def new_panels(
+    count: int, width: float, height: float, legend: float, *, sharex: bool = False
+) -> tuple[Figure, list[Axes], int]:
+    """A figure of ``count`` panels in rows of three, and its number of columns; sizes in inch."""
+    columns = min(3, count)
+    rows = -(-count // columns)
+    figure = new_figure(width * columns, height * rows + legend)
+    panels = figure.subplots(rows, columns, sharex=sharex, squeeze=False).ravel().tolist()
+    for panel in panels[count:]:
+        panel.set_visible(False)
+    return figure, panels[:count], columns
+
+
+def title(figure: Figure, text: str) -> None:
+    """A bold title in the upper left corner of the sheet."""
+    figure.suptitle(text, x=0.012, ha="left")
 
 
 def section_colours(sections: int) -> Colormap:
     """One colour a section, perceptually uniform, without the light yellow end."""
-    viridis = mpl.colormaps["viridis"]
-    steps = max(sections - 1, 1)
-    return ListedColormap([viridis(0.88 * k / steps) for k in range(sections)])
+    return ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.88, sections)))
 
 
 def span_time(axes: Axes, values: xr.DataArray) -> None:
@@ -98,15 +101,8 @@ def span_time(axes: Axes, values: xr.DataArray) -> None:
 def span_sizes(axes: Axes, sizes: np.ndarray) -> None:
     """Value axis from zero; logarithmic where most of the run would be a flat line.
 
-    Peaks at locking are hundreds of times larger than values before, so a linear axis
-    would show nothing else.
-
-    Parameters
-    ----------
-    axes
-        Where the values were drawn.
-    sizes
-        What was drawn, any shape, not negative, NaN where nothing was recorded.
+    Peaks at locking are hundreds of times larger than values before, so a linear axis would show
+    nothing else.  ``sizes`` is what was drawn, of any shape, NaN where nothing was recorded.
     """
     known = sizes[np.isfinite(sizes) & (sizes > 0.0)]
     largest = float(known.max()) if known.size else 1.0
@@ -117,8 +113,13 @@ def span_sizes(axes: Axes, sizes: np.ndarray) -> None:
     lowest = max(float(np.quantile(known, 0.02)), 1e-5 * largest)
     axes.set_yscale("log", nonpositive="clip")
     axes.set_ylim(10.0 ** np.floor(np.log10(lowest)), 4.0 * largest)
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    plain_numbers(axes.yaxis)
+
+
+def plain_numbers(axis: Axis) -> None:
+    """Ticks of a logarithmic axis as 0.01 instead of a power of ten, and only the major ones."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
@@ -129,19 +130,28 @@ def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
     )  # fmt: skip
 
 
-def mark_moment(axes: Axes, moment: float, text: str = "") -> None:
-    """A dashed vertical line at a time (s), with a label above the frame."""
-    axes.axvline(moment, color=INK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=1.5)
-    if text:
-        first, last = axes.get_xlim()
-        side = "right" if moment > 0.5 * (first + last) else "left"
-        axes.annotate(
-            text, (moment, 1.0), xycoords=axes.get_xaxis_transform(), xytext=(0, 3),
+def deployment_time(dataset: xr.Dataset) -> float:
+    """Time at which the last V-joint locked (s), NaN if it did not."""
+    return float(dataset.get("deployment_time", math.nan))
+
+
+def mark_deployment(dataset: xr.Dataset, *panels: Axes, named: bool = True) -> None:
+    """A dashed line where the last V-joint locked, if it did; its time above the first panel."""
+    moment = deployment_time(dataset)
+    if math.isnan(moment):
+        return
+    for axes in panels:
+        axes.axvline(moment, color=INK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=1.5)
+    if named:
+        side = "right" if moment > 0.5 * sum(panels[0].get_xlim()) else "left"
+        panels[0].annotate(
+            f"all locked at {moment:.2f} s", (moment, 1.0),
+            xycoords=panels[0].get_xaxis_transform(), xytext=(0, 3),
             textcoords="offset points", ha=side, va="bottom", fontsize=9.5,
         )  # fmt: skip
 
 
+@styled
 def write(figure: Figure, path: Path) -> None:
     """Write a PNG."""
-    with mpl.rc_context(_SETTINGS):
-        figure.savefig(path, dpi=DPI, format="png")
+    figure.savefig(path, dpi=DPI, format="png")

@@ -10,6 +10,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ringsim.plots import style
+from ringsim.variables import Status
+
 _PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
 _PREFIXED = ("J", "Pa", "N", "W")
 
@@ -29,18 +32,10 @@ def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> 
 def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
     """Factor and prefixed unit that scale the largest value to between 0.5 and 500.
 
-    Parameters
-    ----------
-    *variables
-        Arrays that share one unit; only J, Pa, N and W get a prefix.
-
-    Returns
-    -------
-    tuple[float, str]
-        Multiply the values by the first; the second is their unit then.
+    The variables share one unit; only J, Pa, N and W get a prefix.
     """
     units = str(variables[0].attrs.get("units", "1"))
-    largest = max((largest_magnitude(v) for v in variables), default=0.0)
+    largest = max(largest_magnitude(v) for v in variables)
     if units not in _PREFIXED or largest == 0.0:
         return 1.0, units
     power = min(max(math.floor(math.log10(2.0 * largest) / 3.0), -4), 3)
@@ -49,33 +44,20 @@ def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
 
 def largest_magnitude(variable: xr.DataArray) -> float:
     """Largest finite absolute value, 0 if there is none."""
-    values = np.abs(variable.values[np.isfinite(variable.values)])
-    return float(values.max()) if values.size else 0.0
-
-
-def status_word(dataset: xr.Dataset) -> str:
-    """The run's status in words, from the flags of the variable ``status``."""
-    flags = np.atleast_1d(dataset["status"].attrs["flag_values"]).tolist()
-    words = str(dataset["status"].attrs["flag_meanings"]).split()
-    word: str = words[flags.index(int(dataset["status"]))]
-    return word.replace("_", " ")
-
-
-def deployment_time(dataset: xr.Dataset) -> float:
-    """Time at which the last V-joint locked (s), NaN if it did not."""
-    return float(dataset["deployment_time"]) if "deployment_time" in dataset else math.nan
+    values = variable.values
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def ending(dataset: xr.Dataset) -> str:
     """How the run ended, in one sentence."""
-    word = status_word(dataset)
-    deployed = deployment_time(dataset)
-    final = float(dataset["final_time"]) if "final_time" in dataset else math.nan
-    after = f" after {final:.4g} s" if math.isfinite(final) else ""
+    word = Status(int(dataset["status"])).word.replace("_", " ")
+    deployed = style.deployment_time(dataset)
+    final = float(dataset.get("final_time", math.nan))
     if word == "ok" and math.isfinite(deployed):
         return f"Deployed after {deployed:.2f} s"
     reason = str(dataset.attrs.get("reason", "")).strip()
-    start = f"Ended{after}" if word == "ok" else f"{word[:1].upper()}{word[1:]}{after}"
+    start = "Ended" if word == "ok" else word[:1].upper() + word[1:]
+    start += f" after {final:.4g} s" if math.isfinite(final) else ""
     return f"{start}: {reason}" if reason else start
 
 
@@ -83,7 +65,7 @@ def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: flo
     """Subject and scene above the figure, how the run ended above its first axes."""
     inches = figure.get_size_inches()[0]
     title = f"{subject}: {dataset.attrs.get('title', '')}".rstrip(": ")
-    figure.suptitle(_balanced(title, int(10.3 * inches)), x=0.012, ha="left")
+    style.title(figure, _balanced(title, int(10.3 * inches)))
     lines = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
     axes.set_title("\n".join(lines), pad=pad)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.choice import OneOf
+from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.correlation import Correlation
@@ -18,7 +19,6 @@ from ringsim.sampling.designs.family import Design, Factor
 from ringsim.sampling.distributions.family import Distribution
 from ringsim.sampling.paths import each_of, field_at, refuse_fixed, unit_at
 from ringsim.scene import Scene, place_of
-from ringsim.variables import COORDINATES, VARIABLES
 
 AnyDistribution = Annotated[Distribution, OneOf()]
 AnyDesign = Annotated[Design, OneOf()]
@@ -68,7 +68,7 @@ def draw(
     drawn = design.table(factors, correlations, seed=seed, folder=folder)
     samples = len(next(iter(drawn.values()))) if drawn else getattr(design, "samples", 1)
     columns: list[Column] = []
-    taken = set(VARIABLES) | {c.name for c in COORDINATES}
+    taken = {*VARIABLES, *COORDINATES}
     for path in inputs or drawn:
         refuse_fixed(base, path)
         grouped = path in inputs and inputs[path].each_section

@@ -8,6 +8,7 @@ import numpy as np
 
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import StopContact
+from ringsim.variables import Cause, Reason
 
 BEND, PEAK_BEND = 0.05, 0.4
 """Bend of a tension over the largest tension, its root mean square over the run and its value at
@@ -43,7 +44,7 @@ class ConstantSteps:
         return min(self.step, left)
 
 
-def unresolved(run: list[Instant], slack_tension: float | None) -> str:
+def unresolved(run: list[Instant], slack_tension: float | None) -> Reason:
     """Why constant steps have not resolved a run; empty if they have.  Bends below the slack
     tension (N; None without cables) do not matter.
 
@@ -59,13 +60,14 @@ def unresolved(run: list[Instant], slack_tension: float | None) -> str:
     times, angles = np.array([(one.time, one.angles.max()) for one in run]).T
     first = int(np.argmax(angles >= math.pi))
     if 0 < first < STEPS:
-        return (
+        return Reason(
+            Cause.FEW_STEPS,
             f"the first V-joint locked within {first} steps, at {times[first]:.3g} s, fewer than "
             f"{STEPS} of constant length: reduce solver.step, or let it follow the motion "
-            '(solver.step_control = "motion")'
+            '(solver.step_control = "motion")',
         )
     if len(times) < 3 or slack_tension is None:
-        return ""
+        return Reason()
     tensions = np.array([one.tensions for one in run])
     steps = np.diff(times)[:, None]
     bends = np.abs(np.diff(np.diff(tensions, axis=0) / steps, axis=0))
@@ -78,10 +80,11 @@ def unresolved(run: list[Instant], slack_tension: float | None) -> str:
         (there, PEAK_BEND, f"at {times[peak]:.6g} s, where it is largest"),
     ):
         if bend > max(share * largest, slack_tension):
-            return (
+            return Reason(
+                Cause.TENSION_BENDS,
                 f"a tension bends by {bend:.3g} N within a step {where}, "
                 f"{100.0 * bend / largest:.3g} % of its largest value and more than "
                 f"{100.0 * share:g} %: the steps do not resolve how the rope swings: "
-                "reduce solver.step"
+                "reduce solver.step",
             )
-    return ""
+    return Reason()

@@ -20,6 +20,7 @@ from ringsim.parts.solver import Solver
 from ringsim.stepping.constant_steps import unresolved
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.scales import Scales
+from ringsim.variables import Cause, Reason
 
 GAIN, LOSS = 2.0, 5.0
 """B / X at which a run is stopped, over ``solver.energy_tolerance``.  Larger than at the end,
@@ -47,7 +48,7 @@ class Guard:
         self._low = self._high = np.zeros(3)
         self._worst = (0.0, 0.0)
 
-    def judge(self, now: Instant, overrun: float = 0.0) -> str:
+    def judge(self, now: Instant, overrun: float = 0.0) -> Reason:
         """Why the run must stop here: cause, measured value, bound and cure; empty if it may go on.
 
         ``overrun`` is the largest angle by which a V-joint has passed its stops, rad.
@@ -66,27 +67,30 @@ class Guard:
 
         available = max(abs(work), self._scales.energy) + start.kinetic + start.elastic
         if stored > BLOW_UP * available:
-            return (
+            return Reason(
+                Cause.BLOW_UP,
                 f"the motion blew up at {time:.6g} s: {found.kinetic:.3g} J of kinetic and "
                 f"{found.elastic:.3g} J of elastic energy, more than {BLOW_UP:g} times the "
-                f"{available:.3g} J that start, loads and winches have given: {_CURE}"
+                f"{available:.3g} J that start, loads and winches have given: {_CURE}",
             )
         if now.gap > GAP * self._scales.length:
-            return (
+            return Reason(
+                Cause.JOINT_GAP,
                 f"the joints came apart by {now.gap:.2g} m at {time:.6g} s, more than "
-                f"{GAP * self._scales.length:.2g} m: {_CURE}"
+                f"{GAP * self._scales.length:.2g} m: {_CURE}",
             )
         if overrun > OVERRUN:
-            return (
+            return Reason(
+                Cause.STOP_PASSED,
                 f"a V-joint swung {math.degrees(overrun):.3g} deg past its stop at {time:.6g} s, "
                 f"more than {math.degrees(OVERRUN):.0f} deg: raise stop.stiffness, or lower what "
-                "drives it"
+                "drives it",
             )
         factor = GAIN if balance > 0.0 else LOSS
         words = f"{factor:g} times solver.energy_tolerance"
         return self._unbalanced(time, balance, self._scales.energy, factor, words)
 
-    def verdict(self) -> str:
+    def verdict(self) -> Reason:
         """Why a run that ended by itself is not sound after all; empty if it is."""
         least = SLIGHT * self._scales.energy
         reason = self._unbalanced(*self._worst, least, 1.0, "solver.energy_tolerance")
@@ -96,16 +100,17 @@ class Guard:
 
     def _unbalanced(
         self, time: float, balance: float, least: float, factor: float, bound: str
-    ) -> str:
+    ) -> Reason:
         """Why an imbalance B in J is too large; X counts as ``least`` (J) at least."""
         work = max(self._high[2], -self._low[2])
         exchanged = float(max(least, work, *(self._high - self._low)[:2]))
         # Not <=: an unknown balance (NaN) stops nothing.
         if not abs(balance) > factor * self._tolerance * exchanged:
-            return ""
+            return Reason()
         share, limit = 100.0 * abs(balance) / exchanged, 100.0 * self._tolerance
-        return (
+        return Reason(
+            Cause.ENERGY_GREW if balance > 0.0 else Cause.ENERGY_LOST,
             f"time integration {'added' if balance > 0.0 else 'lost'} {abs(balance):.3g} J, "
             f"{share:.3g} % of the energy exchanged, up to {time:.6g} s, more than {bound} "
-            f"({limit:g} %): {_CURE}"
+            f"({limit:g} %): {_CURE}",
         )

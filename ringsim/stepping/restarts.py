@@ -10,12 +10,12 @@ import numpy as np
 
 from ringsim.parts.solver import Solver
 from ringsim.stepping.instant import Array
-from ringsim.variables import COUNTS, TIMINGS, Outcome, Status
+from ringsim.variables import COUNTS, TIMINGS, Cause, Outcome, Status
 
 Solve = Callable[[Solver], Outcome]
 """Runs a scene with these settings; it never raises."""
 ErrorBars = Callable[..., dict[str, Array]]
-"""As ``ringsim.theory.error_bars``: of a run and another with steps half or twice as long, its
+"""As ``ringsim.outputs.error_bars``: of a run and another with steps half or twice as long, its
 ``tolerance`` and the ``scale`` of their differences; empty if one did not reach its goal."""
 
 
@@ -31,7 +31,7 @@ def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Ou
         ``total_steps``, ... count those of all starts.
     """
     used, outcome, restarts = solver, solve(solver), 0
-    first, totals = outcome.reason, _counts(outcome)
+    first, totals = outcome, _counts(outcome)
     while restarts < solver.restarts and _curable(outcome, solver):
         restarts += 1
         used = solver.refined(restarts)
@@ -40,7 +40,10 @@ def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Ou
         how = f"start {restarts + 1} with solver.step = {used.step:.3g} s"
         if used.step_control != "constant":
             how += f" and solver.tolerance = {used.tolerance:.2g}"
-        outcome = replace(outcome, reason=f"{outcome.reason} ({how}; start 1: {first})")
+        # A start that only ran out of its smaller steps does not say what is wrong.
+        cause = first.cause if outcome.cause is Cause.STEP_LIMIT else outcome.cause
+        reason = f"{outcome.reason} ({how}; start 1: {first.reason})"
+        outcome = replace(outcome, reason=reason, cause=cause)
     if solver.error_bars and outcome.status == Status.OK:
         outcome = _with_bars(outcome, solve, used, error_bars)
     found = {

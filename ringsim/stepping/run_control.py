@@ -19,7 +19,7 @@ from ringsim.stepping.locks import Locks, StopContact, lock_times
 from ringsim.stepping.motion_steps import MotionSteps
 from ringsim.stepping.repeats import EnergyBalance, Indicator, TensionBend
 from ringsim.stepping.scales import Scales
-from ringsim.variables import Status
+from ringsim.variables import Cause, Reason, Status
 
 _ROUND_OFF = 1e-12
 """Relative difference of two times that are the same."""
@@ -74,7 +74,7 @@ class RunControl:
         self._guard = Guard(solver, scales)
         self._shorter: float | None = None
         self._count, self.repeats, self._settled_at = 0, 0, math.inf
-        self.status, self.reason, self.goes_on = Status.UNFINISHED, "", True
+        self.status, self.reason, self.goes_on = Status.UNFINISHED, Reason(), True
         self._watch()
 
     def next_step(self, next_event: float = math.inf) -> float:
@@ -132,12 +132,13 @@ class RunControl:
     def fail(self, cause: str) -> None:
         """End a run whose solver gave up, for this cause."""
         self._give_up(
+            Cause.NEWTON,
             f"the solver gave up at {self.now.time:.6g} s after {self.repeats} reductions of the "
             "step: reduce solver.step or solver.tolerance, or raise solver.newton_tolerance "
-            f"({cause})"
+            f"({cause})",
         )
 
-    def diverge(self, reason: str) -> None:
+    def diverge(self, reason: Reason) -> None:
         """End a run that cannot be sound."""
         self.status, self.reason, self.goes_on = Status.DIVERGED, reason, False
 
@@ -160,7 +161,8 @@ class RunControl:
         if not (locks.deployed.all() or locks.stowed.all()):
             return
         where = "180 deg" if locks.deployed.all() else "the stowed stop"
-        self.status, self.reason = Status.OK, f"all V-joints have reached {where}"
+        reason = Reason(Cause.NONE, f"all V-joints have reached {where}")
+        self.status, self.reason = Status.OK, reason
         # Settling counts from the last lock within this step: what happens after it must not
         # depend on where steps end.
         time, settling = self.now.time, self._solver.settling_time if locks.stops else 0.0
@@ -180,22 +182,25 @@ class RunControl:
             self.goes_on = False
             if locks is None:
                 self.status = Status.OK
-                self.reason = f"the cable was wound until solver.end_time = {solver.end_time:g} s"
+                words = f"the cable was wound until solver.end_time = {solver.end_time:g} s"
+                self.reason = Reason(Cause.NONE, words)
             elif self.status == Status.UNFINISHED:
-                self.reason = (
+                self.reason = Reason(
+                    Cause.END_TIME,
                     f"solver.end_time = {solver.end_time:g} s was reached with "
-                    f"{int(locks.deployed.sum())} of {locks.deployed.size} V-joints locked"
+                    f"{int(locks.deployed.sum())} of {locks.deployed.size} V-joints locked",
                 )
         elif self._count >= solver.step_limit:
             self._give_up(
+                Cause.STEP_LIMIT,
                 f"solver.step_limit = {solver.step_limit} steps took the run to {time:.6g} s only, "
-                f"the last of {time - before:.1e} s: raise solver.tolerance or solver.step_limit"
+                f"the last of {time - before:.1e} s: raise solver.tolerance or solver.step_limit",
             )
 
-    def _give_up(self, reason: str) -> None:
+    def _give_up(self, cause: Cause, words: str) -> None:
         """End a run early; one that has reached its goal only settles less."""
         self.goes_on = False
         if math.isfinite(self._settled_at):
             self.reason += f"; settling was cut short at {self.now.time:.6g} s"
         else:
-            self.status, self.reason = Status.SOLVER_FAILED, reason
+            self.status, self.reason = Status.SOLVER_FAILED, Reason(cause, words)

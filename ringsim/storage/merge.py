@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.files import whole
+from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.sampling.columns import Table, add_inputs
 from ringsim.storage.netcdf import (
     CHUNK_BYTES,
@@ -20,9 +21,8 @@ from ringsim.storage.netcdf import (
     add_variable,
     blank,
 )
-from ringsim.storage.result import COORDINATE
 from ringsim.storage.survey import Survey
-from ringsim.variables import VARIABLES, Status, Variable
+from ringsim.variables import Cause, Status, Variable
 
 NAME = "campaign.nc"
 BLOCK_BYTES = 64 << 20
@@ -79,7 +79,7 @@ def _common(found: Survey) -> tuple[dict[str, NDArray[Any]], set[str], NDArray[n
     for sample in np.sort(first[forms >= 0]):  # the lowest sample of each form
         (result,) = found.results([sample])
         arrays = result.arrays()
-        own = {name: arrays[name] for name in COORDINATE if name in arrays}
+        own = {name: arrays[name] for name in COORDINATES if name in arrays}
         fit = all(np.array_equal(axes.get(n, v), v) for n, v in own.items())
         fits[found.form[sample]] = fit
         if fit:
@@ -106,6 +106,7 @@ def _copy(
                 if name in blocks:
                     blocks[name][k] = values
             blocks["status"][k] = result.status if fit else Status.ERROR
+            blocks["cause"][k] = result.cause if fit else Cause.UNFIT
             blocks["reason"][k] = result.reason if fit else UNFIT
             blocks["log"][k] = result.log
         for name, values in blocks.items():

@@ -9,26 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import known_or_nearest
 from ringsim.storage.result import MISSING_COUNT
 from ringsim.units import Model
-from ringsim.variables import COORDINATES, VARIABLES, Status, Variable
+from ringsim.variables import Variable, flags_of
 
 NOT_RUN = -1
-"""Value of ``status`` for samples that have not been run."""
+"""Value of ``status`` for samples that have not been run, and of codes that are missing."""
 
 CHUNK_BYTES = 1 << 20
 """Size of what is compressed at once, about."""
 
-COORDINATE = {
-    v.name: v
-    for v in (Variable("sample", ("sample",), "1", "sample of the campaign", "i8"), *COORDINATES)
-}
+SAMPLE = Variable("sample", ("sample",), "1", "sample of the campaign", "i8")
 
 PER_SAMPLE = {
     v.name: v
     for v in (
         VARIABLES["status"],
+        VARIABLES["cause"],
         Variable("reason", (), "1", "why the run ended so", "str"),
         Variable("log", (), "1", "end of what a failed run printed", "str"),
     )
@@ -62,7 +61,7 @@ class Output(Model):
 def add_coordinate(file: Any, name: str, values: NDArray[Any]) -> None:
     """Create a dimension with its coordinate variable in an open netCDF4 dataset."""
     file.createDimension(name, len(values))
-    variable = _create(file, COORDINATE[name], (name,))
+    variable = _create(file, COORDINATES.get(name, SAMPLE), (name,))
     if name == "sample":
         variable.standard_name = "realization"
     variable[:] = values.astype(object) if values.dtype.kind == "U" else values
@@ -82,7 +81,7 @@ def add_variable(
         row = max(1, math.prod(shape) * np.dtype(definition.dtype).itemsize)
         rows = max(1, min(samples, CHUNK_BYTES // row))
         options["chunksizes"] = (rows, *(max(1, n) for n in shape))
-        if definition.name != "status":  # whose "not_run" is a value like others
+        if definition.flags is None:  # a missing code has a word like others
             options["fill_value"] = blank(definition, ())[()]
         if compression:
             options |= {"compression": "zlib", "complevel": compression, "shuffle": True}
@@ -90,9 +89,11 @@ def add_variable(
             options |= {"significant_digits": digits, "quantize_mode": "GranularBitRound"}
     variable = _create(file, definition, dims, **options)
     variable.set_auto_maskandscale(False)
-    if definition.name == "status":
-        variable.flag_values = np.array([NOT_RUN, *Status], dtype="i1")
-        variable.flag_meanings = " ".join(["not_run", *(s.word for s in Status)])
+    if definition.flags is not None:
+        flags = flags_of(definition.flags)
+        missing = "not_run" if definition.name == "status" else "unknown"
+        variable.flag_values = np.append(np.int8(NOT_RUN), flags["flag_values"])
+        variable.flag_meanings = f"{missing} {flags['flag_meanings']}"
 
 
 def _create(file: Any, definition: Variable, dims: tuple[str, ...], **options: Any) -> Any:
@@ -109,7 +110,5 @@ def blank(definition: Variable, shape: tuple[int, ...]) -> NDArray[Any]:
     """An array of missing values."""
     if definition.dtype == "str":
         return np.full(shape, "", dtype=object)
-    if definition.name == "status":
-        return np.full(shape, NOT_RUN, dtype="i1")
     kind = np.dtype(definition.dtype)
     return np.full(shape, np.nan if kind.kind == "f" else MISSING_COUNT, dtype=kind)

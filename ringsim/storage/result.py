@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.variables import COORDINATES, VARIABLES, Status
+from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.variables import Cause, Status
 
-COORDINATE = {variable.name: variable for variable in COORDINATES}
 MISSING_COUNT = -1
 """Stands for a missing whole number."""
 
@@ -35,6 +35,8 @@ class Result:
     """How the run ended."""
     reason: str
     """One sentence: why it ended so."""
+    cause: Cause = Cause.NONE
+    """The same as a code."""
     log: str = ""
     """The end of what a failed run printed."""
     seconds: float = float("nan")
@@ -55,7 +57,8 @@ class Result:
     def from_header(cls, header: bytes, body: bytes) -> Result:
         """The result whose :meth:`header` is given."""
         table = json.loads(header)
-        return cls(**table | {"status": Status(table["status"])}, body=body)
+        codes = {"status": Status(table["status"]), "cause": Cause(table.get("cause", 0))}
+        return cls(**table | codes, body=body)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """The arrays by name."""
@@ -110,10 +113,10 @@ def pack(arrays: Mapping[str, NDArray[Any]]) -> tuple[str, bytes]:
     ValueError
         If a name has no definition, or an array does not span its coordinates.
     """
-    sizes = {name: np.shape(values) for name, values in arrays.items() if name in COORDINATE}
+    sizes = {name: np.shape(values) for name, values in arrays.items() if name in COORDINATES}
     described, parts, same = [], [], []
     for name, values in arrays.items():
-        wanted = COORDINATE.get(name) or VARIABLES.get(name)
+        wanted = COORDINATES.get(name) or VARIABLES.get(name)
         if wanted is None:
             raise ValueError(f"there is no variable {name}")
         array = np.asarray(values)
@@ -133,12 +136,12 @@ def pack(arrays: Mapping[str, NDArray[Any]]) -> tuple[str, bytes]:
             array = np.where(np.isfinite(array), array, MISSING_COUNT).astype(wanted.dtype)
         else:
             array = array.astype(wanted.dtype)
-            if name in COORDINATE and array.dtype.kind == "f":
+            if name in COORDINATES and array.dtype.kind == "f":
                 array = _rounded(array)
         described.append((name, array.dtype.str, array.shape))
         planes = np.frombuffer(array.tobytes(), "u1").reshape(-1, array.itemsize).T.tobytes()
         parts.append(planes)
-        if name in COORDINATE:
+        if name in COORDINATES:
             same.append(planes)
     head = json.dumps(described, separators=(",", ":")).encode()
     form = hashlib.blake2b(b"\n".join([head, *same]), digest_size=8).hexdigest()

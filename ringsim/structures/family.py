@@ -72,20 +72,20 @@ class Structure(Model):
         """
         raise NotImplementedError
 
-    def basis(self, coordinate: float) -> NDArray[np.float64] | None:
-        """Functions of the coordinate in which all points are linear, if there are a few.
+    def basis(self, coordinate: float) -> NDArray[np.float64]:
+        """Functions of the coordinate in which all places are linear; none unless a kind has some.
 
         Every place of the layout is then P s with constant P, so that theory need not build a
         layout at each coordinate.
 
         Returns
         -------
-        Array or None
+        Array
             The functions s, the first of them 1, and their first and second derivatives, shape
             (3, functions).
         """
         del coordinate
-        return None
+        return np.zeros((3, 0))
 
     def describe(self) -> dict[str, str]:
         """Its shape and size in words, by label, for ``ringsim check``."""

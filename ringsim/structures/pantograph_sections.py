@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ringsim.layout.draft import BodyRef, Draft, RodRef, Track
+from ringsim.layout.draft import BodyRef, Draft, Track
 from ringsim.parts.persection import spread
 from ringsim.structures.ring_geometry import Fold, RingGeometry
 
@@ -37,42 +37,37 @@ def add_sections(
         Of the rods' names, where a structure has several rings.
     """
     rods = draft.scene.rods
-    young = spread(rods.young_modulus, geometry.sections)
+    young = spread(rods.young_modulus, geometry.sections).tolist()
+    whole, half = (np.arange(n + 1) / n for n in (2 * rods.elements, rods.elements))
+    middle = ((rods.elements, vjoint_mass),) if vjoint_mass > 0.0 else ()
     tracks: tuple[list[Any], list[Any]] = ([], [])
     for section, normal in enumerate(geometry.normals):
-        left, right = fold.left[:, section], fold.right[:, section]
-        ends = (section, (section + 1) % len(corners[0]))
-
-        def rod(name: str, start: Any, end: Any, halves: int) -> RodRef:
-            stations = [k / (halves * rods.elements) for k in range(halves * rods.elements + 1)]
-            group, tube = ("diagonals", rods.diagonal) if halves == 2 else ("bars", rods.bar)
-            return draft.rod(
-                prefix + name, section, group, (start, end), normal, tube, stations,  # noqa: B023
-                float(young[section]),  # noqa: B023
+        pins = fold.left[:, section], fold.right[:, section]
+        held = [[plane[(section + end) % len(plane)] for plane in corners] for end in (0, 1)]
+        diagonals = []
+        for name, sides in (("rising", (1, 0)), ("falling", (0, 1))):
+            ends = [pins[end][side] for end, side in enumerate(sides)]
+            diagonals.append(
+                draft.rod(f"{prefix}diagonal_{name}", section, "diagonals", ends, normal,
+                          rods.diagonal, whole, young[section])
             )  # fmt: skip
-
-        def hinge(part: RodRef, side: int, end: int, at: Any) -> None:
-            body = corners[side][ends[end]]  # noqa: B023
-            draft.joint("revolute", "hinge", section, (part, body), at)  # noqa: B023
-
-        rising = rod("diagonal_rising", left[1], right[0], 2)
-        falling = rod("diagonal_falling", left[0], right[1], 2)
-        hinge(rising, 1, 0, left[1])
-        hinge(rising, 0, 1, right[0])
-        hinge(falling, 0, 0, left[0])
-        hinge(falling, 1, 1, right[1])
-        draft.joint("revolute", "pivot", section, (rising, falling), fold.pivots[section])
+            for end, side in enumerate(sides):
+                parts = diagonals[-1], held[end][side]
+                draft.joint("revolute", "hinge", section, parts, ends[end])
+        draft.joint("revolute", "pivot", section, diagonals, fold.pivots[section])
         for side, (name, sense) in enumerate((("upper", 1.0), ("lower", -1.0))):
-            at = fold.vjoints[side, section]
-            first = rod(f"bar_{name}_left", left[side], at, 1)
-            second = rod(f"bar_{name}_right", at, right[side], 1)
-            hinge(first, side, 0, left[side])
-            hinge(second, side, 1, right[side])
-            joint = draft.joint("revolute", "vjoint", section, (first, second), at)
+            at, bars, track = fold.vjoints[side, section], [], tracks[side]
+            for end, name_of_half in enumerate(("left", "right")):
+                pin, body = pins[end][side], held[end][side]
+                bars.append(
+                    draft.rod(f"{prefix}bar_{name}_{name_of_half}", section, "bars",
+                              (at, pin) if end else (pin, at), normal, rods.bar, half,
+                              young[section], () if end else middle)
+                )  # fmt: skip
+                draft.joint("revolute", "hinge", section, (bars[end], body), pin)
+                track.append(draft.on(body, pin))
+            track.insert(-1, section)
+            joint = draft.joint("revolute", "vjoint", section, bars, at)
             draft.opening(plane + side, joint, sense, [0.0, 0.0, sense])
-            if vjoint_mass > 0.0:
-                draft.add_mass(first, -1, vjoint_mass)
-            pins = [draft.on(corners[side][ends[k]], (left, right)[k][side]) for k in (0, 1)]
-            tracks[side].extend([pins[0], section, pins[1]])
     for side, sense in enumerate((1.0, -1.0)):
         draft.tracks[plane + side] = Track(tracks[side], np.array([0.0, 0.0, -sense]))

@@ -67,7 +67,7 @@ class PlanarTruss(Structure):
 
     Paper 001 gives the parts and their sections (its fig. 4 and table 1), not where the strut
     and the cable are attached, nor the spring.  They are chosen so that the ideal truss
-    (``ringsim.theory.planar_truss``) shows what its figs 8 and 9 show:
+    (tests/physics_planar/truss_statics.py) shows what its figs 8 and 9 show:
 
     1. The cable has the published lengths.  If it ends at the outer joint of the upper beam,
        0.9 m is reached at 90 deg or less from H = 0.646 m on, 0.1 m up to H = 0.727 m (then

@@ -9,18 +9,17 @@ keeps all rod lengths, so each is an exact, stress-free configuration.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.structures.polygon import corners as polygon_corners
-
 Array = NDArray[np.float64]
-
-PLANES = ("upper", "lower")
-_SIGN = np.array([1.0, -1.0])
+_UP = np.array([0.0, 0.0, 1.0])
+_SIGNED = np.array([_UP, -_UP])[:, None]
+"""Outward in the upper and in the lower plane, shape (2, 1, 3)."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,7 @@ class RingGeometry:
     @property
     def normals(self) -> Array:
         """Outward normal n_k = e_k x z of each section's plane, shape (sections, 3)."""
-        return np.cross(self.directions, [0.0, 0.0, 1.0])
+        return np.cross(self.directions, _UP)
 
     @property
     def deployed_chord(self) -> float:
@@ -108,24 +107,79 @@ class RingGeometry:
 
         A complex ``phi`` gives complex positions: its imaginary part carries derivatives.
         """
-        width, height = self.width(phi), self.height(phi)
-        return self._place(
-            chord=width + 2.0 * self.hinge_offset,
-            offset=self.hinge_offset,
-            half_height=0.5 * height,
-            joint_height=0.5 * height - self.half_bar * np.sin(phi),
+        half_height, half_chord = 0.5 * self.height(phi), 0.5 * self.width(phi) + self.hinge_offset
+        lift, offset = half_height * _SIGNED, self.hinge_offset * self.directions
+        chord = 2.0 * half_chord
+        first, second = self.plan[: self.sections], np.roll(self.plan, -1, axis=0)[: self.sections]
+        pivots = half_chord * (first + second)
+        return Fold(
+            corners=chord * self.plan + lift,
+            left=chord * first + offset + lift,
+            right=chord * second - offset + lift,
+            pivots=pivots,
+            vjoints=pivots + (half_height - self.half_bar * np.sin(phi)) * _SIGNED,
         )
 
-    def _place(self, *, chord: Any, offset: float, half_height: Any, joint_height: Any) -> Fold:
-        up = np.array([0.0, 0.0, 1.0])
-        lift = _SIGN[:, None, None] * half_height * up
-        following = np.roll(self.plan, -1, axis=0)[: self.sections]
-        first, second = self.plan[: self.sections], following
-        middle = 0.5 * chord * (first + second)
-        return Fold(
-            corners=chord * self.plan[None] + lift,
-            left=(chord * first + offset * self.directions)[None] + lift,
-            right=(chord * second - offset * self.directions)[None] + lift,
-            pivots=middle,
-            vjoints=middle[None] + _SIGN[:, None, None] * joint_height * up,
-        )
+
+@functools.lru_cache(maxsize=64)  # the scenes of a campaign ask for the same ones again and again
+def polygon_corners(sides: int, aspect_ratio: float) -> Array:
+    """Corners of the closed polygon with equal chords of length 1, inscribed in an ellipse.
+
+    The first corner lies on the major axis (+x), the polygon runs anticlockwise and is
+    centred on the origin.  The unknowns are the ellipse parameters of the other corners and
+    the chord; Newton's method starts from the regular polygon and converges quadratically.
+
+    Parameters
+    ----------
+    sides
+        Number of chords, at least 3.
+    aspect_ratio
+        Minor axis over major axis of the ellipse, in (0, 1].
+
+    Returns
+    -------
+    Array
+        Read-only, shape (sides, 3), in units of the chord, z = 0.
+
+    Raises
+    ------
+    ValueError
+        If the polygon does not exist or is not found.
+    """
+    if sides < 3:
+        raise ValueError(f"a closed polygon needs at least 3 sides, not {sides}")
+    if not 0.0 < aspect_ratio <= 1.0:
+        raise ValueError(f"aspect_ratio = {aspect_ratio} must be in (0, 1]")
+    parameters = 2.0 * np.pi * np.arange(sides) / sides
+    steps = 1 + int(np.ceil(8 * np.log(1.0 / aspect_ratio)))
+    for ratio in (aspect_ratio ** (np.arange(1, steps + 1) / steps)).tolist():
+        parameters, chord = _equal_chords(parameters, ratio)
+    points = np.stack([np.cos(parameters), ratio * np.sin(parameters), 0.0 * parameters], axis=-1)
+    found: Array = points / chord
+    found.flags.writeable = False
+    return found
+
+
+def _equal_chords(t: Array, ratio: float) -> tuple[Array, float]:
+    """Newton's method on |r(t_k+1) - r(t_k)|^2 = c^2, k = 0..sides-1, with t_0 = 0 fixed."""
+    sides = len(t)
+    square = 4.0 * np.sin(np.pi / sides) ** 2 * (0.5 * (1.0 + ratio**2))
+    this, following = np.arange(sides), (np.arange(sides) + 1) % sides
+    for _ in range(60):
+        place = np.stack([np.cos(t), ratio * np.sin(t)])
+        slope = np.stack([-np.sin(t), ratio * np.cos(t)])
+        run = place[:, following] - place
+        jacobian = np.zeros((sides, sides + 1))
+        jacobian[this, this] = -2.0 * np.sum(run * slope, axis=0)
+        jacobian[this, following] += 2.0 * np.sum(run * slope[:, following], axis=0)
+        jacobian[:, sides] = -1.0
+        change = np.linalg.solve(jacobian[:, 1:], square - np.sum(run**2, axis=0))
+        largest = np.abs(change[:-1]).max()
+        change *= min(1.0, np.pi / sides / max(largest, 1e-300))
+        t = t + np.append(0.0, change[:-1])
+        square += change[-1]
+        if largest < 1e-14 * sides:
+            break
+    if not (np.all(np.diff(t) > 0.0) and t[-1] < 2.0 * np.pi and square > 0.0):
+        raise ValueError(f"no equal-chord polygon with {sides} sides and axis ratio {ratio:.6g}")
+    return t, float(np.sqrt(square))

@@ -10,7 +10,7 @@ from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.structures.pantograph_ring import PantographRing
-from ringsim.theory.ideal_course import Integration
+from ringsim.theory.ideal_course import Course
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 
 _WIDEST, _LEAST = 179.0, 1.0
@@ -47,35 +47,39 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         least = max(least, scene.stop.stowed_angle + _CLOSE)
 
     def excess(angle: float) -> float:
-        course = Integration(plain.with_values({"structure.opening_angle": angle})).run()
+        course = Course(plain.with_values({"structure.opening_angle": angle})).run()
         if course.status.failed:
             raise InputError(f"from {angle:.4g} deg the ideal ring fails: {course.reason}")
         found = course.lock_time - time
         return found if math.isfinite(found) else math.inf
 
-    high, slack = _WIDEST, excess(_WIDEST)
-    if slack > 0.0:
-        raise InputError(
-            f"a deployment time of {time:g} s is too short: from {_WIDEST:g} deg the ideal ring "
-            "takes longer, or it does not open at all: check loads, cables, net and friction"
-        )
-    low = high
-    while slack < 0.0:
-        if low <= least:
+    low = high = min(max(scene.structure.opening_angle, least), _WIDEST)
+    slow = fast = excess(low)
+    while fast > 0.0:
+        if high == _WIDEST:
+            raise InputError(
+                f"a deployment time of {time:g} s is too short: from {_WIDEST:g} deg the ideal "
+                "ring takes longer, or it does not open at all: check loads, cables, net and "
+                "friction"
+            )
+        low, slow, high = high, fast, min(0.5 * (high + 180.0), _WIDEST)
+        fast = excess(high)
+    while slow < 0.0:
+        if low == least:
             raise InputError(
                 f"a deployment time of {time:g} s is too long: even from {least:g} deg the ideal "
                 "ring deploys sooner; check loads, cables and masses"
             )
-        high, low = low, max(0.7 * low, least)
-        slack = excess(low)
-    while math.isinf(slack):
+        low, high = max(0.7 * low, least), low
+        slow = excess(low)
+    while math.isinf(slow):
         middle = 0.5 * (low + high)
         if high - low < _CLOSE:
             raise InputError(
                 f"a deployment time of {time:g} s is never met: near {low:.6g} deg it jumps past it"
             )
         found = excess(middle)
-        low, high, slack = (middle, high, found) if found >= 0.0 else (low, middle, slack)
+        low, high, slow = (middle, high, found) if found >= 0.0 else (low, middle, slow)
     return float(brentq(excess, low, high, xtol=_CLOSE))
 
 

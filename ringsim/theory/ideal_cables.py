@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,6 @@ from numpy.typing import NDArray
 
 from ringsim.cable.chain import Chain
 from ringsim.cable.faults.family import CableFault
-from ringsim.cable.records import Winch
 from ringsim.cable.state import ChainState
 from ringsim.cable.winding.family import FeedbackWinding, WinchState
 from ringsim.scene import Scene
@@ -49,14 +47,6 @@ class Pull(NamedTuple):
     elastic: float
 
 
-class _Place(NamedTuple):
-    """A winch: its cable (from 0), the end of it (0 first, 1 far), and what it is."""
-
-    cable: int
-    end: int
-    winch: Winch
-
-
 class IdealCables:
     """The cables of a scene on its ideal ring.
 
@@ -72,7 +62,8 @@ class IdealCables:
     spans
         Of the longest cable.
     answering
-        The winches with feedback: their rope and speed are states of the motion.
+        Cable and end (0 first, 1 far) of the winches with feedback: their rope and speed are
+        states of the motion.
     """
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
@@ -92,18 +83,18 @@ class IdealCables:
         self.ropes = self._chain.start(self.paths @ start.values)
         self.spans = scene.spans
         self._slip = min(cable.slip_speed_over(scene.pulleys_of(cable)) for cable in self._cables)
-        self._places = [
-            _Place(number, end, winch)
+        self._winches = {
+            (number, end): winch
             for number, cable in enumerate(self._cables)
             for end, winch in enumerate(cable.winches)
-        ]
-        self.answering = [place for place in self._places if place.winch.feedback]
+        }
+        self.answering = [place for place, winch in self._winches.items() if winch.feedback]
 
     @property
     def breaks(self) -> list[float]:
         """Times at which a winch is switched on or off, s."""
-        times = {t for p in self._places for t in (p.winch.start_time, p.winch.stop_time)}
-        return sorted(time for time in times if time is not None and time > 0.0)
+        switched = [(w.start_time, w.stop_time) for w in self._winches.values()]
+        return [time for times in switched for time in times if time is not None and time > 0.0]
 
     @property
     def nudges(self) -> tuple[float, float]:
@@ -131,75 +122,52 @@ class IdealCables:
             If a span has no length, or a winch has wound up its whole rope.
         """
         points, slopes = self.paths @ now.values, self.paths @ now.by_place
-        state = self._wind(time, points, slopes @ now.rate, motors)
         ropes, copies = self.ropes, self._copies
-        on_rope = copies[ropes.cable]
+        wound, speed = np.zeros((2, len(copies), 2))
+        for place, winch in self._winches.items():
+            if not winch.feedback:
+                law = winch.at(time, WinchState())
+                wound[place], speed[place] = law.wound, law.speed
+        for place, *motor in zip(self.answering, *motors, strict=True):
+            wound[place], speed[place] = motor
+        state = self._chain.state(ropes, points, slopes @ now.rate, wound, speed)
+        on_rope, density = copies[ropes.cable], state.energy_density
         of_points = np.repeat(copies, ropes.points_per_cable)[:, None] * state.point_forces
         return Pull(
             state,
             np.tensordot(of_points, slopes, 2),
             self._commands(time, now, state),
             float(on_rope[ropes.of_pulley] @ state.friction_loss + on_rope @ state.damping_loss),
-            float(
-                copies @ state.winch_power.sum(axis=1)
-                - on_rope @ (state.energy_density * state.wound_rates)
-            ),
-            float(on_rope @ state.elastic_energy),
+            float(copies @ state.winch_power.sum(axis=1) - on_rope @ (density * state.wound_rates)),
+            float(on_rope @ (density * state.natural)),
         )
 
     def strike(self, fault: CableFault, state: ChainState) -> None:
         """Let a fault change the ropes."""
         self.ropes = fault.strike(self.ropes, state)
 
-    def tensions(self, state: ChainState) -> Array:
-        """Tensions by cable and span, N, shape (cables, spans); NaN beyond a cable's last span."""
-        found = np.full((len(self.planes), self.spans), np.nan)
-        edges = self.ropes.cable_starts
-        for number, (first, end) in enumerate(pairwise(edges)):
-            found[number, : end - first] = state.tensions[first:end]
-        return found
-
-    def stretches(self, state: ChainState) -> Array:
-        """Path less natural length of the rope at each cable's first winch, m; -1 if it is cut."""
-        first = self.ropes.first
-        alive = self.ropes.alive[first]
-        return np.where(alive, (state.paths - state.natural)[first], -1.0)
-
-    def _wind(self, time: float, points: Array, velocities: Array, motors: Array) -> ChainState:
-        """The chain with its winches' ropes and speeds."""
-        wound, speed = np.zeros((2, len(self._cables), 2))
-        for number, end, winch in self._places:
-            if not winch.feedback:
-                law = winch.at(time, WinchState())
-                wound[number, end], speed[number, end] = law.wound, law.speed
-        for place, length, rate in zip(self.answering, *motors, strict=True):
-            wound[place.cable, place.end], speed[place.cable, place.end] = length, rate
-        return self._chain.state(self.ropes, points, velocities, wound, speed)
-
     def _commands(self, time: float, now: Configuration, state: ChainState) -> Array:
         """Speeds commanded by the laws with feedback, m/s, shape (winches,).
 
         Winches on one rope share the length that the structure releases.
         """
+        if not self.answering:
+            return np.zeros(0)
         opening = np.full(self._structure.sections, math.pi - 2.0 * float(now.place[0]))
-        on = [place for place in self.answering if place.winch.turns(time)]
-        ends = (self.ropes.first, self.ropes.last)
-        running = [int(ends[place.end][place.cable]) for place in on]
+        rope_of = np.stack([self.ropes.first, self.ropes.last], axis=1)
+        on = [place for place in self.answering if self._winches[place].turns(time)]
+        running = [rope_of[place] for place in on]
         rest = state.path_rates + state.wound_rates
         for place, rope in zip(on, running, strict=True):
-            rest[rope] -= state.wound_rate[place.cable, place.end]
-        found = np.zeros(len(self.answering))
-        for number, place in enumerate(self.answering):
-            law = place.winch.winding
-            if place not in on or not isinstance(law, FeedbackWinding):
-                continue
-            rope = int(ends[place.end][place.cable])
-            slope = self._structure.path_slope(self._cables[place.cable], opening)
-            reading = replace(
-                state.reading(place.cable, place.end, slope),
-                path_rate=float(rest[rope]) / running.count(rope),
-            )
-            tension = float(state.winch_tensions[place.cable, place.end])
+            rest[rope] -= state.wound_rate[place]
+        found = dict.fromkeys(self.answering, 0.0)
+        for place, rope in zip(on, running, strict=True):
+            law = self._winches[place].winding
+            assert isinstance(law, FeedbackWinding)
+            slope = self._structure.path_slope(self._cables[place[0]], opening)
+            shared = float(rest[rope]) / running.count(rope)
+            reading = replace(state.reading(*place, slope), path_rate=shared)
             least, most = law.limits()
-            found[number] = min(max(law.command(tension, reading), least), most)
-        return found
+            command = law.command(float(state.winch_tensions[place]), reading)
+            found[place] = min(max(command, least), most)
+        return np.array(list(found.values()))

@@ -9,32 +9,31 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import Radau
+from scipy.integrate import solve_ivp
 from scipy.interpolate import BPoly
-from scipy.optimize import brentq
 
 from ringsim.cable.ropes import Ropes
 from ringsim.scene import Scene
 from ringsim.theory.ideal_motion import IdealMotion
-from ringsim.variables import Status
+from ringsim.variables import Cause, Status
 
 Array = NDArray[np.float64]
 
 RELATIVE = 3e-7
 """Local error of a step, relative to every part of the state."""
-AT_STOP = 1e-10
-"""Angle in rad within which a stop counts as met."""
+BEYOND = 1e-10
+"""Angle in rad beyond a stop at which it counts as met, and before it as left: more than
+round-off, so that no step begins with the crossing that ended the one before it."""
 MOST_EVALUATIONS = 400_000
 """Evaluations of the equations after which a run is given up."""
 MOST_CONTACTS = 1000
 """How often steps end at a stop; beyond, the error control alone resolves the kink."""
 _COLLOCATION = np.array([4.0 - math.sqrt(6.0), 4.0 + math.sqrt(6.0)]) / 10.0
 """Points of Radau IIA within a step."""
-_LOOKS = np.linspace(0.0, 1.0, 17)
 _ALIKE = 1e-13
 
 
@@ -59,9 +58,20 @@ class Piece:
     inner: list[tuple[float, Array]] = field(default_factory=list)
 
 
-@dataclass
+class _Crossing:
+    """An event of scipy: the first coordinate passes a level."""
+
+    terminal = True
+
+    def __init__(self, level: float) -> None:
+        self.level = level
+
+    def __call__(self, time: float, state: Array) -> float:
+        return float(state[0]) - self.level
+
+
 class Course:
-    """Result of a run.
+    """One run of a scene's ideal ring.
 
     Attributes
     ----------
@@ -73,173 +83,122 @@ class Course:
         Of the equations.
     """
 
-    motion: IdealMotion
-    status: Status = Status.UNFINISHED
-    reason: str = ""
-    lock_time: float = math.nan
-    pieces: list[Piece] = field(default_factory=list)
-    evaluations: int = 0
-    jacobians: int = 0
-
-
-class _TooLongError(Exception):
-    """The run takes too many evaluations."""
-
-
-class Integration:
-    """One run of a scene's ideal ring."""
-
     def __init__(self, scene: Scene) -> None:
-        self._scene, self._motion = scene, IdealMotion(scene)
-        self.course = Course(self._motion)
-        self._time, self._state = 0.0, self._motion.start()
+        self._scene, self.motion = scene, IdealMotion(scene)
+        self.status, self.cause, self.reason = Status.UNFINISHED, Cause.NONE, ""
+        self.lock_time = math.nan
+        self.pieces: list[Piece] = []
+        self.evaluations, self.jacobians = 0, 0
+        self._time, self._state = 0.0, self.motion.start()
         self._end, self._contacts = scene.solver.end_time, 0
-        stowed = 0.0 if scene.stop is None else scene.stop.stowed_angle
-        self._stowed = 0.5 * (math.pi - math.radians(stowed))
-        self._piece = Piece(False, None)
+        self._stowed = 0.5 * (math.pi if scene.stop is None else scene.stop.most_folded)
 
     def run(self) -> Course:
         """Integrate to the end; never raises."""
-        faults = sorted(self._scene.faults, key=lambda fault: fault.time)
-        cables = self._motion.cables
+        faults, cables = self._scene.faults, self.motion.cables
         breaks = [] if cables is None else cables.breaks
-        marks = sorted({fault.time for fault in faults} | {*breaks, math.inf})
         try:
-            for mark in marks:
-                self._until(mark)
-                over = self._time >= self._end * (1.0 - _ALIKE)
-                if over or self.course.status.failed:
+            for mark in sorted({fault.time for fault in faults} | {*breaks, math.inf}):
+                self.motion.until = mark
+                self._begin()
+                while self._time < min(mark, self._end) * (1.0 - _ALIKE):
+                    self._advance(min(mark, self._end))
+                    self._judge()
+                if self._time >= self._end * (1.0 - _ALIKE):
                     break
                 for fault in (fault for fault in faults if fault.time == mark):
-                    self._state = self._motion.strike(fault, self._time, self._state)
-        except _TooLongError:
-            self._fail(f"it took more than {MOST_EVALUATIONS} evaluations")
+                    self._state = self.motion.strike(fault, self._time, self._state)
         except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
-            self._fail(str(error))
-        if self.course.status == Status.UNFINISHED:
+            too_long = self.evaluations > MOST_EVALUATIONS
+            self.status = Status.SOLVER_FAILED
+            self.cause = Cause.STEP_LIMIT if too_long else Cause.NEWTON
+            self.reason = f"the ideal ring's solver gave up at {self._time:.6g} s: {error}"
+        if self.status == Status.UNFINISHED:
             joints = 2 * self._scene.structure.sections
-            self.course.reason = (
+            self.cause = Cause.END_TIME
+            self.reason = (
                 f"solver.end_time = {self._scene.solver.end_time:g} s was reached with 0 of "
                 f"{joints} V-joints locked"
             )
-        return self.course
-
-    def _until(self, mark: float) -> None:
-        self._motion.until = mark
-        self._begin()
-        while self._time < min(mark, self._end) * (1.0 - _ALIKE):
-            if not self._go_on(min(mark, self._end)):
-                return
+        return self
 
     def _begin(self) -> None:
         """Open a piece at the present state."""
-        cables = self._motion.cables
-        self._piece = Piece(self._motion.latched, None if cables is None else cables.ropes)
-        self.course.pieces.append(self._piece)
-        self._file(self._time, self._state, self._rates(self._time, self._state))
+        cables = self.motion.cables
+        self.pieces.append(Piece(self.motion.latched, None if cables is None else cables.ropes))
+        self._file(self._time, self._state)
 
-    def _file(self, time: float, state: Array, rates: Array) -> None:
-        self._piece.times.append(time)
-        self._piece.states.append(state)
-        self._piece.rates.append(rates)
+    def _file(self, time: float, state: Array) -> None:
+        piece = self.pieces[-1]
+        piece.times.append(time)
+        piece.states.append(state)
+        piece.rates.append(self.motion.rates(time, state))
         self._time, self._state = time, state
 
-    def _file_step(self, solver: Radau) -> None:
-        if self._motion.cables is not None:
-            begin, curve = self._time, solver.dense_output()
-            points = begin + _COLLOCATION * (solver.t - begin)
-            self._piece.inner += [(float(time), curve(time)) for time in points]
-        self._file(float(solver.t), solver.y.copy(), solver.f.copy())
+    def _file_steps(self, found: Any, count: int) -> None:
+        """Add the first steps of a solution to the present piece."""
+        for k, curve in enumerate(found.sol.interpolants[:count]):
+            if self.motion.cables is not None:
+                points = found.t[k] + _COLLOCATION * (found.t[k + 1] - found.t[k])
+                self.pieces[-1].inner += [(float(time), curve(time)) for time in points]
+            self._file(float(found.t[k + 1]), found.y[:, k + 1].copy())
 
-    def _go_on(self, target: float) -> bool:
-        """Take steps until ``target``, an event, or a failure; whether there is more to do."""
-        solver = self._solver(target)
-        while solver.status == "running":
-            solver.step()
-            if solver.status == "failed":
-                self._fail(self._motion.refusal or self._cause())
-                return False
-            contact = self._contact(solver)
-            if contact is None:
-                self._file_step(solver)
-            else:
-                self._reach(*contact)
-            if self._judge():
-                self._begin()
-                return True
-            if contact is not None:
-                return True
-        return True
+    def _advance(self, target: float) -> None:
+        """Take steps until ``target``, or until a stop is met or left."""
+        phi = float(self._state[0])
+        levels = [self._stowed + math.copysign(BEYOND, self._stowed - phi)]
+        if not self.motion.latched:
+            levels.append(math.copysign(BEYOND, -phi))
+        found = self._solve(target, levels if self._contacts < MOST_CONTACTS else [])
+        crossed = [k for k, times in enumerate(found.t_events or []) if len(times)]
+        if crossed:
+            self._contacts += 1
+            self._file_steps(found, len(found.t) - 2)
+            found = self._solve(float(found.t[-1]), [])
+            # The crossing was found on a cubic; the repeated step is far more accurate.
+            rates = self.motion.rates(found.t[-1], found.y[:, -1])
+            late = (levels[crossed[0]] - found.y[0, -1]) / rates[0]
+            if abs(late) < 1e-3 * (found.t[-1] - self._time):
+                found.t[-1] += late
+                found.y[:, -1] += late * rates
+        self._file_steps(found, len(found.t) - 1)
+        if found.status < 0:
+            raise ValueError(self.motion.refusal or self._cause())
 
-    def _solver(self, target: float) -> Radau:
-        self.course.jacobians += 1
-
-        def jacobian(time: float, state: Array) -> Array:
-            self.course.jacobians += 1
-            return self._motion.jacobian(time, state)
-
-        return Radau(
-            self._rates, self._time, self._state, target, max_step=self._scene.solver.step,
-            rtol=RELATIVE, atol=self._motion.tolerances(RELATIVE), jac=jacobian,
+    def _solve(self, target: float, levels: list[float]) -> Any:
+        self.jacobians += 1
+        return solve_ivp(
+            self._rates, (self._time, target), self._state, method="Radau", jac=self._jacobian,
+            max_step=self._scene.solver.step, rtol=RELATIVE,
+            atol=self.motion.tolerances(RELATIVE), dense_output=True,
+            events=[_Crossing(level) for level in levels],
         )  # fmt: skip
 
     def _rates(self, time: float, state: Array) -> Array:
-        self.course.evaluations += 1
-        if self.course.evaluations > MOST_EVALUATIONS:
-            raise _TooLongError
-        return self._motion.rates(time, state)
+        self.evaluations += 1
+        if self.evaluations > MOST_EVALUATIONS:
+            self.motion.refusal = f"it took more than {MOST_EVALUATIONS} evaluations"
+            return np.full(len(state), math.nan)
+        return self.motion.rates(time, state)
 
-    def _contact(self, solver: Radau) -> tuple[float, float] | None:
-        """Time at which the step just taken first meets or leaves a stop, and that stop's phi."""
-        if self._contacts >= MOST_CONTACTS:
-            return None
-        turn = self._motion.rate_of_phi
-        curve = quintic(
-            np.array([self._time, solver.t]),
-            np.array([self._state, solver.y])[:, [0, turn]],
-            np.array([self._piece.rates[-1], solver.f])[:, turn],
-        )
-        places = self._time + _LOOKS * (solver.t - self._time)
-        found = []
-        for level in (0.0, self._stowed):
-            if level == 0.0 and self._motion.latched:
-                continue
-            above = curve(places) - level
-            above[0] = above[0] if abs(above[0]) > AT_STOP else self._state[turn]
-            crossed = np.flatnonzero((above[:-1] * above[1:] < 0.0) & (np.abs(above[1:]) > AT_STOP))
-            crossed = crossed[(crossed > 0) | (abs(curve(places[0]) - level) > AT_STOP)]
-            if len(crossed):
-                begin, finish = places[crossed[0]], places[crossed[0] + 1]
-                found.append((float(brentq(partial(_above, curve, level), begin, finish)), level))
-        return min(found, default=None)
+    def _jacobian(self, time: float, state: Array) -> Array:
+        self.jacobians += 1
+        return self.motion.jacobian(time, state)
 
-    def _reach(self, time: float, level: float) -> None:
-        """Step to the instant at which phi is at ``level``, met near ``time``."""
-        self._contacts += 1
-        solver = self._solver(time)
-        while solver.status == "running":
-            solver.step()
-            if solver.status == "failed":
-                raise ValueError("the step became too small at a stop")
-            self._file_step(solver)
-        self._state[0] = level if abs(self._state[0] - level) < 1e-6 else self._state[0]
-
-    def _judge(self) -> bool:
-        """Locks and ends; whether the equations change."""
-        course, state = self.course, self._state
-        phi, rate = float(state[0]), float(state[self._motion.rate_of_phi])
+    def _judge(self) -> None:
+        """Locks and ends."""
+        phi, rate = float(self._state[0]), float(self._state[self.motion.rate_of_phi])
         stop = self._scene.stop
-        if math.isnan(course.lock_time) and phi <= AT_STOP and rate < 0.0:
-            course.lock_time = self._time - phi / rate
-            course.status, course.reason = Status.OK, "all V-joints have reached 180 deg"
-            self._motion.latched = stop is not None and stop.latch
-            self._settle(course.lock_time)
-            return self._motion.latched
-        if course.status == Status.UNFINISHED and phi >= self._stowed - AT_STOP:
-            course.status = Status.OK
-            course.reason = "all V-joints have reached the stowed stop"
+        if math.isnan(self.lock_time) and phi <= 0.0 and rate < 0.0:
+            self.lock_time = self._time - phi / rate
+            self.status, self.reason = Status.OK, "all V-joints have reached 180 deg"
+            self._settle(self.lock_time)
+            if stop is not None and stop.latch:
+                self.motion.latched = True
+                self._begin()
+        elif self.status == Status.UNFINISHED and phi >= self._stowed:
+            self.status, self.reason = Status.OK, "all V-joints have reached the stowed stop"
             self._settle(self._time)
-        return False
 
     def _settle(self, time: float) -> None:
         settling = 0.0 if self._scene.stop is None else self._scene.solver.settling_time
@@ -247,18 +206,10 @@ class Integration:
 
     def _cause(self) -> str:
         """Why steps became too small: a rope at twice its natural length has been wound up."""
-        pull = self._motion.instant(self._time, self._state).pull
+        pull = self.motion.instant(self._time, self._state).pull
         if pull is not None and pull.chain.strains.max() > 1.0:
             return "a winch has wound up its whole rope (limit its winding law, or stop it)"
         return "the step became too small"
-
-    def _fail(self, cause: str) -> None:
-        self.course.status = Status.SOLVER_FAILED
-        self.course.reason = f"the ideal ring's solver gave up at {self._time:.6g} s: {cause}"
-
-
-def _above(curve: BPoly, level: float, time: float) -> float:
-    return float(curve(time)) - level
 
 
 def quintic(times: Array, values: Array, bends: Array) -> BPoly:

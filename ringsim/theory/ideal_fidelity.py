@@ -14,14 +14,15 @@ import numpy as np
 
 from ringsim.choice import kind_of
 from ringsim.layout.free_hub import FreeHub
+from ringsim.layout.of_scene import layout_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.net import Net
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.faded_friction import with_remark
-from ringsim.theory.ideal_course import Integration
+from ringsim.theory.ideal_course import Course
 from ringsim.theory.ideal_outcome import to_outcome
-from ringsim.variables import Outcome, Status
+from ringsim.variables import Cause, Outcome, Status
 
 _LIGHT_HUB = 1e-3
 """Largest mass of the net's hub over the ring's."""
@@ -60,7 +61,8 @@ def refuse_if_not_ideal(scene: Scene) -> None:
 
 
 def _refuse_net(scene: Scene, net: Net) -> None:
-    corners = scene.structure.geometry().fold(scene.structure.coordinate).corners[0]
+    layout = layout_of(scene)
+    corners = np.array([layout.bodies[number].pose.place for number in layout.corners[0]])
     aside = FreeHub(net, len(corners)).imbalance(corners)
     if net.damping > 0.0 and aside > _CENTRED:
         raise InputError(
@@ -69,7 +71,7 @@ def _refuse_net(scene: Scene, net: Net) -> None:
             "springs alone (set it to 0, use one net.stiffness and a closed ring, or use the full "
             "fidelity)"
         )
-    total = 2.0 * len(corners) * scene.structure.corner_mass
+    total = layout.masses()["hinges"]
     if net.hub_mass > _LIGHT_HUB * total:
         raise InputError(
             f"net.hub_mass = {net.hub_mass:g} kg must be at most {_LIGHT_HUB * total:.2g} kg in "
@@ -95,9 +97,10 @@ def run_ideal(scene: Scene) -> Outcome:
     wall, cpu = time.perf_counter(), time.process_time()
     with np.errstate(all="ignore"):
         try:
-            outcome = to_outcome(Integration(scene).run(), scene, wall_time=0.0, cpu_time=0.0)
+            outcome = to_outcome(Course(scene).run(), scene)
         except ValueError as error:  # the cables have no answer at the very start
-            outcome = Outcome(Status.SOLVER_FAILED, f"the ideal ring has no answer: {error}")
+            reason = f"the ideal ring has no answer: {error}"
+            outcome = Outcome(Status.SOLVER_FAILED, reason, cause=Cause.REFUSED)
     outcome.values["wall_time"] = np.array(time.perf_counter() - wall)
     outcome.values["cpu_time"] = np.array(time.process_time() - cpu)
     return with_remark(outcome, scene)

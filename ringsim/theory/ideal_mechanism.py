@@ -10,8 +10,8 @@ swings.  For masses m at r(p), p = (q, psi),
     J = (1, -[r]x, dr/dp),
 
 Kane's equations.  With r = P s the sums over the masses are constant: sum m, sum m P and
-sum m P_i P_j^T.  A base that floats has no force on the translation; a fixed one holds the first
-upper assembly, and so gives V and W as functions of p and p'.
+sum m P_i P_j^T.  A base that floats has no force on the translation; a support holds a body, and so
+gives V and W as functions of p and p'.
 Source: Kane and Levinson, Dynamics: Theory and Applications (1985), secs. 4.11 and 6.1.
 """
 
@@ -24,92 +24,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.scene import Scene
-from ringsim.theory.ideal_points import UP, Points
+from ringsim.theory.ideal_points import UP, Points, body_of
 
 Array = NDArray[np.float64]
 
 
+_LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3))
+
+
 def skew(r: Array) -> Array:
     """The matrix [r]x."""
-    return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+    return np.asarray(-_LEVI_CIVITA @ r)
 
 
 def _axial(w: Array) -> Array:
     """Sums of a x b from sums of a b^T, shape (..., 3, 3)."""
-    return np.stack(
-        [w[..., 1, 2] - w[..., 2, 1], w[..., 2, 0] - w[..., 0, 2], w[..., 0, 1] - w[..., 1, 0]], -1
-    )
-
-
-class Moments(NamedTuple):
-    """Masses of a structure at one instant, with n coordinates.
-
-    Attributes
-    ----------
-    first
-        Sums of m P s_k, k over the columns of ``Points.functions``, shape (3, n + 3).
-    second
-        Sums of m (P s_j) (P s_k)^T, shape (n + 1, n + 3, 3, 3).
-    matrix
-        Mass matrix of (V, W, p'), shape (6 + n, 6 + n).
-    """
-
-    first: Array
-    second: Array
-    matrix: Array
-
-
-class MassSums:
-    """Sums over the masses of a structure."""
-
-    def __init__(self, masses: Array, places: Array) -> None:
-        count, flat = places.shape[-1], places.reshape(len(masses), -1)
-        self._mass, self._first = float(masses.sum()), np.tensordot(masses, places, 1)
-        second = ((flat.T * masses) @ flat).reshape(3, count, 3, count)
-        self._second = second.transpose(1, 3, 0, 2).reshape(count, -1)
-
-    def at(self, functions: Array) -> Moments:
-        """Moments where ``Points.functions`` has these values."""
-        size, columns = functions.shape
-        n = columns - 3
-        first = self._first @ functions
-        half = (functions[:, : n + 1].T @ self._second).reshape(n + 1, size, 9)
-        second = (functions.T @ half).reshape(n + 1, columns, 3, 3)
-        matrix = np.zeros((6 + n, 6 + n))
-        matrix[:3, :3] = self._mass * np.eye(3)
-        matrix[:3, 3:6] = -skew(first[:, 0])
-        matrix[3:6, 3:6] = np.trace(second[0, 0]) * np.eye(3) - second[0, 0]
-        matrix[:3, 6:] = first[:, 1 : n + 1]
-        matrix[3:6, 6:] = _axial(second[0, 1 : n + 1]).T
-        matrix[6:, 6:] = np.trace(second[1:, 1 : n + 1], axis1=2, axis2=3)
-        matrix[3:6, :3] = matrix[:3, 3:6].T
-        matrix[6:, :6] = matrix[:6, 6:].T
-        return Moments(first, second, matrix)
+    return np.asarray(np.einsum("abc,...bc->...a", _LEVI_CIVITA, w))
 
 
 class Configuration(NamedTuple):
-    """Coordinates and rates of the mechanism at one instant.
+    """The mechanism at one instant, with n coordinates.
 
     Attributes
     ----------
     place, rate
         p = (q, psi) and its rate, shape (n,), rad and rad/s.
+    slopes, bias
+        Derivatives of p after the free coordinates, shape (n, freedom), and p'' less slopes times
+        the free accelerations, rad/s^2.
     functions
         ``Points.functions`` there.
-    slopes
-        Derivatives of p after the free coordinates, shape (n, freedom).
-    bias
-        p'' less slopes times the free accelerations, rad/s^2.
-    moments
-        Of the masses.
+    first, second
+        Sums of m P s_k and of m (P s_j) (P s_k)^T, where j and k count the columns of
+        ``functions``, j the first n + 1; shapes (3, n + 3) and (n + 1, n + 3, 3, 3).
+    matrix
+        Mass matrix of (V, W, p'), shape (6 + n, 6 + n).
     """
 
     place: Array
     rate: Array
-    functions: Array
     slopes: Array
     bias: Array
-    moments: Moments
+    functions: Array
+    first: Array
+    second: Array
+    matrix: Array
 
     @property
     def values(self) -> Array:
@@ -123,23 +82,36 @@ class Configuration(NamedTuple):
 
 
 class Mechanism:
-    """Coordinates, masses and equations of the ideal ring of a scene.
+    """Coordinates, masses and equations of a scene's structure.
+
+    Parameters
+    ----------
+    at
+        See ``Points``.
 
     Attributes
     ----------
     points
         Coefficients of its points.
+    upper_corners
+        Those of the upper hinge assemblies, shape (corners, 3, functions), m.
     freedom
         Number of free coordinates: 1, or 4 or 5 for an open arc; q is the first.
     fixed
-        Whether the first upper assembly is held.
+        Whether a body is held: the first upper assembly by the base of a boom.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self.points = points = Points(scene)
-        self.fixed = bool(points.layout.supports)
-        self._sums = MassSums(*points.masses())
+    def __init__(self, scene: Scene, at: float | None = None) -> None:
+        self.points = points = Points(scene, at)
+        masses, places = points.masses()
+        count, flat = places.shape[-1], places.reshape(len(masses), -1)
+        self._mass, self._first = float(masses.sum()), np.tensordot(masses, places, 1)
+        second = ((flat.T * masses) @ flat).reshape(3, count, 3, count)
+        self._second = second.transpose(1, 3, 0, 2).reshape(count, -1)
         self.upper_corners = points.upper_corners()
+        held = [body_of(support.second) for support in points.layout.supports]
+        self.fixed = bool(held)
+        self._held = points.frame(held[0]) if held else np.zeros(0)
         swings = len(points.swinging)
         self._on_boom = swings > 0 and scene.boom is not None
         self.freedom = 1 + swings - self._on_boom
@@ -154,25 +126,34 @@ class Mechanism:
         if self._on_boom:
             place, slopes, bias = self._along_the_boom(free, rates)
         rate = slopes @ rates
-        functions = self.points.functions(place, rate)
-        return Configuration(place, rate, functions, slopes, bias, self._sums.at(functions))
+        s, n = self.points.functions(place, rate), len(place)
+        first = self._first @ s
+        half = (s[:, : n + 1].T @ self._second).reshape(n + 1, len(s), 9)
+        second = (s.T @ half).reshape(n + 1, n + 3, 3, 3)
+        matrix = np.zeros((6 + n, 6 + n))
+        matrix[:3, :3] = self._mass * np.eye(3)
+        matrix[:3, 3:6] = -skew(first[:, 0])
+        matrix[3:6, 3:6] = np.trace(second[0, 0]) * np.eye(3) - second[0, 0]
+        matrix[:3, 6:] = first[:, 1 : n + 1]
+        matrix[3:6, 6:] = _axial(second[0, 1 : n + 1]).T
+        matrix[6:, 6:] = np.einsum("jkaa->jk", second[1:, 1 : n + 1])
+        matrix[3:6, :3] = matrix[:3, 3:6].T
+        matrix[6:, :6] = matrix[:6, 6:].T
+        return Configuration(place, rate, slopes, bias, s, first, second, matrix)
 
     def vertical(self, now: Configuration) -> Array:
         """Unit vector that points up in space, in the structure's axes, if it cannot pitch."""
-        if not (self.fixed and self.points.swinging):
-            return UP
-        angle, normal = now.place[1], self.points.normals[0]
-        return np.asarray(math.cos(angle) * UP + math.sin(angle) * np.cross(normal, UP))
+        return np.asarray(self._held[3] @ now.values) if self.fixed else UP
 
     def rigid_rates(self, now: Configuration, spin: Array | None = None) -> Array:
         """V and W, shape (6,).
 
-        On a fixed base those that hold the first assembly; else those without momentum, with the
+        Where a body is held those that hold it; else those without momentum, with the
         rotation ``spin`` (rad/s) or, if None, without angular momentum too.
         """
-        matrix = now.moments.matrix
+        matrix = now.matrix
         if self.fixed:
-            return np.asarray(self._held(now) @ now.rate)
+            return np.asarray(self._holding(now)[:, :-2] @ now.rate)
         if spin is None:
             return np.asarray(np.linalg.solve(matrix[:6, :6], -matrix[:6, 6:] @ now.rate))
         momentum = matrix[:3, 3:6] @ spin + matrix[:3, 6:] @ now.rate
@@ -192,35 +173,31 @@ class Mechanism:
         forces
             Generalised forces on p, N m.
         """
-        (first, second, matrix), turn = now.moments, skew(spin)
+        first, second, matrix, turn = now.first, now.second, now.matrix, skew(spin)
         whirl, rigid = turn @ turn, 0 if self.fixed else 6
         # Accelerations of the masses at zero (V' + W x V, W', p'') are linear in s, s' and s''.
         about = second[:, 0] @ whirl.T + 2.0 * second[:, -2] @ turn.T + second[:, -1]
         inertial = whirl @ first[:, 0] + 2.0 * turn @ first[:, -2] + first[:, -1]
-        along = np.trace(about[1:], axis1=1, axis2=2)
+        along = np.einsum("jaa->j", about[1:])
         load = np.concatenate([-inertial, torque - _axial(about[0]), forces - along])
         reach = np.zeros((len(matrix), rigid + self.freedom))
         reach[:rigid, :rigid] = np.eye(rigid)
         reach[6:, rigid:] = now.slopes
         rest = np.concatenate([np.zeros(6), now.bias])
         if self.fixed:
-            top, slopes = self.upper_corners[0], self._held(now)
-            reach[:6] = slopes @ now.slopes
-            rest[:6] = slopes @ now.bias
-            rest[:3] -= top @ now.functions[:, -1]
-            rest[:3] -= whirl @ (top @ now.values) + 2.0 * turn @ (top @ now.functions[:, -2])
+            holding, origin = self._holding(now), self._held[0] @ now.functions
+            reach[:6] = holding[:, :-2] @ now.slopes
+            rest[:6] = holding[:, :-2] @ now.bias + holding[:, -1]
+            rest[:3] -= whirl @ origin[:, 0] + 2.0 * turn @ origin[:, -2]
         found = np.linalg.solve(reach.T @ matrix @ reach, reach.T @ (load - matrix @ rest))
         return np.asarray(found[rigid:]), np.asarray(found[3:6] if rigid else np.zeros(3))
 
-    def _held(self, now: Configuration) -> Array:
-        """Derivatives of (V, W) after p' that hold the first upper assembly, shape (6, n)."""
-        top, slopes = self.upper_corners[0], np.zeros((6, len(now.place)))
-        slopes[:3] = -top @ now.by_place
-        if self.points.swinging:
-            normal = self.points.normals[0]
-            slopes[3:, 1] = -normal
-            slopes[:3, 1] += np.cross(normal, top @ now.values)
-        return slopes
+    def _holding(self, now: Configuration) -> Array:
+        """(V, W) that stop the held body while it moves with each column of s, shape (6, n + 2)."""
+        frame = self._held @ now.functions
+        origin, axes = frame[0], frame[1:]
+        turn = -0.5 * np.einsum("abc,kb,kcj->aj", _LEVI_CIVITA, axes[:, :, 0], axes[:, :, 1:])
+        return np.vstack([skew(origin[:, 0]) @ turn - origin[:, 1:], turn])
 
     def _along_the_boom(self, free: Array, rates: Array) -> tuple[Array, Array, Array]:
         """p, its derivatives after (q, b, psi_3, psi_4), and p'' at zero accelerations of these.

@@ -127,7 +127,7 @@ class IdealMotion:
         spin = rigid[3:]
         moving, turning = mechanism.accelerations(now, spin, acting.couple, force)
         rates = np.concatenate([rigid, now.rate])
-        kinetic = 0.5 * float(rates @ now.moments.matrix @ rates)
+        kinetic = 0.5 * float(rates @ now.matrix @ rates)
         return Instant(moving, turning, spin, kinetic, acting, pull)
 
     def rates(self, time: float, state: Array) -> Array:

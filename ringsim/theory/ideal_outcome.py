@@ -3,187 +3,163 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+from scipy.interpolate import CubicHermiteSpline
 
+from ringsim.cable.state import ChainState
+from ringsim.outputs.cable_tension import CableTension
+from ringsim.outputs.family import Output, Values, axes
+from ringsim.outputs.reading import Reading
+from ringsim.outputs.recorder import outputs_of, reduced, spanned
+from ringsim.outputs.series import Run, Series, output_times
 from ringsim.scene import Scene
+from ringsim.stepping.instant import Energies
 from ringsim.theory.ideal_course import Course, Piece, quintic
-from ringsim.theory.ideal_motion import Instant
-from ringsim.variables import COUNTS, PLANES, Fidelity, Outcome
+from ringsim.variables import COUNTS, Fidelity, Outcome
 
 Array = NDArray[np.float64]
+_Reader = Callable[[Reading], Array | float | None]
 
 
-class _Seen(NamedTuple):
-    """A course at some times: states (times, size), and what belongs to each."""
+@dataclass(frozen=True)
+class _Evaluated(Series):
+    """Readings at the ends of steps, and evaluated anew wherever they are asked for."""
 
-    times: Array
-    states: Array
-    instants: list[Instant]
+    evaluate: Callable[[Array], Array]
+
+    def _within(self, where: Array, rates: Array | None) -> Array:
+        return self.evaluate(where)
 
 
-def to_outcome(course: Course, scene: Scene, *, wall_time: float, cpu_time: float) -> Outcome:
+def to_outcome(course: Course, scene: Scene) -> Outcome:
     """Put a run on the scene's output grid; what lies after its end is NaN.
 
     Angles come from the quintic that fits angle, rate and acceleration at both ends of a step,
     energies lost and supplied from the cubic that fits them and their rates, tensions from one
     through all points at which the steps are in balance; all else follows from the state.
     """
-    count = math.floor(scene.solver.end_time / scene.record.interval * (1.0 + 1e-12))
-    grid = np.arange(count + 1) * scene.record.interval
-    sections = scene.structure.sections
-    coordinates: dict[str, Any] = {
-        "plane": np.array(PLANES),
-        "section": np.arange(1, sections + 1),
-        "time": grid,
-    }
-    end = course.pieces[-1].times[-1]
-    where = np.minimum(grid[grid <= end * (1.0 + 1e-12)], end)
-    seen = _on_grid(course, where)
-    values: dict[str, Array] = {}
-
-    def whole(found: Array) -> Array:
-        rest = np.full((*found.shape[:-1], len(grid) - len(where)), np.nan)
-        return np.concatenate([found, rest], axis=-1)
-
-    opening = whole(np.degrees(math.pi - 2.0 * seen.states[:, 0]))
-    values["opening_angle"] = np.broadcast_to(opening, (2, sections, len(grid))).copy()
-    values["lock_time"] = np.full((2, sections), course.lock_time)
-    values["deployment_time"] = np.array(course.lock_time)
-    values["asynchrony"] = values["constraint_violation"] = whole(np.zeros(len(where)))
-    values["asynchrony_max"] = values["constraint_error"] = np.array(0.0)
-    steps = [_at(course, piece, np.array(piece.times)) for piece in course.pieces]
-    start = steps[0].instants[0]
-    parts = _energies(seen, start)
-    for name, series in parts.items():
-        values[name] = whole(series)
-    values["energy_error"] = np.array(_imbalance(steps, start))
+    ideal = _IdealRun(course, scene)
+    values = reduced(ideal.run, outputs_of(scene), ideal.series_of)
     if course.motion.cables is not None:
-        coordinates["span"] = np.arange(1, scene.spans + 1)
-        _add_cables(values, course, steps, seen, whole)
-    counts = {
-        "steps": sum(len(piece.times) - 1 for piece in course.pieces),
-        "newton_iterations": course.evaluations,
-        "jacobians": course.jacobians,
-        "restarts": 0,
+        values |= {name: np.asarray(value) for name, value in ideal.cables().items()}
+    coordinates = spanned(values, axes(scene))
+    found = {
         "fidelity": int(Fidelity.IDEAL),
+        "restarts": 0,
+        "step_used": scene.solver.step,
+        "tolerance_used": np.nan,
+        **{f"total_{name}": ideal.run.counts[name] for name in COUNTS},
     }
-    counts |= {f"total_{name}": counts[name] for name in COUNTS}
-    values.update({name: np.array(number) for name, number in counts.items()})
-    values["step_used"] = np.array(scene.solver.step)
-    values["tolerance_used"] = np.array(np.nan)
-    values["final_time"] = np.array(end)
-    values["wall_time"], values["cpu_time"] = np.array(wall_time), np.array(cpu_time)
-    return Outcome(course.status, course.reason, coordinates, values)
+    values |= {name: np.array(value) for name, value in found.items()}
+    return Outcome(course.status, course.reason, coordinates, values, course.cause)
 
 
-def _at(course: Course, piece: Piece, where: Array) -> _Seen:
-    """A piece at times within it."""
-    motion = course.motion
-    motion.latched, motion.until = piece.latched, piece.times[-1]
-    if motion.cables is not None and piece.ropes is not None:
-        motion.cables.ropes = piece.ropes
-    times, states = np.array(piece.times), np.array(piece.states)
-    found = np.repeat(states[:1], len(where), axis=0)
-    keep = np.append(True, np.diff(times) > 0.0)
-    if keep.sum() > 1 and len(where):
-        times, states, rates = times[keep], states[keep], np.array(piece.rates)[keep]
-        turn = motion.rate_of_phi
-        found = CubicHermiteSpline(times, states, rates)(where)
-        both = np.stack([states[:, :turn], states[:, turn : 2 * turn]], axis=1)
-        curve = quintic(times, both, rates[:, turn : 2 * turn])
-        found[:, :turn], found[:, turn : 2 * turn] = curve(where), curve.derivative()(where)
-    instants = [motion.instant(float(t), y) for t, y in zip(where, found, strict=True)]
-    return _Seen(where, found, instants)
+class _IdealRun:
+    """A course as the ``run`` that outputs reduce."""
 
+    def __init__(self, course: Course, scene: Scene) -> None:
+        self._course, self._shape = course, (2, scene.structure.sections)
+        self._grid, self._lifted = output_times(scene), 0.0
+        self._known: dict[bytes, list[Reading]] = {}
+        self._steps: list[Reading] = []
+        self._balanced: list[Reading] = []  # ends of steps, collocation points between them
+        first = course.pieces[0]
+        self._lifted = self._at(first, np.array(first.times[:1]))[0].energies.work
+        for piece in course.pieces:
+            ends = self._at(piece, np.array(piece.times))
+            inner = [self._told(time, state) for time, state in piece.inner]
+            self._steps += ends
+            self._balanced += sorted([*ends, *inner], key=lambda now: now.time)
+        counts = {
+            "steps": len(self._steps) - len(course.pieces),
+            "newton_iterations": course.evaluations,
+            "jacobians": course.jacobians,
+        }
+        angles, rates = self._series(lambda now: now.angles), self._series(lambda now: now.rates)
+        locks = np.full(self._shape, course.lock_time)
+        self.run = Run(scene, angles, rates, locks, counts, course.status, course.cause)
 
-def _on_grid(course: Course, where: Array) -> _Seen:
-    """All pieces at the output's times; the later one where two meet."""
-    last = np.searchsorted([piece.times[0] for piece in course.pieces], where, side="right") - 1
-    seen = [_at(course, piece, where[last == k]) for k, piece in enumerate(course.pieces)]
-    states = np.concatenate([part.states for part in seen])
-    return _Seen(where, states, [instant for part in seen for instant in part.instants])
+    def series_of(self, output: Output) -> Series | None:
+        """Readings at the ends of steps; of tensions at all points that are in balance."""
+        if output.read(self._steps[0]) is None:
+            return None
+        if isinstance(output, CableTension):
+            return Series(*_readings(output.read, self._balanced), self._grid)
+        return self._series(output.read)
 
+    def cables(self) -> Values:
+        """The largest tension, and how long ropes were slack, between readings as well."""
+        times, tensions = _readings(CableTension().read, self._balanced)
+        counts = times <= self.run.until
+        peak, moment = _top(times[counts], np.nanmax(tensions[counts], axis=(1, 2)))
+        stretch = np.array([_stretches(now.chain) for now in self._balanced if now.chain])
+        slack = np.array([_time_below_zero(times, each) for each in stretch.T])
+        slack = self._balanced[0].by_plane(slack)
+        return {"peak_tension": peak, "peak_tension_time": moment, "slack_duration": slack}
 
-def _energies(seen: _Seen, start: Instant) -> dict[str, Array]:
-    """Energies by their names, J; work counts from the start."""
-    now = seen.instants
-    lifted = np.array([i.acting.work for i in now]) - start.acting.work
-    return {
-        "kinetic_energy": np.array([i.kinetic for i in now]),
-        "elastic_energy": np.array([i.elastic for i in now]),
-        "work": lifted + seen.states[:, -1],
-        "dissipation": seen.states[:, -2],
-    }
+    def _series(self, read: _Reader) -> Series:
+        def evaluate(where: Array) -> Array:
+            return _readings(read, self._instants(where))[1]
 
+        return _Evaluated(*_readings(read, self._steps), self._grid, evaluate)
 
-def _imbalance(steps: list[_Seen], start: Instant) -> float:
-    """Largest energy imbalance at any step over the largest energy exchanged."""
-    wrong, exchanged = 0.0, 1e-300
-    for seen in steps:
-        parts = _energies(seen, start)
-        kinetic, elastic = parts["kinetic_energy"], parts["elastic_energy"] - start.elastic
-        balance = kinetic + elastic + parts["dissipation"] - parts["work"]
-        wrong = max(wrong, float(np.abs(balance).max()))
-        exchanged = max(
-            exchanged, *(float(np.abs(x).max()) for x in (kinetic, elastic, parts["work"]))
+    def _instants(self, where: Array) -> list[Reading]:
+        """The run at some times; the later piece where two meet."""
+        pieces, key = self._course.pieces, where.tobytes()
+        if key not in self._known:
+            last = np.searchsorted([piece.times[0] for piece in pieces], where, side="right") - 1
+            seen = [self._at(piece, where[last == k]) for k, piece in enumerate(pieces)]
+            self._known[key] = [now for part in seen for now in part]
+        return self._known[key]
+
+    def _at(self, piece: Piece, where: Array) -> list[Reading]:
+        """A piece at times within it."""
+        motion = self._course.motion
+        motion.latched, motion.until = piece.latched, piece.times[-1]
+        if motion.cables is not None and piece.ropes is not None:
+            motion.cables.ropes = piece.ropes
+        times, states = np.array(piece.times), np.array(piece.states)
+        found = np.repeat(states[:1], len(where), axis=0)
+        keep = np.append(True, np.diff(times) > 0.0)
+        if keep.sum() > 1 and len(where):
+            times, states, rates = times[keep], states[keep], np.array(piece.rates)[keep]
+            turn = motion.rate_of_phi
+            found = CubicHermiteSpline(times, states, rates)(where)
+            both = np.stack([states[:, :turn], states[:, turn : 2 * turn]], axis=1)
+            curve = quintic(times, both, rates[:, turn : 2 * turn])
+            found[:, :turn], found[:, turn : 2 * turn] = curve(where), curve.derivative()(where)
+        return [self._told(float(t), y) for t, y in zip(where, found, strict=True)]
+
+    def _told(self, time: float, state: Array) -> Reading:
+        """A state as every output reads it; work counts from the first one."""
+        motion = self._course.motion
+        now = motion.instant(time, state)
+        work = now.acting.work - self._lifted + state[-1]
+        opening, rate = math.pi - 2.0 * state[0], -2.0 * state[motion.rate_of_phi]
+        return Reading(
+            time,
+            np.full(self._shape, opening),
+            np.full(self._shape, rate),
+            Energies(now.kinetic, now.elastic, work, state[-2]),
+            latched=np.full(self._shape, motion.latched),
+            chain=None if now.pull is None else now.pull.chain,
+            planes=() if motion.cables is None else tuple(motion.cables.planes),
         )
-    return wrong / exchanged
 
 
-def _add_cables(
-    values: dict[str, Array], course: Course, steps: list[_Seen], seen: _Seen, whole: Any
-) -> None:
-    """Tensions by plane and span; a plane without a cable is NaN."""
-    cables = course.motion.cables
-    assert cables is not None
-    wound = np.array([i.pull.chain.wound.sum(axis=1) for i in seen.instants if i.pull])
-    sizes = 2, cables.spans, len(seen.times)
-    tensions, reeled, loose = (
-        np.full(sizes, np.nan),
-        np.full(sizes[::2], np.nan),
-        np.full(2, np.nan),
-    )
-    for number, planes in enumerate(cables.planes):
-        reeled[list(planes)], loose[list(planes)] = wound[:, number], 0.0
-    peak = (-math.inf, math.nan)
-    until = course.lock_time if math.isfinite(course.lock_time) else math.inf
-    for piece, at_steps in zip(course.pieces, steps, strict=True):
-        _at(course, piece, np.zeros(0))
-        inner = [(time, course.motion.instant(time, state)) for time, state in piece.inner]
-        line = sorted([*zip(piece.times, at_steps.instants, strict=True), *inner], key=_moment)
-        chains = [instant.pull.chain for _, instant in line if instant.pull is not None]
-        times = np.array([time for time, _ in line])
-        found = np.array([cables.tensions(chain) for chain in chains])
-        counts = times <= until
-        if counts.any():
-            peak = max(peak, _top(times[counts], np.nanmax(found[counts], axis=(1, 2))))
-        stretch = np.array([cables.stretches(chain) for chain in chains])
-        own = (seen.times >= times[0]) & (seen.times <= times[-1])
-        curve, missing = _through(times, np.nan_to_num(found)), np.isnan(found[0])
-        for number, planes in enumerate(cables.planes):
-            loose[list(planes)] += _time_below_zero(times, stretch[:, number])
-            for plane in planes:
-                at_spans = np.where(missing, np.nan, curve(seen.times[own]))
-                tensions[plane][:, own] = at_spans[:, number].T
-    values["cable_tension"], values["wound_length"] = whole(tensions), whole(reeled)
-    values["slack_duration"] = loose
-    values["peak_tension"], values["peak_tension_time"] = np.array(peak[0]), np.array(peak[1])
+def _readings(read: _Reader, instants: list[Reading]) -> tuple[Array, Array]:
+    values = np.array([read(now) for now in instants], dtype=float)
+    return np.array([now.time for now in instants]), values
 
 
-def _moment(item: tuple[float, Instant]) -> float:
-    return item[0]
-
-
-def _through(times: Array, series: Array) -> Any:
-    """Shape-preserving cubic through a series, which may be one point."""
-    keep = np.append(True, np.diff(times) > 0.0)
-    if keep.sum() == 1:
-        return lambda where: np.repeat(series[:1], len(where), axis=0)
-    return PchipInterpolator(times[keep], series[keep], axis=0)
+def _stretches(chain: ChainState) -> Array:
+    """Path less natural length of the rope at each cable's first winch, m; -1 if it is cut."""
+    first = chain.ropes.first
+    return np.where(chain.ropes.alive[first], (chain.paths - chain.natural)[first], -1.0)
 
 
 def _top(times: Array, series: Array) -> tuple[float, float]:

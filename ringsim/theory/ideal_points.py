@@ -16,6 +16,7 @@ linear in two more functions for each of them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,7 +66,7 @@ class Points:
         self.pins, self.normals = np.zeros((0, 3, 0)), np.zeros((0, 3))
         if hinges:
             self.pins = self.fit(
-                lambda layout: _stacked(layout.bodies[h.body].pose.at(h.arm) for h in hinges)
+                lambda layout: _stacked(layout.pose(h).at(0.0 * UP) for h in hinges)
             )
             self.normals = np.array([self.layout.pose(hinge).axes[:, 2] for hinge in hinges])
 
@@ -150,21 +151,40 @@ class Points:
 
     def upper_corners(self) -> Array:
         """Coefficients of the upper hinge assemblies' centres, shape (corners, 3, functions), m."""
-        bodies = self.layout.corners[0]
+        bodies = self.layout.corners[0] if self.layout.corners else ()
+        return self.places([OnBody(body, np.zeros(3), np.eye(3)) for body in bodies])
+
+    def frame(self, body: int) -> Array:
+        """Coefficients of a body's origin, m, and of its axes; shape (4, 3, functions)."""
+        axes = [OnBody(body, np.zeros(3), np.roll(np.eye(3), -k, axis=1)) for k in range(3)]
+        return np.concatenate([self.places(axes[:1]), self.directions(axes)])
+
+    def places(self, mounts: Sequence[Mount], *, ahead: float = 0.0) -> Array:
+        """Coefficients of mounts, or of points ahead of them along their x axes (m).
+
+        The mounts are those of ``layout``; shape (mounts, 3, functions), m.
+        """
+        arm = np.array([ahead, 0.0, 0.0])
         return self.swung(
-            lambda layout: _stacked(layout.bodies[b].pose.at(UP * 0.0) for b in bodies), bodies
+            lambda layout: _stacked(layout.pose(mount).at(arm) for mount in mounts),
+            map(body_of, mounts),
         )
 
+    def directions(self, mounts: Sequence[Mount]) -> Array:
+        """Coefficients of the mounts' x axes, shape (mounts, 3, functions)."""
+        return self.places(mounts, ahead=1.0) - self.places(mounts)
+
+    @cached_property
     def forces(self) -> tuple[Array, Array]:
         """The loads, N, and where they act; shapes (forces, 3) and (forces, 3, functions)."""
         mounts = [self.layout.joints[joint].first for joint, _ in self.layout.forces]
         vectors = np.array([force for _, force in self.layout.forces]).reshape(-1, 3)
+        return vectors, self.places(mounts)
 
-        def read(layout: Layout) -> Pairs:
-            poses = [layout.pose(mount) for mount in mounts]
-            return _stacked((pose.place, pose.rate) for pose in poses)
-
-        return vectors, self.swung(read, map(body_of, mounts))
+    @cached_property
+    def load_work(self) -> Array:
+        """Coefficients of the work of loads that turn with the structure, shape (functions,), J."""
+        return np.tensordot(*self.forces, 2)
 
     def path(self, number: int) -> Array:
         """Coefficients of a cable's sheaves, shape (sheaves, 3, functions), m."""
@@ -191,14 +211,13 @@ def _stacked(pairs: Iterable[Sequence[Array]]) -> Pairs:
 def _end_hinges(layout: Layout) -> list[OnBody]:
     """A mount on each hinge assembly at an end of an arc, all of whose hinges share one axis."""
     found = []
-    for end in (0, -1):
-        for plane in layout.corners[:2]:
-            hinges = [
-                mount
-                for joint in layout.joints
-                for mount in (joint.first, joint.second)
-                if joint.kind == "revolute" and body_of(mount) == plane[end]
-            ]
-            if np.ptp([hinge.axes[:, 2] for hinge in hinges], axis=0).max() < _CLOSE:
-                found.append(hinges[0])
-    return [mount for mount in found if isinstance(mount, OnBody)]
+    for body in [plane[end] for end in (0, -1) for plane in layout.corners]:
+        hinges = [
+            mount
+            for joint in layout.joints
+            for mount in (joint.first, joint.second)
+            if joint.kind == "revolute" and isinstance(mount, OnBody) and mount.body == body
+        ]
+        if np.ptp([hinge.axes[:, 2] for hinge in hinges], axis=0).max() < _CLOSE:
+            found.append(hinges[0])
+    return found

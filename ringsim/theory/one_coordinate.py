@@ -19,10 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.layout.free_hub import FreeHub, NetForces
-from ringsim.layout.layout import Layout
 from ringsim.scene import Scene
-from ringsim.theory.ideal_mechanism import MassSums
-from ringsim.theory.ideal_points import Pairs, Points, body_of
+from ringsim.theory.ideal_mechanism import Configuration, Mechanism
 
 Array = NDArray[np.float64]
 
@@ -48,71 +46,44 @@ class OneCoordinate:
     """Masses, loads and net of a scene; joint friction, stops, springs and cables are left out."""
 
     def __init__(self, scene: Scene) -> None:
-        known = scene.structure.basis(scene.structure.coordinate) is not None
-        everywhere = _Parts(scene, None) if known else None
-        self._parts = lru_cache(maxsize=4)(lambda q: everywhere or _Parts(scene, q))
+        self._scene = scene
+        known = scene.structure.basis(scene.structure.coordinate).size
+        everywhere = Mechanism(scene) if known else None
+        self._mechanism = lru_cache(maxsize=4)(lambda q: everywhere or Mechanism(scene, q))
 
     def motion(self, q: float) -> Motion:
         """Inertia and rigid-body part of the motion at ``q`` (rad)."""
-        parts, functions = self._at(q)
-        matrix = parts.sums.at(functions).matrix[:7, :7]
-        if len(parts.held):
-            place, *axes = parts.held @ functions[:, 0]
-            rate, *turning = parts.held @ functions[:, 1]
-            turn = 0.5 * np.cross(axes, turning).sum(axis=0)
-            rigid = -np.concatenate([rate - np.cross(turn, place), turn])
-        else:
-            rigid = -np.linalg.solve(matrix[:6, :6], matrix[:6, 6])
-        rates = np.append(rigid, 1.0)
-        return Motion(float(rates @ matrix @ rates), -rigid[:3], -rigid[3:])
+        mechanism, now = self._at(q)
+        rigid = mechanism.rigid_rates(now)
+        rates = np.concatenate([rigid, now.rate])
+        return Motion(float(rates @ now.matrix @ rates), -rigid[:3], -rigid[3:])
 
     def work(self, q: float) -> float:
         """Work function W(q) in J, up to a constant."""
-        parts, functions = self._at(q)
-        return float(parts.lift @ functions[:, 0]) - parts.net_forces(functions).energy
+        mechanism, now = self._at(q)
+        return float(mechanism.points.load_work @ now.values) - self._net(q).energy
 
     def work_rate(self, q: float) -> float:
         """Generalised force dW/dq, J/rad."""
-        parts, functions = self._at(q)
-        return float(parts.lift @ functions[:, 1] + parts.net_forces(functions).force[0])
+        mechanism, now = self._at(q)
+        done = mechanism.points.load_work @ now.by_place[:, 0]
+        return float(done + self._net(q).force[0])
 
     def acceleration_from_rest(self, q: float) -> float:
         """Q'' in rad/s^2 when released at rest."""
         return self.work_rate(q) / self.motion(q).inertia
 
-    def _at(self, q: float) -> tuple[_Parts, Array]:
-        """What acts and ``Points.functions`` at a coordinate."""
-        parts = self._parts(q)
-        rest = np.zeros(len(parts.points.swinging))
-        return parts, parts.points.functions([q, *rest], [1.0, *rest])
+    def _at(self, q: float) -> tuple[Mechanism, Configuration]:
+        """The mechanism, folding at rate 1 without swings."""
+        mechanism = self._mechanism(q)
+        folding = np.eye(mechanism.freedom)[0]
+        return mechanism, mechanism.configuration(q * folding, folding)
 
-
-class _Parts:
-    """What moves and acts, good at all coordinates or at one."""
-
-    def __init__(self, scene: Scene, at: float | None) -> None:
-        self.points = points = Points(scene, at)
-        self.sums = MassSums(*points.masses())
-        self.lift = np.tensordot(*points.forces(), 2)
-        self._net, self._corners = None, np.zeros(0)
-        if scene.net is not None:
-            self._corners = points.upper_corners()
-            self._net = FreeHub(scene.net, len(self._corners))
-        self.held = np.zeros(0)
-        held = [body_of(support.second) for support in points.layout.supports]
-        if held and held[0] >= 0:
-            self.held = points.swung(lambda layout: _frame(layout, held[0]), [-1] * 4)
-
-    def net_forces(self, functions: Array) -> NetForces:
+    def _net(self, q: float) -> NetForces:
         """What the net does, nothing where there is none."""
-        if self._net is None:
+        if self._scene.net is None:
             return NetForces(np.zeros(1), 0.0, 0.0)
-        places, slopes = self._corners @ functions[:, 0], self._corners @ functions[:, 1:2]
-        return self._net.forces(places, slopes, np.zeros(1))
-
-
-def _frame(layout: Layout, body: int) -> Pairs:
-    """Origin and axes of a body, shape (4, 3)."""
-    pose = layout.bodies[body].pose
-    turned = np.cross(pose.turn, pose.axes.T)
-    return np.vstack([pose.place, pose.axes.T]), np.vstack([pose.rate, turned])
+        mechanism, now = self._at(q)
+        corners = mechanism.upper_corners
+        net = FreeHub(self._scene.net, len(corners))
+        return net.forces(corners @ now.values, corners @ now.by_place, 0.0 * now.rate)

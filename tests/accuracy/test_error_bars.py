@@ -11,6 +11,7 @@ from ringsim.analysis.error_budget import budget_lines, error_budget
 from ringsim.campaign.cases import Cases, run_cases
 from ringsim.campaign.specification import load_campaign
 from ringsim.dataset import to_dataset
+from ringsim.outputs.error_bars import error_bars, rules
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
@@ -20,7 +21,6 @@ from ringsim.stepping.instant import Energies, Instant
 from ringsim.stepping.locks import StopContact
 from ringsim.stepping.motion_steps import MotionSteps
 from ringsim.stepping.scales import Scales
-from ringsim.theory.error_bars import BETWEEN_READINGS, OF_ONE_ELEMENT, SAFETY, error_bars
 from ringsim.variables import Outcome, Status
 
 TIMES = np.linspace(0.0, 4.0, 41)
@@ -59,7 +59,7 @@ def test_a_method_of_second_order_is_covered_three_times_and_more() -> None:
     found = error_bars(outcome(error), outcome(4.0 * error), elements=100, tolerance=0.0)
     values = {"deployment_time": 3.0, "opening_angle": 150.0, "peak_tension": 10.0}
     for name, value in values.items():
-        expected = 3.0 * SAFETY[name] * error * value
+        expected = 3.0 * rules()[name].safety * error * value
         assert found[f"{name}_error"] == pytest.approx(expected, rel=0.01)
 
 
@@ -101,7 +101,7 @@ def test_few_elements_widen_what_they_bend() -> None:
     same = outcome(0.0)
     for elements in (1, 2):
         found = error_bars(same, same, elements, tolerance=0.0)
-        share = OF_ONE_ELEMENT["asynchrony_max"] / elements**2
+        share = rules()["asynchrony_max"].of_one_element / elements**2
         assert found["asynchrony_max_error"] == pytest.approx(share * 5.0)
         assert found["deployment_time_error"] == 0.0
 
@@ -158,9 +158,9 @@ def test_shorter_steps_give_the_bars_where_longer_ones_fail(attempts) -> None:
     found = run(scene)
     assert seen[1] == scene.solver.scaled(2.0)
     assert seen[2] == scene.solver.scaled(0.5)
-    of_steps = 3.0 * SAFETY["peak_tension"] * error * 10.0
-    between = BETWEEN_READINGS["peak_tension"] * scene.solver.tolerance
-    expected = of_steps + (OF_ONE_ELEMENT["peak_tension"] + between) * 10.0
+    of_steps = 3.0 * rules()["peak_tension"].safety * error * 10.0
+    between = rules()["peak_tension"].between_readings * scene.solver.tolerance
+    expected = of_steps + (rules()["peak_tension"].of_one_element + between) * 10.0
     assert found.values["peak_tension_error"] == pytest.approx(expected, rel=0.01)
     assert "no error bars" not in found.reason
 
@@ -179,8 +179,8 @@ def test_the_bar_of_the_asynchrony_is_that_of_all_that_came_before() -> None:
     fine.values["asynchrony"] = np.where(TIMES <= 3.0, TIMES, np.nan)
     coarse.values["asynchrony"] = fine.values["asynchrony"] + np.where(TIMES[10] == TIMES, 0.5, 0.1)
     found = error_bars(fine, coarse, elements=10**6, tolerance=0.0)["asynchrony_error"]
-    np.testing.assert_allclose(found[:10], 0.1 * SAFETY["asynchrony"], rtol=1e-9)
-    np.testing.assert_allclose(found[10:31], 0.5 * SAFETY["asynchrony"], rtol=1e-9)
+    np.testing.assert_allclose(found[:10], 0.1 * rules()["asynchrony"].safety, rtol=1e-9)
+    np.testing.assert_allclose(found[10:31], 0.5 * rules()["asynchrony"].safety, rtol=1e-9)
     assert np.isnan(found[31:]).all()
 
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.plots.cables import SectionSeries
+from ringsim.plots.cables import section_series
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 
@@ -46,7 +46,7 @@ def test_fig_4_span_lengths(truss: xr.Dataset) -> None:
     """A rope along four spans of one length gives what was wound: no geometry is needed."""
     opening = np.radians(truss["opening_angle"].sel(plane="upper").values)
     length = np.sqrt(HALF**2 + OFFSET**2 + 2.0 * HALF * OFFSET * np.cos(0.5 * opening))
-    assert SectionSeries(truss, "upper").lengths == pytest.approx(length, nan_ok=True)
+    assert section_series(truss, "upper")["length"].values == pytest.approx(length, nan_ok=True)
     last = int(np.flatnonzero(np.isfinite(length[0]))[-1])
     begin, end = length[:, 0].mean(), length[:, at(truss, 34.0)].mean()
     assert (round(begin, 3), round(end, 3)) == (0.393, 0.308)
@@ -75,7 +75,7 @@ def test_figs_6_and_7_decay_factors(
     hinge = eta(np.pi / 2 - gamma) if section == 0 else eta(beside)
     after = eta(beside) if section == 0 else 1.0  # the rope ends at the last hinge pulley
     expected = hinge * eta(np.pi - 2.0 * gamma) * after
-    found = SectionSeries(truss, "upper").decays[section]
+    found = section_series(truss, "upper")["decay"].values[section]
     taut = np.isfinite(found) & np.isfinite(expected) & (truss["time"].values > 1.0)
     # Assemblies of an open arc lean by some mrad, as rigid rods let them: f / R times that.
     assert found[taut] == pytest.approx(expected[taut], rel=2e-4)
@@ -92,7 +92,7 @@ def test_figs_9_and_10_forces_on_the_second_section(
     truss: xr.Dataset, time: float, hinge: str, block: str
 ) -> None:
     """Vector sums of the tensions at the pulleys (eqs 29 and 30, see test_paper_forces.py)."""
-    k, series = at(truss, time), SectionSeries(truss, "upper")
+    k, series = at(truss, time), section_series(truss, "upper")
     tension = truss["cable_tension"].sel(plane="upper").values[:, k]
     c, s = np.cos(fall(truss)[1, k]), np.sin(fall(truss)[1, k])
     # The short span leads on by half the plan's turn, out of the section's plane.
@@ -106,5 +106,5 @@ def test_figs_9_and_10_forces_on_the_second_section(
         digits = len(stated.split(".")[1])
         assert found == pytest.approx(float(stated), abs=0.6 * 10.0**-digits)
     # The plan's turn is written with seven digits; the part along the bars is left out.
-    assert series.hinge_forces[1, k] == pytest.approx(first, rel=1e-6)
-    assert series.block_forces[1, k] == pytest.approx(second, rel=0.01)
+    assert float(series["hinge_force"][1, k]) == pytest.approx(first, rel=1e-6)
+    assert float(series["block_force"][1, k]) == pytest.approx(second, rel=0.01)

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from campaign_bench import Bench, comparable, journals
-from ringsim.variables import VARIABLES
+from ringsim.outputs import VARIABLES
 
 
 @pytest.fixture(scope="module")

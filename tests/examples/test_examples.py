@@ -23,7 +23,7 @@ def test_an_example_runs(script: Path, tmp_path: Path) -> None:
         env=os.environ | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert len(done.stdout.splitlines()) >= 3
+    assert done.stdout.strip()
     for name in re.findall(r"^wrote (\S+)$", done.stdout, re.MULTILINE):
         assert (tmp_path / name).stat().st_size > 0
 

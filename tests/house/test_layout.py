@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ringsim.cli import VERBS
-from ringsim.variables import VARIABLES
+from ringsim.outputs import VARIABLES
 
 ROOT = Path(__file__).parents[2]
 SOURCES = sorted((ROOT / "ringsim").rglob("*.py"))

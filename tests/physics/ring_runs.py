@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from ringsim.engine.build import build
-from ringsim.engine.history import History
 from ringsim.engine.integrate import Integration
+from ringsim.outputs.recorder import Recorder
 from ringsim.scene import Scene, load_scene
 from ringsim.stepping.locks import lock_times
 from ringsim.theory.energy_quadrature import opening_time
@@ -46,7 +46,7 @@ class Run:
     """A run at the engine's own steps."""
 
     scene: Scene
-    history: History
+    history: Recorder
 
     @cached_property
     def times(self) -> Array:

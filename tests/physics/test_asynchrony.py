@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ring_runs import ring
-from ringsim.engine.outcome import largest_spread
+from ringsim.outputs.asynchrony import largest_spread
 from ringsim.simulation import run
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from ringsim.scene import load_scene
 from ringsim.simulation import run
-from ringsim.theory.planar_truss import bending_strain, statics
 from ringsim.variables import Status
 from truss_runs import DEPLOYED, STOWED
+from truss_statics import bending_strain, statics
 
 KILOGRAM_FORCE = 9.80665
 

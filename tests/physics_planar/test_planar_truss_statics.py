@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ringsim.scene import load_scene
-from ringsim.theory.planar_truss import (
+from truss_statics import (
     bending_moment,
     bending_strain,
     spring_force,

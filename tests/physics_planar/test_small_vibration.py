@@ -12,8 +12,8 @@ import pytest
 from linearised_truss import LinearisedTruss
 from ringsim.scene import load_scene
 from ringsim.simulation import run
-from ringsim.theory.planar_truss import statics
 from ringsim.variables import Status
+from truss_statics import statics
 
 SCENE = load_scene("planar-truss")
 STEP = 1e-3

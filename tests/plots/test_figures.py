@@ -11,6 +11,7 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from ringsim.dataset import to_dataset
+from ringsim.outputs import VARIABLES
 from ringsim.plots.asynchrony import asynchrony
 from ringsim.plots.diagonal_stress import default_sections, diagonal_stress
 from ringsim.plots.energy import energy, imbalance
@@ -19,7 +20,7 @@ from ringsim.plots.ring import ring
 from ringsim.plots.run import PICTURES, draw_run
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
-from ringsim.variables import VARIABLES, Outcome, Status
+from ringsim.variables import Outcome, Status
 
 DRAWINGS = [opening_angles, asynchrony, diagonal_stress, energy, ring]
 CHARTS = [opening_angles, asynchrony, diagonal_stress, energy]

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 
-from ringsim.plots.camera import Camera
-from ringsim.plots.ring import facing_azimuth, instants, lines_at, ring
+from ringsim.plots.ring import facing_azimuth, instants, lines_at, ring, view
 from ringsim.variables import Status
 
 LEFT = [*range(6), *range(12, 18)]
@@ -68,13 +67,14 @@ def test_springs_are_taut_beyond_their_neutral_length(scene_of):
 @pytest.mark.parametrize("azimuth", [0.0, 42.0, -130.0])
 def test_camera_keeps_all_distances(azimuth):
     points = np.random.default_rng(3).normal(size=(20, 3))
-    paper, near = Camera(azimuth, 24.0).view(points)
+    paper, near = view(points, azimuth, 24.0)
     turned = np.concatenate([paper, near[:, None]], axis=-1)
     np.testing.assert_allclose(turned @ turned.T, points @ points.T, atol=1e-13)
 
 
 def test_camera_sees_up_as_up_and_near_as_near():
-    paper, near = Camera(0.0, 30.0).view(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1, 0]]))
+    points = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1, 0]])
+    paper, near = view(points, 0.0, 30.0)
     assert paper[0, 1] > 0.0
     assert paper[2, 0] == pytest.approx(1.0)
     assert near[1] == pytest.approx(np.cos(np.radians(30.0)))
@@ -83,8 +83,8 @@ def test_camera_sees_up_as_up_and_near_as_near():
 def test_arcs_are_seen_from_outside(scene_of):
     scene = scene_of(5, closed=False)
     azimuth = np.radians(facing_azimuth(scene))
-    view = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    assert (scene.structure.geometry().normals @ view > 0.0).all()
+    towards = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    assert (scene.structure.geometry().normals @ towards > 0.0).all()
 
 
 def test_instants_are_first_middle_and_deployment(deployed):

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ringsim.analysis.stability import cause_of
+from ringsim.analysis.stability import word_of
 from ringsim.parts.solver import Solver
 from ringsim.stepping.constant_steps import PEAK_BEND, STEPS
 from ringsim.stepping.guard import BLOW_UP, GAIN, GAP, LOSS, OVERRUN, SLIGHT, Guard
@@ -55,7 +55,7 @@ def test_energy_that_comes_or_goes_stops_the_run_at_its_bound(factor, sign) -> N
     exact = share / (1.0 - share) if sign > 0.0 else share
     assert guard().judge(1.0, after(1.0, 0.999 * exact), 0.0) == ""
     reason = guard().judge(1.0, after(1.0, 1.001 * exact), 0.0)
-    assert cause_of(reason) == ("energy grew" if sign > 0.0 else "energy lost")
+    assert word_of(reason.cause) == ("energy grew" if sign > 0.0 else "energy lost")
     assert "1 s" in reason
     assert "solver.energy_tolerance" in reason
     assert "reduce solver.step" in reason
@@ -66,7 +66,7 @@ def test_a_run_that_ends_with_too_large_an_imbalance_is_not_sound(created) -> No
     watching = guard()
     assert watching.judge(1.0, after(1.0, created), 0.0) == ""
     assert watching.judge(2.0, after(1.0, 0.0), 0.0) == ""
-    assert cause_of(watching.verdict()) == ("energy grew" if created > 0.0 else "energy lost")
+    assert word_of(watching.verdict().cause) == ("energy grew" if created > 0.0 else "energy lost")
     assert "up to 1 s" in watching.verdict()
 
 
@@ -86,13 +86,13 @@ def test_next_to_no_energy_does_not_count() -> None:
 def test_a_quiet_run_is_judged_by_its_own_energy_at_the_end() -> None:
     watching = guard()
     assert watching.judge(1.0, after(0.1 * LEAST, 0.01 * LEAST), 0.0) == ""
-    assert cause_of(watching.verdict()) == "energy grew"
+    assert word_of(watching.verdict().cause) == "energy grew"
 
 
 def test_more_energy_than_there_can_be_is_a_blow_up() -> None:
     stored = (BLOW_UP + 1.0) * 2.0
     reason = guard().judge(0.5, Energies(stored, 0.0, 2.0, 0.0), 0.0)
-    assert cause_of(reason) == "blow-up"
+    assert word_of(reason.cause) == "blow-up"
     assert f"{stored:.3g} J of kinetic" in reason
 
 
@@ -106,14 +106,14 @@ def test_energy_of_the_start_is_available() -> None:
 def test_a_gap_of_a_joint_stops_the_run() -> None:
     assert guard().judge(1.0, after(1.0, 0.0), 0.99 * GAP * BAR) == ""
     reason = guard().judge(1.0, after(1.0, 0.0), 1.01 * GAP * BAR)
-    assert cause_of(reason) == "joint gap"
+    assert word_of(reason.cause) == "joint gap"
     assert f"{1.01 * GAP * BAR:.2g} m" in reason
 
 
 def test_a_joint_far_beyond_its_stop_stops_the_run() -> None:
     assert guard().judge(1.0, after(1.0, 0.0), 0.0, 0.99 * OVERRUN) == ""
     reason = guard().judge(1.0, after(1.0, 0.0), 0.0, 1.01 * OVERRUN)
-    assert cause_of(reason) == "stop passed"
+    assert word_of(reason.cause) == "stop passed"
     assert "raise stop.stiffness" in reason
 
 
@@ -138,7 +138,7 @@ def test_constant_steps_have_to_resolve_a_swing(steps, cause) -> None:
     """A seventh of the mean, with a period of 1 s."""
     times = np.arange(0.0, 10.0, 1.0 / steps)
     swing = 10.0 + 1.5 * np.sin(2.0 * np.pi * times)
-    assert cause_of(unresolved(swing, times)) == cause
+    assert word_of(unresolved(swing, times).cause) == cause
     assert unresolved(swing, times, slack_tension=None) == ""
 
 
@@ -147,7 +147,7 @@ def test_constant_steps_have_to_resolve_the_largest_tension(share, cause) -> Non
     tensions = np.full(1001, 10.0)
     tensions[500] /= 1.0 - 0.5 * share * PEAK_BEND
     found = unresolved(tensions, 0.01 * np.arange(1001))
-    assert cause_of(found) == cause
+    assert word_of(found.cause) == cause
     assert "at 5 s" in found or not cause
 
 
@@ -171,4 +171,4 @@ def test_a_few_constant_steps_do_not_resolve_a_motion(control, steps, cause) -> 
     for k in range(steps + 5):
         angles = np.full((2, 3), math.pi * k / steps)
         assert watching.judge(Instant(0.1 * k, angles, 0.0 * angles, REST)) == ""
-    assert cause_of(watching.verdict()) == cause
+    assert word_of(watching.verdict().cause) == cause

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ringsim.analysis.stability import cause_of
+from ringsim.analysis.stability import word_of
 from ringsim.engine.build import build
 from ringsim.engine.integrate import Integration
 from ringsim.scene import Scene, load_scene
@@ -42,10 +42,10 @@ def test_a_run_with_absurd_steps_stops_early_with_its_cause() -> None:
     """With its energy unwatched it goes on to the stops."""
     hard = {"loads.force": 1.0}
     unguarded = run(ring(**COARSE, energy_tolerance=1e6).with_values(hard))
-    assert cause_of(unguarded.reason) == "few steps"
+    assert word_of(unguarded.cause) == "few steps"
     outcome = run(ring(**COARSE).with_values(hard))
     assert outcome.status is Status.DIVERGED
-    assert cause_of(outcome.reason) == "energy lost"
+    assert word_of(outcome.cause) == "energy lost"
     assert float(outcome.values["final_time"]) < float(unguarded.values["final_time"])
     assert int(outcome.values["steps"]) < int(unguarded.values["steps"])
 
@@ -56,15 +56,14 @@ def test_too_coarse_steps_are_cured_by_a_new_start() -> None:
     assert outcome.status is Status.OK
     assert float(outcome.values["energy_error"]) < coarse.solver.energy_tolerance
     assert 1 <= int(outcome.values["restarts"]) <= coarse.solver.restarts
-    first = outcome.reason.partition("start 1: ")[2]
-    assert cause_of(first) in ("energy lost", "energy grew")
+    assert "start 1: time integration" in outcome.reason
 
 
 def test_constant_steps_that_newton_has_to_cut_are_too_few() -> None:
     """A dozen that converge balance their energy, and are 2 % late."""
     outcome = run(ring(step_control="constant", step=3.0).with_values({"loads.force": 5.0}))
     assert outcome.status is Status.DIVERGED
-    assert cause_of(outcome.reason) == "few steps"
+    assert word_of(outcome.cause) == "few steps"
     assert float(outcome.values["energy_error"]) < ring().solver.energy_tolerance
 
 
@@ -72,7 +71,7 @@ def test_a_stop_that_is_far_too_soft_is_named() -> None:
     soft = ring(restarts=0).with_values({"loads.force": 10.0, "stop.stiffness": 1e-3})
     outcome = run(soft.with_values({"stop.damping": 0.0}))
     assert outcome.status is Status.DIVERGED
-    assert cause_of(outcome.reason) == "stop passed"
+    assert word_of(outcome.cause) == "stop passed"
 
 
 def reel(**values) -> Scene:
@@ -99,7 +98,7 @@ def test_a_rope_whose_swing_constant_steps_swallow_is_named_and_cured() -> None:
     """Its energy balance to a tenth of a percent says nothing of it."""
     coarse = run(reel(**{"solver.step": 0.05, "solver.restarts": 0}))
     assert coarse.status is Status.DIVERGED
-    assert cause_of(coarse.reason) == "tension bends"
+    assert word_of(coarse.cause) == "tension bends"
     assert float(coarse.values["energy_error"]) < 0.01
     cured, fine = run(reel(**{"solver.step": 0.05})), run(reel(**{"solver.step": 0.003}))
     assert int(cured.values["restarts"]) == 1

@@ -16,7 +16,6 @@ from ringsim.analysis.stability import (
     TENSION_PROMISE,
     TIME_PROMISE,
     WRONG,
-    cause_of,
     cells_of,
     checked,
     chosen_for_check,
@@ -26,17 +25,19 @@ from ringsim.analysis.stability import (
 from ringsim.analysis.stability_text import borders, summary, to_markdown
 from ringsim.parts.solver import Solver
 from ringsim.plots.stability import stability
-from ringsim.variables import Status
+from ringsim.variables import Cause, Status
 
 NEWTON = "the solver gave up at 1 s after 9 reductions of the step: reduce solver.step"
 ENDS = {
-    "all V-joints have reached 180 deg": Status.OK,
-    "solver.end_time = 4 s was reached with 0 of 4 V-joints locked": Status.UNFINISHED,
-    NEWTON: Status.SOLVER_FAILED,
-    "still running after limits.timeout = 90 s: raise it": Status.TIMEOUT,
-    "KeyError: 'x'": Status.ERROR,
-    "the solver process died of SIGSEGV": Status.CRASHED,
-}
+    "all V-joints have reached 180 deg": (Status.OK, Cause.NONE),
+    "solver.end_time = 4 s was reached with 0 of 4 V-joints locked": (
+        Status.UNFINISHED, Cause.END_TIME,
+    ),
+    NEWTON: (Status.SOLVER_FAILED, Cause.NEWTON),
+    "still running after limits.timeout = 90 s: raise it": (Status.TIMEOUT, Cause.TIME_LIMIT),
+    "KeyError: 'x'": (Status.ERROR, Cause.EXCEPTION),
+    "the solver process died of SIGSEGV": (Status.CRASHED, Cause.CRASH),
+}  # fmt: skip
 
 
 def campaign(*reasons: str, **values: list[float]) -> xr.Dataset:
@@ -49,7 +50,8 @@ def campaign(*reasons: str, **values: list[float]) -> xr.Dataset:
         "peak_tension": [10.0] * count, "cpu_time": [1.0] * count, "steps": [1.0] * count,
     }  # fmt: skip
     found = {name: ("sample", np.array(v)) for name, v in (numbers | values).items()}
-    found["status"] = ("sample", np.array([int(ENDS[r]) for r in reasons], dtype="i1"))
+    for place, name in enumerate(("status", "cause")):
+        found[name] = ("sample", np.array([int(ENDS[r][place]) for r in reasons], dtype="i1"))
     found["reason"] = ("sample", np.array(reasons, dtype=object))
     found["opening_angle"] = (("sample", "plane", "section", "time"), angle)
     return xr.Dataset(found)
@@ -79,20 +81,6 @@ def test_ok_with_an_energy_error_over_its_tolerance_is_wrong() -> None:
     most = Solver().energy_tolerance
     found = judged(cells(GOOD, GOOD, energy_error=[0.99 * most, 1.01 * most]))
     assert found["verdict"].values.tolist() == [OK, WRONG]
-
-
-def test_the_cause_is_that_of_the_last_start() -> None:
-    told = (
-        "solver.end_time = 4 s was reached with 0 of 4 (start 2 with solver.step = 1 s; start 1: "
-    )
-    assert cause_of(f"{told}{NEWTON})") == "end time"
-    assert cause_of(f"{NEWTON} (start 2 with solver.step = 1 s; start 1: not finite)") == "Newton"
-
-
-def test_a_new_start_that_runs_out_of_steps_is_ended_by_what_ended_the_first() -> None:
-    limit = "solver.step_limit = 800 steps took the run to 1 s only: raise solver.step_limit"
-    assert cause_of(limit) == "step limit"
-    assert cause_of(f"{limit} (start 2 with solver.step = 1 s; start 1: {NEWTON})") == "Newton"
 
 
 def test_the_final_angle_is_the_last_that_was_recorded() -> None:

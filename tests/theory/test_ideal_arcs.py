@@ -135,7 +135,7 @@ def test_nothing_is_lost_or_won_without_forces(boom):
     def kinetic(q, v):
         now = mechanism.configuration(q, v)
         rates = np.concatenate([mechanism.rigid_rates(now), now.rate])
-        return 0.5 * float(rates @ now.moments.matrix @ rates)
+        return 0.5 * float(rates @ now.matrix @ rates)
 
     now = mechanism.configuration(q, v)
     spin = mechanism.rigid_rates(now)[3:]

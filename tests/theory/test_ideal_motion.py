@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from ideal_cases import pulled, six
+from ringsim.outputs import VARIABLES
 from ringsim.simulation import run_ideal
 from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.one_coordinate import OneCoordinate
-from ringsim.variables import VARIABLES, Status
+from ringsim.variables import Status
 
 BALANCE = 1e-7
 """Local errors of 1e-7 of the rate, of which a few hundred partly cancel."""

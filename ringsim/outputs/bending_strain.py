@@ -1,0 +1,32 @@
+"""Bending strain of the rod that carries a structure's gauge."""
+
+import numpy as np
+
+from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+
+
+class BendingStrain(Output):
+    """Strain of the outer fibre at the nodes, where a beam loaded at its nodes is bent most."""
+
+    rank = 44
+    needs = ("gauge",)
+    coordinates = (
+        Variable("station", ("station",), "m", "distance along the upper beam from the fixed axis"),
+    )
+    variables = (
+        Variable(
+            "bending_strain", ("station", "time"), "1", "bending strain of the upper beam's fibre"
+        ),
+        Variable(
+            "peak_bending_strain", (), "1", "largest bending strain of the upper beam at any step",
+            summary=("largest strain", "10.2e"),
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> Array | None:
+        """Shape (stations,)."""
+        return now.strain
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Interpolated, and the largest reading of either sign."""
+        return super().reduce(run, series) | {"peak_bending_strain": np.abs(series.values).max()}

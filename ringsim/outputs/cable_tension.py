@@ -1,0 +1,56 @@
+"""Tensions of the cables' spans."""
+
+import math
+
+import numpy as np
+
+from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
+from ringsim.parts.solver import TENSION_BEND
+
+
+class CableTension(Output):
+    """Tension of every span, and the largest with its time.
+
+    The largest counts up to the deployment time: winches that go on pulling at a locked ring raise
+    the tension for as long as one cares to simulate.
+    """
+
+    rank = 40
+    needs = ("cables",)
+    variables = (
+        Variable("cable_tension", ("plane", "span", "time"), "N", "tension of a cable's span"),
+        Variable(
+            "peak_tension", (), "N",
+            "largest tension of any span of any cable up to the deployment time",
+            # Between two readings it may rise by an eighth of the largest bend that no step is
+            # refused for, which both runs may miss alike.
+            error_bar=ErrorBar(
+                "largest tension", safety=1.2, of_one_element=0.001,
+                between_readings=2.0 * TENSION_BEND / 8.0,
+            ),
+            summary=("largest tension", "10.3f"),
+        ),
+        Variable("peak_tension_time", (), "s", "time of the largest tension"),
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> Array | None:
+        """Shape (planes, spans), N; NaN where a plane has no cable or one of fewer spans."""
+        if now.chain is None:
+            return None
+        edges = now.chain.ropes.cable_starts
+        found = np.full((len(now.angles), int(np.diff(edges).max())), np.nan)
+        for number, planes in enumerate(now.planes):
+            own = now.chain.tensions[edges[number] : edges[number + 1]]
+            found[list(planes), : len(own)] = own
+        return found
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Interpolated, and the largest reading or value at the deployment time."""
+        times, largest = series.times, np.nanmax(series.values, axis=(1, 2))
+        if math.isfinite(run.until):
+            before = times <= run.until
+            times = np.append(times[before], run.until)
+            last = series.at(np.array([run.until]))
+            largest = np.append(largest[before], np.nanmax(last))
+        peak = {"peak_tension": largest.max(), "peak_tension_time": times[np.argmax(largest)]}
+        return super().reduce(run, series) | peak

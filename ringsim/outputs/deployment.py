@@ -1,0 +1,25 @@
+"""When the V-joints reached 180 deg."""
+
+from ringsim.outputs.family import ErrorBar, Output, Run, Series, Values, Variable
+
+
+class Deployment(Output):
+    """The lock time of every V-joint, and the latest of them."""
+
+    rank = 0
+    variables = (
+        Variable(
+            "deployment_time", (), "s", "time at which the last V-joint reached 180 deg",
+            error_bar=ErrorBar("deployment time", safety=1.0, judged_by="lock_time"),
+            summary=("deployment time", "10.4f"),
+        ),
+        Variable(
+            "lock_time", ("plane", "section"), "s", "time at which the V-joint reached 180 deg"
+        ),
+    )  # fmt: skip
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """As the run knows them; see ``ringsim.stepping.locks.lock_times``."""
+        if not run.scene.structure.locks:
+            return {}
+        return {"lock_time": run.locks, "deployment_time": run.locks.max()}

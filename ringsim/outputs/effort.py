@@ -1,0 +1,39 @@
+"""What a run took: steps, iterations, starts, times, and the settings that it ended up with."""
+
+from __future__ import annotations
+
+from ringsim.outputs.family import Output, Run, Series, Values, Variable
+
+
+def _number(name: str, long_name: str, summary: tuple[str, str] | None = None) -> Variable:
+    return Variable(name, (), "1", long_name, "i4", summary=summary)
+
+
+class Effort(Output):
+    """Counts of the start that counts; ``ringsim.stepping.restarts`` adds those of all starts."""
+
+    rank = 70
+    variables = (
+        _number("steps", "time steps of the start that counts", ("steps", "10d")),
+        _number("repeated_steps", "steps that were repeated with a smaller one"),
+        _number("newton_iterations", "Newton iterations of the start that counts"),
+        _number("jacobians", "Jacobian factorisations of the start that counts"),
+        _number("restarts", "new starts with a smaller step after a run that failed"),
+        _number(
+            "total_steps", "time steps of all starts of the run", ("steps of all starts", "10d")
+        ),
+        _number("total_newton_iterations", "Newton iterations of all starts"),
+        _number("total_jacobians", "Jacobian factorisations of all starts"),
+        _number("fidelity", "model: 0 full multibody, 1 ideal ring of rigid rods"),
+        Variable(
+            "step_used", (), "s", "largest step allowed, solver.step, of the start that counts"
+        ),
+        Variable("tolerance_used", (), "1", "solver.tolerance of the start that counts"),
+        Variable("final_time", (), "s", "time at which the run ended"),
+        Variable("wall_time", (), "s", "elapsed time of the run", summary=("wall time", "10.2f")),
+        Variable("cpu_time", (), "s", "processor time of the run"),
+    )
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """As counted."""
+        return {**run.counts, "final_time": series.times[-1]}

@@ -1,0 +1,33 @@
+"""Energies over time, and what their balance lacks."""
+
+import numpy as np
+
+from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+
+
+class EnergyBalance(Output):
+    """Kinetic and elastic energy, work of loads and winches, what was lost, and the imbalance."""
+
+    rank = 60
+    variables = (
+        Variable("kinetic_energy", ("time",), "J", "kinetic energy"),
+        Variable("elastic_energy", ("time",), "J", "energy stored in rods, net and stops"),
+        Variable("work", ("time",), "J", "work done on the structure by forces and winches"),
+        Variable("dissipation", ("time",), "J", "energy lost in joints, dampers and stops"),
+        Variable(
+            "energy_error", (), "1", "largest energy imbalance over the largest energy exchanged",
+            summary=("energy error", "10.1e"),
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> Array:
+        """In the order of the variables, J, shape (4,)."""
+        return np.array(now.energies[:4])
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Each interpolated by itself: the losses may be unknown (NaN) where the others are not."""
+        kinetic, elastic, work, lost = series.values.T
+        balance = kinetic - kinetic[0] + elastic - elastic[0] + lost - work
+        exchanged = max(np.abs(work).max(), np.ptp(kinetic), np.ptp(elastic), 1e-300)
+        names = [variable.name for variable in self.variables]
+        return dict(zip(names, [*series.on_grid(), np.abs(balance).max() / exchanged], strict=True))

@@ -1,0 +1,119 @@
+"""The family of outputs, and what all of them together declare."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.choice import kind_of
+from ringsim.outputs.reading import Array, Reading
+from ringsim.outputs.series import Run, Series, output_times
+from ringsim.scene import Scene
+from ringsim.variables import ErrorBar, Variable
+
+__all__ = ["Array", "ErrorBar", "Output", "Reading", "Run", "Series", "Values", "Variable"]
+
+Values = dict[str, Any]
+"""Arrays and numbers by the names of their variables."""
+
+OUTPUTS: list[type[Output]] = []
+"""All outputs, those of the smallest rank first."""
+
+VARIABLES: dict[str, Variable] = {}
+"""What all outputs declare, with the error bars of those that have one."""
+
+COORDINATES = {
+    variable.name: variable
+    for variable in (
+        Variable("plane", ("plane",), "1", "plane of the ring", "str"),
+        Variable("section", ("section",), "1", "section number, counted from the boom", "i4"),
+        Variable("time", ("time",), "s", "time since the start of the run"),
+        Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
+    )
+}
+"""Dimensions of the variables; an output may declare more."""
+
+
+class Output:
+    """An output, or a few that are computed together; every run that needs it has its own.
+
+    Attributes
+    ----------
+    variables
+        What it gives.
+    coordinates
+        Dimensions that no other output has; an engine gives their values to its ``Recorder``.
+    needs
+        What a scene must hold for it, see ``Variable``.
+    rank
+        Place among the outputs in files and summaries; the smaller the earlier.
+    """
+
+    variables: ClassVar[tuple[Variable, ...]]
+    coordinates: ClassVar[tuple[Variable, ...]] = ()
+    needs: ClassVar[tuple[str, ...]] = ()
+    rank: ClassVar[int] = 50
+
+    def __init_subclass__(cls) -> None:
+        """Make it known to all that handle results."""
+        twice = sorted(_declared(cls).keys() & (VARIABLES.keys() | COORDINATES.keys()))
+        if twice:
+            raise ValueError(f"{cls.__module__}: there is an output {twice[0]} already: rename it")
+        COORDINATES.update({variable.name: variable for variable in cls.coordinates})
+        OUTPUTS.append(cls)
+        OUTPUTS.sort(key=lambda output: output.rank)
+        VARIABLES.clear()
+        for output in OUTPUTS:
+            VARIABLES.update(_declared(output))
+
+    def read(self, now: Reading) -> Array | float | None:
+        """What to keep of the state after an accepted step; None if this run does not tell it."""
+        return np.empty(0)
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Values of its variables, from what ``read`` gave at all instants of a run.
+
+        Unless said otherwise the first variable is the reading, interpolated in time.
+        """
+        return {self.variables[0].name: series.on_grid()}
+
+
+def _declared(output: type[Output]) -> dict[str, Variable]:
+    """Variables of an output and their error bars ``NAME_error``, with what these need.
+
+    The bar of a function of time alone is one, too; any other is a number.
+    """
+    found = {v.name: replace(v, needs=output.needs) for v in output.variables}
+    for name, variable in list(found.items()):
+        if variable.error_bar is not None:
+            words = f"what the {variable.error_bar.words} may be wrong by"
+            dims = variable.dims if variable.dims == ("time",) else ()
+            words += " at any time up to then" if dims else ""
+            needs = ("error bars", *output.needs)
+            name += "_error"
+            found[name] = Variable(name, dims, variable.units, words, needs=needs)
+    return found
+
+
+def holds(scene: Scene) -> set[str]:
+    """Everything that a variable may need and the scene has."""
+    parts = {name for name in type(scene).parts() if getattr(scene, name) is not None}
+    asked = {
+        "stress": scene.record.stress,
+        "error bars": scene.solver.error_bars,
+        "gauge": bool(scene.structure.gauge),
+    }
+    return parts | {kind_of(scene.structure)} | {name for name, wanted in asked.items() if wanted}
+
+
+def axes(scene: Scene) -> dict[str, NDArray[Any]]:
+    """Values of the dimensions that a scene tells before it runs."""
+    return {
+        "plane": np.array(scene.structure.planes),
+        "section": np.arange(1, scene.structure.sections + 1),
+        "time": output_times(scene),
+        "span": np.arange(1, scene.spans + 1),
+    }

@@ -1,0 +1,111 @@
+"""Recording a run step by step, and reducing it to its outcome at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.outputs.family import COORDINATES, OUTPUTS, VARIABLES, Array, Output, axes, holds
+from ringsim.outputs.reading import Reading
+from ringsim.outputs.series import Run, Series, output_times
+from ringsim.scene import Scene
+from ringsim.stepping.instant import Energies
+from ringsim.stepping.locks import lock_times
+from ringsim.variables import Outcome, Reason, Status
+
+
+class Recorder:
+    """A run of a scene, step by step.
+
+    Attributes
+    ----------
+    times, angles, rates, energies, gaps
+        Of all accepted steps; see ``ringsim.stepping.instant``.
+    status, reason
+        How the run has ended and why.
+    repeats, newton_iterations, jacobians
+        What the solver took.
+    """
+
+    def __init__(self, scene: Scene, coordinates: Mapping[str, NDArray[Any]] | None = None) -> None:
+        """Begin a run; ``coordinates`` are those that its outputs declare themselves."""
+        self._scene, self._coordinates = scene, coordinates or {}
+        self._readings: dict[Output, list[Any]] = {output: [] for output in outputs_of(scene)}
+        self._lost = self._driven = 0.0
+        self.times: list[float] = []
+        self.angles: list[Array] = []
+        self.rates: list[Array] = []
+        self.energies: list[Energies] = []
+        self.gaps: list[float] = []
+        self.status, self.reason = Status.UNFINISHED, Reason()
+        self.repeats = self.newton_iterations = self.jacobians = 0
+
+    def note(self, now: Reading) -> None:
+        """Keep an accepted step; its energies lost and driven are those since the step before."""
+        energies = now.energies
+        self.times.append(now.time)
+        self.angles.append(now.angles)
+        self.rates.append(now.rates)
+        self.energies.append(energies)
+        self.gaps.append(now.gap)
+        self._lost += energies.lost
+        self._driven += energies.driven
+        work = energies.work + self._driven
+        now = replace(now, energies=energies._replace(work=work, lost=self._lost, driven=0.0))
+        for output, readings in self._readings.items():
+            readings.append(output.read(now))
+
+    def outcome(self) -> Outcome:
+        """Put the run on the output grid; what lies after its end is NaN."""
+        times, grid = np.array(self.times), output_times(self._scene)
+        angles, rates = np.array(self.angles), np.array(self.rates)
+        counts = {
+            "steps": len(times) - 1,
+            "repeated_steps": self.repeats,
+            "newton_iterations": self.newton_iterations,
+            "jacobians": self.jacobians,
+        }
+        run = Run(
+            self._scene,
+            Series(times, angles, grid),
+            Series(times, rates, grid),
+            lock_times(times, angles, rates),
+            counts,
+            self.status,
+            self.reason.cause,
+        )
+
+        def series_of(output: Output) -> Series | None:
+            readings = self._readings[output]
+            unknown = any(reading is None for reading in readings)
+            return None if unknown else Series(times, np.array(readings, dtype=float), grid)
+
+        values = reduced(run, self._readings, series_of)
+        coordinates = spanned(values, axes(self._scene) | dict(self._coordinates))
+        return Outcome(self.status, str(self.reason), coordinates, values, self.reason.cause)
+
+
+def outputs_of(scene: Scene) -> list[Output]:
+    """The outputs that a scene holds everything for."""
+    return [output() for output in OUTPUTS if set(output.needs) <= holds(scene)]
+
+
+def reduced(
+    run: Run, outputs: Iterable[Output], series_of: Callable[[Output], Series | None]
+) -> dict[str, NDArray[Any]]:
+    """Values of the outputs of a run; ``series_of`` gives what one has read, if this run can."""
+    values: dict[str, Any] = {}
+    for output in outputs:
+        series = series_of(output)
+        values |= {} if series is None else output.reduce(run, series)
+    return {name: np.asarray(value) for name, value in values.items()}
+
+
+def spanned(values: Iterable[str], known: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Those of the known coordinates that the named variables have."""
+    dims = {dim for name in values for dim in VARIABLES[name].dims}
+    return {dim: known[dim] for dim in COORDINATES if dim in dims}

@@ -1,0 +1,30 @@
+"""Stress of the rods."""
+
+from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
+
+
+class RodStress(Output):
+    """Axial + bending stress at the ends of every rod half, and the largest at any step."""
+
+    rank = 30
+    needs = ("stress",)
+    coordinates = (Variable("rod", ("rod",), "1", "rod half of a section", "str"),)
+    variables = (
+        Variable(
+            "rod_stress", ("rod", "section", "time"), "Pa",
+            "axial + bending stress of a rod, elastic + viscous",
+        ),
+        Variable(
+            "peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod",
+            error_bar=ErrorBar("largest stress", safety=1.1, of_one_element=0.03),
+            summary=("largest rod stress", "10.3e"),
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> Array | None:
+        """Shape (rod halves, sections), Pa."""
+        return now.stress
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Interpolated, and the largest reading."""
+        return super().reduce(run, series) | {"peak_rod_stress": series.values.max()}

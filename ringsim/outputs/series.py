@@ -1,0 +1,105 @@
+"""Readings over time, and a run that has ended: what outputs are reduced from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
+from ringsim.scene import Scene
+from ringsim.variables import Cause, Status
+
+Array = NDArray[np.float64]
+_SAME = 1.0 + 1e-12
+"""Times that differ by round-off alone are the same."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """Readings of one thing at all instants of a run.
+
+    Attributes
+    ----------
+    times, values
+        Shapes (n,) and (n, ...); s, and the reading's unit.
+    grid
+        The scene's output times, s.
+    """
+
+    times: Array
+    values: Array
+    grid: Array
+
+    def on_grid(self, rates: Array | None = None) -> Array:
+        """Values at the output times, which are the last axis; see :meth:`at`."""
+        return np.moveaxis(self.at(self.grid, rates), 0, -1)
+
+    def at(self, where: Array, rates: Array | None = None) -> Array:
+        """Values at increasing times (s), which are the first axis; NaN after the end of the run.
+
+        What is not known throughout, as a plane without a cable, is NaN.  With ``rates``, the
+        values' derivatives, it is the cubic Hermite interpolation, else the shape-preserving one.
+        """
+        found = np.full((len(where), *self.values.shape[1:]), np.nan)
+        inside = where <= self.times[-1] * _SAME
+        found[inside] = self._within(np.minimum(where[inside], self.times[-1]), rates)
+        found[:, ~np.isfinite(self.values).all(axis=0)] = np.nan
+        return found
+
+    def _within(self, where: Array, rates: Array | None) -> Array:
+        found = np.empty((len(where), *self.values.shape[1:]))
+        values = np.nan_to_num(self.values, posinf=0.0, neginf=0.0)
+        # Two readings of one time are a jump, which no curve goes through.
+        jumps = np.flatnonzero(np.diff(self.times) <= 0.0) + 1
+        for begin, end in pairwise([0, *jumps, len(self.times)]):
+            times, known = self.times[begin:end], values[begin:end]
+            own = (where >= times[0]) & (where <= times[-1])
+            if len(times) == 1:
+                found[own] = known
+            elif rates is not None:
+                curve = CubicHermiteSpline(times, known, rates[begin:end], axis=0)
+                found[own] = curve(where[own])
+            else:
+                found[own] = PchipInterpolator(times, known, axis=0)(where[own])
+        return found
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that has ended.
+
+    Attributes
+    ----------
+    angles, rates
+        Opening angles and their rates, shape (n, planes, sections) each, rad and rad/s.
+    locks
+        When each V-joint reached 180 deg, shape (planes, sections), s; NaN if it did not.
+    counts
+        What the solver has counted, by variable.
+    status, cause
+        How it ended and why.
+    """
+
+    scene: Scene
+    angles: Series
+    rates: Series
+    locks: Array
+    counts: Mapping[str, int]
+    status: Status
+    cause: Cause
+
+    @property
+    def until(self) -> float:
+        """When the last V-joint reached 180 deg, s; infinite if one did not."""
+        return float(np.nan_to_num(self.locks, nan=math.inf).max())
+
+
+def output_times(scene: Scene) -> Array:
+    """The scene's output grid in s: multiples of ``record.interval`` up to the end time."""
+    count = math.floor(scene.solver.end_time / scene.record.interval * _SAME)
+    return np.asarray(np.arange(count + 1) * scene.record.interval, dtype=float)

@@ -1,0 +1,35 @@
+"""``ringsim explain`` names every variable with its codes, and refuses what is none."""
+
+from __future__ import annotations
+
+from click.testing import CliRunner
+
+from ringsim.cli import cli
+from ringsim.outputs import COORDINATES, VARIABLES
+
+
+def explain(*names: str) -> str:
+    return CliRunner().invoke(cli, ["explain", *names]).output
+
+
+def test_every_variable_is_explained() -> None:
+    lines = explain().splitlines()
+    assert [line.partition("(")[0] for line in lines] == [*COORDINATES, *VARIABLES]
+
+
+def test_a_variable_has_units_meaning_and_needs() -> None:
+    words = explain("peak_tension_error")
+    assert " N " in words
+    assert "what the largest tension may be wrong by" in words
+    assert "only with error bars, cables" in words
+
+
+def test_codes_have_words() -> None:
+    assert "2 solver_failed" in explain("status")
+    assert "10 step_limit" in explain("cause")
+
+
+def test_an_unknown_name_is_refused_with_the_nearest() -> None:
+    found = CliRunner().invoke(cli, ["explain", "asynchronie"])
+    assert found.exit_code == 2
+    assert "asynchrony" in found.output
