@@ -6,44 +6,32 @@ from typing import Any
 
 import exudyn.itemInterface as item
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.choice import kind_of
+from ringsim.engine.assembly import Assembly
 from ringsim.engine.model import Model
 from ringsim.parts.boom.flexible import FlexibleBoom
-
-Array = NDArray[np.float64]
 
 
 def add_boom(model: Model) -> None:
     """The flexible boom, if there is one; a rigid one is part of its hinge assembly."""
-    boom = model.layout.boom
-    if boom is None:
+    layout, assembly, system = model.layout, model.assembly, model.assembly.system
+    if layout.boom is None:
         return
-    if not isinstance(boom.record, FlexibleBoom):
-        raise TypeError(f"no builder for a boom of kind {kind_of(boom.record)}")
-    (top_body, top_node), (low_body, _) = model.bodies[boom.top.body], model.bodies[boom.low.body]
-    top, low = (model.layout.bodies[end.body].pose.place for end in (boom.top, boom.low))
-    _add_flexible(model, boom.record, (top_body, top_node, top), (low_body, low))
-
-
-def _add_flexible(
-    model: Model, boom: FlexibleBoom, clamp: tuple[Any, Any, Array], sleeve: tuple[Any, Array]
-) -> None:
-    assembly, system = model.assembly, model.assembly.system
-    (top_body, top_node, top), (low_body, low) = clamp, sleeve
+    boom = layout.boom.record
+    if not isinstance(boom, FlexibleBoom):
+        raise TypeError(f"no builder for a boom of kind {kind_of(boom)}")
+    ends = layout.boom.top.body, layout.boom.low.body
+    top, low = (layout.bodies[number].pose.place for number in ends)
+    (top_body, top_node), (low_body, _) = (model.bodies[number] for number in ends)
     start = assembly.starts[int(top_node)]
     spin = 2.0 * start[4:7]
     nodes = []
     for drop in np.linspace(0.0, boom.length, boom.elements + 1):
         arm = np.array([0.0, 0.0, -drop])
-        node = system.AddNode(
-            item.NodePointSlope1(
-                referenceCoordinates=[*(top + arm), 0.0, 0.0, -1.0],
-            )
-        )
-        assembly.starts[int(node)] = np.concatenate(
-            [start[:3] + np.cross(spin, arm), np.cross(spin, [0.0, 0.0, -1.0])]
+        node = assembly.add_node(
+            item.NodePointSlope1(referenceCoordinates=[*(top + arm), 0.0, 0.0, -1.0]),
+            np.concatenate([start[:3] + np.cross(spin, arm), np.cross(spin, [0.0, 0.0, -1.0])]),
         )
         nodes.append(node)
     length = boom.length / boom.elements
@@ -60,33 +48,26 @@ def _add_flexible(
         for k in range(boom.elements)
     ]
     assembly.bodies += cables
-    _clamp(model, top_body, cables[0], 0.1 * length)
-    _slide(model, low_body, cables, length, float(top[2] - low[2]))
+    _clamp(assembly, top_body, cables[0], 0.1 * length)
+    _slide(assembly, low_body, cables, length, float(top[2] - low[2]))
 
 
-def _clamp(model: Model, body: Any, cable: Any, reach: float) -> None:
+def _clamp(assembly: Assembly, body: Any, cable: Any, reach: float) -> None:
     """Hold the boom's end on the upper hinge assembly at two points, ``reach`` apart.
 
     The element's nodes have a slope but no orientation, so the direction is held by a second
     spherical joint; the boom is inextensible between the two.
     """
-    system = model.assembly.system
+    system = assembly.system
     for drop in (0.0, reach):
-        system.AddObject(
-            item.ObjectJointSpherical(
-                markerNumbers=[
-                    model.assembly.body_marker(body, np.array([0.0, 0.0, -drop])),
-                    system.AddMarker(
-                        item.MarkerBodyPosition(bodyNumber=cable, localPosition=[drop, 0.0, 0.0])
-                    ),
-                ]
-            )
-        )
+        place = item.MarkerBodyPosition(bodyNumber=cable, localPosition=[drop, 0.0, 0.0])
+        markers = [assembly.body_marker(body, np.array([0.0, 0.0, -drop])), system.AddMarker(place)]
+        system.AddObject(item.ObjectJointSpherical(markerNumbers=markers))
 
 
-def _slide(model: Model, body: Any, cables: list[Any], length: float, place: float) -> None:
+def _slide(assembly: Assembly, body: Any, cables: list[Any], length: float, place: float) -> None:
     """Let the lower hinge assembly slide along the chain of elements."""
-    system = model.assembly.system
+    system = assembly.system
     markers = [system.AddMarker(item.MarkerBodyBeamShape(bodyNumber=c)) for c in cables]
     element = min(int(place / length), len(cables) - 1)
     data = system.AddNode(
@@ -94,7 +75,7 @@ def _slide(model: Model, body: Any, cables: list[Any], length: float, place: flo
     )
     system.AddObject(
         item.ObjectJointSliding(
-            markerNumbers=[model.assembly.body_marker(body, np.zeros(3)), markers[element]],
+            markerNumbers=[assembly.body_marker(body, np.zeros(3)), markers[element]],
             slidingMarkerNumbers=markers,
             slidingMarkerOffsets=[k * length for k in range(len(cables))],
             nodeNumber=data,

@@ -15,7 +15,6 @@ from ringsim.cable.state import ChainState
 from ringsim.engine.build import Built
 from ringsim.engine.closing import close
 from ringsim.engine.energy import EnergyMeter
-from ringsim.engine.joints import latch
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import Openings, State, joint_groups
 from ringsim.engine.scales import residual_tolerance, scales_of
@@ -45,7 +44,7 @@ class Integration:
         self._settings = solver_settings(scene, residual_tolerance(built))
         self._state = State(model)
         self._openings = Openings(model)
-        self._energy = EnergyMeter(model, built.hub, built.faults)
+        self._energy = EnergyMeter(built)
         self._stress = StressMeter(model) if scene.record.stress else None
         structure = scene.structure
         coordinates = {"rod": np.array(list(halves(model.layout)))}
@@ -135,11 +134,8 @@ class Integration:
             return False
         found = self._weighed or self._measure(time)
         goes_on = self._control.accept(found, self._read(found))
-        stop, locks = self._scene.stop, self._locks
-        if locks is not None and stop is not None and stop.latch:
-            for plane, section in np.argwhere(locks.deployed & ~self._latched):
-                latch(self._built.model, self._built.stops[plane][section])
-            self._latched = locks.deployed.copy()
+        if self._locks is not None and self._built.stops is not None:
+            self._latched = self._built.stops.latch(self._locks.deployed)
         return goes_on
 
     def _read(self, now: Instant) -> Instant:
@@ -173,7 +169,7 @@ class Integration:
         cables, state = self._built.cables, self._state
         if cables is not None:
             self._chain = cables.current(state.position, state.velocity, time)
-        energies = self._energy.read(time, state, angles, rates, self._latched, self._chain)
+        energies = self._energy.read(time, state, angles, rates, self._chain)
         gap = max(float(group.gaps(state).max()) for group in self._gaps)
         tensions = None if self._chain is None else self._chain.tensions
         return Instant(time, angles, rates, energies, gap, tensions)

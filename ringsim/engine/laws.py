@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import exudyn as exu
+from exudyn.advancedUtilities import CreateSymbolicUserFunction
 
 from ringsim.engine.assembly import Assembly
 
@@ -44,4 +45,8 @@ def symbolic_law(
         return law(place, rate, last)
 
     argument = "springTorqueUserFunction" if kind == TORSION else "springForceUserFunction"
-    return {argument: assembly.symbolic(key, function, kind, argument)}
+    if key not in assembly.laws:
+        assembly.laws[key] = CreateSymbolicUserFunction(
+            assembly.system, function, argument, itemTypeName=kind
+        )
+    return {argument: assembly.laws[key]}

@@ -1,19 +1,18 @@
-"""A layout assembled in exudyn: bodies, rods, joints and what acts between them."""
+"""A layout assembled in exudyn: bodies, rods, joints and loads."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.assembly import Assembly, Frame
-from ringsim.engine.contact import add_contact
+from ringsim.engine.assembly import Assembly
 from ringsim.engine.rods import Formulation, Rod, add_rod
+from ringsim.layout import joints as parts
 from ringsim.layout.bodies import InSpace, Mount, OnBody
-from ringsim.layout.joints import JointOpening
 from ringsim.layout.layout import Layout
 from ringsim.layout.of_scene import layout_of
 from ringsim.layout.pose import Pose, cross
@@ -21,50 +20,92 @@ from ringsim.scene import Scene
 from ringsim.theory.one_coordinate import OneCoordinate
 
 Array = NDArray[np.float64]
+_JOINTS: dict[str, Any] = {
+    "revolute": item.ObjectJointRevoluteZ,
+    "prismatic": item.ObjectJointPrismaticX,
+    "sleeve": partial(item.ObjectJointGeneric, constrainedAxes=[1, 1, 0, 0, 0, 0]),
+    "weld": partial(item.ObjectJointGeneric, constrainedAxes=[1, 1, 1, 1, 1, 1]),
+}
+"""exudyn's joint of each kind; flags hold translations and rotations."""
 
 
-@dataclass(frozen=True)
-class Joint:
-    """A joint as built: its markers, and the node and arm (m, in its frame) of either side.
-
-    A side in space has no node.
+class Joint(NamedTuple):
+    """A joint of the layout as built: its markers, and the node and arm (m, in its axes) of each
+    side.  A side in space has no node.
     """
 
-    family: str
-    section: int
+    part: parts.Joint
     markers: tuple[Any, Any]
     nodes: tuple[Any, Any]
     arms: tuple[Array, Array]
 
 
-@dataclass
 class Model:
-    """What was built, for the parts that come after and for reading results.
+    """Bodies, rods, joints and loads of a scene's layout in its initial state.
 
     Attributes
     ----------
     layout
-        What it was built from, at the start of the run.
+        What it is built from, at the start of the run.
     bodies
         Body and node of every rigid body.
     rods, joints
         In the order of the layout.
     """
 
-    scene: Scene
-    layout: Layout
-    formulation: Formulation
-    assembly: Assembly = field(default_factory=Assembly)
-    bodies: list[tuple[Any, Any]] = field(default_factory=list)
-    rods: list[Rod] = field(default_factory=list)
-    joints: list[Joint] = field(default_factory=list)
+    def __init__(self, scene: Scene, formulation: Formulation) -> None:
+        self.scene, self.formulation, self.layout = scene, formulation, layout_of(scene)
+        self.assembly = assembly = Assembly()
+        start = _Start(scene, self.layout)
+        self.bodies: list[tuple[Any, Any]] = []
+        for body in self.layout.bodies:
+            node = assembly.add_rigid_node(start.of(body.pose))
+            number = assembly.add_body(node, body.mass, body.inertia, body.centre)
+            self.bodies.append((number, node))
+        self.rods: list[Rod] = []
+        for part in self.layout.rods:
+            poses = [start.of(part.station(share)) for share in part.stations]
+            rod = add_rod(assembly, formulation, part, poses, scene.rods)
+            self.rods.append(rod)
+            for station, mass in part.masses:
+                formulation.add_mass(assembly, rod.nodes[station], mass)
+        self.joints = [self._joint(joint) for joint in self.layout.joints]
+        for number, force in self.layout.forces:
+            # Constant in space, not in the ring: bodyFixed is not set.
+            marker = self.joints[number].markers[0]
+            assembly.system.AddLoad(
+                item.LoadForceVector(markerNumber=marker, loadVector=list(force))
+            )
 
     def openings(self) -> list[list[tuple[Joint, float]]]:
         """Joints that open, with their senses, by plane and section; empty for other angles."""
         return [
-            [(self.joints[o.joint], o.sense) for o in plane if isinstance(o, JointOpening)]
+            [(self.joints[o.joint], o.sense) for o in plane if isinstance(o, parts.JointOpening)]
             for plane in self.layout.openings
         ]
+
+    def side_of(self, mount: Mount) -> tuple[Any, Array]:
+        """Node of a mount, None in space, and the arm from it in the node's axes, m."""
+        if isinstance(mount, InSpace):
+            return None, mount.place
+        if isinstance(mount, OnBody):
+            return self.bodies[mount.body][1], mount.arm
+        return self.rods[mount.rod].nodes[mount.station], np.zeros(3)
+
+    def _joint(self, joint: parts.Joint) -> Joint:
+        nodes, arms = zip(*map(self.side_of, (joint.first, joint.second)), strict=True)
+        markers = self._marker(joint.first), self._marker(joint.second)
+        self.assembly.system.AddObject(_JOINTS[joint.kind](markerNumbers=list(markers)))
+        return Joint(joint, markers, nodes, arms)
+
+    def _marker(self, mount: Mount) -> Any:
+        node, arm = self.side_of(mount)
+        if isinstance(mount, InSpace):
+            ground = self.assembly.system.AddObject(item.ObjectGround())
+            return self.assembly.body_marker(ground, arm, mount.axes)
+        if isinstance(mount, OnBody):
+            return self.assembly.body_marker(self.bodies[mount.body][0], arm, mount.axes)
+        return self.assembly.node_marker(node)
 
 
 class _Start:
@@ -81,85 +122,8 @@ class _Start:
             self._pull = ideal.work_rate(q) / motion.inertia
             self._velocity, self._rotation = motion.velocity, motion.rotation
 
-    def frame(self, pose: Pose) -> Frame:
-        """A frame with its acceleration."""
+    def of(self, pose: Pose) -> Pose:
+        """A pose with its accelerations in place of its derivatives."""
         moving = pose.rate - self._velocity - cross(self._rotation, pose.place)
         turning = pose.turn - self._rotation
-        return Frame(pose.place, pose.axes, self._pull * moving, self._pull * turning)
-
-
-def assemble(scene: Scene, formulation: Formulation) -> Model:
-    """Build bodies, rods, joints and springs of a scene's layout in its initial state."""
-    layout = layout_of(scene)
-    model, start = Model(scene, layout, formulation), _Start(scene, layout)
-    assembly = model.assembly
-    for body in layout.bodies:
-        node = assembly.add_rigid_node(start.frame(body.pose))
-        number = assembly.add_body(node, body.mass, body.inertia, body.centre)
-        model.bodies.append((number, node))
-    for part in layout.rods:
-        ends = start.frame(part.start), start.frame(part.end)
-        rod = add_rod(
-            assembly, formulation, ends, part.stations, scene.rods, part.tube, part.young_modulus
-        )
-        model.rods.append(rod)
-        for station, mass in part.masses:
-            formulation.add_mass(assembly, rod.nodes[station], mass)
-    for joint in layout.joints:
-        sides = [_side(model, mount) for mount in (joint.first, joint.second)]
-        markers, nodes, arms = zip(*sides, strict=True)
-        _ADD[joint.kind](assembly, markers)
-        model.joints.append(Joint(joint.family, joint.section, markers, nodes, arms))
-    _add_springs(model)
-    for joint_number, force in layout.forces:
-        # Constant in space, not in the ring: bodyFixed is not set.
-        marker = model.joints[joint_number].markers[0]
-        assembly.system.AddLoad(item.LoadForceVector(markerNumber=marker, loadVector=list(force)))
-    return model
-
-
-def side_of(model: Model, mount: Mount) -> tuple[Any, Array]:
-    """Node of a mount, None in space, and the arm from it in the node's axes, m."""
-    if isinstance(mount, InSpace):
-        return None, mount.place
-    if isinstance(mount, OnBody):
-        return model.bodies[mount.body][1], mount.arm
-    return model.rods[mount.rod].nodes[mount.station], np.zeros(3)
-
-
-def _side(model: Model, mount: Mount) -> tuple[Any, Any, Array]:
-    node, arm = side_of(model, mount)
-    if isinstance(mount, InSpace):
-        marker = model.assembly.ground_marker(mount.place)
-    elif isinstance(mount, OnBody):
-        marker = model.assembly.body_marker(model.bodies[mount.body][0], mount.arm, mount.axes)
-    else:
-        marker = model.assembly.node_marker(node)
-    return marker, node, arm
-
-
-_ADD = {
-    "revolute": lambda assembly, markers: assembly.revolute(*markers),
-    "prismatic": lambda assembly, markers: assembly.prismatic(*markers),
-    "sleeve": lambda assembly, markers: assembly.generic_joint(*markers, [1, 1, 0, 0, 0, 0]),
-    "weld": lambda assembly, markers: assembly.generic_joint(*markers, [1, 1, 1, 1, 1, 1]),
-}
-"""exudyn's joint of each kind; flags hold translations and rotations."""
-
-
-def _add_springs(model: Model) -> None:
-    assembly, here = model.assembly, np.zeros(3)
-    for spring in model.layout.springs:
-        ends = [model.bodies[number][0] for number in (spring.first, spring.second)]
-        assembly.system.AddObject(
-            item.ObjectConnectorSpringDamper(
-                markerNumbers=[assembly.body_marker(body, here) for body in ends],
-                referenceLength=spring.law.free_length,
-                stiffness=spring.law.stiffness,
-                damping=spring.law.damping,
-            )
-        )
-    for contact in model.layout.contacts:
-        node = model.bodies[contact.body][1]
-        start = float(model.layout.bodies[contact.body].pose.place[contact.axis])
-        add_contact(assembly, node, contact.axis, contact.law, start - contact.room)
+        return Pose(pose.place, pose.axes, self._pull * moving, self._pull * turning)

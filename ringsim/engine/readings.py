@@ -69,7 +69,6 @@ class JointGroup:
     """Joints of one family, read together."""
 
     def __init__(self, model: Model, joints: list[Joint]) -> None:
-        self.sections = np.array([joint.section for joint in joints])
         self._first, self._second = (
             Side(model, [j.nodes[k] for j in joints], [j.arms[k] for j in joints]) for k in (0, 1)
         )
@@ -99,10 +98,9 @@ def joint_groups(model: Model) -> list[JointGroup]:
     """All revolutes, by what they join, so that each group reads nodes of one kind."""
     groups: dict[Any, list[Joint]] = {}
     size = model.assembly.coordinates_of
-    kinds = [joint.kind for joint in model.layout.joints]
-    for kind, joint in zip(kinds, model.joints, strict=True):
-        if kind == "revolute":
-            key = (joint.family, *(len(size(node)) for node in joint.nodes))
+    for joint in model.joints:
+        if joint.part.kind == "revolute":
+            key = (joint.part.family, *(len(size(node)) for node in joint.nodes))
             groups.setdefault(key, []).append(joint)
     return [JointGroup(model, joints) for joints in groups.values()]
 

@@ -3,47 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.assembly import Assembly, Frame
+from ringsim.engine.assembly import Assembly
+from ringsim.layout import bodies as parts
+from ringsim.layout.pose import Pose
 from ringsim.parts.rods.family import Rods
-from ringsim.parts.tube import Tube
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Rod:
-    """A chain of beam elements.
+class Rod(NamedTuple):
+    """A chain of beam elements, one fewer than nodes, from start to end.
 
-    Attributes
-    ----------
-    nodes
-        From start to end; their frames have x along the rod and z along the section's normal.
-    elements
-        Objects, one fewer than nodes.
-    axes
-        Initial frame, columns in global coordinates, shape (3, 3).
-    tube
-        Cross-section.
-    lengths
-        Of the elements, m.
-    young_modulus
-        Pa.
-
+    The nodes' frames have x along the rod and z along the section's normal.
     """
 
     nodes: list[Any]
     elements: list[Any]
-    axes: Array
-    tube: Tube
-    lengths: Array
-    young_modulus: float
 
 
 class NodeFrames(NamedTuple):
@@ -56,17 +37,15 @@ class NodeFrames(NamedTuple):
 
 
 class Formulation(Protocol):
-    """What a rod formulation must offer.
-
-    ``has_strains`` says whether exudyn reports strains, forces and moments of its elements.
-    """
+    """What a rod formulation must offer."""
 
     has_strains: bool
+    """Whether exudyn reports strains, forces and moments of its elements."""
     constant_curvature: bool
     """Whether the curvature is constant in an element."""
 
-    def add_node(self, assembly: Assembly, frame: Frame) -> Any:
-        """A node of this formulation."""
+    def add_node(self, assembly: Assembly, pose: Pose) -> Any:
+        """A node of this formulation; as for ``Assembly.add_rigid_node``."""
 
     def add_element(self, assembly: Assembly, nodes: list[Any], length: float, section: Any) -> Any:
         """An element between two nodes."""
@@ -78,7 +57,7 @@ class Formulation(Protocol):
         """Frames of nodes from their total coordinates and rates, shape (n, coordinates)."""
 
 
-def beam_section(rods: Rods, tube: Tube, young_modulus: float, constant_over: float = 0.0) -> Any:
+def beam_section(rods: Rods, part: parts.Rod, constant_over: float) -> Any:
     """Exudyn's section data: stiffness diag(EA, kGA, kGA, GJ, EI, EI) and inertia.
 
     An element of constant curvature misses the bending by the part of the moment that is linear
@@ -89,25 +68,15 @@ def beam_section(rods: Rods, tube: Tube, young_modulus: float, constant_over: fl
 
     Parameters
     ----------
-    young_modulus
-        Pa.
     constant_over
         Length over which the curvature is constant, m; 0 for elements that bend by themselves.
     """
-    area, second = tube.area, tube.second_moment
-    shear = young_modulus * rods.shear_modulus_ratio
-    direct = tube.shear_factor(rods.poisson_ratio) * shear * area
-    across = 1.0 / (1.0 / direct + constant_over**2 / (12.0 * young_modulus * second))
-    stiffness = np.diag(
-        [
-            young_modulus * area,
-            across,
-            across,
-            shear * 2.0 * second,
-            young_modulus * second,
-            young_modulus * second,
-        ]
-    )
+    young, area, second = part.young_modulus, part.tube.area, part.tube.second_moment
+    shear = young * rods.shear_modulus_ratio
+    direct = part.tube.shear_factor(rods.poisson_ratio) * shear * area
+    across = 1.0 / (1.0 / direct + constant_over**2 / (12.0 * young * second))
+    bending = young * second
+    stiffness = np.diag([young * area, across, across, shear * 2.0 * second, bending, bending])
     section = exu.BeamSection()
     section.massPerLength = rods.density * area
     section.inertia = rods.density * np.diag([2.0 * second, second, second])
@@ -119,40 +88,15 @@ def beam_section(rods: Rods, tube: Tube, young_modulus: float, constant_over: fl
 def add_rod(
     assembly: Assembly,
     formulation: Formulation,
-    ends: tuple[Frame, Frame],
-    stations: Sequence[float],
+    part: parts.Rod,
+    poses: Sequence[Pose],
     rods: Rods,
-    tube: Tube,
-    young_modulus: float,
 ) -> Rod:
-    """A straight rod between two frames that share their axes; motion is interpolated.
-
-    Parameters
-    ----------
-    stations
-        Shares of its length at which it has nodes, from 0 to 1.
-    """
-    first, last = ends
-    lengths = np.diff(stations) * float(np.linalg.norm(last.position - first.position))
-    frames = [
-        Frame(
-            (1 - share) * first.position + share * last.position,
-            first.axes,
-            (1 - share) * first.acceleration + share * last.acceleration,
-            first.turn,
-        )
-        for share in stations
-    ]
-    nodes = [formulation.add_node(assembly, frame) for frame in frames]
-    sections = {
-        length: beam_section(
-            rods, tube, young_modulus, length if formulation.constant_curvature else 0.0
-        )
-        for length in set(lengths.tolist())
-    }
-    objects = [
-        formulation.add_element(assembly, nodes[k : k + 2], length, sections[length])
-        for k, length in enumerate(lengths.tolist())
-    ]
-    assembly.bodies += objects
-    return Rod(nodes, objects, first.axes, tube, lengths, young_modulus)
+    """A rod of the layout with the poses of its nodes; as for ``Assembly.add_rigid_node``."""
+    nodes = [formulation.add_node(assembly, pose) for pose in poses]
+    elements = []
+    for k, length in enumerate(part.lengths.tolist()):
+        section = beam_section(rods, part, length if formulation.constant_curvature else 0.0)
+        elements.append(formulation.add_element(assembly, nodes[k : k + 2], length, section))
+    assembly.bodies += elements
+    return Rod(nodes, elements)

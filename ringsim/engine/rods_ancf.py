@@ -8,8 +8,9 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.assembly import Assembly, Frame
+from ringsim.engine.assembly import Assembly
 from ringsim.engine.rods import NodeFrames
+from ringsim.layout.pose import Pose
 
 Array = NDArray[np.float64]
 
@@ -20,40 +21,26 @@ class Ancf:
     has_strains = False
     constant_curvature = False
 
-    def add_node(self, assembly: Assembly, frame: Frame) -> Any:
+    def add_node(self, assembly: Assembly, pose: Pose) -> Any:
         """A node with position and the slope vectors along y and z."""
-        y, z = frame.axes[:, 1], frame.axes[:, 2]
-        node = assembly.system.AddNode(
-            item.NodePointSlope23(
-                referenceCoordinates=[*frame.position, *y, *z],
-            )
+        y, z = pose.axes[:, 1], pose.axes[:, 2]
+        return assembly.add_node(
+            item.NodePointSlope23(referenceCoordinates=[*pose.place, *y, *z]),
+            np.concatenate([pose.rate, np.cross(pose.turn, y), np.cross(pose.turn, z)]),
         )
-        assembly.starts[int(node)] = np.concatenate(
-            [frame.acceleration, np.cross(frame.turn, y), np.cross(frame.turn, z)]
-        )
-        return node
 
     def add_element(self, assembly: Assembly, nodes: list[Any], length: float, section: Any) -> Any:
         """Exudyn's ObjectANCFBeam."""
         return assembly.system.AddObject(
-            item.ObjectANCFBeam(
-                nodeNumbers=nodes,
-                length=length,
-                sectionData=section,
-            )
+            item.ObjectANCFBeam(nodeNumbers=nodes, length=length, sectionData=section)
         )
 
     def add_mass(self, assembly: Assembly, node: Any, mass: float) -> None:
         """A mass matrix that acts on the node's position alone."""
         matrix = np.zeros((9, 9))
         matrix[:3, :3] = mass * np.eye(3)
-        body = assembly.system.AddObject(
-            item.ObjectGenericODE2(
-                nodeNumbers=[node],
-                massMatrix=matrix,
-            )
-        )
-        assembly.bodies.append(body)
+        body = item.ObjectGenericODE2(nodeNumbers=[node], massMatrix=matrix)
+        assembly.bodies.append(assembly.system.AddObject(body))
 
     def read(self, coordinates: Array, rates: Array) -> NodeFrames:
         """See ``Formulation``; the spin is that of the slope along y about the one along z."""

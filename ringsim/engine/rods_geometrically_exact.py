@@ -8,9 +8,10 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.assembly import Assembly, Frame
+from ringsim.engine.assembly import Assembly
 from ringsim.engine.rods import NodeFrames
 from ringsim.engine.rotations import axes_of, spin
+from ringsim.layout.pose import Pose
 
 Array = NDArray[np.float64]
 
@@ -21,9 +22,9 @@ class GeometricallyExact:
     has_strains = True
     constant_curvature = True
 
-    def add_node(self, assembly: Assembly, frame: Frame) -> Any:
+    def add_node(self, assembly: Assembly, pose: Pose) -> Any:
         """A node with position and Euler parameters."""
-        return assembly.add_rigid_node(frame)
+        return assembly.add_rigid_node(pose)
 
     def add_element(self, assembly: Assembly, nodes: list[Any], length: float, section: Any) -> Any:
         """Exudyn's ObjectBeamGeometricallyExact, and a damper if the section is damped.
@@ -42,11 +43,7 @@ class GeometricallyExact:
             tau = float(section.dampingMatrix[0][0] / section.stiffnessMatrix[0][0])
             number = assembly.dampers.add(assembly.system, markers, damping, tau)
         element = assembly.system.AddObject(
-            item.ObjectBeamGeometricallyExact(
-                nodeNumbers=nodes,
-                length=length,
-                sectionData=section,
-            )
+            item.ObjectBeamGeometricallyExact(nodeNumbers=nodes, length=length, sectionData=section)
         )
         if damping.any():
             assembly.dampers.numbers[int(element)] = number

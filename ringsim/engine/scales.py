@@ -68,7 +68,7 @@ def residual_tolerance(built: Built) -> float:
     drive = float(np.linalg.norm([force for _, force in layout.forces])) + scene.structure.push
     if scene.net is not None and layout.net is not None:
         drive += float(np.linalg.norm(layout.net.stiffness)) * scene.net.neutral_length
-    stiffest = max(rod.young_modulus * rod.tube.area / rod.shortest for rod in layout.rods)
+    stiffest = max(rod.young_modulus * rod.tube.area / rod.lengths.min() for rod in layout.rods)
     if scene.rods.damping > 0.0:
         stiffest *= STIFFENING
     size = built.model.assembly.system.systemData.ODE2Size()

@@ -60,9 +60,9 @@ class BendingMeter:
 
     def __init__(self, model: Model, name: str) -> None:
         number = next(k for k, rod in enumerate(model.layout.rods) if rod.name == name)
-        self._rod = rod = model.rods[number]
-        gauged = model.layout.rods[number]
-        self.stations = np.array(gauged.stations) * gauged.length
+        rod, self._elements = model.layout.rods[number], model.rods[number].elements
+        self._lengths = rod.lengths
+        self.stations = np.array(rod.stations) * rod.length
         self._output = model.assembly.system.GetObjectOutputBody
         self._per_moment = (
             0.5 * rod.tube.outer_diameter / (rod.young_modulus * rod.tube.second_moment)
@@ -70,10 +70,9 @@ class BendingMeter:
 
     def read(self) -> Array:
         """Strains at the current state, shape (nodes,)."""
-        elements = self._rod.elements
-        moments = np.array([self._output(e, _TORQUE, _MIDDLE)[2] for e in elements])
-        shear = np.array([self._output(e, _FORCE, _MIDDLE)[1] for e in elements])
-        change = 0.5 * shear * self._rod.lengths
+        moments = np.array([self._output(e, _TORQUE, _MIDDLE)[2] for e in self._elements])
+        shear = np.array([self._output(e, _FORCE, _MIDDLE)[1] for e in self._elements])
+        change = 0.5 * shear * self._lengths
         first, last = moments + change, moments - change
         at_nodes = np.concatenate([first[:1], 0.5 * (first[1:] + last[:-1]), last[-1:]])
         return np.asarray(-self._per_moment * at_nodes)
@@ -81,10 +80,10 @@ class BendingMeter:
 
 def _ends(model: Model, half: Half) -> tuple[list[tuple[Any, float]], Any]:
     """First and last element of a half with the place (m) of its outer end from its middle."""
-    rod = model.rods[half.rod]
+    part, elements = model.layout.rods[half.rod], model.rods[half.rod].elements
     first, last = half.first, half.last - 1
     ends = [
-        (rod.elements[first], -0.5 * float(rod.lengths[first])),
-        (rod.elements[last], 0.5 * float(rod.lengths[last])),
+        (elements[first], -0.5 * float(part.lengths[first])),
+        (elements[last], 0.5 * float(part.lengths[last])),
     ]
-    return ends, rod.tube
+    return ends, part.tube

@@ -100,9 +100,9 @@ class Rod:
         return self.density * self.tube.area * self.length
 
     @property
-    def shortest(self) -> float:
-        """Length of its shortest element, m."""
-        return float(np.diff(self.stations).min()) * self.length
+    def lengths(self) -> Array:
+        """Of its elements, m."""
+        return np.diff(self.stations) * self.length
 
     def station(self, share: float) -> Pose:
         """The pose at a share of the length."""

@@ -18,9 +18,10 @@ from ringsim.cable.cables import Cables
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.sheaves import FixedSheave
 from ringsim.cable.winding.constant import ConstantWinding
-from ringsim.engine.assembly import Assembly, Frame
+from ringsim.engine.assembly import Assembly
 from ringsim.engine.cable_path import CablePath
 from ringsim.engine.cables import CableDrive
+from ringsim.layout.pose import Pose
 
 Array = NDArray[np.float64]
 STIFFNESS, STRETCH, GRAVITY = 2e3, 0.014, 9.81
@@ -39,13 +40,14 @@ class Swing:
     def __init__(self) -> None:
         self.assembly = Assembly()
         frame = self._body(np.zeros(3), 1.0)
-        ground = self.assembly.ground_marker(np.zeros(3))
-        clamp = self.assembly.body_marker(frame[0], np.zeros(3))
-        self.assembly.generic_joint(ground, clamp, [1] * 6)
+        system = self.assembly.system
+        bodies = system.AddObject(item.ObjectGround()), frame[0]
+        clamp = [self.assembly.body_marker(body, np.zeros(3)) for body in bodies]
+        system.AddObject(item.ObjectJointGeneric(markerNumbers=clamp, constrainedAxes=[1] * 6))
         blocks = [self._body(np.array(p), m) for p, m in zip(BLOCKS, MASSES, strict=True)]
         for body, _ in blocks:
-            marker = self.assembly.system.AddMarker(item.MarkerBodyMass(bodyNumber=body))
-            self.assembly.system.AddLoad(
+            marker = system.AddMarker(item.MarkerBodyMass(bodyNumber=body))
+            system.AddLoad(
                 item.LoadMassProportional(markerNumber=marker, loadVector=[0.0, -GRAVITY, 0.0])
             )
         self.path = [
@@ -54,7 +56,7 @@ class Swing:
         ]  # fmt: skip
 
     def _body(self, place: Array, mass: float) -> tuple[Any, Any]:
-        node = self.assembly.add_rigid_node(Frame(place, np.eye(3)))
+        node = self.assembly.add_rigid_node(Pose.of(place, np.eye(3)))
         inertia = mass * np.diag([0.02, 0.03, 0.025])
         return self.assembly.add_body(node, mass, inertia), node
 

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from ring_runs import Array, ring, run
-from ringsim.engine.assembly import Assembly, Frame
+from ringsim.engine.assembly import Assembly
 from ringsim.engine.rods_geometrically_exact import GeometricallyExact
+from ringsim.layout.pose import Pose
 
 LENGTH, MASS, INERTIA, RELAXATION = 0.3, 1.0, 1e-2, 1e-3
 STIFFNESS = np.diag([1e4, 4e3, 4e3, 10.0, 20.0, 20.0])
@@ -31,8 +32,8 @@ def swing(
     section.inertia = 1e-9 * np.eye(3)
     section.stiffnessMatrix = STIFFNESS
     section.dampingMatrix = relaxation * STIFFNESS
-    frames = [Frame(np.array([x, 0.0, 0.0]), np.eye(3)) for x in (0.0, LENGTH)]
-    nodes = [assembly.add_rigid_node(frame) for frame in frames]
+    poses = [Pose.of([x, 0.0, 0.0], np.eye(3)) for x in (0.0, LENGTH)]
+    nodes = [assembly.add_rigid_node(pose) for pose in poses]
     for node in nodes:
         assembly.add_body(node, MASS, INERTIA * np.eye(3))
     GeometricallyExact().add_element(assembly, nodes, LENGTH, section)

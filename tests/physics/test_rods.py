@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from ring_runs import ring
-from ringsim.engine.assembly import Assembly, Frame
+from ringsim.engine.assembly import Assembly
 from ringsim.engine.rods import add_rod
 from ringsim.engine.rods_geometrically_exact import GeometricallyExact
+from ringsim.layout.bodies import Rod
+from ringsim.layout.pose import Pose
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.tube import Tube
 from ringsim.simulation import run
@@ -21,8 +23,10 @@ def test_a_cantilever_bends_as_it_should(elements: int) -> None:
     """Tip deflection P L^3 / 3EI + P L / kGA, exact with any number of elements."""
     rods, length, young, push = GeometricallyExactRods(), 0.5, 1e9, 1e-3
     assembly = Assembly()
-    ends = tuple(Frame(np.array([x, 0.0, 0.0]), np.eye(3)) for x in (0.0, length))
-    rod = add_rod(assembly, GeometricallyExact(), ends, elements, rods, TUBE, young)
+    stations = np.linspace(0.0, 1.0, elements + 1)
+    poses = [Pose.of([length * share, 0.0, 0.0], np.eye(3)) for share in stations]
+    part = Rod("rod", 0, "", poses[0], poses[-1], TUBE, young, rods.density, tuple(stations))
+    rod = add_rod(assembly, GeometricallyExact(), part, poses, rods)
     system = assembly.system
     ground = system.AddMarker(
         item.MarkerBodyRigid(bodyNumber=system.AddObject(item.ObjectGround()))

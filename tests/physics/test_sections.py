@@ -46,7 +46,7 @@ def test_a_value_acts_on_its_own_section(path: str) -> None:
 
 
 def built(scene: Scene) -> Counter[str]:
-    system = build(scene).ring.assembly.system
+    system = build(scene).model.assembly.system
     count = system.systemData.NumberOfObjects()
     return Counter(system.GetObject(k)["objectType"] for k in range(count))
 

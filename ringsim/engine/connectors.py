@@ -1,0 +1,238 @@
+"""What pushes, pulls and brakes between the parts of a model.
+
+Each law acts in exudyn's connectors while a step is solved, and is evaluated again with numpy for
+the energy balance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import exudyn.itemInterface as item
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.engine.laws import SYMBOLIC, TORSION, symbolic_law
+from ringsim.engine.model import Model
+from ringsim.engine.readings import JointGroup, State
+from ringsim.layout.pose import turned_about_z
+from ringsim.layout.springs import Contact, HubNet
+from ringsim.parts.faults.stuck_vjoint import StuckVJoint
+from ringsim.parts.joint_friction.family import JointFriction
+from ringsim.parts.net import Net
+from ringsim.parts.persection import at_section
+from ringsim.parts.springs import Reaction
+from ringsim.parts.stop.family import Stop
+
+Array = NDArray[np.float64]
+Reacting = Callable[[State, Array, Array], tuple[Reaction, Array]]
+"""The reactions of one law at all its places, and the rates (m/s or rad/s) that they resist, from
+the state, the opening angles and their rates, shape (planes, sections), rad and rad/s."""
+
+
+def connect(model: Model) -> list[Reacting]:
+    """Springs, contacts, net and friction of a model; before ``Assembly.finish``."""
+    scene, layout, found = model.scene, model.layout, []
+    for spring in layout.springs:
+        law, ends = spring.law, [model.bodies[k][1] for k in (spring.first, spring.second)]
+        linear = {"stiffness": law.stiffness, "damping": law.damping}
+        found.append(_strings(model, [ends], law.tension, law.free_length, [linear]))
+    found += [_contact(model, contact) for contact in layout.contacts]
+    if scene.net is not None and layout.net is not None:
+        found.append(_net(model, scene.net, layout.net))
+    return found + [_friction(model, *one) for one in scene.joints.present().items()]
+
+
+class Stops:
+    """A stop on every V-joint, with its latch.
+
+    exudyn measures the angle from the half-open joint, a quarter turn away, so that neither end of
+    the range lies near the jump of the measured angle at 180 deg.
+    """
+
+    def __init__(self, model: Model, stop: Stop) -> None:
+        self._law, self._system = stop, model.assembly.system
+        self._objects: list[list[Any]] = []
+        for plane in model.openings():
+            self._objects.append([])
+            for joint, sense in plane:
+                quarter = turned_about_z(sense * 0.5 * math.pi)
+                markers = model.assembly.node_marker(joint.nodes[0], quarter), joint.markers[1]
+                self._objects[-1].append(_torsion(model, markers, **self._settings(model, sense)))
+        self._latched = np.zeros([len(self._objects), len(self._objects[0])], dtype=bool)
+
+    def _settings(self, model: Model, sense: float) -> dict[str, Any]:
+        def torque(angle: Any, rate: Any, offset: Any) -> Any:
+            folded = sense * angle + 0.5 * math.pi
+            return sense * self._law.torque(folded, sense * rate, offset > 0.5, SYMBOLIC).total
+
+        return symbolic_law(model.assembly, TORSION, ("stop", sense), torque)
+
+    def latch(self, deployed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Hold these V-joints from both sides from now on, if there are latches.
+
+        Returns those that are held, both of shape (planes, sections).
+        """
+        if self._law.latch:
+            for plane, section in np.argwhere(deployed & ~self._latched):
+                # A stop has no use for the connector's offset; its law reads it as a switch.
+                self._system.SetObjectParameter(self._objects[plane][section], "offset", 1.0)
+            self._latched = deployed.copy()
+        return self._latched
+
+    def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
+        """See ``Reacting``."""
+        return self._law.torque(np.pi - angles, -rates, self._latched), -rates
+
+
+class StuckJoint:
+    """A V-joint that a fault will hold: a torsion spring that lies inactive until then."""
+
+    def __init__(self, model: Model, fault: StuckVJoint) -> None:
+        self._law, self._system = fault, model.assembly.system
+        self._place = model.scene.structure.planes.index(fault.plane), fault.section - 1
+        joint, self._sense = model.openings()[self._place[0]][self._place[1]]
+        linear = {"stiffness": fault.stiffness, "damping": fault.damping}
+        self._object = _torsion(model, joint.markers, activeConnector=False, **linear)
+        self._angle: float | None = None
+
+    def strike(self, angles: Array) -> None:
+        """Hold the joint at the opening angle that it has now."""
+        self._angle = float(angles[self._place])
+        offset = self._sense * (math.pi - self._angle)
+        self._system.SetObjectParameter(self._object, "offset", offset)
+        self._system.SetObjectParameter(self._object, "activeConnector", True)
+
+    def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
+        """See ``Reacting``."""
+        rate = rates[self._place]
+        if self._angle is None:
+            return Reaction(0.0, 0.0, 0.0), rate
+        return self._law.torque(float(angles[self._place]) - self._angle, rate), rate
+
+
+def _torsion(model: Model, markers: Sequence[Any], **settings: Any) -> Any:
+    """A torsion spring-damper about the common z axis of two markers."""
+    return model.assembly.system.AddObject(
+        item.ObjectConnectorTorsionalSpringDamper(markerNumbers=list(markers), **settings)
+    )
+
+
+def _friction(model: Model, family: str, law: JointFriction) -> Reacting:
+    """Friction of the joints of a family."""
+    joints = [joint for joint in model.joints if joint.part.family == family]
+    for joint in joints:
+        settings = _friction_settings(model, at_section(law, joint.part.section))
+        if settings:
+            _torsion(model, joint.markers, **settings)
+    group = JointGroup(model, joints)
+    each = at_section(law, np.array([joint.part.section for joint in joints]))
+
+    def reaction(state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
+        rate = group.rate(state)
+        return Reaction(0.0, each.torque(rate), 0.0), rate
+
+    return reaction
+
+
+def _friction_settings(model: Model, law: JointFriction) -> dict[str, Any]:
+    damping = law.linear_damping()
+    if damping is not None:
+        return {"damping": damping} if damping > 0.0 else {}
+    return symbolic_law(
+        model.assembly, TORSION, law, lambda _angle, rate, _: law.torque(rate, SYMBOLIC)
+    )
+
+
+def _net(model: Model, net: Net, held: HubNet) -> Reacting:
+    """The net's strings and their hub.
+
+    The hub starts where its strings balance: from anywhere else it would swing for the whole run,
+    next to weightless as it is, with the energy of its first stretch.
+    """
+    assembly, nodes = model.assembly, [model.bodies[number][1] for number in held.bodies]
+    hub = assembly.add_node(
+        item.NodePoint(referenceCoordinates=list(held.hub)),
+        np.mean([assembly.starts[int(node)][:3] for node in nodes], axis=0),
+    )
+    mass = item.ObjectMassPoint(nodeNumber=hub, mass=held.mass)
+    assembly.bodies.append(assembly.system.AddObject(mass))
+    settings = [_string_settings(model, at_section(net, k)) for k in range(len(nodes))]
+    each, free = at_section(net, np.arange(len(nodes))), net.neutral_length
+    pairs = [(hub, node) for node in nodes]
+    return _strings(model, pairs, lambda s, rate: each.tension(s - free, rate), free, settings)
+
+
+def _string_settings(model: Model, net: Net) -> dict[str, Any]:
+    if net.two_sided:
+        return {"stiffness": net.stiffness, "damping": net.damping}
+    return symbolic_law(
+        model.assembly,
+        "ObjectConnectorSpringDamper",
+        net,
+        lambda stretch, rate, _: net.tension(stretch, rate, SYMBOLIC).total,
+    )
+
+
+def _strings(
+    model: Model,
+    pairs: Sequence[Sequence[Any]],
+    law: Callable[[Array, Array], Reaction],
+    free_length: float,
+    settings: Sequence[dict[str, Any]],
+) -> Reacting:
+    """Springs with dampers along the lines between pairs of nodes.
+
+    Parameters
+    ----------
+    law
+        Reaction to the lengths (m) and their rates (m/s).
+    settings
+        exudyn's of each.
+    """
+    system = model.assembly.system
+    for pair, own in zip(pairs, settings, strict=True):
+        ends = [system.AddMarker(item.MarkerNodePosition(nodeNumber=node)) for node in pair]
+        system.AddObject(
+            item.ObjectConnectorSpringDamper(markerNumbers=ends, referenceLength=free_length, **own)
+        )
+    places = [[model.assembly.coordinates_of(node)[:3] for node in pair] for pair in pairs]
+    near, far = np.array(places).transpose(1, 0, 2)
+
+    def reaction(state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
+        arms, moving = (x[far] - x[near] for x in (state.position, state.velocity))
+        lengths = np.linalg.norm(arms, axis=1)
+        rates = np.sum(arms * moving, axis=1) / lengths
+        return law(lengths, rates), rates
+
+    return reaction
+
+
+def _contact(model: Model, contact: Contact) -> Reacting:
+    """One-sided contact of a body with a plane."""
+    law, system, node = contact.law, model.assembly.system, model.bodies[contact.body][1]
+    markers = [
+        system.AddMarker(item.MarkerNodeCoordinate(nodeNumber=end, coordinate=contact.axis))
+        for end in (system.AddNode(item.NodePointGround()), node)
+    ]
+    settings = symbolic_law(
+        model.assembly,
+        "ObjectConnectorCoordinateSpringDamper",
+        law,
+        lambda moved, rate, room: -law.push(room - moved, -rate, SYMBOLIC).total,
+    )
+    start = float(model.layout.bodies[contact.body].pose.place[contact.axis])
+    system.AddObject(
+        item.ObjectConnectorCoordinateSpringDamper(
+            markerNumbers=markers, offset=contact.room - start, **settings
+        )
+    )
+    where = model.assembly.coordinates_of(node)[contact.axis]
+
+    def reaction(state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
+        closer = -state.velocity[where]
+        return law.push(contact.room - state.position[where], closer), closer
+
+    return reaction
