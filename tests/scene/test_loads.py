@@ -28,7 +28,7 @@ def pitch(scene: Scene) -> float:
 
 
 def test_forces_are_vertical_in_space() -> None:
-    system = build(RING.with_values({"structure.sections": 3})).ring.assembly.system
+    system = build(RING.with_values({"structure.sections": 3})).model.assembly.system
     loads = [system.GetLoad(k) for k in range(system.systemData.NumberOfLoads())]
     along = [load["loadVector"] for load in loads if load["loadType"] == "ForceVector"]
     assert not any(load["bodyFixed"] for load in loads)
