@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import operator
 import types
 import typing
 from collections.abc import Iterable, Iterator
@@ -66,6 +67,18 @@ class Model(BaseModel):
             key: None if isinstance(value, str) and value == LEFT_OUT and key in parts else value
             for key, value in table.items()
         }
+
+    def require_below(self, path: str, limit: str, why: str = "") -> None:
+        """Refuse a field at a dotted path that is not below another one of the same unit."""
+        value, most = operator.attrgetter(path, limit)(self)
+        if value >= most:
+            inner, _, last = path.rpartition(".")
+            owner = operator.attrgetter(inner)(self) if inner else self
+            unit = unit_of(type(owner).model_fields[last])
+            because = f": {why}" if why else ""
+            raise ValueError(
+                f"{path} = {value} {unit} must be below {limit} = {most} {unit}{because}"
+            )
 
     @model_serializer(mode="wrap")
     def _write_nothing(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:

@@ -17,11 +17,7 @@ class Tube(Model):
 
     @model_validator(mode="after")
     def _inside(self) -> Tube:
-        if self.inner_diameter >= self.outer_diameter:
-            raise ValueError(
-                f"inner_diameter = {self.inner_diameter} m must be below "
-                f"outer_diameter = {self.outer_diameter} m"
-            )
+        self.require_below("inner_diameter", "outer_diameter")
         return self
 
     @property
@@ -40,11 +36,6 @@ class Tube(Model):
         Source: Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech. 33
         (1966), with m = inner over outer diameter.
         """
-        m2 = (self.inner_diameter / self.outer_diameter) ** 2
-        nu = poisson_ratio
-        return (
-            6.0
-            * (1.0 + nu)
-            * (1.0 + m2) ** 2
-            / ((7.0 + 6.0 * nu) * (1.0 + m2) ** 2 + (20.0 + 12.0 * nu) * m2)
-        )
+        m2, nu = (self.inner_diameter / self.outer_diameter) ** 2, poisson_ratio
+        wall = (1.0 + m2) ** 2
+        return 6.0 * (1.0 + nu) * wall / ((7.0 + 6.0 * nu) * wall + (20.0 + 12.0 * nu) * m2)

@@ -14,10 +14,8 @@ from ringsim.units import Model
 class Structure(Model):
     """Any deployable structure that a scene can hold: one file, found by its ``kind``.
 
-    Its parts follow from one coordinate (a fold angle, rad).  A kind says, as fields, constants or
-    properties: ``sections`` and ``closed`` (how many values a list of a scene has), ``pulleys`` (of
-    each of its cables), ``coordinate`` at the start, and ``reach`` (a length in m, against which
-    gaps are measured).
+    Its parts follow from one coordinate (a fold angle, rad).  The properties below are fields,
+    constants or properties of a kind; lists of a scene have as many values as they say.
     """
 
     if TYPE_CHECKING:
@@ -40,7 +38,7 @@ class Structure(Model):
 
         @property
         def reach(self) -> float:
-            """Length of a rod, m."""
+            """Length against which gaps are measured, m."""
 
     locks: ClassVar[bool] = True
     """Whether it has opened, and a run ended, when every opening angle has reached 180 deg."""
@@ -65,7 +63,7 @@ class Structure(Model):
         Parameters
         ----------
         scene
-            Whose rods, boom, net, loads and cables it holds (ringsim.layout.draft.Equipment).
+            Whose rods, boom, net, loads and cables it holds.
         coordinate
             With the imaginary part ``ringsim.layout.pose.STEP``, which carries the derivatives:
             compute places with functions that take complex numbers, without ``float`` and ``abs``.
@@ -73,16 +71,11 @@ class Structure(Model):
         raise NotImplementedError
 
     def basis(self, coordinate: float) -> NDArray[np.float64]:
-        """Functions of the coordinate in which all places are linear; none unless a kind has some.
+        """Functions s of the coordinate in which all places are linear; none unless a kind has some.
 
         Every place of the layout is then P s with constant P, so that theory need not build a
-        layout at each coordinate.
-
-        Returns
-        -------
-        Array
-            The functions s, the first of them 1, and their first and second derivatives, shape
-            (3, functions).
+        layout at each coordinate.  The first of them is 1; below them come their first and second
+        derivatives, shape (3, functions).
         """
         del coordinate
         return np.zeros((3, 0))
@@ -94,12 +87,7 @@ class Structure(Model):
     def path_slope(self, cable: Any, angles: Any) -> float:
         """Derivative of the ideal path of a cable after the opening angle, m/rad.
 
-        Parameters
-        ----------
-        cable
-            One that can run in this structure.
-        angles
-            Opening angles along its path, shape (sections,), rad.
+        ``angles`` are the opening angles along its path, shape (sections,), rad.
         """
         raise NotImplementedError
 

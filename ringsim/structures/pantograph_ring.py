@@ -49,16 +49,12 @@ class PantographRing(Structure):
 
     @model_validator(mode="after")
     def _possible(self) -> PantographRing:
-        if self.half_bar >= self.half_diagonal:
-            raise ValueError(
-                f"half_bar = {self.half_bar} m must be below half_diagonal = "
-                f"{self.half_diagonal} m: the diagonals could not span the deployed section"
-            )
-        if self.hinge_offset >= self.half_bar:
-            raise ValueError(
-                f"hinge_offset = {self.hinge_offset} m must be below half_bar = {self.half_bar} m: "
-                "shorten it, a hinge assembly is smaller than a section"
-            )
+        self.require_below(
+            "half_bar", "half_diagonal", "the diagonals could not span the deployed section"
+        )
+        self.require_below(
+            "hinge_offset", "half_bar", "shorten it, a hinge assembly is smaller than a section"
+        )
         if self.closed and self.sections < 3:
             raise ValueError(
                 f"sections = {self.sections} must be at least 3 for a closed ring "
@@ -82,31 +78,20 @@ class PantographRing(Structure):
         return self
 
     def check(self, scene: Any) -> None:
-        """See ``Structure``: rods longer than thick, a boom to slide on, stops out of the way."""
-        for rod, tube, longest in (
-            ("diagonal", scene.rods.diagonal, self.half_diagonal),
-            ("bar", scene.rods.bar, self.half_bar),
-        ):
-            if tube.outer_diameter >= longest:
-                raise ValueError(
-                    f"rods.{rod}.outer_diameter = {tube.outer_diameter} m must be below "
-                    f"structure.half_{rod} = {longest} m: a rod is longer than thick"
-                )
+        """See ``Structure``: rods longer than thick, a boom to slide on, stops out of the way, V
+        pulleys that open the bars, and spans of cables that have a length and a direction.
+        """
+        for rod in ("diagonal", "bar"):
+            tube, longest = f"rods.{rod}.outer_diameter", f"structure.half_{rod}"
+            scene.require_below(tube, longest, "a rod is longer than thick")
         highest = 2.0 * self.half_diagonal
         if scene.boom is not None and scene.boom.length < highest:
             raise ValueError(
                 f"boom.length = {scene.boom.length} m must be at least {highest:.4g} m, the "
                 "height of the stowed ring: the sliding joint would leave the boom"
             )
-        self._check_pulleys(scene)
-        if scene.stop is not None and scene.stop.stowed_angle >= self.opening_angle:
-            raise ValueError(
-                f"stop.stowed_angle = {scene.stop.stowed_angle} deg must be below "
-                f"structure.opening_angle = {self.opening_angle} deg"
-            )
-
-    def _check_pulleys(self, scene: Any) -> None:
-        """V pulleys that open the bars, and spans that have a length and a direction."""
+        if scene.stop is not None:
+            scene.require_below("stop.stowed_angle", "structure.opening_angle")
         present = [] if scene.cables is None else scene.cables.present()
         for plane, cable in present:
             reason = cable.bracket.refusal(self.opening_angle)
@@ -117,9 +102,7 @@ class PantographRing(Structure):
                     f'cables.{self.planes[plane]}.bracket.kind = "bar-half" needs rods.kind = '
                     '"geometrically-exact", not "ancf": choose one of both'
                 )
-        if not present or self.sections == 1:
-            return
-        if self.hinge_offset < LEAST_HINGE_OFFSET:
+        if present and self.sections > 1 and self.hinge_offset < LEAST_HINGE_OFFSET:
             raise ValueError(
                 f"structure.hinge_offset = {self.hinge_offset} m must be at least "
                 f"{LEAST_HINGE_OFFSET:g} m with cables: the rope runs between the hinge pulleys of "
@@ -163,13 +146,13 @@ class PantographRing(Structure):
         """See ``Structure``."""
         geometry = self.geometry()
         shape = "closed ring" if self.closed else f"open arc of a {self.polygon}-gon"
-        count = f"{self.sections} section{'' if self.sections == 1 else 's'}"
         # The first corner lies on the major axis of the ellipse.
-        major, (x, y) = float(geometry.plan[0, 0]), geometry.plan[1, :2]
+        chord = 2.0 * (self.half_bar + self.hinge_offset)
+        major, (x, y) = geometry.plan[0, 0], geometry.plan[1, :2]
         minor = abs(y) / math.sqrt(1.0 - (x / major) ** 2)
-        chord = geometry.deployed_chord
         return {
-            "structure": f"{kind_of(self)}, {shape}, {count}",
+            "structure": f"{kind_of(self)}, {shape}, {self.sections} section"
+            + "s" * (self.sections > 1),
             "polygon": f"equal chords of {chord:.4f} m on an ellipse with axes "
             f"{2.0 * chord * major:.4f} m and {2.0 * chord * minor:.4f} m",
             "deployed": _size(geometry, 0.0),
@@ -186,11 +169,8 @@ class PantographRing(Structure):
         The distance of two corners 2 (l cos(phi) + a), half the height d sin(theta) and the
         directions of all rods are linear in them.  NaN where the diagonals are too short.
         """
-        ratio, c, s = (
-            (self.half_bar / self.half_diagonal) ** 2,
-            math.cos(coordinate),
-            math.sin(coordinate),
-        )
+        c, s = math.cos(coordinate), math.sin(coordinate)
+        ratio = (self.half_bar / self.half_diagonal) ** 2
         rest = 1.0 - ratio * c * c
         h = math.sqrt(rest) if rest > 0.0 else math.nan
         slope = ratio * c * s / h

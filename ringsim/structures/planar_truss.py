@@ -21,7 +21,6 @@ from ringsim.structures.family import Structure
 from ringsim.structures.truss_geometry import TrussGeometry
 from ringsim.units import DampingRate, Metre, Model, SpringRate
 
-RING_PARTS = ("stop", "boom", "net", "loads")
 REST_ONSET = 1e-5
 """Depth over which the rest's damper comes in, m: 1 N on the default spring, less than the 1.5 N
 that the cable holds where the rest is met."""
@@ -69,25 +68,21 @@ class PlanarTruss(Structure):
     and the cable are attached, nor the spring.  They are chosen so that the ideal truss
     (tests/physics_planar/truss_statics.py) shows what its figs 8 and 9 show:
 
-    1. The cable has the published lengths.  If it ends at the outer joint of the upper beam,
-       0.9 m is reached at 90 deg or less from H = 0.646 m on, 0.1 m up to H = 0.727 m (then
-       folded flat).  H = 0.72 m puts 0.1 m at 3.1 deg and 0.9 m at 83.5 deg.  At 3.1 deg the
-       outer joint is 34 mm off the axis: half the axis' tube (15 mm), half the synchronising
-       beam (7.5 mm) and a buffer.  There the contraction ends on a rest, so winding further
-       only stretches the cable.
-    2. The gauge sits at the centre of the upper beam.  For a head q up to there the strain of
-       the gauge follows from the tension alone, M = T H sin(g) b / (2 c): 4e-4 is 4.7 N (0.48
-       kgf).  A head beyond it asks for more tension and strains the beam more elsewhere: 13.6 N
-       and 6.6e-4 at q = 0.45 m, 57 N (above the published 2 kgf) and 14e-4 at 0.54 m; one before
-       it, 0.2 m, has 5.4e-4 at the head.  So q = b / 2: the gauge sits where the beam bends most.
-    3. In time the strain is small when folded (sin g) and when deployed (spring nearly relaxed).
-       It is largest at 0.40 m of cable with the strut's foot at the lower joint, 0.46 m with
-       p = 0.08 m, 0.48 m with p = 0.05 m, 0.50 m with 0.03 m, but then the spring needs 180 N for
-       5 N of tension.  p = 0.05 m takes 106 N and stays near the published 500 mm.
-    4. 2030 N/m and 0.316 m give 4e-4; 0.12 of that is left at 0.1 m and 0.14 at 0.9 m.  Zero
-       would need a truss folded flat there, and here a spring without force, so a slack cable:
-       0.8 N are left to it.  The tension is 1.4 N where the rest is met; the published 2 kgf is
-       the rise at the end of contraction.
+    1. The cable has the published lengths, 0.9 m deployed and 0.1 m folded: if it ends at the outer
+       joint of the upper beam, for H from 0.646 m to 0.727 m.  H = 0.72 m puts 0.1 m at 3.1 deg,
+       where the outer joint is 34 mm off the axis: half the axis' tube (15 mm), half the
+       synchronising beam (7.5 mm) and a buffer.  There the contraction ends on a rest, so winding
+       further only stretches the cable.
+    2. The gauge sits where the beam bends most, at its centre: so does the strut's head, q = b / 2.
+       Strain then follows from tension alone, M = T H sin(g) b / (2 c), 4e-4 from 4.7 N (0.48 kgf).
+       At q = 0.45 m it takes 13.6 N, at 0.54 m 57 N, above the published 2 kgf; at q = 0.2 m the
+       head is strained more than the gauge.
+    3. The strain is largest near 500 mm of cable, as published, with p = 0.05 m (0.48 m, the
+       spring pushing 106 N): at 0.40 m with the strut's foot at the lower joint, at 0.50 m with
+       p = 0.03 m, which needs 180 N for 5 N of tension.
+    4. 2030 N/m and 0.316 m give 4e-4; 0.12 of that is left at 0.1 m and 0.14 at 0.9 m, where the
+       spring leaves the cable 0.8 N.  The tension is 1.4 N where the rest is met; the published
+       2 kgf is the rise at the end of contraction.
     """
 
     planes: ClassVar[tuple[str, ...]] = ("upper",)
@@ -124,14 +119,8 @@ class PlanarTruss(Structure):
 
     @model_validator(mode="after")
     def _possible(self) -> PlanarTruss:
-        for name, most, limit in (
-            ("strut_head", "beam_length", self.beam_length),
-            ("strut_foot", "axis_length", self.axis_length),
-        ):
-            if getattr(self, name) >= limit:
-                raise ValueError(
-                    f"{name} = {getattr(self, name)} m must be below {most} = {limit} m"
-                )
+        self.require_below("strut_head", "beam_length")
+        self.require_below("strut_foot", "axis_length")
         if self.rest_distance >= self.beam_length:
             raise ValueError(
                 f"rest.buffer = {self.rest.buffer} m must leave the beams room to fold: the rest "
@@ -156,7 +145,7 @@ class PlanarTruss(Structure):
 
     def check(self, scene: Any) -> None:
         """See ``Structure``: parts of rings are refused, the cable is needed."""
-        for name in RING_PARTS:
+        for name in ("stop", "boom", "net", "loads"):
             if getattr(scene, name) is not None:
                 raise ValueError(
                     f'{name} is a part of rings: leave it out of a planar truss ({name} = "none")'
@@ -247,35 +236,32 @@ class PlanarTruss(Structure):
         strut are rigid bodies.
         """
         draft, points, rods = Draft(scene), self.geometry().points(coordinate), scene.rods
-        height, down = self.axis_length, np.array([0.0, -self.axis_length, 0.0])
-        mass = rods.density * self.axis.area * height
-        axis = draft.body(points.lower, [_slender("axis", mass, -0.5 * down)])
-        mass = rods.density * self.bar_width * self.bar_depth * height
-        bar = draft.body(points.upper_end, [_slender("synchronising beam", mass, 0.5 * down)])
+        down, across = np.array([0.0, -self.axis_length, 0.0]), np.array([0.0, 0.0, 1.0])
+        line = rods.density * self.axis.area, rods.density * self.bar_width * self.bar_depth
+        axis = draft.body(points.lower, [_slender("axis", line[0], -0.5 * down)])
+        bar = draft.body(points.upper_end, [_slender("synchronising beam", line[1], 0.5 * down)])
         draft.joint("weld", "", 0, (None, axis), points.lower)
 
-        head = self.strut_head / self.beam_length
-        count = 2 * rods.elements
+        head, count = self.strut_head / self.beam_length, 2 * rods.elements
         inside = min(max(round(head * count), 1), count - 1)
         beyond = np.linspace(head, 1.0, count - inside + 1)[1:]
         shares = [*np.linspace(0.0, head, inside + 1), *beyond]
-        young, across = float(np.max(rods.young_modulus)), np.array([0.0, 0.0, 1.0])
-        upper = draft.rod("upper_beam", 0, "beams", (points.upper, points.upper_end), across,
-                          rods.bar, shares, young)  # fmt: skip
-        lower = draft.rod("lower_beam", 0, "beams", (points.lower, points.lower_end), across,
-                          rods.bar, [0.0, 0.5, 1.0], young)  # fmt: skip
-        for body, beam, at in (
-            (axis, upper, points.upper),
-            (axis, lower, points.lower),
-            (bar, upper, points.upper_end),
-            (bar, lower, points.lower_end),
-        ):
-            draft.joint("revolute", "", 0, (body, beam), at)
+        young = float(np.max(rods.young_modulus))
+        lines = (points.upper, points.upper_end), (points.lower, points.lower_end)
+        upper, lower = (
+            draft.rod(name, 0, "beams", ends, across, rods.bar, stations, young)
+            for name, ends, stations in zip(
+                ("upper_beam", "lower_beam"), lines, (shares, [0.0, 0.5, 1.0]), strict=True
+            )
+        )
+        for end, body in enumerate((axis, bar)):
+            for beam, ends in zip((upper, lower), lines, strict=True):
+                draft.joint("revolute", "", 0, (body, beam), ends[end])
 
         along = axes_along(points.foot, points.head, across)
         half = np.array([0.5 * self.strut_tube_length, 0.0, 0.0])
         outer, inner = (
-            draft.body(at, [_slender("strut", self._tube_mass(rods.density, tube), centre)], along)
+            draft.body(at, [_slender("strut", rods.density * tube.area, centre)], along)
             for at, centre, tube in (
                 (points.foot, half, rods.diagonal),
                 (points.head, -half, self.strut_inner),
@@ -287,20 +273,15 @@ class PlanarTruss(Structure):
         draft.springs.append(Spring(outer.number, inner.number, self.spring))
         draft.contacts.append(Contact(bar.number, 0, self.rest_distance, self.rest))
         draft.chord_opening(0, bar, points.upper)
-        ends = [draft.on(axis, points.lower), draft.on(bar, points.upper_end)]
-        draft.tracks[0] = Track(ends, np.array([0.0, 1.0, 0.0]))
+        cable = [draft.on(axis, points.lower), draft.on(bar, points.upper_end)]
+        draft.tracks[0] = Track(cable, np.array([0.0, 1.0, 0.0]))
         return draft.finish()
 
-    def _tube_mass(self, density: float, tube: Tube) -> float:
-        return density * tube.area * self.strut_tube_length
 
-
-def _slender(group: str, mass: float, centre: NDArray[np.float64]) -> Lump:
-    """A slender rod from the body's origin to twice ``centre``; about its own line it has little
-    inertia.
+def _slender(group: str, per_length: float, centre: NDArray[np.float64]) -> Lump:
+    """A slender rod (kg/m) from the body's origin to twice ``centre``, with little inertia about
+    its own line.
     """
     length = 2.0 * float(np.linalg.norm(centre))
-    along = 2.0 * centre / length
-    across = np.eye(3) - np.outer(along, along)
-    inertia = mass * length**2 * (across / 3.0 + 1e-4 * np.outer(along, along))
-    return Lump(group, mass, centre, inertia)
+    mass, own = per_length * length, np.outer(centre, centre) / (0.25 * length**2)
+    return Lump(group, mass, centre, mass * length**2 * ((np.eye(3) - own) / 3.0 + 1e-4 * own))

@@ -89,11 +89,6 @@ class RingGeometry:
         """Outward normal n_k = e_k x z of each section's plane, shape (sections, 3)."""
         return np.cross(self.directions, _UP)
 
-    @property
-    def deployed_chord(self) -> float:
-        """Distance of neighbouring corners at 180 deg, in metre."""
-        return 2.0 * (self.half_bar + self.hinge_offset)
-
     def width(self, phi: Any) -> Any:
         """Horizontal distance between the pins of a section, in metre."""
         return 2.0 * self.half_bar * np.cos(phi)

@@ -70,10 +70,6 @@ class TrussGeometry:
         """Length s of the strut between its joints."""
         return _third_side(self.head, self.foot, angle)
 
-    def strut_rate(self, angle: ArrayLike) -> Array:
-        """Its derivative ds/dg, m/rad."""
-        return np.asarray(self.head * self.foot * np.sin(angle) / self.strut(angle))
-
     def strut_over_cable(self, angle: ArrayLike) -> Array:
         """Ratio (ds/dg) / (dc/dg) = q p c / (b H s), finite at every angle."""
         sides = self.head * self.foot / (self.beam * self.axis)
@@ -92,15 +88,9 @@ class TrussGeometry:
         zero = np.zeros_like(g)
         along = np.stack([np.sin(g), -np.cos(g), zero], axis=-1)
         up = np.stack([zero, zero + 1.0, zero], axis=-1)
-        lower, upper = 0.0 * up, self.axis * up
-        return TrussPoints(
-            lower=lower,
-            upper=upper,
-            lower_end=self.beam * along,
-            upper_end=upper + self.beam * along,
-            foot=upper - self.foot * up,
-            head=upper + self.head * along,
-        )
+        upper, beam = self.axis * up, self.beam * along
+        foot, head = upper - self.foot * up, upper + self.head * along
+        return TrussPoints(0.0 * up, upper, beam, upper + beam, foot, head)
 
 
 def _third_side(a: float, b: float, angle: ArrayLike) -> Array:

@@ -77,7 +77,7 @@ def rigid_frequency(scene):
     strut = points.head - points.foot
     turn = np.unwrap(np.arctan2(strut[:, 1], strut[:, 0]))
     turning = (turn[2] - turn[0]) / (2.0 * step)
-    sliding = float(geometry.strut_rate(angle[1]))
+    sliding = float(np.diff(geometry.strut(angle[[0, 2]]))[0]) / (2.0 * step)
     beam = density * scene.rods.bar.area * truss.beam_length
     bar = density * truss.bar_width * truss.bar_depth * truss.axis_length
     inertia = (2.0 / 3.0 * beam + bar) * truss.beam_length**2

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
-from scipy.interpolate import PchipInterpolator, PPoly
 
 from ringsim.cable.winding.family import PrescribedWinding
 from ringsim.units import ListIn, SecondOrZero, SignedMetre
@@ -46,11 +45,13 @@ class TableWinding(PrescribedWinding):
         return self
 
     @cached_property
-    def _curve(self) -> PchipInterpolator:
+    def _curve(self) -> Any:
+        from scipy.interpolate import PchipInterpolator  # here: reading scenes must not load scipy
+
         return PchipInterpolator(self.times, self.lengths)
 
     @cached_property
-    def _speed(self) -> PPoly:
+    def _speed(self) -> Any:
         return self._curve.derivative()
 
     def usual_speed(self) -> float:
