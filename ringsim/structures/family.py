@@ -71,7 +71,7 @@ class Structure(Model):
         raise NotImplementedError
 
     def basis(self, coordinate: float) -> NDArray[np.float64]:
-        """Functions s of the coordinate in which all places are linear; none unless a kind has some.
+        """Functions s of the coordinate in which all places are linear, if a kind has some.
 
         Every place of the layout is then P s with constant P, so that theory need not build a
         layout at each coordinate.  The first of them is 1; below them come their first and second
