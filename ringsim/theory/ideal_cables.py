@@ -118,7 +118,7 @@ class IdealCables:
         ValueError
             If a span has no length, or a winch has wound up its whole rope.
         """
-        points, slopes = self.paths @ now.values, self.paths @ now.by_place
+        points, slopes, velocities = now.moved(self.paths)
         ropes, copies = self.ropes, self._copies
         wound, speed = np.zeros((2, len(copies), 2))
         for place, winch in self._winches.items():
@@ -127,7 +127,7 @@ class IdealCables:
                 wound[place], speed[place] = law.wound, law.speed
         for place, *motor in zip(self.answering, *motors, strict=True):
             wound[place], speed[place] = motor
-        state = self._chain.state(ropes, points, slopes @ now.rate, wound, speed)
+        state = self._chain.state(ropes, points, velocities, wound, speed)
         on_rope, density = copies[ropes.cable], state.energy_density
         of_points = np.repeat(copies, ropes.points_per_cable)[:, None] * state.point_forces
         return Pull(

@@ -66,7 +66,7 @@ class _FrictionJoints:
     def act(self, now: Configuration) -> tuple[Array, float]:
         """Generalised force and power lost."""
         first, second = (
-            np.einsum("ja,jap->jp", ahead @ now.values, along @ now.by_place)
+            np.einsum("ja,jap->jp", now.moved(ahead)[0], now.moved(along)[1])
             for ahead, along in self._sides
         )
         slopes = second - first
@@ -115,8 +115,8 @@ class Forces:
             torque, lost = joints.act(now)
             force, loss = force + torque, loss + lost
         if self._net is not None:
-            corners = self._mechanism.upper_corners
-            net = self._net.forces(corners @ now.values, corners @ now.by_place, now.rate)
+            places, slopes, _ = now.moved(self._mechanism.upper_corners)
+            net = self._net.forces(places, slopes, now.rate)
             force, elastic, loss = force + net.force, net.energy, loss + net.loss
         stop, folded, rate = self._stop, 2.0 * float(now.place[0]), 2.0 * float(now.rate[0])
         if stop is not None and (latched or not 0.0 <= folded <= stop.most_folded):

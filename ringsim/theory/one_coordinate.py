@@ -84,6 +84,6 @@ class OneCoordinate:
         if self._scene.net is None:
             return NetForces(np.zeros(1), 0.0, 0.0)
         mechanism, now = self._at(q)
-        corners = mechanism.upper_corners
-        net = FreeHub(self._scene.net, len(corners))
-        return net.forces(corners @ now.values, corners @ now.by_place, 0.0 * now.rate)
+        places, slopes, _ = now.moved(mechanism.upper_corners)
+        net = FreeHub(self._scene.net, len(places))
+        return net.forces(places, slopes, 0.0 * now.rate)
