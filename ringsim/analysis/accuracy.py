@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ringsim.analysis.errors import OUTPUTS, Errors
 from ringsim.analysis.frontier import bounds, cheapest, eligible, frontier, in_favour, typical_cost
 from ringsim.analysis.ladder import PATHS, Rung
+from ringsim.analysis.reference import largest
 
 Array = NDArray[np.float64]
 TARGETS = (1e-2, 1e-3, 1e-4)
@@ -49,15 +50,15 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     Returns
     -------
     xr.Dataset
-        ``error`` (rung, output): relative; ``bound`` (rung, output): what the setting is good
-        for, see :mod:`ringsim.analysis.frontier`; ``order`` (graded, output): observed along a
-        ladder, NaN where errors come near the reference's own; ``uncertainty`` (output): of the
-        reference, relative; ``reference`` (output): its value, in the output's unit, NaN for
-        series (of the asynchrony the largest value); ``frontier`` (rung, output): whether no
-        other setting of the scene's own model is both cheaper and better; ``cheapest`` (target,
-        output): the rung among them, -1 if there is none; ``cost`` (rung): processor time without
-        the scatter of single timings, s; counts, status and settings (rung); ``from_truth``
-        (rung, truth) and ``reference_from_truth`` (truth): distances from the truths, relative.
+        ``error`` and ``bound`` (rung, output): relative, and what the setting is good for, see
+        :mod:`ringsim.analysis.frontier`; ``order`` (graded, output): observed along a ladder, NaN
+        where errors come near the reference's own; ``uncertainty`` (output): of the reference,
+        relative; ``reference`` (output): its value, in the output's unit, NaN for series (of the
+        asynchrony the largest value); ``frontier`` (rung, output): whether no other setting of the
+        scene's own model is both cheaper and better; ``cheapest`` (target, output): the rung among
+        them, -1 if there is none; ``cost`` (rung): processor time without the scatter of single
+        timings, s; counts, status and settings (rung); ``from_truth`` (rung, truth) and
+        ``reference_from_truth`` (truth): distances from the truths, relative.
 
     Raises
     ------
@@ -107,10 +108,10 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         units = "s" if path == "solver.step" else ""
         values = [rung.values[path] for rung in rungs]
         rows.append((path.replace(".", "_"), one, values, f"setting {path}", units))
-    found = xr.Dataset(
-        {name: (dims, values, _words(text, units)) for name, dims, values, text, units in rows},
-        coords={"output": outputs, "target": list(TARGETS), "graded": graded},
-    )
+    found = xr.Dataset(coords={"output": outputs, "target": list(TARGETS), "graded": graded})
+    for name, dims, values, text, units in rows:
+        words = {"long_name": text} | ({"units": units} if units else {})
+        found[name] = (dims, values, words)
     return _add_truths(found, errors, truths)
 
 
@@ -119,28 +120,26 @@ def settings_at(found: xr.Dataset, rung: int) -> dict[str, Any]:
     return {path: found[path.replace(".", "_")].values.tolist()[rung] for path in PATHS}
 
 
-def _words(long_name: str, units: str) -> Mapping[str, str]:
-    return {"long_name": long_name, "units": units} if units else {"long_name": long_name}
-
-
 def _add_truths(found: xr.Dataset, errors: Errors, truths: Sequence[Truth]) -> xr.Dataset:
     """How far every rung and the reference are from values of other origin, relative."""
-    if not truths:
-        return found
-    distance, references_own = [], []
+    distances = []
     for name, _, value in truths:
         values, best = errors.until_the_end(name), errors.best_of(name).value
         both = xr.concat([values, best.expand_dims("rung")], "rung")
         if name == "opening_angle":
-            mean = both.mean(("plane", "section"))
             expected = xr.DataArray(value, dims="time", coords={"time": errors.results.time})
-            apart = (abs(mean - expected).max("time") / errors.scale(name, best)).to_numpy()
+            apart = largest(both.mean(("plane", "section")) - expected) / errors.scale(name, best)
         else:
             apart = np.abs(both.to_numpy() / value - 1.0)
-        distance.append(np.where(errors.good, apart[:-1], np.nan))
-        references_own.append(apart[-1])
-    long_name = "distance from values of other origin, relative"
-    found["from_truth"] = (("rung", "truth"), np.array(distance).T, _words(long_name, "1"))
-    own = ("truth", references_own, _words(f"reference: {long_name}", "1"))
-    rows = [f"{truth.output}: {truth.source}" for truth in truths]
-    return found.assign(reference_from_truth=own).assign_coords(truth=rows)
+        distances.append(apart)
+    if not truths:
+        return found
+    distance = np.array(distances)
+    words = {"long_name": "distance from values of other origin, relative", "units": "1"}
+    of_rungs = np.where(errors.good, distance[:, :-1], np.nan).T
+    return found.assign(
+        from_truth=(("rung", "truth"), of_rungs, words),
+        reference_from_truth=(
+            "truth", distance[:, -1], words | {"long_name": f"reference: {words['long_name']}"}
+        ),
+    ).assign_coords(truth=[f"{truth.output}: {truth.source}" for truth in truths])  # fmt: skip

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import xarray as xr
 
@@ -45,9 +43,9 @@ def tables(found: xr.Dataset, title: str) -> str:
 
     ``found`` is from :func:`ringsim.analysis.accuracy.judge`; ``title`` is the heading.
     """
-    single = [str(name) for name in found.output.values if name not in GROUPS]
-    parts = [f"# {title}", _ADVICE, _advice(found), _COSTS, _errors(found, single)]
-    parts += [_ORDERS, _orders(found, single)]
+    single = found.sel(output=[name for name in found.output.values if name not in GROUPS])
+    parts = [f"# {title}", _ADVICE, _advice(found), _COSTS, _errors(single)]
+    parts += [_ORDERS, _orders(single)]
     if "from_truth" in found:
         parts += [_TRUTHS, _truths(found)]
     failed = [k for k in _distinct(found) if found.status.values[k] != Status.OK]
@@ -69,8 +67,8 @@ def in_words(found: xr.Dataset, rung: int) -> str:
 def _advice(found: xr.Dataset) -> str:
     ideal = np.flatnonzero(found.ladder.values == "fidelity")
     targets, rows = found.target.values, []
-    for column, name in enumerate(found.output.values):
-        cells = [_NAMES.get(name, name)]
+    for column, name in enumerate(_names(found)):
+        cells = [name]
         for target, cheapest in zip(targets, found.cheapest.values[:, column], strict=True):
             picked = [int(cheapest), *ideal[found.bound.values[ideal, column] <= target]]
             words = [
@@ -83,23 +81,46 @@ def _advice(found: xr.Dataset) -> str:
     return markdown_table(["error of", *(f"{target:g}" for target in targets)], rows)
 
 
-def _errors(found: xr.Dataset, outputs: Sequence[str]) -> str:
+def _errors(found: xr.Dataset) -> str:
     """Errors and cost of every setting; what lies on a frontier is bold."""
-    error, best = (found[name].sel(output=outputs).values for name in ("error", "frontier"))
     rows = []
     for rung in _distinct(found):
         row = found.isel(rung=rung)
         name = _name(found, rung) + (f" ({_end(found, rung)})" if row.status != Status.OK else "")
         counts = [row[count].item() for count in ("steps", "residual_evaluations", "jacobians")]
         times = [f"{row[time].item():.3g} s" for time in ("cpu_time", "cost")]
-        errors = [f"{e:.1e}" if np.isfinite(e) else "" for e in error[rung]]
-        errors = [f"**{e}**" if bold else e for e, bold in zip(errors, best[rung], strict=True)]
+        errors = [f"{e:.1e}" if np.isfinite(e) else "" for e in row.error.values]
+        errors = [
+            f"**{e}**" if bold else e for e, bold in zip(errors, row.frontier.values, strict=True)
+        ]
         rows.append([name, *(f"{count:.0f}" for count in counts), *times, *errors])
-    own = [f"{e:.1e}" for e in found.uncertainty.sel(output=outputs).values]
-    own = ["" if name == "energy" else e for name, e in zip(outputs, own, strict=True)]
-    rows.append(["uncertainty of the reference", *[""] * 5, *own])
+    own = zip(found.output.values, found.uncertainty.values, strict=True)
+    last = ["" if name == "energy" else f"{e:.1e}" for name, e in own]
+    rows.append(["uncertainty of the reference", *[""] * 5, *last])
     head = ["setting", "steps", "residuals", "Jacobians", "run", "cost"]
-    return markdown_table(head + [_NAMES.get(name, name) for name in outputs], rows)
+    return markdown_table(head + _names(found), rows)
+
+
+def _orders(found: xr.Dataset) -> str:
+    rows = [
+        [name, _THEORY.get(name, ""), *(f"{o:.1f}" if np.isfinite(o) else "-" for o in orders)]
+        for name, orders in zip(found.graded.values.tolist(), found.order.values, strict=True)
+    ]
+    return markdown_table(["ladder", "theory", *_names(found)], rows)
+
+
+def _truths(found: xr.Dataset) -> str:
+    rows = []
+    standing = found.from_truth.values[_standing(found)]
+    gaps = zip(found.reference_from_truth.values, standing, strict=True)
+    for name, both in zip(found.truth.values.tolist(), gaps, strict=True):
+        output, _, source = name.partition(": ")
+        rows.append([f"{_NAMES.get(output, output)}, {source}", *(f"{gap:.1e}" for gap in both)])
+    return markdown_table(["value", "reference", STANDING], rows)
+
+
+def _names(found: xr.Dataset) -> list[str]:
+    return [_NAMES.get(name, name) for name in found.output.values.tolist()]
 
 
 def _distinct(found: xr.Dataset) -> list[int]:
@@ -117,27 +138,6 @@ def _name(found: xr.Dataset, rung: int) -> str:
 
 def _end(found: xr.Dataset, rung: int) -> str:
     return Status(int(found.status.values[rung])).word
-
-
-def _orders(found: xr.Dataset, outputs: Sequence[str]) -> str:
-    rows = [
-        [name, _THEORY.get(name, ""), *(f"{o:.1f}" if np.isfinite(o) else "-" for o in orders)]
-        for name, orders in zip(
-            found.graded.values.tolist(), found.order.sel(output=outputs).values, strict=True
-        )
-    ]
-    return markdown_table(["ladder", "theory", *(_NAMES.get(name, name) for name in outputs)], rows)
-
-
-def _truths(found: xr.Dataset) -> str:
-    rows = []
-    standing = found.from_truth.values[_standing(found)]
-    for name, *gaps in zip(
-        found.truth.values, found.reference_from_truth.values, standing, strict=True
-    ):
-        output, _, source = str(name).partition(": ")
-        rows.append([f"{_NAMES.get(output, output)}, {source}", *(f"{gap:.1e}" for gap in gaps)])
-    return markdown_table(["value", "reference", STANDING], rows)
 
 
 def _standing(found: xr.Dataset) -> int:

@@ -21,8 +21,6 @@ OUTPUTS = {
     "peak_bending_strain": "peak strain",
 }
 """What people use of a result, as far as a scene has it, and its name in tables."""
-_LARGEST = {"asynchrony": "asynchrony_max"}
-"""Series whose largest value counts, too: the grid of output times may miss it."""
 LEAST_ASYNCHRONY = 1e-3
 """deg: below this the asynchrony of a symmetric ring is round-off, and its error not relative."""
 GROUPS = {
@@ -50,10 +48,9 @@ class Errors:
         self.good = (results.status == 0).to_numpy()
         if not self.good[places].all():
             raise ValueError("a reference run did not end well")
-        ends = results.deployment_time.isel(rung=places)
-        self._end = float(ends.min(skipna=False))
-        if np.isnan(self._end):
-            self._end = float(results.final_time.isel(rung=places).min())
+        ends = results[["deployment_time", "final_time"]].isel(rung=places).min(skipna=False)
+        deployed = float(ends.deployment_time)
+        self._end = float(ends.final_time) if np.isnan(deployed) else deployed
         self.of: dict[str, Array] = {}
         self.uncertainty: dict[str, float] = {}
         self.best: dict[str, float] = {}
@@ -71,9 +68,7 @@ class Errors:
     def until_the_end(self, name: str) -> xr.DataArray:
         """A variable, series only up to the earliest deployment time of the references."""
         values = self.results[name]
-        if "time" not in values.dims:
-            return values
-        return held(values.sel(time=values.time <= self._end))
+        return held(values.sel(time=values.time <= self._end)) if "time" in values.dims else values
 
     def best_of(self, name: str) -> Limit:
         """The reference of a variable, in its unit."""
@@ -82,14 +77,15 @@ class Errors:
 
     def scale(self, name: str, best: xr.DataArray) -> float:
         """What an error is relative to: the value itself, or the extent of a series."""
-        if name in _LARGEST or name in _LARGEST.values():
+        if name.startswith("asynchrony"):
             most = float(self.results.asynchrony_max.isel(rung=self._in_time[-1]))
             return max(most, LEAST_ASYNCHRONY)
         return float(best.max() - best.min() if name == "opening_angle" else abs(best).max())
 
     def _judge(self, name: str) -> None:
         error, own = np.full(len(self.good), np.nan), 0.0
-        for each in (name, _LARGEST[name]) if name in _LARGEST else (name,):
+        # Of the asynchrony the largest value counts, too: the grid of output times may miss it.
+        for each in (name, "asynchrony_max") if name == "asynchrony" else (name,):
             values, best = self.until_the_end(each), self.best_of(each)
             scale = self.scale(each, best.value)
             error = np.fmax(error, largest(values - best.value) / scale)
@@ -106,12 +102,13 @@ class Errors:
         errors against the limit of the steps, whatever the elements are; elements and formulations
         that of the changes from level to level, which all share the error of their steps.
         """
-        names = list(dict.fromkeys(rung.ladder for rung in self._rungs if rung.size > 0.0))
-        found = np.full((len(names), len(self.of)), np.nan)
-        for row, name in enumerate(names):
-            own = [k for k, rung in enumerate(self._rungs) if rung.ladder == name]
-            if name == "steps":  # longer ones than the scene's own are too long to show an order
-                own = [k for k in own if self._rungs[k].size <= 1.0]
+        ladders: dict[str, list[int]] = {}
+        for k, rung in enumerate(self._rungs):
+            # Longer steps than the scene's own are too long to show an order.
+            if rung.size > 0.0 and not (rung.ladder == "steps" and rung.size > 1.0):
+                ladders.setdefault(rung.ladder, []).append(k)
+        found = np.full((len(ladders), len(self.of)), np.nan)
+        for row, (name, own) in enumerate(ladders.items()):
             sizes = np.array([self._rungs[k].size for k in own])
             for column, output in enumerate(self.of):
                 if output == "energy":
@@ -124,7 +121,7 @@ class Errors:
                         found[row, column] = slope(sizes, error[own], steps.uncertainty)
                     elif self.good[own].all():
                         found[row, column] = order(values.isel(rung=own), steps.uncertainty)
-        return names, found
+        return list(ladders), found
 
 
 def held(values: xr.DataArray) -> xr.DataArray:
@@ -132,7 +129,8 @@ def held(values: xr.DataArray) -> xr.DataArray:
 
     What ``DataArray.ffill`` does, which needs bottleneck or numbagg.
     """
-    series = values.transpose(..., "time").to_numpy()
+    values = values.transpose(..., "time")
+    series = values.to_numpy()
     last = np.where(np.isfinite(series), np.arange(series.shape[-1]), 0)
     kept = np.take_along_axis(series, np.maximum.accumulate(last, axis=-1), axis=-1)
-    return values.transpose(..., "time").copy(data=kept)
+    return values.copy(data=kept)

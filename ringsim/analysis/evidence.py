@@ -77,10 +77,11 @@ class Evidence(Model):
 
     def values_for(self, setting: Setting, scene: Scene) -> dict[str, Any]:
         """A setting's values for a scene: no fewer elements than it has, no step beyond its end."""
-        values = dict(setting.values)
-        values["solver.step"] = min(values["solver.step"], scene.solver.end_time)
-        values["rods.elements"] = max(values["rods.elements"], scene.rods.elements)
-        return values
+        values = setting.values
+        return values | {
+            "solver.step": min(values["solver.step"], scene.solver.end_time),
+            "rods.elements": max(values["rods.elements"], scene.rods.elements),
+        }
 
     def require_like(self, scene: Scene) -> None:
         """Raise InputError, with what differs, if this is evidence of another kind of scene."""
@@ -116,7 +117,8 @@ def evidence_of(found: xr.Dataset) -> Evidence:
     best: dict[str, float] = {}
     for rung in np.argsort(cost, kind="stable")[: usable.sum()].tolist():
         bounds = zip(outputs, found.bound.values[rung].tolist(), strict=True)
-        errors = {name: _rounded_up(bound) for name, bound in bounds if np.isfinite(bound)}
+        # Rounded up: a setting is good for no less.
+        errors = {name: float(f"{1.0049 * e:.2e}") for name, e in bounds if np.isfinite(e)}
         if better := {name: e for name, e in errors.items() if e < best.get(name, np.inf)}:
             best |= better
             values = settings_at(found, rung)
@@ -126,10 +128,6 @@ def evidence_of(found: xr.Dataset) -> Evidence:
             seconds = float(f"{found.cost.values[rung]:.3g}")
             settings.append(Setting(seconds=seconds, values=values, errors=errors))
     return Evidence(scene=scene.name, kind=kind_of_scene(scene), settings=tuple(settings))
-
-
-def _rounded_up(error: float) -> float:
-    return float(f"{1.0049 * error:.2e}")
 
 
 def read_evidence(path: Path | Traversable) -> Evidence:

@@ -14,6 +14,7 @@ from typing import Any
 
 from ringsim.choice import kind_of
 from ringsim.parts.solver import NO_DEVIATIONS
+from ringsim.sampling.paths import field_at
 from ringsim.scene import Scene
 
 PATHS = (
@@ -54,62 +55,59 @@ class Rung:
 
 
 def ladder(scene: Scene) -> list[Rung]:
-    """All rungs for a scene, those of the reference among them (see :func:`references`).
-
-    Some ladders share a setting.
-    """
-    base, solver, found = standing(scene), scene.solver, []
-    tight, follows = min(solver.newton_tolerance, _TIGHT), solver.step_control == "motion"
+    """All rungs for a scene, those of the reference among them; some ladders share a setting."""
+    base, solver, one, found = standing(scene), scene.solver, scene.rods.elements, []
+    tight = {"solver.newton_tolerance": min(solver.newton_tolerance, _TIGHT)}
+    follows = solver.step_control == "motion"
 
     def add(name: str, label: str, size: float, changes: Mapping[str, Any]) -> None:
         found.append(Rung(name, label, size, {**base, **changes}))
 
     add(STANDING, STANDING, 0.0, {})
     for label, halvings in _HALVINGS.items():
-        add("steps", label, 0.5**halvings, _halved(scene, halvings))
+        add("steps", label, 0.5**halvings, _scaled(scene, 0.5**halvings) | tight)
     for step in (_rounded(share * solver.step) for share in (0.1, 0.05, 0.025) if follows):
-        constant = {"solver.step_control": "constant", "solver.newton_tolerance": tight}
-        add("constant step", f"{step:g} s", step, constant | {"solver.step": step})
-    one, own = scene.rods.elements, kind_of(scene.rods)
+        constant = {"solver.step_control": "constant", "solver.step": step}
+        add("constant step", f"{step:g} s", step, constant | tight)
     for elements in (one, 2 * one, 4 * one):
-        changes = _halved(scene, 3) | {"rods.elements": elements}
+        changes = _scaled(scene, 1.0 / 8.0) | tight | {"rods.elements": elements}
         add("elements", f"{elements}", 1.0 / elements, changes)
     if kind_of(scene.structure) == "pantograph-ring" and scene.cables is None:
-        other = "ancf" if own != "ancf" else "geometrically-exact"
+        other = "ancf" if kind_of(scene.rods) != "ancf" else "geometrically-exact"
+        rods = _scaled(scene, 1.0 / 4.0) | tight | {"rods.kind": other}
         for elements in (one, 2 * one, 4 * one):
-            changes = _halved(scene, 2) | {"rods.kind": other, "rods.elements": elements}
+            changes = rods | {"rods.elements": elements}
             add("formulation", f"{other}, {elements}", 1.0 / elements, changes)
     for radius in (0.5, 0.8, 0.9, 0.95):
         add("dissipation", f"{radius:g}", 0.0, {"solver.spectral_radius": radius})
     for tolerance in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
         add("newton", f"{tolerance:g}", 0.0, {"solver.newton_tolerance": tolerance})
     for coarser, newtons, more in _SETTINGS:
-        newton = _rounded(max(newtons * solver.newton_tolerance, tight))
-        elements = more * one
-        changes = {"solver.newton_tolerance": newton, "rods.elements": elements}
+        newton = max(newtons * solver.newton_tolerance, tight["solver.newton_tolerance"])
+        changes = {"solver.newton_tolerance": _rounded(newton), "rods.elements": more * one}
+        scaled = _scaled(scene, coarser**0.5)
         if follows:
-            tolerance = _within(coarser * solver.tolerance)
+            del scaled["solver.step"]
+            tolerance = scaled["solver.tolerance"]
             if tolerance == solver.tolerance and coarser != 1.0:
                 continue  # the scene's own tolerance is the end of what is allowed
-            changes["solver.tolerance"] = tolerance
-            changes["solver.deviation_tolerance"] = _deviations(scene, coarser)
             label = f"tolerance {tolerance:g}"
         else:
-            step = min(coarser**0.5 * solver.step, solver.end_time)
-            step = solver.step if coarser == 1.0 else float(f"{step:.2g}")
-            changes["solver.step"] = step
-            label = f"step {step:g} s"
-        label += f", newton {newton:g}" if newton != solver.newton_tolerance else ""
-        label += f", {elements} elements" if more > 1 else ""
-        add("setting", label, 0.0, changes)
+            step = scaled["solver.step"]
+            scaled["solver.step"] = solver.step if coarser == 1.0 else float(f"{step:.2g}")
+            label = f"step {scaled['solver.step']:g} s"
+        changed = changes["solver.newton_tolerance"]
+        label += f", newton {changed:g}" if changed != solver.newton_tolerance else ""
+        label += f", {more * one} elements" if more > 1 else ""
+        add("setting", label, 0.0, changes | scaled)
     return found
 
 
 def standing(scene: Scene) -> dict[str, Any]:
     """The settings that a scene has."""
-    table = scene.to_table()
-    found = {path: table[path.split(".")[0]][path.split(".")[1]] for path in PATHS}
-    return found | {"solver.deviation_tolerance": _deviations(scene)}
+    found = {path: field_at(scene, path) for path in PATHS}
+    # A study records the stresses of every scene, which must not change the scene's steps.
+    return found if scene.record.stress else found | {"solver.deviation_tolerance": NO_DEVIATIONS}
 
 
 def references(rungs: Sequence[Rung]) -> tuple[list[int], list[int]]:
@@ -121,32 +119,15 @@ def references(rungs: Sequence[Rung]) -> tuple[list[int], list[int]]:
     return in_time, [k for k, r in enumerate(rungs) if r.ladder == "elements"]
 
 
-def _halved(scene: Scene, times: int) -> dict[str, Any]:
-    """Every step halved so often (negative: doubled), and each solved to a tight tolerance."""
-    solver = scene.solver
-    found: dict[str, Any] = {
-        "solver.step": _rounded(min(solver.step * 0.5**times, solver.end_time)),
-        "solver.newton_tolerance": min(solver.newton_tolerance, _TIGHT),
-    }
+def _scaled(scene: Scene, factor: float) -> dict[str, Any]:
+    """What makes every step so many times as long."""
+    solver = scene.solver.scaled(factor)
+    found = {"solver.step": _rounded(solver.step)}
     if solver.step_control == "motion":
-        found["solver.tolerance"] = _within(solver.tolerance * 0.25**times)
-        found["solver.deviation_tolerance"] = _deviations(scene, 0.25**times)
+        found["solver.tolerance"] = _rounded(solver.tolerance)
+        if scene.record.stress:
+            found["solver.deviation_tolerance"] = _rounded(solver.deviation_tolerance)
     return found
-
-
-def _deviations(scene: Scene, factor: float = 1.0) -> float:
-    """``solver.deviation_tolerance`` times a factor; not followed where the scene has no stress.
-
-    A study records the stresses of every scene, which must not change the scene's steps.
-    """
-    if not scene.record.stress:
-        return NO_DEVIATIONS
-    return _rounded(scene.solver.deviations_scaled(factor))
-
-
-def _within(tolerance: float) -> float:
-    """The nearest tolerance that ``solver.tolerance`` may have."""
-    return _rounded(min(max(tolerance, 1e-8), 0.1))
 
 
 def _rounded(value: float) -> float:

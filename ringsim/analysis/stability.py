@@ -1,9 +1,7 @@
-"""The stability map: how each cell ended, why, and whether "ok" was true.
+"""The stability map: how each cell (one run) ended, why, and whether "ok" was true.
 
-A cell is one run.  It is "ok" if it ended well with its errors within their tolerances, "ended"
-if its status and reason name a cause, and "wrong" if it says ok and is not, or fails without a
-cause.  Random ok cells are run again with smaller steps; one that differs by more than ok promises
-is wrong.
+A cell is "ok" if it ended well with its errors within their tolerances, "ended" if its status and
+reason name a cause, and "wrong" if it says ok and is not, or fails without a cause.
 """
 
 from __future__ import annotations
@@ -27,11 +25,10 @@ _NAMELESS = {Cause.NONE, Cause.EXCEPTION, Cause.CRASH, Cause.UNFIT}
 _WORDS = {Cause.NEWTON: "Newton", Cause.BLOW_UP: "blow-up", Cause.NOT_FINITE: "blow-up"}
 """Words for causes where their names are not."""
 
-PROMISES = TIME_PROMISE, ANGLE_PROMISE, TENSION_PROMISE = 0.01, 0.5, 0.05
+PROMISES = {"time_difference": 0.01, "angle_difference": 0.5, "tension_difference": 0.05}
 """What an ok cell promises: relative error of the deployment time, error in degree of the mean
-angle where a run ended before, and error of the largest tension over itself."""
-DIFFERENCES = ("time_difference", "angle_difference", "tension_difference")
-"""Their errors, as a finer run shows them."""
+angle where a run ended before, and error of the largest tension over itself; by the name of what a
+finer run shows of it."""
 MORE_STEPS = 1.5
 """Steps of a finer run over those of the cell, at least; Newton may have cut both to the same."""
 ENERGY_PROMISE = Solver().energy_tolerance
@@ -74,18 +71,15 @@ def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr
     """
     unknown = np.full(campaign.sizes["sample"], np.nan)
     status = campaign["status"].values.astype(int)
+    reasons = campaign["reason"].values.astype(str)
     causes = [
         "" if code == Status.OK else word_of(Cause(cause)) or Status(code).word
         for code, cause in zip(status, campaign["cause"].values.astype(int), strict=True)
     ]
-    found: dict[str, Array] = {
-        "x": np.asarray(x, dtype=float),
-        "y": np.asarray(y, dtype=float),
-        "status": status,
-        "reason": campaign["reason"].values.astype(str).astype(object),
-        "cause": np.array(causes),
-        "final_angle": unknown,
-    }
+    found = {
+        "x": np.asarray(x, dtype=float), "y": np.asarray(y, dtype=float), "status": status,
+        "reason": reasons.astype(object), "cause": np.array(causes), "final_angle": unknown,
+    }  # fmt: skip
     if "opening_angle" in campaign:
         angle = campaign["opening_angle"]
         mean = angle.mean([d for d in angle.dims if d not in ("sample", "time")], skipna=False)
@@ -118,10 +112,7 @@ def judged(cells: xr.Dataset) -> xr.Dataset:
 
 
 def chosen_for_check(cells: xr.Dataset, share: float, seed: int) -> NDArray[np.int64]:
-    """Cells to run again with smaller steps: a random share of those that are ok, at least one.
-
-    ``share`` is between 0 and 1, ``seed`` that of the choice.
-    """
+    """A random share (0..1) of the ok cells, at least one, to run again with smaller steps."""
     good = np.flatnonzero((cells["verdict"] == OK).values)
     count = min(len(good), max(1, round(share * len(good))))
     picked = np.random.default_rng(seed).choice(good, count, replace=False)
@@ -141,28 +132,28 @@ def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> x
     Returns
     -------
     xr.Dataset
-        The map with ``time_difference`` (relative), ``angle_difference`` (degree) and
-        ``tension_difference`` (relative) of those cells, and ``check``: "" (not checked),
-        "holds", "differs", or "unproven" where the finer run did not end or was hardly finer.
+        The map with the differences of those cells (see ``PROMISES``), and ``check``: "" (not
+        checked), "holds", "differs", or "unproven" where the finer run did not end or was hardly
+        finer.
     """
-    found, mine = cells.copy(), cells.isel(cell=which)
-    times, tensions = (
-        (abs(mine[name] - finer[name]) / abs(finer[name])).values
-        for name in ("deployment_time", "peak_tension")
+    mine = cells.isel(cell=which)
+    numbers = ["deployment_time", "final_angle", "peak_tension"]
+    apart = abs(mine[numbers] - finer[numbers])
+    differences = (
+        apart["deployment_time"] / abs(finer["deployment_time"]),
+        apart["final_angle"].where(finer["deployment_time"].isnull()),
+        apart["peak_tension"] / abs(finer["peak_tension"]),
     )
-    angles = abs(mine["final_angle"] - finer["final_angle"]).values
-    angles = np.where(np.isfinite(finer["deployment_time"]), np.nan, angles)
-    over = np.zeros(len(which), dtype=bool)
-    for name, promise, apart in zip(DIFFERENCES, PROMISES, (times, angles, tensions), strict=True):
+    found, over = cells.copy(), np.zeros(len(which), dtype=bool)
+    for (name, promise), difference in zip(PROMISES.items(), differences, strict=True):
         found[name] = ("cell", np.full(cells.sizes["cell"], np.nan))
-        found[name].values[which] = apart
-        over |= apart > promise
+        found[name].values[which] = difference
+        over |= (difference > promise).values
     hardly = (finer["steps"].values < MORE_STEPS * mine["steps"].values) & ~over
     unproven = (finer["status"] != Status.OK).values | hardly
     check = np.full(cells.sizes["cell"], "", dtype="U8")
     check[which] = np.where(unproven, "unproven", np.where(over, "differs", "holds"))
-    found["check"] = ("cell", check)
-    return judged(found)
+    return judged(found.assign(check=("cell", check)))
 
 
 def joined(groups: Sequence[tuple[dict[str, str], xr.Dataset]]) -> xr.Dataset:

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.stability import DIFFERENCES, OK, PROMISES, WRONG
+from ringsim.analysis.stability import OK, PROMISES, WRONG
 from ringsim.tables import markdown_table
 
 _LONGEST_REASON = 300
@@ -45,7 +45,7 @@ def summary(whole: xr.Dataset) -> str:
 def _checks(whole: xr.Dataset) -> list[str]:
     check = whole["check"].values
     holds, differs, unproven = (np.sum(check == w) for w in ("holds", "differs", "unproven"))
-    time, angle, tension = PROMISES
+    time, angle, tension = PROMISES.values()
     text = (
         f"{np.sum(check != '')} random ok cells were run again with a quarter of the step and a "
         f"sixteenth of the tolerance: {holds} held what ok promises ({100 * time:g} % of the "
@@ -53,10 +53,10 @@ def _checks(whole: xr.Dataset) -> list[str]:
         f"{100 * tension:g} % of the largest tension), {differs} did not, {unproven} stayed "
         "unproven because the finer run did not end or was hardly finer."
     )
-    lines, labels = [], ("deployment time", "mean angle", "largest tension")
-    for name, label in zip(DIFFERENCES, labels, strict=True):
-        factor, unit = (1.0, "deg") if label == "mean angle" else (100.0, "%")
-        values = whole[name].dropna("cell").values * factor
+    labels = ("deployment time", "mean angle", "largest tension")
+    lines = []
+    for name, label, unit in zip(PROMISES, labels, ("%", "deg", "%"), strict=True):
+        values = whole[name].dropna("cell").values * (100.0 if unit == "%" else 1.0)
         if len(values):
             lines.append(
                 f"- {label}: {np.median(values):.2g} {unit} in the median, "
@@ -75,17 +75,17 @@ def borders(whole: xr.Dataset) -> list[list[str]]:
     for number in range(whole.sizes["group"]):
         group = whole.isel(group=number, cell=(whole["of_group"] == number).values)
         good = (group["verdict"] == OK).values
-        causes = np.where(good, OK, group["cause"].values.astype(str))
         for axis in ("x", "y"):
-            values = np.unique(group[axis].values)
-            columns = [group[axis].values == value for value in values]
+            values, place = np.unique(group[axis].values, return_inverse=True)
+            columns = [place == k for k in range(len(values))]
             sure = [bool(good[column].all()) for column in columns]
             runs = itertools.groupby(range(len(values)), key=sure.__getitem__)
             longest = max((list(run) for all_ok, run in runs if all_ok), key=len, default=[])
             beyond = ["-", "-"]
             for side, k in enumerate((longest[0] - 1, longest[-1] + 1) if longest else ()):
                 if 0 <= k < len(values):
-                    words, counts = np.unique(causes[columns[k] & ~good], return_counts=True)
+                    causes = group["cause"].values[columns[k] & ~good].astype(str)
+                    words, counts = np.unique(causes, return_counts=True)
                     beyond[side] = str(words[counts.argmax()]) or WRONG
             some = [k for k, column in enumerate(columns) if good[column].any()]
             ranges = [
@@ -100,10 +100,10 @@ def borders(whole: xr.Dataset) -> list[list[str]]:
 def _causes(whole: xr.Dataset) -> str:
     """Each cause with its number of cells and one reason as it was given."""
     others = whole.isel(cell=(whole["verdict"] != OK).values)
-    causes = others["cause"].values.astype(str)
+    causes, reasons = (others[name].values.astype(str) for name in ("cause", "reason"))
     words, first, counts = np.unique(causes, return_index=True, return_counts=True)
     rows = [
-        [words[k] or WRONG, counts[k], str(others["reason"].values[first[k]])[:_LONGEST_REASON]]
+        [words[k] or WRONG, counts[k], reasons[first[k]][:_LONGEST_REASON]]
         for k in np.argsort(-counts, kind="stable")
     ]
     return markdown_table(["cause", "cells", "for example"], rows)
@@ -113,7 +113,7 @@ def _cell(whole: xr.Dataset, number: int) -> str:
     cell = whole.isel(cell=number, group=int(whole["of_group"][number]))
     differences = ", ".join(
         f"{name.replace('_', ' ')} {float(cell[name]):.2g}"
-        for name in DIFFERENCES
+        for name in PROMISES
         if name in cell and np.isfinite(float(cell[name]))
     )
     return (

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ringsim.analysis.error_budget import budget_lines, error_budget
-from ringsim.analysis.restarts import restart_lines
+from ringsim.analysis.campaign_notes import budget_lines, restart_lines
 from ringsim.campaign.folder import Folder, open_folder
 from ringsim.campaign.merging import merge
 from ringsim.campaign.share import WHOLE, Share
@@ -181,5 +180,5 @@ def _notes(campaign: Folder, path: Path) -> list[str]:
     with xr.open_dataset(path) as dataset:
         lines = restart_lines(dataset)
         if listed or campaign.scene.solver.error_bars:
-            lines += budget_lines(error_budget(dataset))
+            lines += budget_lines(dataset)
     return lines

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from ringsim import simulation
-from ringsim.analysis.error_budget import budget_lines, error_budget
+from ringsim.analysis.campaign_notes import budget_lines, error_budget
 from ringsim.campaign.cases import Cases, run_cases
 from ringsim.campaign.specification import load_campaign
 from ringsim.dataset import to_dataset
@@ -239,7 +239,7 @@ def test_budget_says_which_error_dominates() -> None:
     assert [budget.output for budget in found] == ["deployment_time", "asynchrony_max"]
     assert found[0].bars == 9
     assert found[0].standard_error == pytest.approx(values[1:].std(ddof=1) / 99**0.5)
-    first, second = budget_lines(found)
+    first, second = budget_lines(campaign)
     assert "sampling error dominates" in first
     assert "numerical error dominates" in second
 
