@@ -23,18 +23,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Scene", "load_scene", "simulate"]
 
-_HOMES = {
-    "Scene": "ringsim.scene",
-    "load_scene": "ringsim.scene",
-    "simulate": "ringsim.simulation",
-}
+_HOMES = {"Scene": "scene", "load_scene": "scene", "simulate": "simulation"}
 
 
 def __getattr__(name: str) -> Any:
     """Load a public word on its first use."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    word = globals()[name] = getattr(importlib.import_module(_HOMES[name]), name)
+    home = importlib.import_module(f"{__name__}.{_HOMES[name]}")
+    word = globals()[name] = getattr(home, name)
     return word
 
 

@@ -18,13 +18,7 @@ DRAFT = ".draft"
 
 
 def read_text(path: Path | Traversable) -> str:
-    """The text of a file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or is not UTF-8.
-    """
+    """The text of a file; InputError if it cannot be read or is not UTF-8."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -40,15 +34,8 @@ def read_text(path: Path | Traversable) -> str:
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
-    """The tables of a TOML text.
+    """The tables of a TOML text; an InputError begins with ``source``.
 
-    Raises
-    ------
-    InputError
-        One line that begins with ``source``.
-
-    Examples
-    --------
     >>> parse_toml("loads.force = 0.02", "ring.toml")
     {'loads': {'force': 0.02}}
     """
@@ -63,13 +50,7 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
 
 
 def require_place(path: Path) -> None:
-    """Refuse a file that could not be written, before time is spent on its content.
-
-    Raises
-    ------
-    InputError
-        If it is a folder, or if there is no folder to write it to.
-    """
+    """Refuse (InputError) a file that could not be written, before time is spent on its content."""
     if path.is_dir():
         raise InputError(f"{path}: this is a folder: give the name of a file")
     if not path.parent.is_dir():
@@ -80,13 +61,8 @@ def require_place(path: Path) -> None:
 
 @contextlib.contextmanager
 def writing(path: Path, cure: str = "make room or choose another folder") -> Iterator[None]:
-    """Refuse what goes wrong while a file is written, with the cure.
-
-    Raises
-    ------
-    InputError
-        For every OSError in the block, and for the RuntimeError by which netCDF4 tells of a full
-        disk.
+    """Refuse, with the cure, every OSError while a file is written, and the RuntimeError by which
+    netCDF4 tells of a full disk.
     """
     try:
         yield
@@ -116,13 +92,7 @@ def whole(path: Path, *, lasting: bool = True) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
+    """Write a text file, whole or not at all; see ``writing`` for what is refused."""
     with writing(path), whole(path) as draft:
         draft.write_text(text, encoding="utf-8")
 

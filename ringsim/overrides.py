@@ -9,14 +9,12 @@ from typing import Any
 from ringsim.refusal import InputError
 from ringsim.units import LEFT_OUT
 
-_STEP = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[([0-9]{1,6})\])?")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_SECTION = re.compile(r"(.*)\[([0-9]{1,6})\]", re.DOTALL)
 
 
 def parse_assignment(text: str) -> tuple[str, Any]:
     """Split ``PATH=VALUE``; the value is TOML, or a bare word taken as a string.
-
-    >>> parse_assignment("loads.force = 0.02"), parse_assignment("net=none")
-    (('loads.force', 0.02), ('net', 'none'))
 
     Raises
     ------
@@ -30,9 +28,8 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     >>> parse_assignment("rods.kind=ancf")
     ('rods.kind', 'ancf')
     """
-    path, equals, raw = text.partition("=")
-    path, raw = path.strip(), raw.strip()
-    if not equals or not path or not raw:
+    path, _, raw = (part.strip() for part in text.partition("="))
+    if not path or not raw:
         raise InputError(f"--set {text}: must read PATH=VALUE, for example loads.force=0.02")
     try:
         table = tomllib.loads(f"value = {raw}")
@@ -47,11 +44,8 @@ def section_of(path: str) -> tuple[str, int | None]:
     >>> section_of("rods.young_modulus[3]"), section_of("loads.force")
     (('rods.young_modulus', 3), ('loads.force', None))
     """
-    inner, dot, last = path.rpartition(".")
-    matched = _STEP.fullmatch(last)
-    if matched is None or matched[2] is None:
-        return path, None
-    return inner + dot + matched[1], int(matched[2])
+    matched = _SECTION.fullmatch(path)
+    return (matched[1], int(matched[2])) if matched else (path, None)
 
 
 def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
@@ -72,22 +66,22 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
     InputError
         If the path is malformed or leads through a value that is not a table.
     """
-    *inner, last = path.split(".")
-    for step in inner:
-        if not _is_name(step):
+    inner, section = section_of(path)
+    *steps, name = inner.split(".")
+    for step in steps:
+        if not _NAME.fullmatch(step):
             raise InputError(f"{path}: {step!r} is not the name of a table")
         if table.get(step, LEFT_OUT) == LEFT_OUT:
             table[step] = {}
         table = table[step]
         if not isinstance(table, dict):
             raise InputError(f"{path}: {step} is a value, not a table: give it as {step}=VALUE")
-    name, section = section_of(last)
-    if not _is_name(name):
-        raise InputError(f"{path}: {last!r} is not a field name, or one with its section: name[1]")
+    if not _NAME.fullmatch(name):
+        raise InputError(f"{path}: {name!r} is not a field name, or one with its section: name[1]")
+    old = table.get(name)
     if section is not None:
-        if name not in table:
+        if old is None:
             raise InputError(f"{path}: there is no {name} yet: give one value for all first")
-        old = table[name]
         values = list(old) if isinstance(old, (list, tuple)) else [old] * length
         if not 1 <= section <= len(values):
             raise InputError(
@@ -95,15 +89,9 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
             )
         values[section - 1] = value
         table[name] = values
-    elif value is None or (value == LEFT_OUT and name != "kind"):
-        if isinstance(table.get(name, {}), dict):
-            table[name] = LEFT_OUT
-        else:
-            del table[name]
-    else:
+    elif value is not None and (value != LEFT_OUT or name == "kind"):
         table[name] = value
-
-
-def _is_name(step: str) -> bool:
-    matched = _STEP.fullmatch(step)
-    return matched is not None and matched[2] is None
+    elif old is None or isinstance(old, dict):
+        table[name] = LEFT_OUT
+    else:
+        del table[name]

@@ -30,17 +30,32 @@ class InputError(ValueError):
         super().__init__("".join(c if c.isprintable() else ascii(c)[1:-1] for c in line))
 
 
-def explain(error: ValidationError, model: type[BaseModel], source: str) -> str:
-    """One line: the first fault in full, then where the others are.
+_SAYS = {
+    "missing": "{where} is missing: give it a value{in_unit}",
+    "greater_than": "{shown} must be above {gt:g}{unit}",
+    "greater_than_equal": "{shown} must be at least {ge:g}{unit}",
+    "less_than": "{shown} must be below {lt:g}{unit}",
+    "less_than_equal": "{shown} must be at most {le:g}{unit}",
+    "int": "{shown} must be a whole number, without quotes or decimal point",
+    "float": "{shown} must be a finite number{in_unit}, without quotes",
+    "finite_number": "{shown} must be a finite number{in_unit}, without quotes",
+    "bool": "{shown} must be true or false, without quotes",
+    "string": '{shown} must be text in quotes, for example {key} = "a-word"',
+    "string_pattern_mismatch": "{shown} must start with a letter or digit and hold only letters, "
+    "digits, dots, dashes and underscores",
+    "string_too_long": "{shown} must have at most {max_length} characters",
+    "string_too_short": "{shown} must have at least {min_length} characters",
+    "literal_error": "{shown} must be {expected}",
+    "model": "{shown} must be a table: write [{where}], and its keys on the lines below",
+    "tuple": "{shown} must be one value, or a list with a value for each section",
+}
+"""What is wrong with a value, by pydantic's word for the fault, or the type that it begins with."""
 
-    Parameters
-    ----------
-    error
-        What pydantic found.
-    model
-        The model that was validated; its fields give units and known names.
-    source
-        File or scene name that starts the line.
+
+def explain(error: ValidationError, model: type[BaseModel], source: str) -> str:
+    """One line that begins with ``source``: the first fault in full, then where the others are.
+
+    ``model`` is what was validated; its fields give units and known names.
     """
     faults = error.errors(include_url=False)
     line = f"{source}: {_describe(faults[0], model)}"
@@ -80,63 +95,33 @@ def _place(fault: Any, model: type[BaseModel]) -> str:
 
 def _describe(fault: Any, model: type[BaseModel]) -> str:
     path, owner, field = _walk(fault["loc"], model)
-    where = ".".join(path)
-    kind, value = fault["type"], fault["input"]
-    symbol = unit_of(field) if field is not None else "1"
-    unit = f" {symbol}" if symbol != "1" else ""
+    where, key = ".".join(path), path[-1] if path else ""
+    kind, value, limits = fault["type"], fault["input"], fault.get("ctx", {})
+    unit = f" {unit_of(field)}".removesuffix(" 1") if field is not None else ""
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     shown = f"{where} = {show(value)}{unit if number else ''}"
-    limits = fault.get("ctx", {})
     match kind:
         case "extra_forbidden":
             # A model may tell of the keys that it once had.
-            hint = getattr(owner, "gone", {}).get(path[-1])
-            hint = hint or known_or_nearest(path[-1], owner.model_fields if owner else ())
+            hint = getattr(owner, "gone", {}).get(key)
+            hint = hint or known_or_nearest(key, owner.model_fields if owner else ())
             return f"{where} is not a known key ({hint})"
-        case "missing":
-            return f"{where} is missing: give it a value{unit and f' in{unit}'}"
-        case "greater_than":
-            return f"{shown} must be above {limits['gt']:g}{unit}"
-        case "greater_than_equal":
-            return f"{shown} must be at least {limits['ge']:g}{unit}"
-        case "less_than":
-            return f"{shown} must be below {limits['lt']:g}{unit}"
-        case "less_than_equal":
-            return f"{shown} must be at most {limits['le']:g}{unit}"
-        case "int_type" | "int_from_float" | "int_parsing" | "int_parsing_size":
-            return f"{shown} must be a whole number, without quotes or decimal point"
-        case "float_type" | "finite_number" | "float_parsing":
-            return f"{shown} must be a finite number{unit and f' in{unit}'}, without quotes"
-        case "bool_type":
-            return f"{shown} must be true or false, without quotes"
-        case "string_type" | "string_unicode" | "string_sub_type":
-            return f'{shown} must be text in quotes, for example {path[-1]} = "a-word"'
-        case "string_pattern_mismatch":
-            return (
-                f"{shown} must start with a letter or digit and hold only letters, digits, "
-                "dots, dashes and underscores"
-            )
-        case "string_too_long":
-            return f"{shown} must have at most {limits['max_length']} characters"
         case "union_tag_invalid":
             given = value.get("kind") if isinstance(value, dict) else limits["tag"]
             hint = known_or_nearest(str(given), _kinds(field))
             return f"{where}.kind = {show(given)} is not a kind of it ({hint})"
         case "union_tag_not_found":
-            choices = " or ".join(f'"{kind}"' for kind in _kinds(field))
+            choices = " or ".join(map(show, _kinds(field)))
             return f"{where}.kind is missing: say which kind it is with kind = {choices}"
-        case "literal_error":
-            return f"{shown} must be {limits['expected']}"
-        case "model_type" | "model_attributes_type":
-            return f"{shown} must be a table: write [{where}], and its keys on the lines below"
-        case "tuple_type":
-            return f"{shown} must be one value, or a list with a value for each section"
         case "value_error":
             text = str(limits["error"])
             return f"{where}.{text}" if where and not text.startswith(where) else text
-        case _:
-            message = fault["msg"]
-            return f"{shown}: {message[0].lower()}{message[1:]}"
+    says = _SAYS.get(kind) or _SAYS.get(kind.split("_")[0])
+    if says is None:
+        message = fault["msg"]
+        return f"{shown}: {message[0].lower()}{message[1:]}"
+    in_unit = f" in{unit}" if unit else ""
+    return says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
 
 
 def _walk(
@@ -148,33 +133,29 @@ def _walk(
     field: FieldInfo | None = None
     inside: list[type[BaseModel]] = [model]
     for step in loc:
-        named = [m for m in inside if isinstance(step, str) and step in m.model_fields]
         tagged = [m for m in inside if _tag(m) == step]
         if tagged and path and len(inside) > 1:
             inside, owner = tagged, tagged[0]
-        elif named:
+        elif named := [m for m in inside if step in m.model_fields]:
             owner, field = named[0], named[0].model_fields[str(step)]
             inside = _models_in(field.annotation)
             path.append(str(step))
         elif isinstance(step, int):
-            path[-1:] = [f"{path[-1]}[{step + 1}]"] if path else [f"[{step + 1}]"]
-        elif step in (ONE, EACH):
-            continue
-        else:
+            path[-1:] = [f"{path[-1] if path else ''}[{step + 1}]"]
+        elif step not in (ONE, EACH):
             owner = inside[0] if inside else None
             field = field if field and typing.get_origin(field.annotation) is dict else None
-            path.append(str(step))
+            path.append(step)
     return path, owner, field
 
 
 def _kinds(field: FieldInfo | None) -> list[str]:
     models = _models_in(field.annotation) if field is not None else []
-    return [str(_tag(model)) for model in models if _tag(model) is not None]
+    return [str(kind) for kind in map(_tag, models) if kind is not None]
 
 
 def _tag(model: type[BaseModel]) -> Any:
-    kind = model.model_fields.get("kind")
-    return kind.default if kind is not None else None
+    return model.model_fields["kind"].default if "kind" in model.model_fields else None
 
 
 _NESTING = (typing.Union, types.UnionType, typing.Annotated, tuple, list, dict)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import os
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
@@ -58,13 +60,7 @@ class Scene(Model):
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
         for path, value in _lists(self):
-            structure = self.structure
-            wanted = _length_of(
-                path,
-                structure.sections,
-                self._pulleys_at(path),
-                closed=structure.closed,
-            )
+            wanted = _length_at(self, path)
             if wanted is not None and len(value) != wanted:
                 raise ValueError(
                     f"{path} has {len(value)} values, but the structure needs {wanted}: give "
@@ -100,11 +96,6 @@ class Scene(Model):
         present = [] if self.cables is None else self.cables.present()
         return max((self.pulleys_of(cable) + 1 for _, cable in present), default=0)
 
-    def _pulleys_at(self, path: str) -> int:
-        """Pulleys of the cable that a dotted path leads to."""
-        cable = getattr(self.cables, path.split(".")[1], None) if "." in path else None
-        return self.pulleys_of(cable) if isinstance(cable, Cable) else self.structure.pulleys
-
     def with_values(self, values: dict[str, Any]) -> Scene:
         """A copy with the fields at dotted paths replaced in their order, validated again.
 
@@ -124,8 +115,8 @@ class Scene(Model):
         (120000000000.0, 200000000000.0, 120000000000.0)
         """
         table = self.to_table()
-        for path, value in values.items():
-            set_path(table, path, value, _length_in(table, section_of(path)[0]))
+        for path, value in copy.deepcopy(values).items():  # later paths may lead into its tables
+            set_path(table, path, value, _length_at(table, section_of(path)[0]) or 1)
         return scene_from_table(table, source=f"scene {self.name}")
 
     def to_table(self) -> dict[str, Any]:
@@ -146,10 +137,23 @@ def place_of(path: str, *, closed: bool) -> str | None:
     return "section"
 
 
-def _length_of(path: str, sections: int, pulleys: int, *, closed: bool) -> int | None:
-    """Values in a list at ``path``; None if any number."""
-    lengths = {"section": sections, "corner": sections + 1, "pulley": pulleys}
-    return lengths.get(place_of(path, closed=closed) or "")
+def _length_at(scene: Scene | dict[str, Any], path: str) -> int | None:
+    """Values in a list at ``path``, also of tables that may still be refused; None: any number."""
+    sections = _at(scene, "structure.sections")
+    if not isinstance(sections, int):
+        return None
+    place = place_of(path, closed=_at(scene, "structure.closed") is not False)
+    pulleys = scene.structure.pulleys if isinstance(scene, Scene) else pulleys_of(sections)
+    both = _at(scene, ".".join([*path.split(".")[:2], "end"])) == "both"
+    lengths = {"section": sections, "corner": sections + 1, "pulley": pulleys + both}
+    return lengths.get(place or "")
+
+
+def _at(owner: Any, path: str) -> Any:
+    """What a dotted path leads to in a record or in nested tables; None if nothing."""
+    for step in path.split("."):
+        owner = owner.get(step) if isinstance(owner, dict) else getattr(owner, step, None)
+    return owner
 
 
 def _check_faults(scene: Scene) -> None:
@@ -157,47 +161,28 @@ def _check_faults(scene: Scene) -> None:
     cables = [] if scene.cables is None else scene.cables.present()
     places = {"section": scene.structure.sections, "cable": len(cables)}
     for number, fault in enumerate(scene.faults, 1):
+        if isinstance(fault, CableFault) and not cables:
+            raise ValueError(
+                f"faults[{number}] is a fault of a cable, but the scene has none: add "
+                "[cables.upper], or leave the fault out"
+            )
         if isinstance(fault, CableFault) and fault.cable <= len(cables):
             pulleys = scene.pulleys_of(cables[fault.cable - 1][1])
             places |= {"pulley": pulleys, "span": pulleys + 1}
         for name, most in places.items():
-            given = getattr(fault, name, 0)
-            if isinstance(fault, CableFault) and not cables:
+            if getattr(fault, name, 0) > most:
                 raise ValueError(
-                    f"faults[{number}] is a fault of a cable, but the scene has none: add "
-                    "[cables.upper], or leave the fault out"
-                )
-            if given > most:
-                raise ValueError(
-                    f"faults[{number}].{name} = {given} must be at most {most}: there is no such "
-                    f"{name}"
+                    f"faults[{number}].{name} = {getattr(fault, name)} must be at most {most}: "
+                    f"there is no such {name}"
                 )
 
 
-def _length_in(table: dict[str, Any], path: str) -> int:
-    """The same for nested tables that may still be refused."""
-    structure = table.get("structure")
-    if not isinstance(structure, dict) or not isinstance(structure.get("sections"), int):
-        return 1
-    sections = structure["sections"]
-    closed = structure.get("closed") is not False
-    own: Any = table
-    for step in path.split(".")[:2]:
-        own = own.get(step) if isinstance(own, dict) else None
-    both = isinstance(own, dict) and own.get("end") == "both"
-    pulleys = pulleys_of(sections, winches=2 if both else 1)
-    return _length_of(path, sections, pulleys, closed=closed) or 1
-
-
-def _lists(record: Model, prefix: str = "") -> list[tuple[str, tuple[float, ...]]]:
-    found: list[tuple[str, tuple[float, ...]]] = []
-    for name in type(record).model_fields:
-        value = getattr(record, name)
+def _lists(record: Model, prefix: str = "") -> Iterator[tuple[str, tuple[float, ...]]]:
+    for name, value in record:
         if isinstance(value, Model):
-            found += _lists(value, f"{prefix}{name}.")
+            yield from _lists(value, f"{prefix}{name}.")
         elif isinstance(value, tuple) and name != "faults":
-            found.append((f"{prefix}{name}", value))
-    return found
+            yield f"{prefix}{name}", value
 
 
 def scene_from_table(table: dict[str, Any], *, source: str) -> Scene:

@@ -24,7 +24,6 @@ from pydantic.fields import FieldInfo
 LEFT_OUT = "none"
 """The word that leaves out a part which would be there by default: ``stop = "none"``."""
 
-
 ListIn = BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
 """TOML arrays arrive as lists; a frozen record keeps tuples."""
 

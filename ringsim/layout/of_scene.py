@@ -16,7 +16,7 @@ def layout_of(scene: Any, coordinate: float | None = None) -> Layout:
     >>> from ringsim.scene import load_scene
     >>> layout = layout_of(load_scene("truss2"))
     >>> len(layout.bodies), len(layout.rods), len(layout.joints)
-    (6, 12, 23)
+    (6, 12, 24)
     """
     q = scene.structure.coordinate if coordinate is None else coordinate
     layout: Layout = scene.structure.layout(scene, q + 1j * STEP)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from ringsim.cable.cables import pulleys_of
 from ringsim.choice import kind_of
 from ringsim.layout.bodies import Lump
 from ringsim.layout.draft import Draft
@@ -113,7 +114,7 @@ class PantographRing(Structure):
     @property
     def pulleys(self) -> int:
         """Pulleys of a cable with one winch: two hinges and a V-joint a section, less its end."""
-        return 3 * self.sections - 1
+        return pulleys_of(self.sections)
 
     @property
     def polygon(self) -> int:

@@ -46,6 +46,12 @@ def test_original_scene_stays_as_it_was() -> None:
     assert RING18.to_toml() == before
 
 
+def test_tables_that_are_given_stay_as_they_were() -> None:
+    values = {"structure": {"kind": "pantograph-ring"}, "structure.sections": 6}
+    assert RING18.with_values(values).structure.sections == 6
+    assert values == {"structure": {"kind": "pantograph-ring"}, "structure.sections": 6}
+
+
 @pytest.mark.parametrize("section", [1, 2, 18])
 def test_sections_are_counted_from_one(section: int) -> None:
     scene = changed(RING18, f"rods.young_modulus[{section}]=1e11")
