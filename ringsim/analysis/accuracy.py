@@ -15,10 +15,9 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from ringsim.analysis.errors import OUTPUTS, Errors, largest
+from ringsim.analysis.errors import OUTPUTS, Array, Errors, largest
 from ringsim.analysis.ladder import PATHS, STANDING, Rung
 
-Array = NDArray[np.float64]
 TARGETS = (1e-2, 1e-3, 1e-4)
 """Errors for which the cheapest setting is looked up."""
 _COUNTS = {

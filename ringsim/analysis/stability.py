@@ -16,8 +16,6 @@ from ringsim.analysis.errors import held
 from ringsim.parts.solver import Solver
 from ringsim.variables import VARIABLES, Status
 
-Array = NDArray[np.float64]
-
 OK, ENDED, WRONG = "ok", "ended", "wrong"
 OUT_OF_STEPS = "step limit"
 CAUSES = (
