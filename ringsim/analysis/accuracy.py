@@ -1,4 +1,9 @@
-"""Errors of numerical settings against a reference, their orders and their cost."""
+"""Errors of numerical settings against a reference, their cost, and which are worth it.
+
+A single error may be small by chance: errors of coarse steps and of few elements have signs and
+may cancel.  The error that a setting is good for is therefore the largest among itself and all
+settings that are finer than it, plus the reference's own uncertainty.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
-from ringsim.analysis.errors import OUTPUTS, Errors
-from ringsim.analysis.frontier import bounds, cheapest, eligible, frontier, in_favour, typical_cost
-from ringsim.analysis.ladder import PATHS, Rung
-from ringsim.analysis.reference import largest
+from ringsim.analysis.errors import OUTPUTS, Array, Errors, largest
+from ringsim.analysis.ladder import PATHS, STANDING, Rung
 
-Array = NDArray[np.float64]
 TARGETS = (1e-2, 1e-3, 1e-4)
 """Errors for which the cheapest setting is looked up."""
 _COUNTS = {
@@ -23,6 +26,15 @@ _COUNTS = {
     "newton_iterations": ("iterations of Newton's method", "1"),
     "jacobians": ("Jacobians built and factorised", "1"),
 }
+WORTH_A_CHANGE = 0.9
+"""Cost of another setting over that of the scene's own up to which it is worth a change: smaller
+differences are within the fit of the cost and the luck of single steps."""
+_OTHER_MODELS = ("fidelity", "formulation", "constant step")
+"""Ladders without the scene's own model, rods and step control: they are not recommended."""
+_SAME = ("solver.step_control", "rods.kind")
+_SMALLER = (
+    "solver.step", "solver.tolerance", "solver.deviation_tolerance", "solver.newton_tolerance",
+)  # fmt: skip
 NEEDED = (*OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "final_time")
 
 
@@ -51,13 +63,13 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     -------
     xr.Dataset
         ``error`` and ``bound`` (rung, output): relative, and what the setting is good for, see
-        :mod:`ringsim.analysis.frontier`; ``order`` (graded, output): observed along a ladder, NaN
-        where errors come near the reference's own; ``uncertainty`` (output): of the reference,
-        relative; ``reference`` (output): its value, in the output's unit, NaN for series (of the
-        asynchrony the largest value); ``frontier`` (rung, output): whether no other setting of the
-        scene's own model is both cheaper and better; ``cheapest`` (target, output): the rung among
-        them, -1 if there is none; ``cost`` (rung): processor time without the scatter of single
-        timings, s; counts, status and settings (rung); ``from_truth`` (rung, truth) and
+        :func:`bounds`; ``order`` (graded, output): observed along a ladder, NaN where errors come
+        near the reference's own; ``uncertainty`` (output): of the reference, relative;
+        ``reference`` (output): its value, in the output's unit, NaN for series (of the asynchrony
+        the largest value); ``frontier`` (rung, output): whether no other setting of the scene's
+        own model is both cheaper and better; ``cheapest`` (target, output): the rung among them,
+        -1 if there is none; ``cost`` (rung): processor time without the scatter of single timings,
+        s; counts, status and settings (rung); ``from_truth`` (rung, truth) and
         ``reference_from_truth`` (truth): distances from the truths, relative.
 
     Raises
@@ -75,10 +87,10 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     work = np.column_stack([residuals, counts["jacobians"], counts["steps"]])
     cost = typical_cost(counts["cpu_time"], work, rungs)
     cost = np.where(errors.good, cost, counts["cpu_time"])
-    choice = eligible(rungs)
+    ladders = [rung.ladder for rung in rungs]
+    choice = np.array([ladder not in _OTHER_MODELS for ladder in ladders])
     ranked = np.where(choice[:, None], good, np.nan)
     graded, orders = errors.orders()
-    ladders = [rung.ladder for rung in rungs]
     pick = cheapest(in_favour(cost, ladders), ranked, TARGETS)
     best = [errors.best.get(name, np.nan) for name in outputs]
     both, one = ("rung", "output"), ("rung",)
@@ -143,3 +155,73 @@ def _add_truths(found: xr.Dataset, errors: Errors, truths: Sequence[Truth]) -> x
             "truth", distance[:, -1], words | {"long_name": f"reference: {words['long_name']}"}
         ),
     ).assign_coords(truth=[f"{truth.output}: {truth.source}" for truth in truths])  # fmt: skip
+
+
+def bounds(error: Array, rungs: Sequence[Rung], uncertainty: Array) -> Array:
+    """Errors that settings are good for, shape (rung, output); NaN where a run failed.
+
+    ``error`` has that shape, too, and ``uncertainty``, of the reference, shape (output,).
+    """
+    worst = [
+        np.fmax.reduce(error[[k, *(j for j, other in enumerate(rungs) if _refines(other, rung))]])
+        for k, rung in enumerate(rungs)
+    ]
+    return np.where(np.isfinite(error), worst, np.nan) + uncertainty
+
+
+def _refines(fine: Rung, coarse: Rung) -> bool:
+    """Whether a setting is finer in something and coarser in nothing."""
+    if "fidelity" in (fine.ladder, coarse.ladder):
+        return False
+    a, b = fine.values, coarse.values
+    if any(a[path] != b[path] for path in _SAME):
+        return False
+    finer = [b[path] - a[path] for path in _SMALLER] + [a["rods.elements"] - b["rods.elements"]]
+    return bool(min(finer) >= 0.0 and max(finer) > 0.0)
+
+
+def typical_cost(seconds: Array, work: Array, rungs: Sequence[Rung]) -> Array:
+    """Processor time of each setting without the scatter of single timings, shape (rung,), s.
+
+    Every piece of work costs the same within a ladder, but for a factor for the rods' formulation
+    and elements: fitted to the measured ``seconds``, shape (rung,), and the counts of ``work``,
+    shape (rung, kinds).  A fidelity keeps its own time.
+    """
+    cost, measured = np.array(seconds, dtype=float), np.isfinite(seconds)
+    sizes = [
+        () if r.ladder == "fidelity" else (r.values["rods.kind"], r.values["rods.elements"])
+        for r in rungs
+    ]
+    commonest = max(set(sizes), key=sizes.count)
+    own = np.array([size == commonest for size in sizes]) & measured
+    scale = 1.0 / np.maximum(seconds[own], 1e-9)  # relative errors count
+    shares, _ = nnls(work[own] * scale[:, None], np.ones(own.sum()))
+    plain = work @ shares
+    if not (plain[own] > 0.0).all():
+        return cost
+    for size in set(sizes) - {()}:
+        members = np.array([each == size for each in sizes]) & measured & (plain > 0.0)
+        if members.any():
+            cost[members] = plain[members] * np.median(seconds[members] / plain[members])
+    return cost
+
+
+def frontier(cost: Array, error: Array) -> NDArray[np.bool_]:
+    """Settings that no other one beats in both cost and error, shape (rung, output)."""
+    costs, errors = cost[:, None, None], error[:, None, :]  # of the other one
+    no_worse = (costs <= cost[:, None]) & (errors <= error)
+    better = no_worse & ((costs < cost[:, None]) | (errors < error))
+    best: NDArray[np.bool_] = np.isfinite(error) & ~better.any(axis=0)
+    return best
+
+
+def in_favour(cost: Array, ladders: Sequence[str]) -> Array:
+    """Cost by which settings are picked: the scene's own is kept unless another one pays."""
+    return cost * np.where(np.array(ladders) == STANDING, WORTH_A_CHANGE, 1.0)
+
+
+def cheapest(cost: Array, error: Array, targets: Sequence[float]) -> NDArray[np.int64]:
+    """The cheapest setting within each target, shape (target, output); -1 if there is none."""
+    within = error <= np.array(targets)[:, None, None]
+    costs = np.where(within, cost[:, None], np.inf)
+    return np.where(within.any(axis=1), costs.argmin(axis=1), -1)

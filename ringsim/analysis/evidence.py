@@ -15,9 +15,8 @@ import numpy as np
 import xarray as xr
 from pydantic import ConfigDict, Field, ValidationError
 
-from ringsim.analysis.accuracy import settings_at
+from ringsim.analysis.accuracy import in_favour, settings_at
 from ringsim.analysis.errors import GROUPS, OUTPUTS
-from ringsim.analysis.frontier import in_favour
 from ringsim.choice import kind_of
 from ringsim.files import parse_toml, read_text
 from ringsim.parts.solver import NO_DEVIATIONS
@@ -154,9 +153,10 @@ def read_evidence(path: Path | Traversable) -> Evidence:
 
 def evidence_for(scene: Scene) -> Evidence:
     """The evidence of the built-in scene with the same kind of structure and drive."""
-    name = "ring18" if scene.cables is None else "ring18-cable"
     if kind_of(scene.structure) == "planar-truss":
         name = "planar-truss"
-    elif scene.cables is not None and not scene.structure.closed:
-        name = "truss2"
+    elif scene.cables is None:
+        name = "ring18"
+    else:
+        name = "ring18-cable" if scene.structure.closed else "truss2"
     return read_evidence(resources.files("ringsim") / "scenes" / "evidence" / f"{name}.toml")

@@ -17,8 +17,6 @@ from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
 from ringsim.variables import Cause, Status
 
-Array = NDArray[np.float64]
-
 OK, ENDED, WRONG = "ok", "ended", "wrong"
 _NAMELESS = {Cause.NONE, Cause.EXCEPTION, Cause.CRASH, Cause.UNFIT}
 """Ends for which ringsim itself is to blame, and none at all: the status says what there is."""

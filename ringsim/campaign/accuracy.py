@@ -61,7 +61,11 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
     if (ideal := study.ideal()) is not None:
         results = xr.concat([ideal, results], "rung")
         rungs = [Rung("fidelity", "ideal", 0.0, standing(scene)), *rungs]
-        truths += _ideal_truths(ideal.isel(rung=0))
+        if np.isfinite(ideal.deployment_time.item()):
+            source = "one-coordinate equation of the ideal ring"
+            mean = ideal.opening_angle.isel(rung=0).mean(("plane", "section")).to_numpy()
+            truths.append(Truth("deployment_time", source, ideal.deployment_time.item()))
+            truths.append(Truth("opening_angle", f"{source}, mean angle", mean))
     return judge(results, rungs, truths)
 
 
@@ -77,15 +81,15 @@ class _Study:
 
     def run(self, stage: str, rungs: Sequence[Rung]) -> xr.Dataset:
         """Results over the rungs, those that earlier stages ran among them."""
+        shared = [path for path in self.scene.structure.shaping if path in PATHS]
+        paths = [path for path in PATHS if path not in shared]
         keys = [tuple(rung.values[path] for path in PATHS) for rung in rungs]
         missing: dict[tuple[str, bool], dict[tuple[object, ...], Rung]] = {}
         for key, rung in zip(keys, rungs, strict=True):
             if key not in self.known:
                 missing.setdefault(self._campaign(stage, rung), {})[key] = rung
         for (name, stress), own in missing.items():
-            shared = [path for path in self.scene.structure.shaping if path in PATHS]
             given = {path: next(iter(own.values())).values[path] for path in shared}
-            paths = [path for path in PATHS if path not in shared]
             found = self._needed(
                 name, f"Settings of {self.scene.name} against each other ({name})",
                 self.scene.with_values(given | {"record.stress": stress}),
@@ -135,26 +139,12 @@ def _require_ok(rungs: Sequence[Rung], results: xr.Dataset) -> None:
             )
 
 
-def _ideal_truths(ideal: xr.Dataset) -> list[Truth]:
-    if not np.isfinite(ideal.deployment_time):
-        return []
-    source = "one-coordinate equation of the ideal ring"
-    mean = ideal.opening_angle.mean(("plane", "section")).to_numpy()
-    return [
-        Truth("deployment_time", source, float(ideal.deployment_time)),
-        Truth("opening_angle", f"{source}, mean angle", mean),
-    ]
-
-
 def _quadrature(scene: Scene) -> list[Truth]:
     """Deployment time of a ring that only position-dependent loads drive, without losses."""
-    if kind_of(scene.structure) != "pantograph-ring" or scene.cables is not None:
-        return []
-    if not scene.structure.closed:
+    conservative = not scene.joints.present() and (scene.net is None or scene.net.damping == 0.0)
+    if kind_of(scene.structure) != "pantograph-ring" or not scene.structure.closed:
         return []  # the quadrature keeps an arc's end assemblies upright, but they swing
-    if scene.net is not None and scene.net.damping > 0.0:
-        return []
-    if scene.joints.present() or scene.faults or scene.loads is None:
+    if not conservative or scene.cables is not None or scene.faults or scene.loads is None:
         return []
     try:
         found = opening_time(OneCoordinate(scene), scene.structure.coordinate)

@@ -21,16 +21,12 @@ from ringsim.variables import PLANES
 DECADE = 10.0
 """HIGH over LOW from which on values are spaced geometrically."""
 _DEFAULTS = (
-    (
-        ("cables.*.axial_stiffness", "net.stiffness"),
-        ("cables.*.friction.coefficient", "joints.vjoint.viscous", "structure.spring.damping"),
-    ),
+    (("cables.*.axial_stiffness", "net.stiffness"),
+     ("cables.*.friction.coefficient", "joints.vjoint.viscous", "structure.spring.damping")),
     (("rods.damping",), ("solver.step",)),
-    (
-        ("cables.*.winch.winding.speed", "loads.force"),
-        ("stop.stiffness", "structure.rest.stiffness"),
-    ),
-)
+    (("cables.*.winch.winding.speed", "loads.force"),
+     ("stop.stiffness", "structure.rest.stiffness")),
+)  # fmt: skip
 """Panels where none are asked for: for each axis the first path at which the scene has a positive
 number.  A panel without one of its axes is left out."""
 _FACTOR, _STEP_FACTOR = 10.0, 5.0
@@ -91,14 +87,19 @@ def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
             f"--over {over[-1]}: has no partner, and a panel has two axes: give one more --over "
             "PATH=LOW..HIGH, or leave this one out"
         )
-    axes = [sweep_of(scene, text, points) for text in over] or _defaults(scene, points)
-    if not axes:
+    asked = [sweep_of(scene, text, points) for text in over]
+    pairs = list(zip(asked[::2], asked[1::2], strict=True)) or [
+        (x, y)
+        for one, other in _DEFAULTS
+        if (x := _around(scene, one, points)) and (y := _around(scene, other, points))
+    ]
+    if not pairs:
         raise InputError(
             f"--over is missing: {scene.name} holds none of the default pairs of axes: give two "
             "--over PATH=LOW..HIGH"
         )
     found = []
-    for number, (x, y) in enumerate(zip(axes[::2], axes[1::2], strict=True), 1):
+    for number, (x, y) in enumerate(pairs, 1):
         if twice := set(x.paths) & set(y.paths):
             raise InputError(
                 f"--over {x.label}, --over {y.label}: both axes of panel {number} vary "
@@ -176,12 +177,6 @@ def _own_value(scene: Scene, path: str) -> object:
         return field_at(scene, path)
     except (AttributeError, IndexError):
         return None
-
-
-def _defaults(scene: Scene, points: int) -> list[Sweep]:
-    """The axes of the default panels for which a scene has both."""
-    pairs = [[_around(scene, paths, points) for paths in pair] for pair in _DEFAULTS]
-    return [sweep for x, y in pairs if x and y for sweep in (x, y)]
 
 
 def _around(scene: Scene, alternatives: Sequence[str], points: int) -> Sweep | None:

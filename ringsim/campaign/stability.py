@@ -48,11 +48,9 @@ def run_map(folder: Path, panels: Sequence[Panel], workers: int) -> xr.Dataset:
     """
     found = []
     for panel in panels:
-        words = {
-            "name": panel.name, "title": panel.title,
-            "x_label": panel.x.label, "x_units": panel.x.units,
-            "y_label": panel.y.label, "y_units": panel.y.units,
-        }  # fmt: skip
+        words = {"name": panel.name, "title": panel.title}
+        for axis, sweep in (("x", panel.x), ("y", panel.y)):
+            words |= {f"{axis}_label": sweep.label, f"{axis}_units": sweep.units}
         parts = [_run(folder, piece, workers) for piece in _pieces(panel)]
         found.append((words, xr.concat(parts, dim="cell")))
     return joined(found)
@@ -69,19 +67,20 @@ def run_check(
     :func:`run_map` gave; ``share`` and ``seed`` choose the cells.
     """
     which = chosen_for_check(whole, share, seed)
+    starts = 1 + whole["restarts"].values[which].astype(int)
+    taken = (whole["final_time"] / whole["steps"]).values[which]
+    refinements = zip(starts.tolist(), taken.tolist(), strict=True)
+    chosen = dict(zip(which.tolist(), refinements, strict=True))
     finer, begin = [], 0
     for piece in (piece for panel in panels for piece in _pieces(panel)):
-        mine = which[(which >= begin) & (which < begin + len(piece.cells))]
-        if len(mine):
-            own = [piece.cells[cell - begin] for cell in mine]
-            starts = 1 + whole["restarts"].values[mine].astype(int)
-            taken = (whole["final_time"] / whole["steps"]).values[mine]
-            how = list(zip(starts.tolist(), taken.tolist(), strict=True))
+        mine = {k: chosen[begin + k] for k in range(len(piece.cells)) if begin + k in chosen}
+        begin += len(piece.cells)
+        if mine:
+            own, how = [piece.cells[k] for k in mine], list(mine.values())
             # Another choice of cells is another campaign.
             mark = hashlib.sha256(repr(([cell[:2] for cell in own], how)).encode()).hexdigest()[:6]
             again = replace(piece, name=f"{piece.name}-check-{mark}", cells=own)
             finer.append(_run(folder, again, workers, finer=how))
-        begin += len(piece.cells)
     return checked(whole, which, xr.concat(finer, dim="cell")) if finer else whole
 
 
@@ -89,16 +88,14 @@ def _pieces(panel: Panel) -> list[_Piece]:
     """The campaigns of a panel; an axis that shapes the result needs one for each value."""
     shaping = [sweep.shapes(panel.scene) for sweep in (panel.x, panel.y)]
     found: dict[str, _Piece] = {}
-    for x, y in panel.cells():
-        name = panel.name
-        shared: dict[str, float] = {}
-        own: dict[str, float] = {}
-        for shapes, sweep, value in zip(shaping, (panel.x, panel.y), (x, y), strict=True):
+    for cell in panel.cells():
+        name, shared, own = panel.name, dict[str, float](), dict[str, float]()
+        for shapes, sweep, value in zip(shaping, (panel.x, panel.y), cell, strict=True):
             (shared if shapes else own).update(sweep.at(value))
             name += f"-{value}".replace("+", "") if shapes else ""
         if name not in found:
             found[name] = _Piece(name, panel, panel.scene.with_values(shared), [])
-        found[name].cells.append((x, y, own))
+        found[name].cells.append((*cell, own))
     return list(found.values())
 
 

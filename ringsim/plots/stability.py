@@ -11,11 +11,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
+from ringsim.analysis.stability import OK, WRONG
 from ringsim.plots import style
 
-_GOOD, _AGAIN = "ok", "ok, after a new start"
+_AGAIN = "ok, after a new start"
 _LOOKS: dict[str, tuple[str, str]] = {
-    _GOOD: ("#cfe6f5", ""),
+    OK: ("#cfe6f5", ""),
     _AGAIN: (style.SKY, "r"),
     "end time": ("#d9d9d9", "t"),
     "energy lost": (style.ORANGE, "L"),
@@ -29,7 +30,7 @@ _LOOKS: dict[str, tuple[str, str]] = {
     "step limit": ("#f0e442", "S"),
     "time limit": ("#8c6d31", "T"),
     "refused": ("#5e5e5e", "X"),
-    "wrong": ("black", "!"),
+    WRONG: ("black", "!"),
 }
 """Colour and letter of each kind of cell; the letter tells what the colour may not."""
 _OTHER = ("#5e5e5e", "?")
@@ -45,9 +46,8 @@ def stability(whole: xr.Dataset) -> Figure:
     seen: set[str] = set()
     for number, axes in enumerate(panels):
         cells = whole.isel(cell=(whole["of_group"] == number).values, group=number)
-        kinds = [_kind(cells.isel(cell=k)) for k in range(cells.sizes["cell"])]
+        seen |= set(kinds := _kinds(cells))
         _panel(axes, cells, kinds)
-        seen |= set(kinds)
     words = [word for word in [*_LOOKS, *sorted(seen - set(_LOOKS))] if word in seen]
     handles = [
         Patch(facecolor=colour, edgecolor=style.GREY, label=f"{letter}  {word}".strip())
@@ -78,11 +78,11 @@ def _panel(axes: Axes, cells: xr.Dataset, kinds: list[str]) -> None:
     axes.set_ylabel(_label(cells, "y", 32), fontsize=9)
 
 
-def _kind(cell: xr.Dataset) -> str:
-    verdict = str(cell["verdict"].values)
-    if verdict == "ok":
-        return _AGAIN if float(cell["restarts"]) > 0.0 else _GOOD
-    return verdict if verdict == "wrong" else str(cell["cause"].values)
+def _kinds(cells: xr.Dataset) -> list[str]:
+    verdict, cause = (cells[name].values.astype(str) for name in ("verdict", "cause"))
+    good = np.where(cells["restarts"] > 0.0, _AGAIN, OK)
+    found: list[str] = np.select([verdict == OK, verdict == WRONG], [good, verdict], cause).tolist()
+    return found
 
 
 def _label(group: xr.Dataset, axis: str, width: int) -> str:

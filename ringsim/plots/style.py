@@ -106,8 +106,7 @@ def span_sizes(axes: Axes, sizes: np.ndarray) -> None:
     """
     known = sizes[np.isfinite(sizes) & (sizes > 0.0)]
     largest = float(known.max()) if known.size else 1.0
-    typical = float(np.median(known)) if known.size else 1.0
-    if typical > _FLAT * largest:
+    if not known.size or np.median(known) > _FLAT * largest:
         axes.set_ylim(0.0, 1.2 * largest)
         return
     lowest = max(float(np.quantile(known, 0.02)), 1e-5 * largest)
