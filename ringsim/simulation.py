@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ringsim.engine.solve import solve
+from ringsim.engine.integrate import solve
 from ringsim.outputs.error_bars import error_bars
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError

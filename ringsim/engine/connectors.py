@@ -34,15 +34,15 @@ the state, the opening angles and their rates, shape (planes, sections), rad and
 
 def connect(model: Model) -> list[Reacting]:
     """Springs, contacts, net and friction of a model; before ``Assembly.finish``."""
-    scene, layout, found = model.scene, model.layout, []
+    layout, found = model.layout, []
     for spring in layout.springs:
         law, ends = spring.law, [model.bodies[k][1] for k in (spring.first, spring.second)]
         linear = {"stiffness": law.stiffness, "damping": law.damping}
         found.append(_strings(model, [ends], law.tension, law.free_length, [linear]))
     found += [_contact(model, contact) for contact in layout.contacts]
-    if scene.net is not None and layout.net is not None:
-        found.append(_net(model, scene.net, layout.net))
-    return found + [_friction(model, *one) for one in scene.joints.present().items()]
+    if layout.net is not None:
+        found.append(_net(model, layout.net))
+    return found + [_friction(model, *one) for one in model.scene.joints.present().items()]
 
 
 class Stops:
@@ -146,18 +146,19 @@ def _friction_settings(model: Model, law: JointFriction) -> dict[str, Any]:
     )
 
 
-def _net(model: Model, net: Net, held: HubNet) -> Reacting:
+def _net(model: Model, held: HubNet) -> Reacting:
     """The net's strings and their hub.
 
     The hub starts where its strings balance: from anywhere else it would swing for the whole run,
     next to weightless as it is, with the energy of its first stretch.
     """
-    assembly, nodes = model.assembly, [model.bodies[number][1] for number in held.bodies]
+    assembly, net = model.assembly, held.law
+    nodes = [model.bodies[number][1] for number in held.bodies]
     hub = assembly.add_node(
         item.NodePoint(referenceCoordinates=list(held.hub)),
         np.mean([assembly.starts[int(node)][:3] for node in nodes], axis=0),
     )
-    mass = item.ObjectMassPoint(nodeNumber=hub, mass=held.mass)
+    mass = item.ObjectMassPoint(nodeNumber=hub, mass=net.hub_mass)
     assembly.bodies.append(assembly.system.AddObject(mass))
     settings = [_string_settings(model, at_section(net, k)) for k in range(len(nodes))]
     each, free = at_section(net, np.arange(len(nodes))), net.neutral_length

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import exudyn as exu
@@ -109,28 +111,26 @@ class Openings:
     """Opening angles of a structure."""
 
     def __init__(self, model: Model) -> None:
-        self._planes: list[Any] = []
+        self._planes: list[Callable[[State], tuple[Array, Array]]] = []
         for plane, joints in zip(model.layout.openings, model.openings(), strict=True):
             if joints:
+                group = JointGroup(model, [joint for joint, _ in joints])
                 senses = np.array([sense for _, sense in joints])
-                self._planes.append((JointGroup(model, [j for j, _ in joints]), senses))
+                self._planes.append(partial(_of_joints, group, senses))
             else:
-                self._planes.append([
-                    (model.assembly.coordinates_of(model.bodies[one.body][1])[:3], one.centre)
-                    for one in plane
-                    if isinstance(one, ChordOpening)
-                ])  # fmt: skip
+                chords = [one for one in plane if isinstance(one, ChordOpening)]
+                nodes = [model.bodies[one.body][1] for one in chords]
+                where = np.array([model.assembly.coordinates_of(node)[:3] for node in nodes])
+                centres = np.array([one.centre for one in chords])
+                self._planes.append(partial(_of_chords, where, centres))
 
     def read(self, state: State) -> tuple[Array, Array]:
         """Opening angles and their rates, shape (planes, sections), rad and rad/s."""
-        found = [
-            _of_chords(state, plane) if isinstance(plane, list) else _of_joints(state, *plane)
-            for plane in self._planes
-        ]
-        return np.array([angle for angle, _ in found]), np.array([rate for _, rate in found])
+        angles, rates = zip(*(plane(state) for plane in self._planes), strict=True)
+        return np.array(angles), np.array(rates)
 
 
-def _of_joints(state: State, group: JointGroup, senses: Array) -> tuple[Array, Array]:
+def _of_joints(group: JointGroup, senses: Array, state: State) -> tuple[Array, Array]:
     """The folded angle pi - delta is followed from -pi/2 to 3 pi/2, so that neither the deployed
     nor the stowed end lies on the jump of the arc tangent.
     """
@@ -140,11 +140,7 @@ def _of_joints(state: State, group: JointGroup, senses: Array) -> tuple[Array, A
     return angle, -senses * rate
 
 
-def _of_chords(state: State, chords: list[tuple[Indices, Array]]) -> tuple[Array, Array]:
-    angles, rates = [], []
-    for where, centre in chords:
-        x, y, _ = state.position[where] - centre
-        moving = state.velocity[where]
-        angles.append(np.arctan2(x, -y))
-        rates.append((x * moving[1] - y * moving[0]) / (x * x + y * y))
-    return np.array(angles), np.array(rates)
+def _of_chords(where: Indices, centres: Array, state: State) -> tuple[Array, Array]:
+    x, y, _ = (state.position[where] - centres).T
+    x_rate, y_rate, _ = state.velocity[where].T
+    return np.arctan2(x, -y), (x * y_rate - y * x_rate) / (x * x + y * y)

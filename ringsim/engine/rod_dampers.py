@@ -25,6 +25,7 @@ damper works against, and in the intrinsic measure they are not.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import exudyn as exu
@@ -70,18 +71,18 @@ class RodDampers:
         self.numbers: dict[int, int] = {}
         self.latest = np.zeros((0, 6))
         self._dampers: list[Any] = []
-        self._rows: list[Array] = []
+        self._matrices: list[Array] = []
         self._short = 0.0
         self._past: list[tuple[float, Array]] = []
         self._prepared = (-1.0, -1.0)
         self._lead = 0.0
-        self._offsets = np.zeros((0, 6))
+        self._offsets = np.zeros(6)
         self._by_velocity = False
         self._found: _Reading | None = None
         self._kept: _Reading | None = None
 
     def add(self, system: Any, markers: list[Any], damping: Array, relaxation: float) -> int:
-        """A damper between two markers that coincide.
+        """A damper between two markers that coincide; returns its row in ``latest``.
 
         Parameters
         ----------
@@ -89,20 +90,12 @@ class RodDampers:
             C, shape (6, 6), N s/m and N m s.
         relaxation
             The rod's Kelvin-Voigt time tau, s.
-
-        Returns
-        -------
-        int
-            Its row in ``latest``.
         """
-        self._dampers.append(
-            system.AddObject(
-                item.ObjectConnectorRigidBodySpringDamper(
-                    markerNumbers=markers, useIntrinsicFormulation=True
-                )
-            )
+        damper = item.ObjectConnectorRigidBodySpringDamper(
+            markerNumbers=markers, useIntrinsicFormulation=True
         )
-        self._rows.append(damping)
+        self._dampers.append(system.AddObject(damper))
+        self._matrices.append(damping)
         self._short = max(self._short, _SHORT * relaxation)
         return len(self._dampers) - 1
 
@@ -119,19 +112,16 @@ class RodDampers:
             if self._found is None or self._found.time != start:
                 raise RuntimeError(f"the rods' dampers were not read at {start:.9g} s")
             self._past = [*self._past[-1:], (start, self._found.strains)]
-        if time - start >= self._short:
-            if self._by_velocity:
-                self._intrinsic(system, wanted=True)
-                self._by_velocity = False
+        matrices, by_velocity = np.array(self._matrices), time - start < self._short
+        if by_velocity != self._by_velocity:
+            self._by_velocity = by_velocity
+            self._intrinsic(system, wanted=not by_velocity)
+            self._set(system, "stiffness", np.zeros_like(matrices))
+            self._set(system, "damping", by_velocity * matrices)
+        if not by_velocity:
             self._lead, self._offsets = _difference(time, self._past)
-            self._set(system, "stiffness", self._lead * np.array(self._rows))
+            self._set(system, "stiffness", self._lead * matrices)
             self._set(system, "offset", self._offsets)
-            self._set(system, "damping", np.zeros((len(self._rows), 6, 6)))
-        elif not self._by_velocity:
-            self._by_velocity = True
-            self._intrinsic(system, wanted=False)
-            self._set(system, "stiffness", np.zeros((len(self._rows), 6, 6)))
-            self._set(system, "damping", np.array(self._rows))
 
     def lost(self, system: Any, time: float) -> float:
         """Energy taken since the reading that was kept last, J: mean force times change of strain.
@@ -146,14 +136,13 @@ class RodDampers:
         if self._by_velocity:
             rates = self._outputs(system, _VELOCITY, _SPIN)
             self._intrinsic(system, wanted=True)
-            strains = self._outputs(system, _SHIFT, _TURN)
+        strains = self._outputs(system, _SHIFT, _TURN)
+        if self._by_velocity:
             self._intrinsic(system, wanted=False)
         else:
-            strains = self._outputs(system, _SHIFT, _TURN)
-            known = bool(self._past)
-            rates = self._lead * (strains - self._offsets) if known else np.zeros_like(strains)
+            rates = self._lead * (strains - self._offsets)
         before = self._kept
-        self.latest = np.einsum("nij,nj->ni", np.array(self._rows), rates)
+        self.latest = np.einsum("nij,nj->ni", np.array(self._matrices), rates)
         self._found = _Reading(time, strains, rates, self.latest, self._by_velocity)
         if before is None:
             return 0.0
@@ -167,13 +156,12 @@ class RodDampers:
         """Count what is lost from the last reading on."""
         self._kept = self._found
 
-    def _set(self, system: Any, name: str, values: Array) -> None:
+    def _intrinsic(self, system: Any, *, wanted: bool) -> None:
+        self._set(system, "useIntrinsicFormulation", [wanted] * len(self._dampers))
+
+    def _set(self, system: Any, name: str, values: Sequence[Any] | Array) -> None:
         for damper, value in zip(self._dampers, values, strict=True):
             system.SetObjectParameter(damper, name, value)
-
-    def _intrinsic(self, system: Any, *, wanted: bool) -> None:
-        for damper in self._dampers:
-            system.SetObjectParameter(damper, "useIntrinsicFormulation", wanted)
 
     def _outputs(self, system: Any, shift: Any, turn: Any) -> Array:
         output = system.GetObjectOutput

@@ -12,14 +12,15 @@ from ringsim.engine.model import Model
 from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.layout.bodies import OnRod
 from ringsim.layout.joints import JointOpening
-from ringsim.stepping import scales
+from ringsim.parts.persection import spread
+from ringsim.stepping.scales import Scales
 from ringsim.theory.one_coordinate import OneCoordinate
 
 _SLIGHT = 1e-3
 """Energy that does not matter, over the largest force of a structure's springs along a rod."""
 
 
-def scales_of(built: Built) -> scales.Scales:
+def scales_of(built: Built) -> Scales:
     """What the ideal structure, as stowed, the stops and the cables say before a run."""
     model, scene, structure = built.model, built.model.scene, built.model.scene.structure
     angles, rates = model.layout.opening_angles()
@@ -27,11 +28,12 @@ def scales_of(built: Built) -> scales.Scales:
     ideal = OneCoordinate(scene)
     acceleration = per_angle * ideal.acceleration_from_rest(structure.coordinate)
     inertia = ideal.motion(structure.coordinate).inertia / per_angle**2
-    rate = scales.reference_rate(acceleration, travel, scene.solver.end_time)
+    # The mean rate if the first acceleration lasted, at least that of the longest run.
+    rate = max(math.sqrt(0.5 * abs(acceleration) * travel), travel / scene.solver.end_time)
     # Springs of its own set their own scale: what they would do along a rod.
     pushed = _SLIGHT * structure.push * structure.reach
     energy = pushed or 0.5 * inertia * rate**2
-    found = scales.Scales(rate, energy, travel, structure.reach, contact_step=_contact_step(model))
+    found = Scales(rate, energy, travel, structure.reach, contact_step=_contact_step(model))
     if built.cables is None or scene.cables is None:
         return found
     cables, lengths = scene.cables.present(), np.abs(built.cables.ropes.content)
@@ -42,10 +44,20 @@ def scales_of(built: Built) -> scales.Scales:
     )
     return replace(
         found,
-        first_step=scales.swing_step(inertia, stiffness, 50),
+        first_step=_swing_step(inertia, stiffness, 50),
         slack_tension=float(widths.max()),
         slack_energy=0.1 * float(np.sum(widths * lengths)),
     )
+
+
+def _swing_step(inertia: float, stiffness: float, steps: int) -> float:
+    """Step in s that takes so many to the period 2 pi sqrt(I / k) of a swing (kg m^2, N m/rad).
+
+    20 for a bounce on a stop: the period is right to (w h)^2 / 12 = 0.8 %.  50 for ropes: a winch
+    that starts at once throws the structure into its swing on them, often with the largest tension
+    of the run, and the first V-joint moves before the others, that is faster than the period says.
+    """
+    return 2.0 * math.pi * math.sqrt(inertia / stiffness) / steps
 
 
 def _contact_step(model: Model) -> float:
@@ -59,17 +71,21 @@ def _contact_step(model: Model) -> float:
             rod = model.layout.rods[mount.rod]
             ends = sum(mass for _, mass in rod.masses)
             inertia += (rod.mass / 3.0 + ends) * rod.length**2
-    return scales.swing_step(inertia, stop.stiffness, 20)
+    return _swing_step(inertia, stop.stiffness, 20)
 
 
 def residual_tolerance(built: Built) -> float:
-    """Residual norm in N at which Newton stops, from loads, springs and the stiffest element."""
+    """Residual norm in N at which Newton stops: a share of the driving forces, but above what
+    round-off lets it reach, the rate EA / L of the stiffest element times coordinates of order 1 m.
+    """
     scene, layout = built.model.scene, built.model.layout
     drive = float(np.linalg.norm([force for _, force in layout.forces])) + scene.structure.push
-    if scene.net is not None and layout.net is not None:
-        drive += float(np.linalg.norm(layout.net.stiffness)) * scene.net.neutral_length
+    if layout.net is not None:
+        net, springs = layout.net.law, len(layout.net.bodies)
+        drive += float(np.linalg.norm(spread(net.stiffness, springs))) * net.neutral_length
     stiffest = max(rod.young_modulus * rod.tube.area / rod.lengths.min() for rod in layout.rods)
     if scene.rods.damping > 0.0:
         stiffest *= STIFFENING
     size = built.model.assembly.system.systemData.ODE2Size()
-    return scales.residual_tolerance(scene.solver.newton_tolerance, drive, float(stiffest), size)
+    reached = 4.0 * float(np.finfo(float).eps) * float(stiffest) * math.sqrt(size)
+    return max(scene.solver.newton_tolerance * drive, reached)

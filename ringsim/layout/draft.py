@@ -230,7 +230,7 @@ class Draft:
             return None
         held = tuple(ref.number for ref in self.corners[0])
         hub = FreeHub(net, len(held)).hub(np.array([self.bodies[k].pose.place for k in held]))
-        return HubNet(hub, net.hub_mass, held, spread(net.stiffness, len(held)))
+        return HubNet(net, hub, held)
 
     def _forces(self) -> tuple[tuple[int, Array], ...]:
         if self.scene.loads is None:

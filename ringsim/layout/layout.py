@@ -79,7 +79,7 @@ class Layout:
         if self.boom is not None:
             parts.append(("boom", self.boom.lump.mass))
         if self.net is not None:
-            parts.append(("hub", self.net.mass))
+            parts.append(("hub", self.net.law.hub_mass))
         found: dict[str, float] = {}
         for group, mass in parts:
             found[group] = found.get(group, 0.0) + mass

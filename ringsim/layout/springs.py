@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.layout.bodies import Lump, OnBody
+from ringsim.parts.net import Net
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Spring:
+class Spring(NamedTuple):
     """A linear spring with a damper between the origins of two bodies.
 
     ``law`` is its record (ringsim.parts): ``stiffness``, ``damping``, ``free_length``, and
@@ -26,8 +25,7 @@ class Spring:
     law: Any
 
 
-@dataclass(frozen=True)
-class Contact:
+class Contact(NamedTuple):
     """A body's origin that may not come closer than ``room`` to the plane x_axis = 0.
 
     ``law`` is its record, with ``push(depth, rate, xp)`` as a ``Reaction``.
@@ -39,30 +37,18 @@ class Contact:
     law: Any
 
 
-@dataclass(frozen=True)
-class HubNet:
-    """Springs from bodies to a hub that is free.
+class HubNet(NamedTuple):
+    """Springs from the origins of bodies to a hub that is free, where they balance.
 
-    Attributes
-    ----------
-    hub
-        Where the springs balance, shape (3,), m.
-    mass
-        Of the hub, kg.
-    bodies
-        Whose origins the springs hold.
-    stiffness
-        Shape (bodies,), N/m.
+    ``law`` is the scene's, ``hub`` a place in space, shape (3,), m.
     """
 
+    law: Net
     hub: Array
-    mass: float
     bodies: tuple[int, ...]
-    stiffness: Array
 
 
-@dataclass(frozen=True)
-class BoomBeam:
+class BoomBeam(NamedTuple):
     """A flexible boom: clamped at ``top``, while ``low`` slides along it.
 
     ``record`` is the scene's, ``lump`` what it would be as a rigid part of the body at its top.
