@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -89,7 +90,7 @@ class Rod:
     stations: tuple[float, ...]
     masses: tuple[tuple[int, float], ...] = ()
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Distance of the ends, m."""
         return float(np.linalg.norm(self.end.place - self.start.place))

@@ -194,9 +194,10 @@ class Draft:
             rod = self.rods[part.number]
             size = max(rod.length, 1.0)
             share = float((place - rod.start.place) @ rod.start.axes[:, 0]) / rod.length
-            mount = OnRod(part.number, int(np.argmin(np.abs(np.array(rod.stations) - share))))
+            off = [abs(station - share) for station in rod.stations]
+            mount = OnRod(part.number, off.index(min(off)))
         there = pose_of(mount, self.bodies, self.rods)
-        apart = np.abs([there.place - place, there.rate - rate_of(at)]).max()
+        apart = max(np.abs(there.place - place).max(), np.abs(there.rate - rate_of(at)).max())
         if apart > _CLOSE * size:
             raise ValueError(
                 f"a {what} stands {apart:.3g} m off a part that it belongs to, or leaves it as the "
