@@ -49,12 +49,8 @@ Part = BodyRef | RodRef
 class Track(NamedTuple):
     """Where the cable of a plane can run.
 
-    Attributes
-    ----------
-    stations
-        Sheaves fixed on bodies, and joints that open, in the order of the path; joints by section.
-    inward
-        From the first or last sheave to a winch, unit vector in space.
+    ``stations`` are, in the order of the path, sheaves fixed on bodies and the sections whose joint
+    opens; ``inward`` points from the first or last of them to a winch, a unit vector in space.
     """
 
     stations: Sequence[Mount | int]
