@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -16,17 +17,10 @@ Array = NDArray[np.float64]
 
 
 class Lump(NamedTuple):
-    """A mass that belongs to a body.
+    """A mass (kg) that belongs to a body; ``group`` is what it is called where masses are listed.
 
-    Attributes
-    ----------
-    group
-        What it is called where masses are listed: "hinges", "boom", ...
-    mass
-        kg.
-    centre, inertia
-        Centre of mass and inertia about the body's origin, in the body's axes; shapes (3,) and
-        (3, 3), m and kg m^2.
+    Centre of mass and inertia about the body's origin are in the body's axes; shapes (3,) and
+    (3, 3), m and kg m^2.
     """
 
     group: str
@@ -89,7 +83,7 @@ class Rod:
     stations: tuple[float, ...]
     masses: tuple[tuple[int, float], ...] = ()
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Distance of the ends, m."""
         return float(np.linalg.norm(self.end.place - self.start.place))
@@ -106,13 +100,9 @@ class Rod:
 
     def station(self, share: float) -> Pose:
         """The pose at a share of the length."""
-        start, end = self.start, self.end
-        return Pose(
-            (1.0 - share) * start.place + share * end.place,
-            start.axes,
-            (1.0 - share) * start.rate + share * end.rate,
-            start.turn,
-        )
+        start, end, rest = self.start, self.end, 1.0 - share
+        place, rate = rest * start.place + share * end.place, rest * start.rate + share * end.rate
+        return Pose(place, start.axes, rate, start.turn)
 
 
 SPACE = np.eye(3)

@@ -49,12 +49,8 @@ Part = BodyRef | RodRef
 class Track(NamedTuple):
     """Where the cable of a plane can run.
 
-    Attributes
-    ----------
-    stations
-        Sheaves fixed on bodies, and joints that open, in the order of the path; joints by section.
-    inward
-        From the first or last sheave to a winch, unit vector in space.
+    ``stations`` are, in the order of the path, sheaves fixed on bodies and the sections whose joint
+    opens; ``inward`` points from the first or last of them to a winch, a unit vector in space.
     """
 
     stations: Sequence[Mount | int]
@@ -194,9 +190,10 @@ class Draft:
             rod = self.rods[part.number]
             size = max(rod.length, 1.0)
             share = float((place - rod.start.place) @ rod.start.axes[:, 0]) / rod.length
-            mount = OnRod(part.number, int(np.argmin(np.abs(np.array(rod.stations) - share))))
+            off = [abs(station - share) for station in rod.stations]
+            mount = OnRod(part.number, off.index(min(off)))
         there = pose_of(mount, self.bodies, self.rods)
-        apart = np.abs([there.place - place, there.rate - rate_of(at)]).max()
+        apart = max(np.abs(there.place - place).max(), np.abs(there.rate - rate_of(at)).max())
         if apart > _CLOSE * size:
             raise ValueError(
                 f"a {what} stands {apart:.3g} m off a part that it belongs to, or leaves it as the "

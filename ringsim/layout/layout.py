@@ -19,14 +19,8 @@ Array = NDArray[np.float64]
 
 
 class PointMasses(NamedTuple):
-    """Point masses of a layout.
-
-    Attributes
-    ----------
-    masses, bodies
-        Mass of each, kg, and number of its body, -1 for rods; shape (n,).
-    places, rates
-        Where they are and the derivatives of that after the coordinate, m, shape (n, 3).
+    """Masses (kg) and numbers of their bodies, -1 for rods, shape (n,); where they are (m) and the
+    derivatives of that after the coordinate, shape (n, 3).
     """
 
     masses: Array

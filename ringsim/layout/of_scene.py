@@ -11,8 +11,6 @@ from ringsim.layout.pose import STEP
 def layout_of(scene: Any, coordinate: float | None = None) -> Layout:
     """The layout of a scene's structure at a coordinate (rad), or as it starts.
 
-    Examples
-    --------
     >>> from ringsim.scene import load_scene
     >>> layout = layout_of(load_scene("truss2"))
     >>> len(layout.bodies), len(layout.rods), len(layout.joints)
@@ -24,10 +22,7 @@ def layout_of(scene: Any, coordinate: float | None = None) -> Layout:
 
 
 def layout_at_opening(scene: Any, opening: float) -> Layout:
-    """The layout at which the mean opening angle has a value (rad).
-
-    Newton's method on the layout's own derivative; opening angles that are linear in the
-    coordinate, as those of the built-in structures, are met at once.
+    """The layout at which the mean opening angle has a value (rad), by Newton's method.
 
     Raises
     ------

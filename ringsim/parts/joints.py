@@ -23,5 +23,4 @@ class Joints(Model):
 
     def present(self) -> dict[str, JointFriction]:
         """The laws that there are, by family."""
-        every = {"pivot": self.pivot, "hinge": self.hinge, "vjoint": self.vjoint}
-        return {family: law for family, law in every.items() if law is not None}
+        return {family: law for family, law in self if law is not None}

@@ -16,4 +16,3 @@ class Loads(Model):
     """
 
     force: PerSection[Newton]
-    """One value, or one per section."""

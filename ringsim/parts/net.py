@@ -15,7 +15,7 @@ ONSET = 1e-4
 
 
 class Net(Model):
-    """A spring from every upper corner to one free hub point in the middle.
+    """A spring from every upper corner, all alike or not, to one free hub point in the middle.
 
     Force = stiffness * (distance - neutral_length) + damping * rate, only while longer than
     neutral unless two_sided.  Source: paper 002, eqs 9-11 and table 1; where the springs go is
@@ -23,7 +23,6 @@ class Net(Model):
     """
 
     stiffness: PerSection[SpringRate] = 0.001
-    """One value, or one per corner."""
     damping: DampingRate = 0.0
     neutral_length: Metre = 0.7116
     two_sided: bool = False
@@ -34,6 +33,5 @@ class Net(Model):
 
         The stiffness is that of all corners, or of those that ``at_section`` has picked.
         """
-        if self.two_sided:
-            return two_sided(stretch, rate, self.stiffness, self.damping)
-        return one_sided(stretch, rate, self.stiffness, self.damping, ONSET, xp)
+        law = stretch, rate, self.stiffness, self.damping
+        return two_sided(*law) if self.two_sided else one_sided(*law, ONSET, xp)

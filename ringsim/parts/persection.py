@@ -31,10 +31,12 @@ PerSection = Annotated[
 
 def at_section(record: _Record, where: int | NDArray[np.int64]) -> _Record:
     """A record whose lists hold the values of one section (floats), or of several (arrays)."""
-    lists = {name: value for name, value in record if isinstance(value, tuple)}
-    one = isinstance(where, int)
     return record.model_copy(
-        update={n: v[where] if one else np.asarray(v)[where] for n, v in lists.items()}
+        update={
+            name: each[where] if isinstance(where, int) else np.asarray(each)[where]
+            for name, each in record
+            if isinstance(each, tuple)
+        }
     )
 
 

@@ -46,17 +46,13 @@ class Solver(Model):
     """Error of the joints' deviations from their mean angle, over the largest so far, to which
     steps resolve the ring's own vibrations where ``record.stress`` asks for them; 1e6: not
     followed."""
-
     step_limit: Annotated[int, Field(ge=1, le=MOST_STEPS)] = 20_000
     """A run that has not ended after so many steps is given up."""
-
     energy_tolerance: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.1
     """Imbalance of energy over the largest energy exchanged at which a run counts as diverged."""
-
     restarts: Annotated[int, Field(ge=0, le=5)] = 2
     """How often a run that failed or diverged starts anew, each time with a quarter of the step
     and a sixteenth of the tolerance."""
-
     error_bars: bool = False
     """Run the scene a second time with steps twice as long, and state what the main numbers may
     be wrong by."""

@@ -58,15 +58,11 @@ class Structure(Model):
         return 0.0
 
     def layout(self, scene: Any, coordinate: Any) -> Layout:
-        """What it consists of at a value of the coordinate.
+        """What it consists of at a value of the coordinate, with a scene's rods, boom, net, loads
+        and cables.
 
-        Parameters
-        ----------
-        scene
-            Whose rods, boom, net, loads and cables it holds.
-        coordinate
-            With the imaginary part ``ringsim.layout.pose.STEP``, which carries the derivatives:
-            compute places with functions that take complex numbers, without ``float`` and ``abs``.
+        The imaginary part ``ringsim.layout.pose.STEP`` of the coordinate carries the derivatives:
+        compute places with functions that take complex numbers, without ``float`` and ``abs``.
         """
         raise NotImplementedError
 

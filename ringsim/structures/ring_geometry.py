@@ -98,9 +98,8 @@ class RingGeometry:
         return np.sqrt(4.0 * self.half_diagonal**2 - self.width(phi) ** 2)
 
     def fold(self, phi: Any) -> Fold:
-        """Positions at the bar angle ``phi`` (rad, 0 deployed .. pi/2 fully stowed).
-
-        A complex ``phi`` gives complex positions: its imaginary part carries derivatives.
+        """Positions at the bar angle ``phi`` (rad, 0 deployed .. pi/2 stowed), complex at complex
+        ``phi``, whose imaginary part carries derivatives.
         """
         half_height, half_chord = 0.5 * self.height(phi), 0.5 * self.width(phi) + self.hinge_offset
         lift, offset = half_height * _SIGNED, self.hinge_offset * self.directions
@@ -124,13 +123,6 @@ def polygon_corners(sides: int, aspect_ratio: float) -> Array:
     centred on the origin.  The unknowns are the ellipse parameters of the other corners and
     the chord; Newton's method starts from the regular polygon and converges quadratically.
 
-    Parameters
-    ----------
-    sides
-        Number of chords, at least 3.
-    aspect_ratio
-        Minor axis over major axis of the ellipse, in (0, 1].
-
     Returns
     -------
     Array
@@ -139,7 +131,7 @@ def polygon_corners(sides: int, aspect_ratio: float) -> Array:
     Raises
     ------
     ValueError
-        If the polygon does not exist or is not found.
+        With less than 3 sides, minor over major axis not in (0, 1], or no polygon found.
     """
     if sides < 3:
         raise ValueError(f"a closed polygon needs at least 3 sides, not {sides}")

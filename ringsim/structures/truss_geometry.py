@@ -41,17 +41,7 @@ class TrussPoints(NamedTuple):
 
 @dataclass(frozen=True)
 class TrussGeometry:
-    """An ideal planar truss with rigid beams; lengths in metre, angles in rad.
-
-    Attributes
-    ----------
-    beam
-        Length b of the upper and the lower beam.
-    axis
-        Distance H of the two joints on the fixed axis.
-    foot, head
-        Distances p and q of the strut's joints from the upper joint.
-    """
+    """An ideal planar truss with rigid beams; its lengths b, H, p and q in metre, angles in rad."""
 
     beam: float
     axis: float

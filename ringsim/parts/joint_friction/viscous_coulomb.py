@@ -17,9 +17,7 @@ class ViscousCoulombFriction(JointFriction):
 
     kind: Literal["viscous-coulomb"] = "viscous-coulomb"
     viscous: PerSection[TorsionDamping] = 0.0
-    """One value, or one per section."""
     coulomb: PerSection[Torque] = 0.0
-    """One value, or one per section."""
     rate: AngularRate = 0.01
     """Rate that regularises the Coulomb torque: 76 % of it acts at this rate."""
 

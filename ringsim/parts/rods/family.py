@@ -17,7 +17,6 @@ class Rods(Model):
     elements: Annotated[int, Field(ge=1, le=64)] = 1
     """Elements per rod half."""
     young_modulus: PerSection[Pascal] = 120e9
-    """One value, or one per section."""
     density: Density = 1800.0
     poisson_ratio: PoissonRatio = 0.3
     damping: SecondOrZero = 0.0
