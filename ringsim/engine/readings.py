@@ -85,10 +85,9 @@ class JointGroup:
 
     def rate(self, state: State) -> Array:
         """Relative angular rate about the joint axis, rad/s."""
-        if not self._bodies:
-            return self.turn(state)[1]
-        rod = self._first.frames(state)
-        return np.asarray(rod.spin - self._second.spin_about(state, rod.z))
+        rod, second = self._first.frames(state), self._second
+        other = second.spin_about(state, rod.z) if self._bodies else second.frames(state).spin
+        return np.asarray(other - rod.spin)
 
     def gaps(self, state: State) -> Array:
         """Distances of the points that the joints hold together, m."""

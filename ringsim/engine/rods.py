@@ -28,9 +28,8 @@ class Rod(NamedTuple):
 
 
 class NodeFrames(NamedTuple):
-    """Frames of n rod nodes: positions (n, 3), y and z axes (n, 3), rates about z (n,)."""
+    """Frames of n rod nodes: y and z axes (n, 3), rates about z (n,), rad/s."""
 
-    position: Array
     y: Array
     z: Array
     spin: Array

@@ -48,4 +48,4 @@ class Ancf:
         length = np.linalg.norm(y, axis=1)
         normal = z / np.linalg.norm(z, axis=1)[:, None]
         spin = np.sum(np.cross(y, rates[:, 3:6]) * normal, axis=1) / length**2
-        return NodeFrames(coordinates[:, :3], y / length[:, None], normal, spin)
+        return NodeFrames(y / length[:, None], normal, spin)

@@ -58,4 +58,4 @@ class GeometricallyExact:
         turned = coordinates[:, 3:7]
         axes, spins = axes_of(turned), spin(turned, rates[:, 3:7])
         z = axes[:, :, 2]
-        return NodeFrames(coordinates[:, :3], axes[:, :, 1], z, np.sum(spins * z, axis=1))
+        return NodeFrames(axes[:, :, 1], z, np.sum(spins * z, axis=1))

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from typing import Any
 
 import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.engine.assembly import Assembly
 from ringsim.engine.model import Model
 from ringsim.layout.halves import Half, halves
 
 Array = NDArray[np.float64]
-_FORCE = exu.OutputVariableType.ForceLocal
-_TORQUE = exu.OutputVariableType.TorqueLocal
-_MIDDLE = [0.0, 0.0, 0.0]
+_KINDS = exu.OutputVariableType.ForceLocal, exu.OutputVariableType.TorqueLocal
 
 
 class StressMeter:
@@ -26,29 +25,25 @@ class StressMeter:
     """
 
     def __init__(self, model: Model) -> None:
-        self._system, self._dampers = model.assembly.system, model.assembly.dampers
-        self._output = self._system.GetObjectOutputBody
-        self._rows = [[_ends(model, half) for half in row] for row in halves(model.layout).values()]
+        self._assembly = model.assembly
+        rows = [*halves(model.layout).values()]
+        ends = [end for row in rows for half in row for end in _ends(model, half)]
+        self._shape = len(rows), len(rows[0]), 2
+        self._elements, *numbers = zip(*ends, strict=True)
+        self._outside, self._area, self._per_moment = np.array(numbers)
+        dampers = model.assembly.dampers.numbers
+        self._damped = [dampers[int(e)] for e in self._elements] if dampers else None
 
     def read(self) -> Array:
         """Stresses at the current state, shape (rod halves, sections), Pa."""
-        damping = self._dampers.latest
-        return np.array(
-            [[self._worst(ends, tube, damping) for ends, tube in row] for row in self._rows]
-        )
-
-    def _worst(self, ends: Any, tube: Any, damping: Array) -> float:
-        worst = 0.0
-        for element, x in ends:
-            force = self._output(element, _FORCE, _MIDDLE)
-            torque = self._output(element, _TORQUE, _MIDDLE)
-            number = self._dampers.numbers.get(int(element))
-            if number is not None:
-                force, torque = force + damping[number, :3], torque + damping[number, 3:]
-            moment = math.hypot(torque[1] + force[2] * x, torque[2] - force[1] * x)
-            bending = moment * 0.5 * tube.outer_diameter
-            worst = max(worst, abs(force[0]) / tube.area + bending / tube.second_moment)
-        return worst
+        force, torque = _in_the_middle(self._assembly, self._elements)
+        if self._damped is not None:
+            carried = self._assembly.dampers.latest[self._damped].T
+            force, torque = force + carried[:3], torque + carried[3:]
+        x = self._outside
+        moment = np.hypot(torque[1] + force[2] * x, torque[2] - force[1] * x)
+        stress = np.abs(force[0]) / self._area + moment * self._per_moment
+        return np.asarray(stress.reshape(self._shape).max(axis=2))
 
 
 class BendingMeter:
@@ -63,27 +58,31 @@ class BendingMeter:
         rod, self._elements = model.layout.rods[number], model.rods[number].elements
         self._lengths = rod.lengths
         self.stations = np.array(rod.stations) * rod.length
-        self._output = model.assembly.system.GetObjectOutputBody
+        self._assembly = model.assembly
         self._per_moment = (
             0.5 * rod.tube.outer_diameter / (rod.young_modulus * rod.tube.second_moment)
         )
 
     def read(self) -> Array:
         """Strains at the current state, shape (nodes,)."""
-        moments = np.array([self._output(e, _TORQUE, _MIDDLE)[2] for e in self._elements])
-        shear = np.array([self._output(e, _FORCE, _MIDDLE)[1] for e in self._elements])
-        change = 0.5 * shear * self._lengths
-        first, last = moments + change, moments - change
+        force, torque = _in_the_middle(self._assembly, self._elements)
+        change = 0.5 * force[1] * self._lengths
+        first, last = torque[2] + change, torque[2] - change
         at_nodes = np.concatenate([first[:1], 0.5 * (first[1:] + last[:-1]), last[-1:]])
         return np.asarray(-self._per_moment * at_nodes)
 
 
-def _ends(model: Model, half: Half) -> tuple[list[tuple[Any, float]], Any]:
-    """First and last element of a half with the place (m) of its outer end from its middle."""
+def _in_the_middle(assembly: Assembly, elements: Sequence[Any]) -> list[Array]:
+    """Force (N) and moment (N m) of elements in their axes, shape (3, elements) each."""
+    output = assembly.system.GetObjectOutputBody
+    return [np.array([output(e, kind, [0.0] * 3) for e in elements]).T for kind in _KINDS]
+
+
+def _ends(model: Model, half: Half) -> list[tuple[Any, float, float, float]]:
+    """First and last element of a half, the place (m) of its outer end from the element's middle,
+    and by what force and moment are divided and multiplied to give stress (m^2, 1/m^3).
+    """
     part, elements = model.layout.rods[half.rod], model.rods[half.rod].elements
-    first, last = half.first, half.last - 1
-    ends = [
-        (elements[first], -0.5 * float(part.lengths[first])),
-        (elements[last], 0.5 * float(part.lengths[last])),
-    ]
-    return ends, part.tube
+    per_moment = 0.5 * part.tube.outer_diameter / part.tube.second_moment
+    ends = (half.first, -0.5), (half.last - 1, 0.5)
+    return [(elements[k], s * part.lengths[k], part.tube.area, per_moment) for k, s in ends]
