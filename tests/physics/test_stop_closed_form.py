@@ -38,7 +38,7 @@ SCENE = ringsim.load_scene("ring18").with_values(
         "loads.force": FORCE,
         "stop.stiffness": STIFFNESS,
         "solver.end_time": 20.0,
-        "solver.tolerance": 1e-4,
+        "solver.tolerance": 1e-5,
         "solver.newton_tolerance": 1e-5,
     }
 )

@@ -13,7 +13,7 @@ import pytest
 import ringsim
 from main_line import README
 
-TABLE = README.partition("## What it reproduces")[2].partition("## ")[0]
+TABLE = README.partition("## Comparison with published results")[2].partition("## ")[0]
 
 
 def stated(case: str) -> list[float]:

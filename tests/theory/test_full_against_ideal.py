@@ -82,15 +82,19 @@ def test_what_is_left_is_elasticity():
     np.testing.assert_allclose(soft.asynchrony[late] / hard.asynchrony[late], 4.0, rtol=0.1)
 
 
+@pytest.mark.slow
 def test_eighteen_sections_move_as_the_ideal_ring():
-    """The built-in ring with cables, whole: half a minute of processor time.
+    """The built-in ring with cables, after the ramp of its winches.
+
+    While they start, within a second, the elastic ring lags by up to 0.11 deg, however fine the
+    steps are: it is thrown into a swing on its ropes, which the ideal ring knows less of.
 
     The angle agrees up to 170 deg; the tension while the sections are less than 4 deg apart.
 
     Beyond, they are up to 15 deg apart at 170 deg, and the winch pulls up to 8 % less.
     """
     pair = both(load_scene("ring18-cable").with_values({"solver.end_time": 23.5}))
-    whole = (pair.ideal < WHOLE) & (pair.ideal > 21.0)
+    whole = (pair.ideal < WHOLE) & (pair.times > 1.05)
     assert pair.held_back(whole).max() < ANGLE
     taut = whole & (pair.ideal > 40.0)
     together = taut & (pair.asynchrony < 3.0)
