@@ -9,7 +9,7 @@ from ringsim.campaign.folder import Folder
 from ringsim.files import DRAFT, writing
 from ringsim.storage.locks import GO_ON, locked
 from ringsim.storage.merge import NAME, write_merged
-from ringsim.storage.netcdf import Output
+from ringsim.storage.netcdf import OutputTable
 from ringsim.storage.provenance import provenance
 
 _KEPT = ("identity", "seed", "solver", "campaign", "campaign_name", "scene", "output")
@@ -47,6 +47,6 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
         made = provenance(name=design["campaign_name"], title=design["title"], action="merged")
         attributes = made | {name: design[name] for name in _KEPT} | {"execution": execution}
         attributes["history"] += f"\n{design['history']}"
-        output = Output.model_validate_json(design["output"])
+        output = OutputTable.model_validate_json(design["output"])
         failed += write_merged(campaign.path, found, campaign.table, output, attributes)
     return Merged(left, failed, path)

@@ -15,7 +15,7 @@ from ringsim.sampling.columns import Table
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import Scene, load_scene
-from ringsim.storage.netcdf import Output
+from ringsim.storage.netcdf import OutputTable
 from ringsim.units import Model
 
 SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_ideal"}
@@ -61,7 +61,7 @@ class Specification(Model):
     """One sample in so many states its error bars (``solver.error_bars``); 0 for none."""
     max_failed: Annotated[int, Field(ge=0)] | None = None
     """The campaign stops when more samples than this have failed."""
-    output: Output = Output()
+    output: OutputTable = OutputTable()
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ import numpy as np
 
 from ringsim.choice import kind_of
 from ringsim.engine.assembly import Assembly
-from ringsim.engine.model import Model
+from ringsim.engine.model import Multibody
 from ringsim.parts.boom.flexible import FlexibleBoom
 
 
-def add_boom(model: Model) -> None:
+def add_boom(model: Multibody) -> None:
     """The flexible boom, if there is one; a rigid one is part of its hinge assembly."""
     layout, assembly, system = model.layout, model.assembly, model.assembly.system
     if layout.boom is None:

@@ -12,7 +12,7 @@ from ringsim.engine.cable_path import CablePath
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.connectors import Reacting, Stops, connect
 from ringsim.engine.faults import Faults
-from ringsim.engine.model import Model
+from ringsim.engine.model import Multibody
 from ringsim.engine.rods import Formulation
 from ringsim.engine.rods_ancf import Ancf
 from ringsim.engine.rods_geometrically_exact import GeometricallyExact
@@ -40,7 +40,7 @@ class Built(NamedTuple):
         What breaks during the run.
     """
 
-    model: Model
+    model: Multibody
     connectors: list[Reacting]
     stops: Stops | None
     cables: CableDrive | None
@@ -49,7 +49,7 @@ class Built(NamedTuple):
 
 def build(scene: Scene) -> Built:
     """Build every part that the scene names, and nothing else."""
-    model = Model(scene, FORMULATIONS[type(scene.rods)])
+    model = Multibody(scene, FORMULATIONS[type(scene.rods)])
     add_boom(model)
     connectors, stops, cables = connect(model), None, None
     if scene.stop is not None:
@@ -67,7 +67,7 @@ def build(scene: Scene) -> Built:
     return Built(model, connectors, stops, cables, faults)
 
 
-def _on_nodes(model: Model, sheave: Sheave) -> Sheave:
+def _on_nodes(model: Multibody, sheave: Sheave) -> Sheave:
     """A sheave of the layout on the nodes that carry it."""
     if isinstance(sheave, BlockSheave):
         left, right = (model.side_of(mount)[0] for mount in (sheave.left, sheave.right))

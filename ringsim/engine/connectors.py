@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.engine.laws import SYMBOLIC, TORSION, symbolic_law
-from ringsim.engine.model import Model
+from ringsim.engine.model import Multibody
 from ringsim.engine.readings import JointGroup, State
 from ringsim.layout.pose import turned_about_z
 from ringsim.layout.springs import Contact, HubNet
@@ -32,7 +32,7 @@ Reacting = Callable[[State, Array, Array], tuple[Reaction, Array]]
 the state, the opening angles and their rates, shape (planes, sections), rad and rad/s."""
 
 
-def connect(model: Model) -> list[Reacting]:
+def connect(model: Multibody) -> list[Reacting]:
     """Springs, contacts, net and friction of a model; before ``Assembly.finish``."""
     layout, found = model.layout, []
     for spring in layout.springs:
@@ -52,7 +52,7 @@ class Stops:
     the range lies near the jump of the measured angle at 180 deg.
     """
 
-    def __init__(self, model: Model, stop: Stop) -> None:
+    def __init__(self, model: Multibody, stop: Stop) -> None:
         self._law, self._system = stop, model.assembly.system
         self._objects: list[list[Any]] = []
         for plane in model.openings():
@@ -63,7 +63,7 @@ class Stops:
                 self._objects[-1].append(_torsion(model, markers, **self._settings(model, sense)))
         self._latched = np.zeros([len(self._objects), len(self._objects[0])], dtype=bool)
 
-    def _settings(self, model: Model, sense: float) -> dict[str, Any]:
+    def _settings(self, model: Multibody, sense: float) -> dict[str, Any]:
         def torque(angle: Any, rate: Any, offset: Any) -> Any:
             folded = sense * angle + 0.5 * math.pi
             return sense * self._law.torque(folded, sense * rate, offset > 0.5, SYMBOLIC).total
@@ -90,7 +90,7 @@ class Stops:
 class StuckJoint:
     """A V-joint that a fault will hold: a torsion spring that lies inactive until then."""
 
-    def __init__(self, model: Model, fault: StuckVJoint) -> None:
+    def __init__(self, model: Multibody, fault: StuckVJoint) -> None:
         self._law, self._system = fault, model.assembly.system
         self._place = model.scene.structure.planes.index(fault.plane), fault.section - 1
         joint, self._sense = model.openings()[self._place[0]][self._place[1]]
@@ -113,14 +113,14 @@ class StuckJoint:
         return self._law.torque(float(angles[self._place]) - self._angle, rate), rate
 
 
-def _torsion(model: Model, markers: Sequence[Any], **settings: Any) -> Any:
+def _torsion(model: Multibody, markers: Sequence[Any], **settings: Any) -> Any:
     """A torsion spring-damper about the common z axis of two markers."""
     return model.assembly.system.AddObject(
         item.ObjectConnectorTorsionalSpringDamper(markerNumbers=list(markers), **settings)
     )
 
 
-def _friction(model: Model, family: str, law: JointFriction) -> Reacting:
+def _friction(model: Multibody, family: str, law: JointFriction) -> Reacting:
     """Friction of the joints of a family."""
     joints = [joint for joint in model.joints if joint.part.family == family]
     for joint in joints:
@@ -137,7 +137,7 @@ def _friction(model: Model, family: str, law: JointFriction) -> Reacting:
     return reaction
 
 
-def _friction_settings(model: Model, law: JointFriction) -> dict[str, Any]:
+def _friction_settings(model: Multibody, law: JointFriction) -> dict[str, Any]:
     damping = law.linear_damping()
     if damping is not None:
         return {"damping": damping} if damping > 0.0 else {}
@@ -146,7 +146,7 @@ def _friction_settings(model: Model, law: JointFriction) -> dict[str, Any]:
     )
 
 
-def _net(model: Model, held: HubNet) -> Reacting:
+def _net(model: Multibody, held: HubNet) -> Reacting:
     """The net's strings and their hub.
 
     The hub starts where its strings balance: from anywhere else it would swing for the whole run,
@@ -166,7 +166,7 @@ def _net(model: Model, held: HubNet) -> Reacting:
     return _strings(model, pairs, lambda s, rate: each.tension(s - free, rate), free, settings)
 
 
-def _string_settings(model: Model, net: Net) -> dict[str, Any]:
+def _string_settings(model: Multibody, net: Net) -> dict[str, Any]:
     if net.two_sided:
         return {"stiffness": net.stiffness, "damping": net.damping}
     return symbolic_law(
@@ -178,7 +178,7 @@ def _string_settings(model: Model, net: Net) -> dict[str, Any]:
 
 
 def _strings(
-    model: Model,
+    model: Multibody,
     pairs: Sequence[Sequence[Any]],
     law: Callable[[Array, Array], Reaction],
     free_length: float,
@@ -211,7 +211,7 @@ def _strings(
     return reaction
 
 
-def _contact(model: Model, contact: Contact) -> Reacting:
+def _contact(model: Multibody, contact: Contact) -> Reacting:
     """One-sided contact of a body with a plane."""
     law, system, node = contact.law, model.assembly.system, model.bodies[contact.body][1]
     markers = [

@@ -11,7 +11,7 @@ from ringsim.cable.faults.family import CableFault
 from ringsim.cable.state import ChainState
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.connectors import StuckJoint
-from ringsim.engine.model import Model
+from ringsim.engine.model import Multibody
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ class Faults:
         V-joints that stick.
     """
 
-    def __init__(self, model: Model, drive: CableDrive | None) -> None:
+    def __init__(self, model: Multibody, drive: CableDrive | None) -> None:
         self._drive = drive
         faults = sorted(model.scene.faults, key=lambda fault: fault.time)
         self._waiting = [

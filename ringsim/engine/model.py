@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.engine.assembly import Assembly
-from ringsim.engine.rods import Formulation, Rod, add_rod
+from ringsim.engine.rods import BuiltRod, Formulation, add_rod
 from ringsim.layout import joints as parts
 from ringsim.layout.bodies import InSpace, Mount, OnBody
 from ringsim.layout.layout import Layout
@@ -29,7 +29,7 @@ _JOINTS: dict[str, Any] = {
 """exudyn's joint of each kind; flags hold translations and rotations."""
 
 
-class Joint(NamedTuple):
+class BuiltJoint(NamedTuple):
     """A joint of the layout as built: its markers, and the node and arm (m, in its axes) of each
     side.  A side in space has no node.
     """
@@ -40,7 +40,7 @@ class Joint(NamedTuple):
     arms: tuple[Array, Array]
 
 
-class Model:
+class Multibody:
     """Bodies, rods, joints and loads of a scene's layout in its initial state.
 
     Attributes
@@ -62,7 +62,7 @@ class Model:
             node = assembly.add_rigid_node(start.of(body.pose))
             number = assembly.add_body(node, body.mass, body.inertia, body.centre)
             self.bodies.append((number, node))
-        self.rods: list[Rod] = []
+        self.rods: list[BuiltRod] = []
         for part in self.layout.rods:
             poses = [start.of(part.station(share)) for share in part.stations]
             rod = add_rod(assembly, formulation, part, poses, scene.rods)
@@ -77,7 +77,7 @@ class Model:
                 item.LoadForceVector(markerNumber=marker, loadVector=list(force))
             )
 
-    def openings(self) -> list[list[tuple[Joint, float]]]:
+    def openings(self) -> list[list[tuple[BuiltJoint, float]]]:
         """Joints that open, with their senses, by plane and section; empty for other angles."""
         return [
             [(self.joints[o.joint], o.sense) for o in plane if isinstance(o, parts.JointOpening)]
@@ -92,11 +92,11 @@ class Model:
             return self.bodies[mount.body][1], mount.arm
         return self.rods[mount.rod].nodes[mount.station], np.zeros(3)
 
-    def _joint(self, joint: parts.Joint) -> Joint:
+    def _joint(self, joint: parts.Joint) -> BuiltJoint:
         nodes, arms = zip(*map(self.side_of, (joint.first, joint.second)), strict=True)
         markers = self._marker(joint.first), self._marker(joint.second)
         self.assembly.system.AddObject(_JOINTS[joint.kind](markerNumbers=list(markers)))
-        return Joint(joint, markers, nodes, arms)
+        return BuiltJoint(joint, markers, nodes, arms)
 
     def _marker(self, mount: Mount) -> Any:
         node, arm = self.side_of(mount)

@@ -10,7 +10,7 @@ import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.model import Joint, Model
+from ringsim.engine.model import BuiltJoint, Multibody
 from ringsim.engine.rods import NodeFrames
 from ringsim.engine.rods_geometrically_exact import GeometricallyExact
 from ringsim.engine.rotations import axes_of, spin
@@ -23,7 +23,7 @@ Indices = NDArray[np.int64]
 class State:
     """Total coordinates and rates of a model, copied from exudyn by ``refresh``."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Multibody) -> None:
         self._data = model.assembly.system.systemData
         self.reference = np.array(self._data.GetODE2Coordinates(exu.ConfigurationType.Reference))
         self.position = self.reference
@@ -42,7 +42,7 @@ class State:
 class Side:
     """One side of some joints: places and frames of n mounts on nodes of one kind."""
 
-    def __init__(self, model: Model, nodes: list[Any], arms: list[Array]) -> None:
+    def __init__(self, model: Multibody, nodes: list[Any], arms: list[Array]) -> None:
         found = [model.assembly.coordinates_of(node) for node in nodes]
         self._where = np.array(found)
         rigid = len(found[0]) == 7
@@ -70,7 +70,7 @@ class Side:
 class JointGroup:
     """Joints of one family, read together."""
 
-    def __init__(self, model: Model, joints: list[Joint]) -> None:
+    def __init__(self, model: Multibody, joints: list[BuiltJoint]) -> None:
         self._first, self._second = (
             Side(model, [j.nodes[k] for j in joints], [j.arms[k] for j in joints]) for k in (0, 1)
         )
@@ -95,9 +95,9 @@ class JointGroup:
         return np.asarray(np.linalg.norm(apart, axis=1))
 
 
-def joint_groups(model: Model) -> list[JointGroup]:
+def joint_groups(model: Multibody) -> list[JointGroup]:
     """All revolutes, by what they join, so that each group reads nodes of one kind."""
-    groups: dict[Any, list[Joint]] = {}
+    groups: dict[Any, list[BuiltJoint]] = {}
     size = model.assembly.coordinates_of
     for joint in model.joints:
         if joint.part.kind == "revolute":
@@ -109,7 +109,7 @@ def joint_groups(model: Model) -> list[JointGroup]:
 class Openings:
     """Opening angles of a structure."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Multibody) -> None:
         self._planes: list[Callable[[State], tuple[Array, Array]]] = []
         for plane, joints in zip(model.layout.openings, model.openings(), strict=True):
             if joints:

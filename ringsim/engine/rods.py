@@ -17,7 +17,7 @@ from ringsim.parts.rods.family import Rods
 Array = NDArray[np.float64]
 
 
-class Rod(NamedTuple):
+class BuiltRod(NamedTuple):
     """A chain of beam elements, one fewer than nodes, from start to end.
 
     The nodes' frames have x along the rod and z along the section's normal.
@@ -90,7 +90,7 @@ def add_rod(
     part: parts.Rod,
     poses: Sequence[Pose],
     rods: Rods,
-) -> Rod:
+) -> BuiltRod:
     """A rod of the layout with the poses of its nodes; as for ``Assembly.add_rigid_node``."""
     nodes = [formulation.add_node(assembly, pose) for pose in poses]
     elements = []
@@ -98,4 +98,4 @@ def add_rod(
         section = beam_section(rods, part, length if formulation.constant_curvature else 0.0)
         elements.append(formulation.add_element(assembly, nodes[k : k + 2], length, section))
     assembly.bodies += elements
-    return Rod(nodes, elements)
+    return BuiltRod(nodes, elements)

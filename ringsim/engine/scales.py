@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ringsim.engine.build import Built
-from ringsim.engine.model import Model
+from ringsim.engine.model import Multibody
 from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.layout.bodies import OnRod
 from ringsim.layout.joints import JointOpening
@@ -60,7 +60,7 @@ def _swing_step(inertia: float, stiffness: float, steps: int) -> float:
     return 2.0 * math.pi * math.sqrt(inertia / stiffness) / steps
 
 
-def _contact_step(model: Model) -> float:
+def _contact_step(model: Multibody) -> float:
     """Of the first V-joint with its two rods; infinite without stops or V-joints."""
     opening, stop = model.layout.openings[0][0], model.scene.stop
     if stop is None or not isinstance(opening, JointOpening):

@@ -48,7 +48,7 @@ class Direction:
         return np.asarray(-curved / self._size**2)
 
 
-class Half:
+class HalfFrame:
     """c = y / |y| + t (y x z) / |y x z| of bar halves from their slopes (y, z), shape (n, 6)."""
 
     def __init__(self, slopes: Array, sign: Array) -> None:
@@ -95,7 +95,7 @@ class PlacedBlocks:
 
     def __init__(self, slopes: Array, rates: Array, sense: Array, offset: Array) -> None:
         count = len(sense)
-        self._halves = Half(slopes.reshape(-1, SLOPES), np.concatenate([-sense, sense]))
+        self._halves = HalfFrame(slopes.reshape(-1, SLOPES), np.concatenate([-sense, sense]))
         self._block = Direction(self._halves.vector[:count] + self._halves.vector[count:])
         self._reach = -sense * offset
         self._by_half = self._halves.first().reshape(2, count, 3, SLOPES)

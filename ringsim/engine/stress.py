@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.engine.assembly import Assembly
-from ringsim.engine.model import Model
+from ringsim.engine.model import Multibody
 from ringsim.layout.halves import Half, halves
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ class StressMeter:
     carries there; along it the moment follows the shear force, dM_z/dx = -Q_y and dM_y/dx = Q_z.
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Multibody) -> None:
         self._assembly = model.assembly
         rows = [*halves(model.layout).values()]
         ends = [end for row in rows for half in row for end in _ends(model, half)]
@@ -53,7 +53,7 @@ class BendingMeter:
     ``stations`` are the nodes' distances from the rod's first end, m.
     """
 
-    def __init__(self, model: Model, name: str) -> None:
+    def __init__(self, model: Multibody, name: str) -> None:
         number = next(k for k, rod in enumerate(model.layout.rods) if rod.name == name)
         rod, self._elements = model.layout.rods[number], model.rods[number].elements
         self._lengths = rod.lengths
@@ -78,7 +78,7 @@ def _in_the_middle(assembly: Assembly, elements: Sequence[Any]) -> list[Array]:
     return [np.array([output(e, kind, [0.0] * 3) for e in elements]).T for kind in _KINDS]
 
 
-def _ends(model: Model, half: Half) -> list[tuple[Any, float, float, float]]:
+def _ends(model: Multibody, half: Half) -> list[tuple[Any, float, float, float]]:
     """First and last element of a half, the place (m) of its outer end from the element's middle,
     and by what force and moment are divided and multiplied to give stress (m^2, 1/m^3).
     """

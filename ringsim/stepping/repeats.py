@@ -74,7 +74,7 @@ class Indicator(ABC):
         return ""
 
 
-class EnergyBalance(Indicator):
+class EnergyImbalance(Indicator):
     """Steps that conjure up or swallow energy.
 
     A rope becomes taut within a small part of the step that the motion asks for, and throws what it

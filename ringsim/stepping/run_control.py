@@ -17,7 +17,7 @@ from ringsim.stepping.guard import Guard
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import Locks, StopContact, lock_times
 from ringsim.stepping.motion_steps import MotionSteps
-from ringsim.stepping.repeats import EnergyBalance, Indicator, TensionBend
+from ringsim.stepping.repeats import EnergyImbalance, Indicator, TensionBend
 from ringsim.stepping.scales import Scales
 from ringsim.variables import Cause, Reason, Status
 
@@ -65,7 +65,7 @@ class RunControl:
         self._deviations: DeviationSteps | None = None
         if solver.step_control == "motion":
             self._steps = MotionSteps(solver, scales)
-            self._indicators.append(EnergyBalance(solver, scales))
+            self._indicators.append(EnergyImbalance(solver, scales))
             if scales.slack_tension is not None:
                 self._indicators.append(TensionBend(solver, scales.slack_tension))
             if follow_deviations and solver.deviation_tolerance < NO_DEVIATIONS:

@@ -16,7 +16,7 @@ from ringsim.sampling.columns import Table, add_inputs
 from ringsim.storage.netcdf import (
     CHUNK_BYTES,
     PER_SAMPLE,
-    Output,
+    OutputTable,
     add_coordinate,
     add_variable,
     blank,
@@ -34,7 +34,7 @@ UNFIT = (
 
 
 def write_merged(
-    folder: Path, found: Survey, table: Table, output: Output, attributes: Mapping[str, Any]
+    folder: Path, found: Survey, table: Table, output: OutputTable, attributes: Mapping[str, Any]
 ) -> int:
     """Write ``campaign.nc`` of what was found in a folder, whole or not at all.
 

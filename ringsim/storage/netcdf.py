@@ -35,7 +35,7 @@ PER_SAMPLE = {
 """What is known of every sample beside its outputs."""
 
 
-class Output(Model):
+class OutputTable(Model):
     """How ``campaign.nc`` stores the results."""
 
     gone: ClassVar[dict[str, str]] = {
@@ -50,7 +50,7 @@ class Output(Model):
     """Output variables that the merged file does not hold."""
 
     @model_validator(mode="after")
-    def _known(self) -> Output:
+    def _known(self) -> OutputTable:
         for name in [*self.significant_digits, *self.leave_out]:
             if name not in VARIABLES:
                 hint = known_or_nearest(name, VARIABLES)

@@ -35,7 +35,7 @@ _ANGLE, _RATE = 1e-6, 1e-4
 """Largest increments of angles (rad) and rates (rad/s) for derivatives of the equations."""
 
 
-class Instant(NamedTuple):
+class IdealState(NamedTuple):
     """Accelerations and energies at one instant.
 
     Attributes
@@ -101,7 +101,7 @@ class IdealMotion:
             state[self._up] = UP
         return state
 
-    def instant(self, time: float, state: Array) -> Instant:
+    def instant(self, time: float, state: Array) -> IdealState:
         """Evaluate everything at a state.
 
         Raises
@@ -123,7 +123,7 @@ class IdealMotion:
         moving, turning = mechanism.accelerations(now, spin, acting.couple, force)
         rates = np.concatenate([rigid, now.rate])
         kinetic = 0.5 * float(rates @ now.matrix @ rates)
-        return Instant(moving, turning, spin, kinetic, acting, pull)
+        return IdealState(moving, turning, spin, kinetic, acting, pull)
 
     def rates(self, time: float, state: Array) -> Array:
         """Derivative of the state; NaN where the cables have no answer."""

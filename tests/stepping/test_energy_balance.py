@@ -8,7 +8,7 @@ from ringsim.scene import load_scene
 from ringsim.simulation import run
 from ringsim.stepping import repeats
 from ringsim.stepping.instant import Energies, Instant
-from ringsim.stepping.repeats import EnergyBalance
+from ringsim.stepping.repeats import EnergyImbalance
 from ringsim.stepping.scales import Scales
 
 SOLVER = Solver(step=0.2, tolerance=1e-4)
@@ -22,14 +22,14 @@ def instant(time: float, kinetic: float) -> Instant:
     return Instant(time, *np.zeros((2, 2, 3)), Energies(kinetic, 0.0, work=1.0, lost=0.0))
 
 
-def shorter(control: EnergyBalance, missing: float, step: float = 0.1) -> float | None:
+def shorter(control: EnergyImbalance, missing: float, step: float = 0.1) -> float | None:
     """What to repeat a step with in which so much energy is lost on the way, J."""
     return control.shorter(instant(0.0, 1.0), instant(step, 1.0 - missing))
 
 
-def balance(*, roped: bool) -> EnergyBalance:
+def balance(*, roped: bool) -> EnergyImbalance:
     slack = {"slack_tension": 1e-3, "slack_energy": 1e-3} if roped else {}
-    return EnergyBalance(SOLVER, Scales(0.1, 1e-3, travel=3.0, length=0.3, **slack))
+    return EnergyImbalance(SOLVER, Scales(0.1, 1e-3, travel=3.0, length=0.3, **slack))
 
 
 def test_a_balanced_step_is_kept() -> None:
