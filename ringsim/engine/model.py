@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.rods import BuiltRod, Formulation, add_rod
 from ringsim.layout import joints as parts
-from ringsim.layout.bodies import InSpace, Mount, OnBody
+from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod
 from ringsim.layout.layout import Layout
 from ringsim.layout.of_scene import layout_of
 from ringsim.layout.pose import Pose, cross
@@ -95,7 +95,11 @@ class Multibody:
     def _joint(self, joint: parts.Joint) -> BuiltJoint:
         nodes, arms = zip(*map(self.side_of, (joint.first, joint.second)), strict=True)
         markers = self._marker(joint.first), self._marker(joint.second)
-        self.assembly.system.AddObject(_JOINTS[joint.kind](markerNumbers=list(markers)))
+        # exudyn holds rotations along the axes of the first marker: those of a body are orthonormal
+        # whatever the rods are made of, and Newton's iterations depend on the choice.
+        pinned = isinstance(joint.first, OnRod) and isinstance(joint.second, OnBody)
+        ordered = markers[::-1] if pinned else markers
+        self.assembly.system.AddObject(_JOINTS[joint.kind](markerNumbers=list(ordered)))
         return BuiltJoint(joint, markers, nodes, arms)
 
     def _marker(self, mount: Mount) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from ringsim.parts.solver import Solver
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import StopContact
-from ringsim.stepping.repeats import GROWTH
+from ringsim.stepping.repeats import FALL, GROWTH, SHORTEST
 from ringsim.stepping.scales import Scales
 
 _LOCAL_ERROR = 0.1
@@ -29,6 +29,9 @@ energy error; a quarter of it moves the asynchrony by 0.5 %."""
 _FIRST = 20.0
 """The first step is ``solver.step`` over this at most: generalised-alpha starts from rest without
 an acceleration, which delays the motion by a third of the first step."""
+_APPROACH = 0.02
+"""Largest first step over the time to the first stop, as it is chosen without knowing the motion: a
+winch may take a ring that is nearly open to its stops within it."""
 
 
 class MotionSteps:
@@ -74,6 +77,12 @@ class MotionSteps:
         if left <= self.step or left >= 2.0 * self.step:
             return min(self.step, left)
         return 0.5 * left
+
+    def shorter_first(self, step: float, stops: StopContact) -> float | None:
+        """A smaller first step in s, where this one leads too close to a stop; else None."""
+        if self._past or step <= SHORTEST * self._solver.step:
+            return None
+        return FALL * step if step > _APPROACH * (step + stops.time_to_next) else None
 
     def _from_motion(self) -> float:
         t2, r2 = self._past[-1]

@@ -17,10 +17,10 @@ from ringsim.parts.solver import TENSION_BEND, Solver
 from ringsim.stepping.instant import Array, Instant
 from ringsim.stepping.scales import Scales
 
-GROWTH, _FALL = 1.5, 0.2
+GROWTH, FALL = 1.5, 0.2
 """Largest and smallest ratio of successive steps: a step behind a much shorter one would see that
 one's vibrations, and what is found across a kink says little about the step that resolves it."""
-_SHORTEST = 1e-4
+SHORTEST = 1e-4
 """No step is repeated below this share of ``solver.step``: what is left then is a jump, which no
 step resolves, and exudyn ends a run whose steps fall below 1e-9 s."""
 _REFUSED = 2.0
@@ -44,7 +44,7 @@ class Indicator(ABC):
 
     def __init__(self, solver: Solver) -> None:
         self.limit = math.inf
-        self._least = _SHORTEST * solver.step
+        self._least = SHORTEST * solver.step
 
     @abstractmethod
     def ratio(self, before: Instant, after: Instant) -> float:
@@ -60,13 +60,13 @@ class Indicator(ABC):
         # A step comes back as a difference of times: a little more than what was asked for.
         if not ratio > _REFUSED or step <= self._least * (1.0 + 1e-6):
             return None
-        return max(step * max(_FALL, self.share(ratio)), self._least)
+        return max(step * max(FALL, self.share(ratio)), self._least)
 
     def accept(self, before: Instant, after: Instant) -> None:
         """Learn from a step that is taken."""
         step, ratio = after.time - before.time, self.ratio(before, after)
         # 1e-3 stands for 0: from 0.2 on down ``GROWTH`` bounds the step, whatever the ratio is.
-        growth = min(max(self.share(max(ratio, 1e-3)), _FALL), GROWTH)
+        growth = min(max(self.share(max(ratio, 1e-3)), FALL), GROWTH)
         self.limit = max(step * growth, self._least) if math.isfinite(ratio) else math.inf
 
     def note(self) -> str:

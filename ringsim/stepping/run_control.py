@@ -97,6 +97,9 @@ class RunControl:
         """
         wanted = [one.shorter(self.now, found) for one in self._indicators]
         self._shorter = min((one for one in wanted if one is not None), default=None)
+        if self._shorter is None and isinstance(self._steps, MotionSteps):
+            step = found.time - self.now.time
+            self._shorter = self._steps.shorter_first(step, self._contact(found))
         return self._shorter
 
     def accept(self, found: Instant, struck: Instant | None = None) -> bool:
@@ -121,10 +124,8 @@ class RunControl:
         if self.goes_on:
             self._note_end(before.time)
         if self.goes_on:
-            locks = self._locks
-            stops = StopContact() if locks is None else locks.contact(self.now)
-            self._steps.advance(self.now, stops)
-            locked = locks is not None and locks.deployed.any()
+            self._steps.advance(self.now, self._contact(self.now))
+            locked = self._locks is not None and self._locks.deployed.any()
             if self._deviations is not None and not locked:
                 self._steps.step = min(self._steps.step, self._deviations.limit(self.now))
         return self.goes_on
@@ -148,6 +149,9 @@ class RunControl:
         if refused and self.status in (Status.OK, Status.UNFINISHED):
             self.diverge(refused)
         self.reason += "".join(indicator.note() for indicator in self._indicators)
+
+    def _contact(self, at: Instant) -> StopContact:
+        return StopContact() if self._locks is None else self._locks.contact(at)
 
     def _watch(self) -> None:
         """End the run where the guard must."""
