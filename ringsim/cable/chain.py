@@ -46,14 +46,11 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable import slack
 from ringsim.cable.records import Cable
-from ringsim.cable.ropes import Ropes
+from ringsim.cable.ropes import Array, Ropes
 from ringsim.cable.state import ChainState, RopeMaterial
-
-Array = NDArray[np.float64]
 
 
 class Chain:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from ringsim.cable import regularisation
@@ -13,6 +12,7 @@ from ringsim.cable.bracket.bisector import BisectorBracket
 from ringsim.cable.bracket.family import Bracket
 from ringsim.cable.friction.family import PulleyFriction
 from ringsim.cable.friction.frictionless import Frictionless
+from ringsim.cable.ropes import Array
 from ringsim.cable.winding.family import PrescribedWinding, WinchState, Winding
 from ringsim.choice import OneOf
 from ringsim.units import (
@@ -26,7 +26,6 @@ from ringsim.units import (
     Tension,
 )
 
-Array = NDArray[np.float64]
 AnyBracket = Annotated[Bracket, OneOf()]
 AnyFriction = Annotated[PulleyFriction, OneOf()]
 AnyWinding = Annotated[Winding, OneOf()]

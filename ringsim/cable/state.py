@@ -6,13 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable import slack
-from ringsim.cable.ropes import Ropes
+from ringsim.cable.ropes import Array, Flags, Ropes
 from ringsim.cable.winding.family import WinchReading
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -96,7 +93,7 @@ class ChainState:
     wound_rate: Array
 
     @property
-    def is_slack(self) -> NDArray[np.bool_]:
+    def is_slack(self) -> Flags:
         """Whether a rope is longer than its path, or cut; shape (ropes,)."""
         return np.asarray((self.paths < self.natural) | ~self.ropes.alive)
 

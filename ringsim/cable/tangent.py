@@ -27,12 +27,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable import slack
+from ringsim.cable.ropes import Array
 from ringsim.cable.state import ChainState
-
-Array = NDArray[np.float64]
 
 STRAIGHT = 1e-7
 """Sine of the angle between the pulls below which its derivative is taken as zero: far above the

@@ -22,15 +22,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from ringsim.cable.records import Cable, Winch
-from ringsim.cable.ropes import Ropes
+from ringsim.cable.ropes import Array, Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.winding.family import FeedbackWinding, WinchReading, WinchState
 
-Array = NDArray[np.float64]
 _NUDGE = 1e-8
 """Change of path in m by which the answer of the winches to the structure is measured: a hundred
 million roundings of a path of 1 m, and still a force of 1e-3 N at EA = 1e5 N."""

@@ -22,14 +22,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
-from ringsim.engine.rotations import axes_of, cross, gyration, skew, spin
+from ringsim.engine.rotations import Array, Indices, axes_of, cross, gyration, skew, spin
 from ringsim.engine.slope_blocks import SLOPES, PlacedBlocks
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 WIDTH = 7
 """Coordinates of a node: position and Euler parameters."""
 

@@ -19,11 +19,9 @@ the rest is the chain rule.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ringsim.engine.rotations import cross, skew
+from ringsim.engine.rotations import Array, cross, skew
 
-Array = NDArray[np.float64]
 SLOPES = 6
 """Coordinates of the two slope vectors of a node."""
 

@@ -5,7 +5,6 @@ Both are one tension EA (L - L0) / L0 in a rope that runs freely over points of 
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import exudyn as exu
@@ -71,9 +70,9 @@ class Swing:
             axial_stiffness=STIFFNESS,
             initial_slack=-STRETCH,
         )
-        carrier: Any = SimpleNamespace(assembly=self.assembly, scene=SimpleNamespace(faults=()))
         sheaves = [FixedSheave(node, arm) for (_, node), arm in self.path]
-        drive = CableDrive(carrier, Cables(upper=cable), CablePath([sheaves]))
+        path = CablePath([sheaves])
+        drive = CableDrive(self.assembly, Cables(upper=cable), path, faults=0)
         self.assembly.finish()
         drive.locate()
         return drive
