@@ -24,36 +24,26 @@ it by 1e-7 rad there."""
 
 @dataclass(frozen=True)
 class Ropes:
-    """The ropes of all cables.
-
-    Attributes
-    ----------
-    points_per_cable
-        Points of every cable, at least 2 each.
-    starts
-        First span of each rope, increasing, shape (ropes,).
-    content
-        Natural length of each rope in metre, with what its winches have wound since the start
-        (and without what they will still wind), shape (ropes,).
-    alive
-        Whether the rope can carry tension, shape (ropes,).
-
-    """
+    """The ropes of all cables."""
 
     points_per_cable: tuple[int, ...]
+    """Points of every cable, at least 2 each."""
     starts: Indices
+    """First span of each rope, increasing, shape (ropes,)."""
     content: Array
+    """Natural length of each rope in metre, with what its winches have wound since the start
+    (and without what they will still wind), shape (ropes,)."""
     alive: Flags
+    """Whether the rope can carry tension, shape (ropes,)."""
 
     @classmethod
-    def whole(cls, points_per_cable: Sequence[int], content: Array) -> Ropes:
-        """One rope per cable; ``content`` is its natural length at the start, in metre."""
-        if min(points_per_cable) < 2:
+    def whole(cls, points_per_cable: Sequence[int]) -> Ropes:
+        """One rope per cable, still without content."""
+        spans = np.asarray(points_per_cable, dtype=np.intp) - 1
+        if spans.min() < 1:
             raise ValueError("a cable needs at least two points")
-        spans = np.asarray(points_per_cable) - 1
-        starts = np.concatenate([[0], np.cumsum(spans)[:-1]]).astype(np.intp)
-        alive = np.ones(len(spans), dtype=bool)
-        return cls(tuple(points_per_cable), starts, np.asarray(content, dtype=float), alive)
+        starts, count = np.cumsum(spans) - spans, len(spans)
+        return cls(tuple(points_per_cable), starts, np.zeros(count), np.ones(count, dtype=bool))
 
     @cached_property
     def cable_starts(self) -> Indices:
@@ -133,7 +123,6 @@ class Ropes:
         ------
         ValueError
             If a span has no length.
-
         """
         apart = points[self.far] - points[self.near]
         lengths = np.sqrt(np.einsum("ij,ij->i", apart, apart))
@@ -170,7 +159,6 @@ class Ropes:
         ------
         ValueError
             If there is no such pulley.
-
         """
         self._check(cable, pulley, 2, "pulley")
         start = int(self.cable_starts[cable]) + pulley + 1
@@ -197,7 +185,6 @@ class Ropes:
         ------
         ValueError
             If there is no such span.
-
         """
         self._check(cable, span, 1, "span")
         alive = self.alive.copy()

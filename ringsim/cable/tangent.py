@@ -39,26 +39,17 @@ rounding of unit vectors (1e-16), far below the angles of any path that bends.""
 
 @dataclass(frozen=True)
 class RopeTangent:
-    """Derivatives of the tensions in one rope of n spans after the differences of its points.
-
-    Attributes
-    ----------
-    spans
-        The rope's spans among those of all cables.
-    mean_by_place, mean_by_velocity
-        Of the mean tension (the material part), N/m and N s/m, shape (n, 3).
-    by_direction
-        T_i (I - u_i u_i^T) / L_i of each span, in N/m, shape (n, 3, 3).
-    swing
-        Of the rates of length at fixed velocities, 1/s, shape (n, 3).
-
-    """
+    """Derivatives of the tensions in one rope of n spans after the differences of its points."""
 
     spans: slice
+    """The rope's spans among those of all cables."""
     mean_by_place: Array
     mean_by_velocity: Array
+    """Of the mean tension (the material part), N/m and N s/m, shape (n, 3)."""
     by_direction: Array
+    """T_i (I - u_i u_i^T) / L_i of each span, in N/m, shape (n, 3, 3)."""
     swing: Array
+    """Of the rates of length at fixed velocities, 1/s, shape (n, 3)."""
 
 
 def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent:
@@ -70,7 +61,6 @@ def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent
         The chain at the instant wanted.
     velocities
         The velocities that it was evaluated with, in m/s, shape (points, 3).
-
     """
     ropes, material = state.ropes, state.material
     spans = slice(int(ropes.starts[rope]), int(ropes.ends[rope]))
@@ -100,7 +90,6 @@ def decay_tangent(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[A
     tuple of Array
         Derivatives of each span's tension after each difference of points (N/m) and after each
         difference of velocities (N s/m), shape (n, n, 3) each.
-
     """
     spans, swing = tangent.spans, tangent.swing
     unit, share, tension = state.directions[spans], state.shares[spans], state.tensions[spans]

@@ -45,21 +45,15 @@ class _Member:
 
 @dataclass(frozen=True)
 class _Rope:
-    """A rope that such winches wind in this step, as it was at the beginning.
-
-    Attributes
-    ----------
-    start, path
-        Beginning of the step (s) and path of the rope then (m).
-    material
-        EA (N), Kelvin-Voigt time (s) and width of the passage from slack to taut (N).
-    """
+    """A rope that such winches wind in this step, as it was at the beginning."""
 
     index: int
     members: list[_Member]
     start: float
     path: float
-    material: tuple[float, float, float]
+    """Beginning of the step (s) and path of the rope then (m)."""
+    material: tuple[float, ...]
+    """EA (N), Kelvin-Voigt time (s) and width of the passage from slack to taut (N)."""
 
     def speeds(self, time: float, path: float, rate: float, natural: float, rest: float) -> Array:
         """Speed of every member, m/s.
@@ -196,7 +190,8 @@ class Winches:
                 continue
             k = int((state.ropes.last if end else state.ropes.first)[number])
             if k not in ropes:
-                ropes[k] = _Rope(k, [], time, float(state.paths[k]), state.material.of(k))
+                material = tuple(float(values[k]) for values in state.material)
+                ropes[k] = _Rope(k, [], time, float(state.paths[k]), material)
             reading = state.reading(number, end, float(slopes[number]))
             ropes[k].members.append(_Member(place, law, reading))
         self._ropes = list(ropes.values())

@@ -33,25 +33,17 @@ WIDTH = 7
 
 @dataclass(frozen=True)
 class Placed:
-    """All points of all paths at one instant.
-
-    Attributes
-    ----------
-    points, velocities
-        Shape (points, 3), m and m/s.
-    arms
-        From the carrying node's position to the point, global, shape (points, 3), m.
-    turns
-        Euler parameters of all nodes, shape (nodes, 4).
-    blocks
-        The blocks between nodes with slope vectors, if there are such nodes.
-    """
+    """All points of all paths at one instant."""
 
     points: Array
     velocities: Array
+    """Shape (points, 3), m and m/s."""
     arms: Array
+    """From the carrying node's position to the point, global, shape (points, 3), m."""
     turns: Array
+    """Euler parameters of all nodes, shape (nodes, 4)."""
     blocks: PlacedBlocks | None
+    """The blocks between nodes with slope vectors, if there are such nodes."""
 
     @cached_property
     def gyrations(self) -> Array:

@@ -12,8 +12,8 @@ import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
 
-from ringsim.cable.cables import Cables
 from ringsim.cable.chain import Chain
+from ringsim.cable.records import Cables
 from ringsim.cable.state import ChainState
 from ringsim.cable.winches import Winches
 from ringsim.engine.assembly import Assembly

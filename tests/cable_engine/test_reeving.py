@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ringsim.cable.cables import Cables
-from ringsim.cable.records import Cable, Winch
+from ringsim.cable.records import Cable, Cables, Winch
 from ringsim.cable.sheaves import FixedSheave
 from ringsim.cable.winding.constant import ConstantWinding
 from ringsim.engine.assembly import Assembly
