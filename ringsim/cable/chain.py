@@ -109,10 +109,7 @@ class Chain:
     def start(self, points: Array) -> Ropes:
         """One rope per cable, as long as its path at the start plus its initial slack.
 
-        Parameters
-        ----------
-        points
-            Points of all cables behind one another, in metre, shape (points, 3).
+        The points are those of all cables behind one another, in metre, shape (points, 3).
         """
         ropes = Ropes.whole(self.points_per_cable)
         lengths = np.linalg.norm(points[ropes.far] - points[ropes.near], axis=1)

@@ -165,18 +165,12 @@ class Ropes:
         if start in self.starts:
             return self
         k = int(self.of_span[start])
-        near = float(stored[self.starts[k] : start].sum())
-        far = float(stored[start : self.ends[k]].sum())
-        near += float(wound[cable, 0]) if self.first[cable] == k else 0.0
-        far += float(wound[cable, 1]) if self.last[cable] == k else 0.0
-        content = np.insert(self.content, k + 1, far)
-        content[k] = near
-        return replace(
-            self,
-            starts=np.insert(self.starts, k + 1, start),
-            content=content,
-            alive=np.insert(self.alive, k + 1, self.alive[k]),
-        )
+        content = np.insert(self.content, k, 0.0)  # of both parts: filled in below
+        alive = np.insert(self.alive, k, self.alive[k])
+        split = Ropes(self.points_per_cable, np.insert(self.starts, k + 1, start), content, alive)
+        held = split.along(stored) + split.per_rope(wound)
+        content[k : k + 2] = held[k : k + 2]
+        return split
 
     def cut(self, cable: int, span: int) -> Ropes:
         """The ropes after a span parts; both count from 0.

@@ -162,17 +162,9 @@ class ChainState:
 
     def reading(self, cable: int, end: int = 0, path_slope: float = 0.0) -> WinchReading:
         """Readings of the winch at an end (0 first, 1 far) of a cable (from 0)."""
-        rope = int((self.ropes.last if end else self.ropes.first)[cable])
-        present = float(self.wound_rate[cable, end])
-        return WinchReading(
-            tension_ratio=self._tension_ratio(rope, end, present),
-            path_rate=float(self.path_rates[rope] + self.wound_rates[rope]) - present,
-            path_slope=path_slope,
-        )
-
-    def _tension_ratio(self, rope: int, end: int, present: float) -> Callable[[float], float]:
-        """End tension over mean tension, were that end's winch to turn at another speed."""
         ropes = self.ropes
+        rope = int((ropes.last if end else ropes.first)[cable])
+        present = float(self.wound_rate[cable, end])
         inner = ropes.inner(rope)
         part = self.lengths[ropes.starts[rope] : ropes.ends[rope]] / self.paths[rope]
         share = 1.0 - np.cumsum(part)[:-1] - float(end)
@@ -185,7 +177,8 @@ class ChainState:
             weights = np.exp(logs - logs.max())
             return float(alive * weights[-1 if end else 0] / (weights @ part))
 
-        return ratio
+        path_rate = float(self.path_rates[rope] + self.wound_rates[rope]) - present
+        return WinchReading(tension_ratio=ratio, path_rate=path_rate, path_slope=path_slope)
 
 
 class ChainWork(NamedTuple):
@@ -217,7 +210,5 @@ def work_between(before: ChainState, after: ChainState) -> ChainWork:
     friction = 0.5 * (before.friction_forces + after.friction_forces) * slipped
     viscous = 0.5 * (before.viscous_forces + after.viscous_forces)
     viscous = viscous * 0.5 * (before.natural + after.natural) * (after.strains - before.strains)
-    return ChainWork(
-        driven=float(np.sum(pulls * wound) - np.sum(carried)),
-        lost=float(np.sum(friction) + np.sum(viscous)),
-    )
+    driven = float(np.sum(pulls * wound) - np.sum(carried))
+    return ChainWork(driven, lost=float(np.sum(friction) + np.sum(viscous)))

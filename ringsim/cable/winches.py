@@ -127,10 +127,7 @@ class Winches:
     ) -> tuple[Array, Array]:
         """Rope wound (m) and its rate (m/s) at both ends of each cable, shape (cables, 2) each.
 
-        Parameters
-        ----------
-        paths, rates
-            Path of each rope and its rate, m and m/s; not needed if no winch answers.
+        The paths of the ropes (m) and their rates (m/s) are not needed if no winch answers.
         """
         if not self._ropes and self._prescribed is not None and self._prescribed[0] == time:
             return self._prescribed[1:]
@@ -170,10 +167,7 @@ class Winches:
     def advance(self, time: float, state: ChainState, slopes: Array) -> None:
         """Begin a step at ``time`` (s) in a state of the chain.
 
-        Parameters
-        ----------
-        slopes
-            Derivative of each cable's ideal path length after the opening angle, m/rad.
+        ``slopes`` are the derivatives of the cables' ideal paths after the opening angle, m/rad.
         """
         self._prescribed = None
         self._held = [

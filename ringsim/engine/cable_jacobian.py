@@ -177,16 +177,11 @@ class JacobianPattern:
 
 def _entries(rows: Indices, columns: Indices, values: Array) -> Array:
     """Entries of a block with (a, 1) rows and (1, b) columns, shape (a b, 3)."""
-    found = np.empty((len(rows), columns.shape[1], 3))
-    found[:, :, 0], found[:, :, 1] = rows, columns
-    found[:, :, 2] = values.reshape(found.shape[:2])
-    return found.reshape(-1, 3)
+    block = values.reshape(len(rows), columns.shape[1])
+    return np.stack(np.broadcast_arrays(rows, columns, block), axis=-1).reshape(-1, 3)
 
 
 def _pairs(rows: Indices, columns: Indices) -> tuple[Indices, Indices]:
     """Row and column of every entry of blocks, (n, a) and (n, b) -> (n a b,) each."""
-    shape = (len(rows), rows.shape[1], columns.shape[1])
-    return (
-        np.broadcast_to(rows[:, :, None], shape).ravel(),
-        np.broadcast_to(columns[:, None, :], shape).ravel(),
-    )
+    row, column = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
+    return row.ravel(), column.ravel()

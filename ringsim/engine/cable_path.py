@@ -186,12 +186,7 @@ class CablePath:
         return maps
 
     def turning(self, placed: Placed, forces: Array) -> tuple[Array, Array]:
-        """Change of the generalised forces of constant point forces with the nodes' turns.
-
-        Parameters
-        ----------
-        forces
-            On all points, N, shape (points, 3).
+        """Change of the generalised forces of constant forces on all points with the nodes' turns.
 
         Returns
         -------

@@ -75,10 +75,7 @@ class CableDrive:
     def advance(self, time: float, state: ChainState, slopes: Array) -> None:
         """Let the winches begin the next step at a time (s) in a state of the chain.
 
-        Parameters
-        ----------
-        slopes
-            Derivative of each cable's ideal path length after the opening angle, m/rad.
+        ``slopes`` are the derivatives of the cables' ideal paths after the opening angle, m/rad.
         """
         self._answered = None
         self.winches.advance(time, state, slopes)
