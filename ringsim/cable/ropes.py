@@ -114,10 +114,7 @@ class Ropes:
     def measured(self, points: Array, velocities: Array) -> tuple[Array, Array, Array]:
         """Lengths (m), unit vectors away from the winch and rates of length (m/s) of all spans.
 
-        Parameters
-        ----------
-        points, velocities
-            Of all cables behind one another, m and m/s, shape (points, 3).
+        Points and velocities are those of all cables, m and m/s, shape (points, 3).
 
         Raises
         ------

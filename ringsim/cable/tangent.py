@@ -85,11 +85,8 @@ def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent
 def decay_tangent(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[Array, Array]:
     """The decay part of one rope: how the shares of its spans change.
 
-    Returns
-    -------
-    tuple of Array
-        Derivatives of each span's tension after each difference of points (N/m) and after each
-        difference of velocities (N s/m), shape (n, n, 3) each.
+    These are the derivatives of each span's tension after each difference of points (N/m) and
+    after each difference of velocities (N s/m), shape (n, n, 3) each.
     """
     spans, swing = tangent.spans, tangent.swing
     unit, share, tension = state.directions[spans], state.shares[spans], state.tensions[spans]

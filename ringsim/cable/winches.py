@@ -47,7 +47,6 @@ class _Member:
 class _Rope:
     """A rope that such winches wind in this step, as it was at the beginning."""
 
-    index: int
     members: list[_Member]
     start: float
     path: float
@@ -113,7 +112,7 @@ class Winches:
             for end, winch in enumerate(cable.winches)
         ]
         self._held = [WinchState() for _ in self._winches]
-        self._ropes: list[_Rope] = []
+        self._ropes: dict[int, _Rope] = {}
         self._speeds: dict[int, float] = {}
         self._prescribed: tuple[float, Array, Array] | None = None
 
@@ -132,7 +131,7 @@ class Winches:
         if not self._ropes and self._prescribed is not None and self._prescribed[0] == time:
             return self._prescribed[1:]
         wound, speed = np.zeros((self._cables, 2)), np.zeros((self._cables, 2))
-        answering = {m.number for rope in self._ropes for m in rope.members}
+        answering = {m.number for rope in self._ropes.values() for m in rope.members}
         for place, ((number, end, winch), held) in enumerate(
             zip(self._winches, self._held, strict=True)
         ):
@@ -142,8 +141,7 @@ class Winches:
             self._prescribed = time, wound, speed
             return wound, speed
         natural, rest = ropes.content - ropes.per_rope(wound), ropes.per_rope(speed)
-        for rope in self._ropes:
-            k = rope.index
+        for k, rope in self._ropes.items():
             found = rope.speeds(
                 time, float(paths[k]), float(rates[k]), float(natural[k]), float(rest[k])
             )
@@ -157,11 +155,11 @@ class Winches:
         """Share of a change of path that stretches the rope, not answered by its winches."""
         left = np.ones(len(ropes.starts))
         near = ropes.per_rope(self.at(time, ropes, paths, rates)[0])
-        for rope in self._ropes:
+        for k in self._ropes:
             moved = paths.copy()
-            moved[rope.index] += _NUDGE
+            moved[k] += _NUDGE
             far = ropes.per_rope(self.at(time, ropes, moved, rates)[0])
-            left[rope.index] += (far - near)[rope.index] / _NUDGE
+            left[k] += (far - near)[k] / _NUDGE
         return np.clip(left, 0.0, 1.0)
 
     def advance(self, time: float, state: ChainState, slopes: Array) -> None:
@@ -174,7 +172,7 @@ class Winches:
             WinchState(time, float(state.wound[number, end]), self._speeds.get(place, 0.0))
             for place, (number, end, _) in enumerate(self._winches)
         ]
-        ropes: dict[int, _Rope] = {}
+        self._ropes = {}
         for place, (number, end, winch) in enumerate(self._winches):
             law = winch.winding
             if not isinstance(law, FeedbackWinding):
@@ -183,9 +181,8 @@ class Winches:
                 self._held[place] = WinchState(time, self._held[place].wound, 0.0)
                 continue
             k = int((state.ropes.last if end else state.ropes.first)[number])
-            if k not in ropes:
+            if k not in self._ropes:
                 material = tuple(float(values[k]) for values in state.material)
-                ropes[k] = _Rope(k, [], time, float(state.paths[k]), material)
+                self._ropes[k] = _Rope([], time, float(state.paths[k]), material)
             reading = state.reading(number, end, float(slopes[number]))
-            ropes[k].members.append(_Member(place, law, reading))
-        self._ropes = list(ropes.values())
+            self._ropes[k].members.append(_Member(place, law, reading))

@@ -62,8 +62,6 @@ def build(scene: Scene) -> Built:
     faults = Faults(model, cables)
     connectors += [joint.reaction for joint in faults.joints]
     model.assembly.finish()
-    if cables is not None:
-        cables.locate()
     return Built(model, connectors, stops, cables, faults)
 
 

@@ -188,12 +188,9 @@ class CablePath:
     def turning(self, placed: Placed, forces: Array) -> tuple[Array, Array]:
         """Change of the generalised forces of constant forces on all points with the nodes' turns.
 
-        Returns
-        -------
-        tuple of Array
-            Derivatives of the moments arm x F by the pairs of ``turning_pairs``, and of what
-            moments do on each leg's own node, shape (pairs or legs, width - 3, width - 3).  What
-            blocks do on slope vectors stands among the pairs.
+        These are derivatives of the moments arm x F by the pairs of ``turning_pairs``, and of
+        what moments do on each leg's own node, shape (pairs or legs, width - 3, width - 3).  What
+        blocks do on slope vectors stands among the pairs.
         """
         pull, arms = forces[self.leg_point], placed.arms[self.leg_point]
         kernel = arms[:, :, None] * pull[:, None, :]

@@ -6,6 +6,7 @@ Jacobian that of ringsim.engine.cable_jacobian.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import exudyn as exu
@@ -19,7 +20,7 @@ from ringsim.cable.winches import Winches
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.cable_jacobian import JacobianPattern
 from ringsim.engine.cable_path import CablePath, Placed
-from ringsim.engine.rotations import Array
+from ringsim.engine.rotations import Array, Indices
 
 
 class CableDrive:
@@ -85,10 +86,10 @@ class CableDrive:
         place, rates = (self.path.by_node(x[self._columns]) for x in (position, velocity))
         return self.evaluate(place, rates, time)[0]
 
-    def locate(self) -> None:
-        """Look up where the nodes' coordinates stand in the system vector; after assembly."""
-        nodes = [self._assembly.coordinates_of(node) for node in self.path.nodes]
-        self._columns = np.concatenate(nodes)
+    @cached_property
+    def _columns(self) -> Indices:
+        """Where the nodes' coordinates stand in the vector of the system, once assembled."""
+        return np.concatenate([self._assembly.coordinates_of(node) for node in self.path.nodes])
 
     def _add_object(self) -> None:
         zeros = np.zeros(self.auxiliary)

@@ -73,7 +73,6 @@ class Swing:
         path = CablePath([sheaves])
         drive = CableDrive(self.assembly, Cables(upper=cable), path, faults=0)
         self.assembly.finish()
-        drive.locate()
         return drive
 
     def with_reeving(self, regularization: float) -> Any:
