@@ -141,12 +141,10 @@ class Ropes:
         return total
 
     def jam(self, cable: int, pulley: int, stored: Array, wound: Array) -> Ropes:
-        """The ropes after a pulley seizes the rope; cable and pulley count from 0.
+        """The ropes after a pulley seizes the rope; cable and pulley count from 0 at the winch.
 
         Parameters
         ----------
-        cable, pulley
-            Where; counted from the winch.
         stored
             Natural length in each span at that instant, in metre, shape (spans,).
         wound

@@ -55,12 +55,7 @@ class RopeTangent:
 def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent:
     """The tangent of one rope as if the shares of its spans stayed as they are.
 
-    Parameters
-    ----------
-    state
-        The chain at the instant wanted.
-    velocities
-        The velocities that it was evaluated with, in m/s, shape (points, 3).
+    The velocities are those that the state was evaluated with, in m/s, shape (points, 3).
     """
     ropes, material = state.ropes, state.material
     spans = slice(int(ropes.starts[rope]), int(ropes.ends[rope]))
