@@ -12,9 +12,8 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
-from ringsim.cable.cables import Cables, pulleys_of
 from ringsim.cable.faults.family import CableFault
-from ringsim.cable.records import Cable
+from ringsim.cable.records import Cable, Cables, pulleys_of
 from ringsim.choice import OneOf
 from ringsim.files import parse_toml, read_text
 from ringsim.overrides import section_of, set_path

@@ -46,14 +46,11 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable import slack
 from ringsim.cable.records import Cable
-from ringsim.cable.ropes import Ropes
+from ringsim.cable.ropes import Array, Ropes
 from ringsim.cable.state import ChainState, RopeMaterial
-
-Array = NDArray[np.float64]
 
 
 class Chain:
@@ -88,7 +85,6 @@ class Chain:
     array([51.44, 48.61])
     >>> float(state.winch_power.sum().round(4)), state.friction_loss.round(4)
     (0.2573, array([0.0071]))
-
     """
 
     def __init__(self, cables: Sequence[Cable], points_per_cable: Sequence[int]) -> None:
@@ -113,13 +109,9 @@ class Chain:
     def start(self, points: Array) -> Ropes:
         """One rope per cable, as long as its path at the start plus its initial slack.
 
-        Parameters
-        ----------
-        points
-            Points of all cables behind one another, in metre, shape (points, 3).
-
+        The points are those of all cables behind one another, in metre, shape (points, 3).
         """
-        ropes = Ropes.whole(self.points_per_cable, np.zeros(len(self.cables)))
+        ropes = Ropes.whole(self.points_per_cable)
         lengths = np.linalg.norm(points[ropes.far] - points[ropes.near], axis=1)
         slack_rope = np.array([cable.initial_slack for cable in self.cables])
         return replace(ropes, content=ropes.along(lengths) + slack_rope)
@@ -143,7 +135,6 @@ class Chain:
         ------
         ValueError
             If a span has no length, or a winch has wound up its whole rope.
-
         """
         lengths, directions, rates = ropes.measured(points, velocities)
         paths, path_rates = ropes.along(lengths), ropes.along(rates)

@@ -22,9 +22,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ringsim.cable.ropes import Array
 
 LARGEST_SLIP_SPEED = 2e-4
 """Metre per second; the slip speed of rope that is wound fast, or not at all."""

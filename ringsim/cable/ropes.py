@@ -24,36 +24,26 @@ it by 1e-7 rad there."""
 
 @dataclass(frozen=True)
 class Ropes:
-    """The ropes of all cables.
-
-    Attributes
-    ----------
-    points_per_cable
-        Points of every cable, at least 2 each.
-    starts
-        First span of each rope, increasing, shape (ropes,).
-    content
-        Natural length of each rope in metre, with what its winches have wound since the start
-        (and without what they will still wind), shape (ropes,).
-    alive
-        Whether the rope can carry tension, shape (ropes,).
-
-    """
+    """The ropes of all cables."""
 
     points_per_cable: tuple[int, ...]
+    """Points of every cable, at least 2 each."""
     starts: Indices
+    """First span of each rope, increasing, shape (ropes,)."""
     content: Array
+    """Natural length of each rope in metre, with what its winches have wound since the start
+    (and without what they will still wind), shape (ropes,)."""
     alive: Flags
+    """Whether the rope can carry tension, shape (ropes,)."""
 
     @classmethod
-    def whole(cls, points_per_cable: Sequence[int], content: Array) -> Ropes:
-        """One rope per cable; ``content`` is its natural length at the start, in metre."""
-        if min(points_per_cable) < 2:
+    def whole(cls, points_per_cable: Sequence[int]) -> Ropes:
+        """One rope per cable, still without content."""
+        spans = np.asarray(points_per_cable, dtype=np.intp) - 1
+        if spans.min() < 1:
             raise ValueError("a cable needs at least two points")
-        spans = np.asarray(points_per_cable) - 1
-        starts = np.concatenate([[0], np.cumsum(spans)[:-1]]).astype(np.intp)
-        alive = np.ones(len(spans), dtype=bool)
-        return cls(tuple(points_per_cable), starts, np.asarray(content, dtype=float), alive)
+        starts, count = np.cumsum(spans) - spans, len(spans)
+        return cls(tuple(points_per_cable), starts, np.zeros(count), np.ones(count, dtype=bool))
 
     @cached_property
     def cable_starts(self) -> Indices:
@@ -124,16 +114,12 @@ class Ropes:
     def measured(self, points: Array, velocities: Array) -> tuple[Array, Array, Array]:
         """Lengths (m), unit vectors away from the winch and rates of length (m/s) of all spans.
 
-        Parameters
-        ----------
-        points, velocities
-            Of all cables behind one another, m and m/s, shape (points, 3).
+        Points and velocities are those of all cables, m and m/s, shape (points, 3).
 
         Raises
         ------
         ValueError
             If a span has no length.
-
         """
         apart = points[self.far] - points[self.near]
         lengths = np.sqrt(np.einsum("ij,ij->i", apart, apart))
@@ -155,12 +141,10 @@ class Ropes:
         return total
 
     def jam(self, cable: int, pulley: int, stored: Array, wound: Array) -> Ropes:
-        """The ropes after a pulley seizes the rope; cable and pulley count from 0.
+        """The ropes after a pulley seizes the rope; cable and pulley count from 0 at the winch.
 
         Parameters
         ----------
-        cable, pulley
-            Where; counted from the winch.
         stored
             Natural length in each span at that instant, in metre, shape (spans,).
         wound
@@ -170,25 +154,18 @@ class Ropes:
         ------
         ValueError
             If there is no such pulley.
-
         """
         self._check(cable, pulley, 2, "pulley")
         start = int(self.cable_starts[cable]) + pulley + 1
         if start in self.starts:
             return self
         k = int(self.of_span[start])
-        near = float(stored[self.starts[k] : start].sum())
-        far = float(stored[start : self.ends[k]].sum())
-        near += float(wound[cable, 0]) if self.first[cable] == k else 0.0
-        far += float(wound[cable, 1]) if self.last[cable] == k else 0.0
-        content = np.insert(self.content, k + 1, far)
-        content[k] = near
-        return replace(
-            self,
-            starts=np.insert(self.starts, k + 1, start),
-            content=content,
-            alive=np.insert(self.alive, k + 1, self.alive[k]),
-        )
+        content = np.insert(self.content, k, 0.0)  # of both parts: filled in below
+        alive = np.insert(self.alive, k, self.alive[k])
+        split = Ropes(self.points_per_cable, np.insert(self.starts, k + 1, start), content, alive)
+        held = split.along(stored) + split.per_rope(wound)
+        content[k : k + 2] = held[k : k + 2]
+        return split
 
     def cut(self, cable: int, span: int) -> Ropes:
         """The ropes after a span parts; both count from 0.
@@ -197,7 +174,6 @@ class Ropes:
         ------
         ValueError
             If there is no such span.
-
         """
         self._check(cable, span, 1, "span")
         alive = self.alive.copy()

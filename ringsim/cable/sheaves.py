@@ -9,24 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from ringsim.cable.ropes import Array
 
 
 @dataclass(frozen=True)
 class FixedSheave:
-    """A sheave, winch or end of a rope fixed on the body of a node.
-
-    Attributes
-    ----------
-    arm
-        From the node to the point in the node's axes, m, shape (3,).
-    """
+    """A sheave, winch or end of a rope fixed on the body of a node."""
 
     node: Any
     arm: Array
+    """From the node to the point in the node's axes, m, shape (3,)."""
 
     @property
     def nodes(self) -> tuple[Any, ...]:
@@ -36,22 +28,15 @@ class FixedSheave:
 
 @dataclass(frozen=True)
 class BlockSheave:
-    """A V pulley on a block that stays on the bisector of two bar halves.
-
-    Attributes
-    ----------
-    left, right
-        Nodes of the halves at their V-joint.
-    sense
-        +1 in the upper plane, -1 in the lower: the block stands inside of the joint.
-    offset
-        Distance from the joint's axis, m.
-    """
+    """A V pulley on a block that stays on the bisector of two bar halves."""
 
     left: Any
     right: Any
+    """Nodes of the halves at their V-joint."""
     sense: float
+    """+1 in the upper plane, -1 in the lower: the block stands inside of the joint."""
     offset: float
+    """Distance from the joint's axis, m."""
 
     @property
     def nodes(self) -> tuple[Any, ...]:

@@ -1,102 +1,73 @@
-"""The chain at one instant: tensions, forces, powers."""
+"""The chain at one instant: tensions, forces, powers; and its work between two instants."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable import slack
-from ringsim.cable.ropes import Ropes
+from ringsim.cable.ropes import Array, Flags, Ropes
 from ringsim.cable.winding.family import WinchReading
 
-Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class RopeMaterial:
-    """Constants of the rope, one value per rope, shape (ropes,)."""
+class RopeMaterial(NamedTuple):
+    """EA (N), Kelvin-Voigt time (s) and slack width (N) of each rope, shape (ropes,)."""
 
     axial_stiffness: Array
     damping_time: Array
     slack_width: Array
 
-    def of(self, rope: int) -> tuple[float, float, float]:
-        """Constants of one rope: EA (N), Kelvin-Voigt time (s), slack width (N)."""
-        one = (self.axial_stiffness[rope], self.damping_time[rope], self.slack_width[rope])
-        return float(one[0]), float(one[1]), float(one[2])
-
 
 @dataclass(frozen=True)
 class ChainState:
-    """All spans, pulleys and ropes at one instant; see ``ringsim.cable.chain``.
-
-    Attributes
-    ----------
-    lengths, rates
-        Length of each span (m) and its rate (m/s), shape (spans,).
-    directions
-        Unit vectors away from the winch, shape (spans, 3).
-    angles
-        Angle between the two pulls on each pulley (rad), shape (pulleys,).
-    log_decays
-        Logarithm of the full decay at each pulley, shape (pulleys,).
-    friction_slopes
-        Computes its derivative after the angle; forces do not need it.
-    speeds
-        Rope over each pulley (m/s, towards the winch positive), shape (pulleys,).
-    exponents
-        Share and direction of the full decay, tanh(speed / slip speed), shape (pulleys,).
-    slip_speeds
-        Speed that regularises the exponents (m/s), shape (pulleys,).
-    shares
-        Tension of each span over its rope's mean tension, shape (spans,).
-    tensions
-        Shape (spans,), in N.
-    paths, path_rates
-        Path length of each rope (m) and its rate (m/s), shape (ropes,).
-    natural, wound_rates
-        Natural length of each rope (m) and what its winches take up (m/s), shape (ropes,).
-    strains, strain_rates
-        Mean strain of each rope, (path - natural) / natural as of paper 001's element, and its
-        rate in 1/s, shape (ropes,).
-    forces
-        Elastic and viscous force of each rope before smoothing (N), shape (ropes,).
-    mean_tensions
-        Mean tension of each rope, weighted by length (N), shape (ropes,).
-    wound, wound_rate
-        Of the winches at both ends of each cable, m and m/s, shape (cables, 2).
-
-    """
+    """All spans, pulleys and ropes at one instant; see ``ringsim.cable.chain``."""
 
     ropes: Ropes
     material: RopeMaterial
     lengths: Array
     rates: Array
+    """Length of each span (m) and its rate (m/s), shape (spans,)."""
     directions: Array
+    """Unit vectors away from the winch, shape (spans, 3)."""
     angles: Array
+    """Angle between the two pulls on each pulley (rad), shape (pulleys,)."""
     log_decays: Array
+    """Logarithm of the full decay at each pulley, shape (pulleys,)."""
     friction_slopes: Callable[[], Array]
+    """Computes the derivative of ``log_decays`` after the angles; forces do not need it."""
     speeds: Array
+    """Rope over each pulley (m/s, towards the winch positive), shape (pulleys,)."""
     exponents: Array
+    """Share and direction of the full decay, tanh(speed / slip speed), shape (pulleys,)."""
     slip_speeds: Array
+    """Speed that regularises the exponents (m/s), shape (pulleys,)."""
     shares: Array
+    """Tension of each span over its rope's mean tension, shape (spans,)."""
     tensions: Array
+    """Of each span, in N, shape (spans,)."""
     paths: Array
     path_rates: Array
+    """Path length of each rope (m) and its rate (m/s), shape (ropes,)."""
     natural: Array
     wound_rates: Array
+    """Natural length of each rope (m) and what its winches take up (m/s), shape (ropes,)."""
     strains: Array
     strain_rates: Array
+    """Mean strain of each rope, (path - natural) / natural as of paper 001's element, and its
+    rate in 1/s, shape (ropes,)."""
     forces: Array
+    """Elastic and viscous force of each rope before smoothing (N), shape (ropes,)."""
     mean_tensions: Array
+    """Mean tension of each rope, weighted by length (N), shape (ropes,)."""
     wound: Array
     wound_rate: Array
+    """Of the winches at both ends of each cable, m and m/s, shape (cables, 2)."""
 
     @property
-    def is_slack(self) -> NDArray[np.bool_]:
+    def is_slack(self) -> Flags:
         """Whether a rope is longer than its path, or cut; shape (ropes,)."""
         return np.asarray((self.paths < self.natural) | ~self.ropes.alive)
 
@@ -158,9 +129,8 @@ class ChainState:
     def viscous_forces(self) -> Array:
         """Viscous part of each rope's mean tension, in N, shape (ropes,)."""
         elastic = self.material.axial_stiffness * self.strains
-        return self.mean_tensions - self.ropes.alive * slack.tension(
-            elastic, self.material.slack_width
-        )
+        statically = slack.tension(elastic, self.material.slack_width)
+        return self.mean_tensions - self.ropes.alive * statically
 
     @property
     def damping_loss(self) -> Array:
@@ -192,17 +162,9 @@ class ChainState:
 
     def reading(self, cable: int, end: int = 0, path_slope: float = 0.0) -> WinchReading:
         """Readings of the winch at an end (0 first, 1 far) of a cable (from 0)."""
-        rope = int((self.ropes.last if end else self.ropes.first)[cable])
-        present = float(self.wound_rate[cable, end])
-        return WinchReading(
-            tension_ratio=self._tension_ratio(rope, end, present),
-            path_rate=float(self.path_rates[rope] + self.wound_rates[rope]) - present,
-            path_slope=path_slope,
-        )
-
-    def _tension_ratio(self, rope: int, end: int, present: float) -> Callable[[float], float]:
-        """End tension over mean tension, were that end's winch to turn at another speed."""
         ropes = self.ropes
+        rope = int((ropes.last if end else ropes.first)[cable])
+        present = float(self.wound_rate[cable, end])
         inner = ropes.inner(rope)
         part = self.lengths[ropes.starts[rope] : ropes.ends[rope]] / self.paths[rope]
         share = 1.0 - np.cumsum(part)[:-1] - float(end)
@@ -215,4 +177,38 @@ class ChainState:
             weights = np.exp(logs - logs.max())
             return float(alive * weights[-1 if end else 0] / (weights @ part))
 
-        return ratio
+        path_rate = float(self.path_rates[rope] + self.wound_rates[rope]) - present
+        return WinchReading(tension_ratio=ratio, path_rate=path_rate, path_slope=path_slope)
+
+
+class ChainWork(NamedTuple):
+    """Energies in J: put in by the winches, less what is wound up; lost by friction, damping."""
+
+    driven: float
+    lost: float
+
+
+def work_between(before: ChainState, after: ChainState) -> ChainWork:
+    """Work on the cables from one instant to a later one.
+
+    The work of a force is its mean at both instants times the displacement: rope wound on a drum,
+    rope slipped over a pulley, strain of a rope.  The trapezoidal rule balances exactly these
+    works; products of force and rate at the instants alone miss the displacement between them.
+    Nothing moves while a fault changes the ropes: states of different ropes have no work.
+    Source: the energy balance of Belytschko, Liu and Moran, Nonlinear Finite Elements for
+    Continua and Structures (2000), sec. 6.2.3.
+    """
+    ropes = after.ropes
+    if before.ropes is not ropes:
+        return ChainWork(0.0, 0.0)
+    wound = after.wound - before.wound
+    pulls = 0.5 * (before.winch_forces + after.winch_forces)
+    carried = 0.5 * (before.energy_density + after.energy_density) * ropes.per_rope(wound)
+    slipped = before.held_beyond - after.held_beyond
+    beyond = ropes.last[ropes.cable[ropes.of_pulley]] == ropes.of_pulley
+    slipped -= beyond * wound[ropes.cable[ropes.of_pulley], 1]
+    friction = 0.5 * (before.friction_forces + after.friction_forces) * slipped
+    viscous = 0.5 * (before.viscous_forces + after.viscous_forces)
+    viscous = viscous * 0.5 * (before.natural + after.natural) * (after.strains - before.strains)
+    driven = float(np.sum(pulls * wound) - np.sum(carried))
+    return ChainWork(driven, lost=float(np.sum(friction) + np.sum(viscous)))

@@ -27,12 +27,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable import slack
+from ringsim.cable.ropes import Array
 from ringsim.cable.state import ChainState
-
-Array = NDArray[np.float64]
 
 STRAIGHT = 1e-7
 """Sine of the angle between the pulls below which its derivative is taken as zero: far above the
@@ -41,38 +39,23 @@ rounding of unit vectors (1e-16), far below the angles of any path that bends.""
 
 @dataclass(frozen=True)
 class RopeTangent:
-    """Derivatives of the tensions in one rope of n spans after the differences of its points.
-
-    Attributes
-    ----------
-    spans
-        The rope's spans among those of all cables.
-    mean_by_place, mean_by_velocity
-        Of the mean tension (the material part), N/m and N s/m, shape (n, 3).
-    by_direction
-        T_i (I - u_i u_i^T) / L_i of each span, in N/m, shape (n, 3, 3).
-    swing
-        Of the rates of length at fixed velocities, 1/s, shape (n, 3).
-
-    """
+    """Derivatives of the tensions in one rope of n spans after the differences of its points."""
 
     spans: slice
+    """The rope's spans among those of all cables."""
     mean_by_place: Array
     mean_by_velocity: Array
+    """Of the mean tension (the material part), N/m and N s/m, shape (n, 3)."""
     by_direction: Array
+    """T_i (I - u_i u_i^T) / L_i of each span, in N/m, shape (n, 3, 3)."""
     swing: Array
+    """Of the rates of length at fixed velocities, 1/s, shape (n, 3)."""
 
 
 def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent:
     """The tangent of one rope as if the shares of its spans stayed as they are.
 
-    Parameters
-    ----------
-    state
-        The chain at the instant wanted.
-    velocities
-        The velocities that it was evaluated with, in m/s, shape (points, 3).
-
+    The velocities are those that the state was evaluated with, in m/s, shape (points, 3).
     """
     ropes, material = state.ropes, state.material
     spans = slice(int(ropes.starts[rope]), int(ropes.ends[rope]))
@@ -97,12 +80,8 @@ def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent
 def decay_tangent(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[Array, Array]:
     """The decay part of one rope: how the shares of its spans change.
 
-    Returns
-    -------
-    tuple of Array
-        Derivatives of each span's tension after each difference of points (N/m) and after each
-        difference of velocities (N s/m), shape (n, n, 3) each.
-
+    These are the derivatives of each span's tension after each difference of points (N/m) and
+    after each difference of velocities (N s/m), shape (n, n, 3) each.
     """
     spans, swing = tangent.spans, tangent.swing
     unit, share, tension = state.directions[spans], state.shares[spans], state.tensions[spans]

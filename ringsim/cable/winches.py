@@ -22,15 +22,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from ringsim.cable.records import Cable, Winch
-from ringsim.cable.ropes import Ropes
+from ringsim.cable.ropes import Array, Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.winding.family import FeedbackWinding, WinchReading, WinchState
 
-Array = NDArray[np.float64]
 _NUDGE = 1e-8
 """Change of path in m by which the answer of the winches to the structure is measured: a hundred
 million roundings of a path of 1 m, and still a force of 1e-3 N at EA = 1e5 N."""
@@ -47,21 +45,14 @@ class _Member:
 
 @dataclass(frozen=True)
 class _Rope:
-    """A rope that such winches wind in this step, as it was at the beginning.
+    """A rope that such winches wind in this step, as it was at the beginning."""
 
-    Attributes
-    ----------
-    start, path
-        Beginning of the step (s) and path of the rope then (m).
-    material
-        EA (N), Kelvin-Voigt time (s) and width of the passage from slack to taut (N).
-    """
-
-    index: int
     members: list[_Member]
     start: float
     path: float
-    material: tuple[float, float, float]
+    """Beginning of the step (s) and path of the rope then (m)."""
+    material: tuple[float, ...]
+    """EA (N), Kelvin-Voigt time (s) and width of the passage from slack to taut (N)."""
 
     def speeds(self, time: float, path: float, rate: float, natural: float, rest: float) -> Array:
         """Speed of every member, m/s.
@@ -121,7 +112,7 @@ class Winches:
             for end, winch in enumerate(cable.winches)
         ]
         self._held = [WinchState() for _ in self._winches]
-        self._ropes: list[_Rope] = []
+        self._ropes: dict[int, _Rope] = {}
         self._speeds: dict[int, float] = {}
         self._prescribed: tuple[float, Array, Array] | None = None
 
@@ -135,15 +126,12 @@ class Winches:
     ) -> tuple[Array, Array]:
         """Rope wound (m) and its rate (m/s) at both ends of each cable, shape (cables, 2) each.
 
-        Parameters
-        ----------
-        paths, rates
-            Path of each rope and its rate, m and m/s; not needed if no winch answers.
+        The paths of the ropes (m) and their rates (m/s) are not needed if no winch answers.
         """
         if not self._ropes and self._prescribed is not None and self._prescribed[0] == time:
             return self._prescribed[1:]
         wound, speed = np.zeros((self._cables, 2)), np.zeros((self._cables, 2))
-        answering = {m.number for rope in self._ropes for m in rope.members}
+        answering = {m.number for rope in self._ropes.values() for m in rope.members}
         for place, ((number, end, winch), held) in enumerate(
             zip(self._winches, self._held, strict=True)
         ):
@@ -153,8 +141,7 @@ class Winches:
             self._prescribed = time, wound, speed
             return wound, speed
         natural, rest = ropes.content - ropes.per_rope(wound), ropes.per_rope(speed)
-        for rope in self._ropes:
-            k = rope.index
+        for k, rope in self._ropes.items():
             found = rope.speeds(
                 time, float(paths[k]), float(rates[k]), float(natural[k]), float(rest[k])
             )
@@ -168,27 +155,24 @@ class Winches:
         """Share of a change of path that stretches the rope, not answered by its winches."""
         left = np.ones(len(ropes.starts))
         near = ropes.per_rope(self.at(time, ropes, paths, rates)[0])
-        for rope in self._ropes:
+        for k in self._ropes:
             moved = paths.copy()
-            moved[rope.index] += _NUDGE
+            moved[k] += _NUDGE
             far = ropes.per_rope(self.at(time, ropes, moved, rates)[0])
-            left[rope.index] += (far - near)[rope.index] / _NUDGE
+            left[k] += (far - near)[k] / _NUDGE
         return np.clip(left, 0.0, 1.0)
 
     def advance(self, time: float, state: ChainState, slopes: Array) -> None:
         """Begin a step at ``time`` (s) in a state of the chain.
 
-        Parameters
-        ----------
-        slopes
-            Derivative of each cable's ideal path length after the opening angle, m/rad.
+        ``slopes`` are the derivatives of the cables' ideal paths after the opening angle, m/rad.
         """
         self._prescribed = None
         self._held = [
             WinchState(time, float(state.wound[number, end]), self._speeds.get(place, 0.0))
             for place, (number, end, _) in enumerate(self._winches)
         ]
-        ropes: dict[int, _Rope] = {}
+        self._ropes = {}
         for place, (number, end, winch) in enumerate(self._winches):
             law = winch.winding
             if not isinstance(law, FeedbackWinding):
@@ -197,8 +181,8 @@ class Winches:
                 self._held[place] = WinchState(time, self._held[place].wound, 0.0)
                 continue
             k = int((state.ropes.last if end else state.ropes.first)[number])
-            if k not in ropes:
-                ropes[k] = _Rope(k, [], time, float(state.paths[k]), state.material.of(k))
+            if k not in self._ropes:
+                material = tuple(float(values[k]) for values in state.material)
+                self._ropes[k] = _Rope([], time, float(state.paths[k]), material)
             reading = state.reading(number, end, float(slopes[number]))
-            ropes[k].members.append(_Member(place, law, reading))
-        self._ropes = list(ropes.values())
+            self._ropes[k].members.append(_Member(place, law, reading))

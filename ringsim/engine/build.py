@@ -58,12 +58,10 @@ def build(scene: Scene) -> Built:
     if scene.cables is not None:
         paths = [[_on_nodes(model, sheave) for sheave in path] for path in model.layout.paths]
         path = CablePath(paths, slopes=isinstance(model.formulation, Ancf))
-        cables = CableDrive(model, scene.cables, path)
+        cables = CableDrive(model.assembly, scene.cables, path, len(scene.faults))
     faults = Faults(model, cables)
     connectors += [joint.reaction for joint in faults.joints]
     model.assembly.finish()
-    if cables is not None:
-        cables.locate()
     return Built(model, connectors, stops, cables, faults)
 
 

@@ -13,21 +13,15 @@ nodes turn at fixed rates; against the rest that is of the order of a node's tur
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.tangent import RopeTangent, decay_tangent, rope_tangent
 from ringsim.engine.cable_path import CablePath, Placed
+from ringsim.engine.rotations import Array, Indices
 
-Array = NDArray[np.float64]
 _PER_SPAN = 4
 """Auxiliary unknowns of a span: three for its difference vector, one for its tension."""
-
-
-def auxiliary_unknowns(spans: int, ropes: int) -> int:
-    """Auxiliary unknowns of so many spans in at most so many ropes."""
-    return _PER_SPAN * spans + ropes
 
 
 class JacobianPattern:
@@ -35,8 +29,15 @@ class JacobianPattern:
 
     The object's equation is mass * acceleration - force = 0; what follows is its left-hand side.
 
+    Parameters
+    ----------
+    most_ropes
+        Largest number of ropes that faults can make of the cables.
+
     Attributes
     ----------
+    unknowns
+        Number of auxiliary unknowns.
     steady
         Share of the full friction from which its changes with the rope's speed do not matter: the
         decay of a rope above it over all its pulleys is left out.
@@ -48,10 +49,11 @@ class JacobianPattern:
     steady = 0.9999
     negligible = 0.02
 
-    def __init__(self, path: CablePath, ropes: Ropes, auxiliary: int) -> None:
+    def __init__(self, path: CablePath, ropes: Ropes, most_ropes: int) -> None:
         self._path = path
         self._size = path.size
         self._spans = ropes.spans
+        self.unknowns = _PER_SPAN * ropes.spans + most_ropes
         # Every leg of the two points of every span; the far point adds to the difference.
         ends = np.stack([ropes.near, ropes.far], axis=1).ravel()
         end, self._leg = np.nonzero(path.leg_point == ends[:, None])
@@ -62,7 +64,7 @@ class JacobianPattern:
         tension = self._tension(self._span)
         first, second = path.turning_pairs
         turn = path.spots[path.leg_node, 3:]
-        every = np.arange(self._size, self._size + auxiliary)
+        every = np.arange(self._size, self._size + self.unknowns)
         turned = np.ones((len(self._leg), width, 3), dtype=bool)
         turned[:, :3] = path.leg_carries[self._leg, None, None] > 0.0
         turned &= own[:, :, None] >= 0
@@ -81,21 +83,20 @@ class JacobianPattern:
         # Explicit zeros would fill the factors of the system's matrix.
         mask = np.concatenate([mask, (rows[len(mask) :] >= 0) & (columns[len(mask) :] >= 0)])
         self._kept = np.flatnonzero(mask)
-        self._unknowns = auxiliary
-        self._known = auxiliary + len(self._kept)
+        self._known = self.unknowns + len(self._kept)
         self._entries = np.ones((self._known, 3))
         self._entries[:, 0] = np.concatenate([every, rows[self._kept]])
         self._entries[:, 1] = np.concatenate([every, columns[self._kept]])
 
-    def _difference(self, span: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _difference(self, span: Indices) -> Indices:
         return np.asarray(self._size + 3 * span[:, None] + np.arange(3))
 
-    def _tension(self, span: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _tension(self, span: Indices) -> Indices:
         return np.asarray(self._size + 3 * self._spans + span)
 
     def empty(self) -> Array:
         """Entries of a cable that pulls nothing, shape (entries, 3)."""
-        empty = self._entries[: self._unknowns].copy()
+        empty = self._entries[: self.unknowns].copy()
         empty[:, 2] = 1.0
         return empty
 
@@ -133,8 +134,8 @@ class JacobianPattern:
         ]
         values = np.concatenate([block.ravel() for block in blocks])
         entries = self._with_room(self._known + sum(len(part) for part in parts))
-        entries[: self._unknowns, 2] = by_q
-        np.multiply(values[self._kept], by_q, out=entries[self._unknowns : self._known, 2])
+        entries[: self.unknowns, 2] = by_q
+        np.multiply(values[self._kept], by_q, out=entries[self.unknowns : self._known, 2])
         np.concatenate(parts, out=entries[self._known :])
         return entries
 
@@ -174,20 +175,13 @@ class JacobianPattern:
         return [*entries, np.stack(decay, axis=1)]
 
 
-def _entries(rows: NDArray[np.int64], columns: NDArray[np.int64], values: Array) -> Array:
+def _entries(rows: Indices, columns: Indices, values: Array) -> Array:
     """Entries of a block with (a, 1) rows and (1, b) columns, shape (a b, 3)."""
-    found = np.empty((len(rows), columns.shape[1], 3))
-    found[:, :, 0], found[:, :, 1] = rows, columns
-    found[:, :, 2] = values.reshape(found.shape[:2])
-    return found.reshape(-1, 3)
+    block = values.reshape(len(rows), columns.shape[1])
+    return np.stack(np.broadcast_arrays(rows, columns, block), axis=-1).reshape(-1, 3)
 
 
-def _pairs(
-    rows: NDArray[np.int64], columns: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _pairs(rows: Indices, columns: Indices) -> tuple[Indices, Indices]:
     """Row and column of every entry of blocks, (n, a) and (n, b) -> (n a b,) each."""
-    shape = (len(rows), rows.shape[1], columns.shape[1])
-    return (
-        np.broadcast_to(rows[:, :, None], shape).ravel(),
-        np.broadcast_to(columns[:, None, :], shape).ravel(),
-    )
+    row, column = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
+    return row.ravel(), column.ravel()

@@ -22,39 +22,28 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
-from ringsim.engine.rotations import axes_of, cross, gyration, skew, spin
+from ringsim.engine.rotations import Array, Indices, axes_of, cross, gyration, skew, spin
 from ringsim.engine.slope_blocks import SLOPES, PlacedBlocks
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 WIDTH = 7
 """Coordinates of a node: position and Euler parameters."""
 
 
 @dataclass(frozen=True)
 class Placed:
-    """All points of all paths at one instant.
-
-    Attributes
-    ----------
-    points, velocities
-        Shape (points, 3), m and m/s.
-    arms
-        From the carrying node's position to the point, global, shape (points, 3), m.
-    turns
-        Euler parameters of all nodes, shape (nodes, 4).
-    blocks
-        The blocks between nodes with slope vectors, if there are such nodes.
-    """
+    """All points of all paths at one instant."""
 
     points: Array
     velocities: Array
+    """Shape (points, 3), m and m/s."""
     arms: Array
+    """From the carrying node's position to the point, global, shape (points, 3), m."""
     turns: Array
+    """Euler parameters of all nodes, shape (nodes, 4)."""
     blocks: PlacedBlocks | None
+    """The blocks between nodes with slope vectors, if there are such nodes."""
 
     @cached_property
     def gyrations(self) -> Array:
@@ -197,19 +186,11 @@ class CablePath:
         return maps
 
     def turning(self, placed: Placed, forces: Array) -> tuple[Array, Array]:
-        """Change of the generalised forces of constant point forces with the nodes' turns.
+        """Change of the generalised forces of constant forces on all points with the nodes' turns.
 
-        Parameters
-        ----------
-        forces
-            On all points, N, shape (points, 3).
-
-        Returns
-        -------
-        tuple of Array
-            Derivatives of the moments arm x F by the pairs of ``turning_pairs``, and of what
-            moments do on each leg's own node, shape (pairs or legs, width - 3, width - 3).  What
-            blocks do on slope vectors stands among the pairs.
+        These are derivatives of the moments arm x F by the pairs of ``turning_pairs``, and of
+        what moments do on each leg's own node, shape (pairs or legs, width - 3, width - 3).  What
+        blocks do on slope vectors stands among the pairs.
         """
         pull, arms = forces[self.leg_point], placed.arms[self.leg_point]
         kernel = arms[:, :, None] * pull[:, None, :]

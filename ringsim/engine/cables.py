@@ -6,49 +6,30 @@ Jacobian that of ringsim.engine.cable_jacobian.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from functools import cached_property
+from typing import Any
 
 import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
-from numpy.typing import NDArray
 
-from ringsim.cable.cables import Cables
 from ringsim.cable.chain import Chain
+from ringsim.cable.records import Cables
 from ringsim.cable.state import ChainState
 from ringsim.cable.winches import Winches
 from ringsim.engine.assembly import Assembly
-from ringsim.engine.cable_jacobian import JacobianPattern, auxiliary_unknowns
+from ringsim.engine.cable_jacobian import JacobianPattern
 from ringsim.engine.cable_path import CablePath, Placed
-from ringsim.scene import Scene
-
-Array = NDArray[np.float64]
-
-
-class Carrier(Protocol):
-    """What carries cables: the model of any structure."""
-
-    @property
-    def scene(self) -> Scene:
-        """What the model was built from."""
-
-    @property
-    def assembly(self) -> Assembly:
-        """The system under construction."""
-
-
-class _Answered(NamedTuple):
-    """The state of the nodes last asked for (shape (nodes, width), s), and what it gave."""
-
-    time: float
-    place: Array
-    rates: Array
-    chain: ChainState
-    placed: Placed
+from ringsim.engine.rotations import Array, Indices
 
 
 class CableDrive:
     """The cables of a scene, with their winches.
+
+    Parameters
+    ----------
+    faults
+        Number of the scene's faults: each may split one rope in two.
 
     Attributes
     ----------
@@ -64,24 +45,21 @@ class CableDrive:
         Why the chain last had no answer to a state that Newton tried; empty if it always had.
     """
 
-    def __init__(self, model: Carrier, cables: Cables, path: CablePath) -> None:
+    def __init__(self, assembly: Assembly, cables: Cables, path: CablePath, faults: int) -> None:
         present = [cable for _, cable in cables.present()]
-        self.path, self._assembly = path, model.assembly
-        parameter = model.assembly.system.GetNodeParameter
+        self.path, self._assembly = path, assembly
+        parameter = assembly.system.GetNodeParameter
         reference = [parameter(node, "referenceCoordinates") for node in path.nodes]
         self._reference = path.by_node(np.concatenate(reference))
         self.chain = Chain(present, path.per_cable)
         start = path.place(self._reference, np.zeros_like(self._reference))
         self.ropes = self.chain.start(start.points)
         self.winches = Winches(present)
-        self._answered: _Answered | None = None
-        # Every fault may split one rope in two.
-        self.auxiliary = auxiliary_unknowns(
-            self.ropes.spans, len(present) + len(model.scene.faults)
-        )
+        self._answered: tuple[tuple[float, bytes, bytes], ChainState, Placed] | None = None
+        self.pattern = JacobianPattern(path, self.ropes, len(present) + faults)
+        self.auxiliary = self.pattern.unknowns
         self._size = path.size + self.auxiliary
         self.refusal = ""
-        self.pattern = JacobianPattern(path, self.ropes, self.auxiliary)
         self._add_object()
 
     def evaluate(self, coordinates: Array, rates: Array, time: float) -> tuple[ChainState, Placed]:
@@ -98,10 +76,7 @@ class CableDrive:
     def advance(self, time: float, state: ChainState, slopes: Array) -> None:
         """Let the winches begin the next step at a time (s) in a state of the chain.
 
-        Parameters
-        ----------
-        slopes
-            Derivative of each cable's ideal path length after the opening angle, m/rad.
+        ``slopes`` are the derivatives of the cables' ideal paths after the opening angle, m/rad.
         """
         self._answered = None
         self.winches.advance(time, state, slopes)
@@ -111,10 +86,10 @@ class CableDrive:
         place, rates = (self.path.by_node(x[self._columns]) for x in (position, velocity))
         return self.evaluate(place, rates, time)[0]
 
-    def locate(self) -> None:
-        """Look up where the nodes' coordinates stand in the system vector; after assembly."""
-        nodes = [self._assembly.coordinates_of(node) for node in self.path.nodes]
-        self._columns = np.concatenate(nodes)
+    @cached_property
+    def _columns(self) -> Indices:
+        """Where the nodes' coordinates stand in the vector of the system, once assembled."""
+        return np.concatenate([self._assembly.coordinates_of(node) for node in self.path.nodes])
 
     def _add_object(self) -> None:
         zeros = np.zeros(self.auxiliary)
@@ -142,17 +117,11 @@ class CableDrive:
         size = self.path.size
         place, rates = (self.path.by_node(np.asarray(x[:size])) for x in (q, q_t))
         place = place + self._reference
+        asked = (time, place.tobytes(), rates.tobytes())
         known = self._answered
-        if (
-            known is None
-            or known.time != time
-            or known.chain.ropes is not self.ropes
-            or not np.array_equal(known.place, place)
-            or not np.array_equal(known.rates, rates)
-        ):
-            known = _Answered(time, place, rates.copy(), *self.evaluate(place, rates, time))
-            self._answered = known
-        return known.chain, known.placed
+        if known is None or known[0] != asked or known[1].ropes is not self.ropes:
+            known = self._answered = asked, *self.evaluate(place, rates, time)
+        return known[1:]
 
     def _force(self, mbs: Any, t: float, number: int, q: Any, q_t: Any) -> Array:
         force = np.zeros(self._size)

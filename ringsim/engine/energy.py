@@ -8,8 +8,7 @@ import exudyn as exu
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.cable.state import ChainState
-from ringsim.cable.work import work_between
+from ringsim.cable.state import ChainState, work_between
 from ringsim.engine.build import Built
 from ringsim.engine.readings import State
 from ringsim.stepping.instant import Energies

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 
 def axes_of(turns: Array) -> Array:

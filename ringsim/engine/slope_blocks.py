@@ -19,11 +19,9 @@ the rest is the chain rule.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ringsim.engine.rotations import cross, skew
+from ringsim.engine.rotations import Array, cross, skew
 
-Array = NDArray[np.float64]
 SLOPES = 6
 """Coordinates of the two slope vectors of a node."""
 
@@ -106,10 +104,7 @@ class PlacedBlocks:
     def turning(self, forces: Array) -> Array:
         """Second derivative of F . arm after the slopes of two nodes, shape (2, 2, blocks, 6, 6).
 
-        Parameters
-        ----------
-        forces
-            F on the pulleys, N, shape (blocks, 3).
+        The forces F act on the pulleys, N, shape (blocks, 3).
         """
         scaled = self._reach * forces
         along = (self._block.first() @ scaled[:, :, None])[:, :, 0]

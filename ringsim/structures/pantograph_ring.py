@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ringsim.cable.cables import pulleys_of
+from ringsim.cable.records import pulleys_of
 from ringsim.choice import kind_of
 from ringsim.layout.bodies import Lump
 from ringsim.layout.draft import Draft

@@ -5,7 +5,6 @@ Both are one tension EA (L - L0) / L0 in a rope that runs freely over points of 
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import exudyn as exu
@@ -14,8 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ringsim.cable.cables import Cables
-from ringsim.cable.records import Cable, Winch
+from ringsim.cable.records import Cable, Cables, Winch
 from ringsim.cable.sheaves import FixedSheave
 from ringsim.cable.winding.constant import ConstantWinding
 from ringsim.engine.assembly import Assembly
@@ -71,11 +69,10 @@ class Swing:
             axial_stiffness=STIFFNESS,
             initial_slack=-STRETCH,
         )
-        carrier: Any = SimpleNamespace(assembly=self.assembly, scene=SimpleNamespace(faults=()))
         sheaves = [FixedSheave(node, arm) for (_, node), arm in self.path]
-        drive = CableDrive(carrier, Cables(upper=cable), CablePath([sheaves]))
+        path = CablePath([sheaves])
+        drive = CableDrive(self.assembly, Cables(upper=cable), path, faults=0)
         self.assembly.finish()
-        drive.locate()
         return drive
 
     def with_reeving(self, regularization: float) -> Any:

@@ -55,8 +55,8 @@ class BarHalfBracket(Bracket):
 
     def rate(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
         """Derivatives of the same."""
-        turn = np.radians(self.angle - 90.0) + np.asarray(phi, dtype=float)
-        return -self._sign * distance * np.sin(turn), distance * np.cos(turn)
+        aside, inward = self.place(phi, distance)
+        return -self._sign * inward, self._sign * aside
 
     @property
     def _sign(self) -> float:

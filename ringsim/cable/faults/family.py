@@ -18,19 +18,11 @@ class CableFault(Fault):
     """Which cable of the scene, counted from 1: the upper one first."""
 
     def strike(self, ropes: Ropes, state: ChainState) -> Ropes:
-        """The ropes after the fault.
-
-        Parameters
-        ----------
-        ropes
-            The ropes before it.
-        state
-            The chain at that instant.
+        """The ropes after the fault, from those before it and the chain at that instant.
 
         Raises
         ------
         ValueError
             If the cable or the place on it does not exist.
-
         """
         raise NotImplementedError

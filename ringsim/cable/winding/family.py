@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
 
 from ringsim.units import Model
 
@@ -24,32 +23,21 @@ class WinchState:
 
 @dataclass(frozen=True)
 class WinchReading:
-    """Readings of a winch at the beginning of a step.
-
-    Attributes
-    ----------
-    tension_ratio
-        Tension at the winch over the mean tension of the rope as a function of the winch's
-        speed (m/s), not falling; 1 without friction.
-    path_rate
-        Rate of the path length and of another winch on the same rope, in m/s: negative while
-        the structure gives rope free.
-    path_slope
-        Derivative of the ideal path length after the opening angle at the measured angles, in
-        m/rad.
-
-    """
+    """Readings of a winch at the beginning of a step."""
 
     tension_ratio: Callable[[float], float]
+    """Tension at the winch over the mean tension of the rope as a function of the winch's
+    speed (m/s), not falling; 1 without friction."""
     path_rate: float = 0.0
+    """Rate of the path length and of another winch on the same rope, in m/s: negative while
+    the structure gives rope free."""
     path_slope: float = 0.0
+    """Derivative of the ideal path length after the opening angle at the measured angles, in
+    m/rad."""
 
 
 class Winding(Model):
     """Any winding law; time counts from the start of its winch."""
-
-    feedback: ClassVar[bool]
-    """Whether the law needs readings of the rope."""
 
     def usual_speed(self) -> float:
         """Speed at which the law winds, or pays out, for most of its time, m/s; 0 if it rests.
@@ -62,8 +50,6 @@ class Winding(Model):
 
 class PrescribedWinding(Winding):
     """A prescribed law."""
-
-    feedback: ClassVar[bool] = False
 
     def wound(self, time: float) -> float:
         """Rope taken up since the start, in metre."""
@@ -82,8 +68,6 @@ class FeedbackWinding(Winding):
     ``ringsim.cable.winches``: T grows with the speed and the command falls with T, so there is
     one solution for any EA and step, and the loop is stable.
     """
-
-    feedback: ClassVar[bool] = True
 
     def command(self, tension: float, reading: WinchReading) -> float:
         """Speed wanted at a tension (N), in m/s; must not grow with the tension."""
