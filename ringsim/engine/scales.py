@@ -13,7 +13,7 @@ from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.layout.bodies import OnRod
 from ringsim.layout.joints import JointOpening
 from ringsim.parts.persection import spread
-from ringsim.stepping.scales import Scales
+from ringsim.stepping.instant import Scales
 from ringsim.theory.one_coordinate import OneCoordinate
 
 _SLIGHT = 1e-3

@@ -8,10 +8,9 @@ from collections import deque
 import numpy as np
 
 from ringsim.parts.solver import Solver
-from ringsim.stepping.instant import Instant
+from ringsim.stepping.instant import Instant, Scales
 from ringsim.stepping.locks import StopContact
 from ringsim.stepping.repeats import GROWTH
-from ringsim.stepping.scales import Scales
 
 _LOCAL_ERROR = 0.1
 """Local error constant C of the integrator, error = C h^3 d3(angle)/dt3.  Generalised-alpha has

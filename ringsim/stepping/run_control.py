@@ -14,11 +14,10 @@ from ringsim.parts.solver import NO_DEVIATIONS, Solver
 from ringsim.stepping.constant_steps import ConstantSteps
 from ringsim.stepping.deviations import DeviationSteps
 from ringsim.stepping.guard import Guard
-from ringsim.stepping.instant import Instant
+from ringsim.stepping.instant import Instant, Scales
 from ringsim.stepping.locks import Locks, StopContact, lock_times
 from ringsim.stepping.motion_steps import MotionSteps
 from ringsim.stepping.repeats import EnergyImbalance, Indicator, TensionBend
-from ringsim.stepping.scales import Scales
 from ringsim.variables import Cause, Reason, Status
 
 _ROUND_OFF = 1e-12

@@ -11,7 +11,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.chain import Chain
 from ringsim.cable.faults.family import CableFault
@@ -19,8 +18,7 @@ from ringsim.cable.state import ChainState
 from ringsim.cable.winding.family import FeedbackWinding, WinchState
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
-
-Array = NDArray[np.float64]
+from ringsim.theory.ideal_points import Array
 
 
 class Pull(NamedTuple):

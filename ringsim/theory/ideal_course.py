@@ -12,15 +12,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from ringsim.cable.ropes import Ropes
 from ringsim.scene import Scene
 from ringsim.theory.ideal_motion import IdealMotion
+from ringsim.theory.ideal_points import Array
 from ringsim.variables import Cause, Status
-
-Array = NDArray[np.float64]
 
 RELATIVE = 3e-7
 """Local error of a step, relative to every part of the state."""

@@ -11,7 +11,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.pose import cross
@@ -19,9 +18,7 @@ from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.persection import at_section
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
-from ringsim.theory.ideal_points import Points
-
-Array = NDArray[np.float64]
+from ringsim.theory.ideal_points import Array, Points
 
 
 class Acting(NamedTuple):

@@ -21,13 +21,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.scene import Scene
-from ringsim.theory.ideal_points import UP, Points, body_of
-
-Array = NDArray[np.float64]
-
+from ringsim.theory.ideal_points import UP, Array, Points, body_of
 
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3))
 

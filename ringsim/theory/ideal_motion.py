@@ -13,7 +13,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.faults.family import CableFault
 from ringsim.parts.faults.family import Fault
@@ -21,9 +20,7 @@ from ringsim.scene import Scene
 from ringsim.theory.ideal_cables import IdealCables, Pull
 from ringsim.theory.ideal_forces import Acting, Forces
 from ringsim.theory.ideal_mechanism import Mechanism, skew
-from ringsim.theory.ideal_points import UP
-
-Array = NDArray[np.float64]
+from ringsim.theory.ideal_points import UP, Array
 
 MOTOR_LAG = 1e-6
 """Time constant in s with which a motor follows the speed that its law commands.

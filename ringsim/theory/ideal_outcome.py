@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BPoly, CubicHermiteSpline
 
 from ringsim.cable.state import ChainState
@@ -19,9 +18,9 @@ from ringsim.outputs.series import Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
 from ringsim.theory.ideal_course import Course, Piece
+from ringsim.theory.ideal_points import Array
 from ringsim.variables import COUNTS, Fidelity, Outcome
 
-Array = NDArray[np.float64]
 _Reader = Callable[[Reading], Array | float | None]
 
 

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from ringsim.parts.solver import Solver
-from ringsim.stepping.instant import Energies, Instant
+from ringsim.stepping.instant import Energies, Instant, Scales
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
-from ringsim.stepping.scales import Scales
 from ringsim.variables import Status
 
 INERTIA, TORQUE, BEGIN = 0.2, 0.01, math.radians(20.0)
