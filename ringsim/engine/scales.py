@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -42,8 +41,7 @@ def scales_of(built: Built) -> Scales:
         cable.axial_stiffness / float(length) * structure.path_slope(cable, angles[plane]) ** 2
         for (plane, cable), length in zip(cables, lengths, strict=True)
     )
-    return replace(
-        found,
+    return found._replace(
         first_step=_swing_step(inertia, stiffness, 50),
         slack_tension=float(widths.max()),
         slack_energy=0.1 * float(np.sum(widths * lengths)),

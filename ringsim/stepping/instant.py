@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -38,8 +37,7 @@ class Instant(NamedTuple):
     tensions: Array | None = None
 
 
-@dataclass(frozen=True)
-class Scales:
+class Scales(NamedTuple):
     """Reference numbers of a structure, from which steps and guards start.
 
     Attributes

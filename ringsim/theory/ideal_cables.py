@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.cable.chain import Chain
-from ringsim.cable.faults.family import CableFault
 from ringsim.cable.state import ChainState
 from ringsim.cable.winding.family import FeedbackWinding, WinchState
 from ringsim.scene import Scene
@@ -22,19 +21,9 @@ from ringsim.theory.ideal_points import Array
 
 
 class Pull(NamedTuple):
-    """The cables at one instant.
-
-    Attributes
-    ----------
-    chain
-        See ringsim.cable.
-    force
-        Generalised force on (q, psi), N m.
-    commands
-        Speeds commanded by the laws of the winches with feedback, m/s.
-    loss, power, elastic
-        Power lost (W), power put in by the winches less the energy wound up with the rope (W),
-        elastic energy (J).
+    """The cables at one instant: their state; generalised force on (q, psi) (N m); speeds
+    commanded by the laws of the winches with feedback (m/s); power lost, and put in by the winches
+    less the energy wound up with the rope (W); elastic energy (J).
     """
 
     chain: ChainState
@@ -56,7 +45,7 @@ class IdealCables:
         Coefficients of all paths' points, winch, sheaves and far end, behind one another; shape
         (points, 3, functions), m.
     ropes
-        Which spans form one rope; ``strike`` changes them.
+        Which spans form one rope; faults change them.
     answering
         Cable and end (0 first, 1 far) of the winches with feedback: their rope and speed are
         states of the motion.
@@ -136,10 +125,6 @@ class IdealCables:
             float(copies @ state.winch_power.sum(axis=1) - on_rope @ (density * state.wound_rates)),
             float(on_rope @ (density * state.natural)),
         )
-
-    def strike(self, fault: CableFault, state: ChainState) -> None:
-        """Let a fault change the ropes."""
-        self.ropes = fault.strike(self.ropes, state)
 
     def _commands(self, time: float, now: Configuration, state: ChainState) -> Array:
         """Speeds commanded by the laws with feedback, m/s, shape (winches,).

@@ -34,15 +34,8 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 class Motion(NamedTuple):
-    """Rates after q at one value of it.
-
-    Attributes
-    ----------
-    inertia
-        I(q), kg m^2.
-    velocity, rotation
-        Rigid motion to be subtracted from the layout's rates: a point at r moves with
-        r' - velocity - rotation x r.  Shapes (3,); m/rad and rad/rad.
+    """Inertia I(q), kg m^2, and the rigid motion to be subtracted from the layout's rates: a point
+    at r moves with r' - velocity - rotation x r, shapes (3,), m/rad and rad/rad.
     """
 
     inertia: float
@@ -107,16 +100,9 @@ class OpeningTime(NamedTuple):
 def opening_time(
     ring: OneCoordinate, phi_start: float, phi_end: float = 0.0, *, panels: int = 24
 ) -> OpeningTime:
-    """Time from rest at ``phi_start`` until the bar angle ``phi_end`` is reached.
+    """Time from rest at the bar angle ``phi_start`` to ``phi_end`` (rad), the deployed ring's.
 
-    Parameters
-    ----------
-    ring
-        The ideal ring; friction is not represented.
-    phi_start, phi_end
-        Bar angles in rad; the default end is the deployed ring.
-    panels
-        Gauss-Legendre panels of 8 nodes each.
+    ``panels`` of 8 Gauss-Legendre nodes each are used.
 
     Raises
     ------

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ringsim.parts.solver import NO_DEVIATIONS, Solver
-from ringsim.stepping.deviations import MOST, DeviationSteps
 from ringsim.stepping.instant import Energies, Instant, Scales
+from ringsim.stepping.motion_steps import MOST, DeviationSteps
 from ringsim.stepping.run_control import RunControl
 
 AMPLITUDE, FREQUENCY, DURATION, TOLERANCE = 1e-3, 10.0, 20.0, 0.02

@@ -201,7 +201,7 @@ def test_the_next_step_starts_from_what_a_fault_has_left() -> None:
 
 def test_tensions_are_judged_until_the_last_lock() -> None:
     """A tension that jumps by 10 N, below the energy that matters."""
-    roped = Scales(**{**SCALES.__dict__, "slack_tension": 0.01, "slack_energy": 1e3})
+    roped = SCALES._replace(slack_tension=0.01, slack_energy=1e3)
     solver = Solver(settling_time=1.0)
     for locked in (False, True):
         motion = Motion()
