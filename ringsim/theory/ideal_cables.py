@@ -82,23 +82,16 @@ class IdealCables:
 
     @property
     def nudges(self) -> tuple[float, float]:
-        """Increments of a length (m) and a rate (1/s) over which tensions are nearly linear.
-
-        A slack rope becomes taut within slack_width / EA of strain; friction turns within the
-        slip speed.
-        """
+        """Increments of a length (m) and a rate (1/s) over which tensions are nearly linear."""
+        # A slack rope becomes taut within this strain; friction turns within the slip speed.
         soft = min(cable.slack_width / cable.axial_stiffness for cable in self._cables)
         return min(max(1e-2 * soft, 1e-9), 1e-6), 1e-2 * self._slip
 
     def pull(self, time: float, now: Configuration, motors: Array) -> Pull:
-        """Evaluate the cables.
+        """Evaluate the cables at a time (s), that of the winches' laws.
 
-        Parameters
-        ----------
-        time
-            For the winches' laws, s.
-        motors
-            Rope wound by each winch with feedback and its speed, m and m/s, shape (2, winches).
+        ``motors`` are the rope wound by each winch with feedback and its speed, m and m/s, shape
+        (2, winches).
 
         Raises
         ------

@@ -92,17 +92,8 @@ class Points:
     def swung(self, read: Callable[[Layout], Pairs], bodies: Iterable[int]) -> Array:
         """Coefficients of points that are read, with the swings of their bodies.
 
-        Parameters
-        ----------
-        read
-            Of a layout, shapes (points, 3).
-        bodies
-            Number of each point's body; -1 for any part that cannot swing.
-
-        Returns
-        -------
-        Array
-            Shape (points, 3, functions), m.
+        ``read`` gives shapes (points, 3), ``bodies`` the number of each point's body, -1 for any
+        part that cannot swing; what is returned has the shape (points, 3, functions), m.
         """
         rigid, bodies = self.fit(read), np.array(list(bodies), dtype=int)
         more = np.zeros((*rigid.shape[:-1], 2 * len(self.swinging)))
@@ -117,11 +108,8 @@ class Points:
     def functions(self, p: Array, w: Array) -> Array:
         """The functions s at p = (q, psi) with its rates w, both of shape (n,), rad and rad/s.
 
-        Returns
-        -------
-        Array
-            s, its n derivatives after p, ds/dt, and d^2s/dt^2 with these rates constant; shape
-            (functions, n + 3).
+        The columns are s, its n derivatives after p, ds/dt, and d^2s/dt^2 with these rates
+        constant; shape (functions, n + 3).
         """
         s = self.basis(float(p[0]))
         first, swings = s.shape[1], np.arange(len(self.swinging))
