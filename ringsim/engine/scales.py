@@ -24,9 +24,10 @@ def scales_of(built: Built) -> Scales:
     model, scene, structure = built.model, built.model.scene, built.model.scene.structure
     angles, rates = model.layout.opening_angles()
     travel, per_angle = math.pi - float(angles.mean()), float(rates.mean())
-    ideal = OneCoordinate(scene)
-    acceleration = per_angle * ideal.acceleration_from_rest(structure.coordinate)
-    inertia = ideal.motion(structure.coordinate).inertia / per_angle**2
+    ideal, start = OneCoordinate(scene), structure.coordinate
+    folding = ideal.motion(start).inertia
+    acceleration = per_angle * (ideal.work_rate(start) / folding)
+    inertia = folding / per_angle**2
     # The mean rate if the first acceleration lasted, at least that of the longest run.
     rate = max(math.sqrt(0.5 * abs(acceleration) * travel), travel / scene.solver.end_time)
     # Springs of its own set their own scale: what they would do along a rod.

@@ -37,18 +37,11 @@ class Pull(NamedTuple):
 class IdealCables:
     """The cables of a scene on its ideal ring.
 
-    Attributes
-    ----------
-    planes
-        Planes of each cable: two where the cables of both planes are identical.
-    paths
-        Coefficients of all paths' points, winch, sheaves and far end, behind one another; shape
-        (points, 3, functions), m.
-    ropes
-        Which spans form one rope; faults change them.
-    answering
-        Cable and end (0 first, 1 far) of the winches with feedback: their rope and speed are
-        states of the motion.
+    ``planes`` are those of each cable, two where the cables of both planes are identical; ``paths``
+    the coefficients of all paths' points, winch, sheaves and far end, behind one another, shape
+    (points, 3, functions), m; ``ropes`` which spans form one rope, which faults change;
+    ``answering`` cable and end (0 first, 1 far) of the winches with feedback, whose rope and speed
+    are states of the motion.
     """
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:

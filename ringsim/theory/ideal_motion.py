@@ -51,15 +51,9 @@ class IdealState(NamedTuple):
 class IdealMotion:
     """The equations of a scene's ideal ring.
 
-    Attributes
-    ----------
-    latched
-        Whether the V-joints' latches hold.
-    until
-        Time at which something is switched on or off next, s: laws of winches are taken from
-        before it.
-    refusal
-        Why the cables could last not be evaluated; empty if they always could.
+    ``latched`` is whether the V-joints' latches hold; ``until`` the time (s) at which something is
+    switched on or off next, from before which laws of winches are taken; ``refusal`` why the
+    cables could last not be evaluated, empty if they always could.
     """
 
     def __init__(self, scene: Scene) -> None:

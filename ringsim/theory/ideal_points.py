@@ -41,18 +41,11 @@ _CLOSE = 1e-10
 class Points:
     """Coefficients P of the points of a scene.
 
-    Attributes
-    ----------
-    basis
-        The functions s of the structure and their derivatives, see ``Structure.basis``.
-    layout
-        One of those that they were found from: what is connected with what.
-    swinging
-        Bodies that swing: left upper, left lower, right upper, right lower; empty unless the
-        structure is an open arc with a basis.
-    pins, normals
-        Their pins' coefficients, shape (swinging, 3, functions of the structure), and axes,
-        shape (swinging, 3).
+    ``basis`` are the functions s of the structure and their derivatives, see ``Structure.basis``;
+    ``layout`` is one of those that P was found from: what is connected with what.  The bodies
+    ``swinging`` are left upper, left lower, right upper, right lower, or none unless the structure
+    is an open arc with a basis; ``pins`` are their pins' coefficients, shape (swinging, 3,
+    functions of the structure), and ``normals`` these pins' axes, shape (swinging, 3).
     """
 
     def __init__(self, scene: Scene, at: float | None = None) -> None:

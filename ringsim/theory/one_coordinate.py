@@ -70,10 +70,6 @@ class OneCoordinate:
         done = mechanism.points.load_work @ now.by_place[:, 0]
         return float(done + self._net(q).force[0])
 
-    def acceleration_from_rest(self, q: float) -> float:
-        """Q'' in rad/s^2 when released at rest."""
-        return self.work_rate(q) / self.motion(q).inertia
-
     def _at(self, q: float) -> tuple[Mechanism, Configuration]:
         """The mechanism, folding at rate 1 without swings."""
         mechanism = self._mechanism(q)
