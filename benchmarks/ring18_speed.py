@@ -14,8 +14,7 @@ import subprocess
 import sys
 
 from ringsim.scene import load_scene
-from ringsim.theory.energy_quadrature import opening_time
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.one_coordinate import OneCoordinate, opening_time
 
 OURS = """
 import ringsim, time

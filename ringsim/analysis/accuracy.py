@@ -52,25 +52,16 @@ class Truth(NamedTuple):
 def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -> xr.Dataset:
     """Errors, orders, cost and the efficient frontier of a ladder.
 
-    Parameters
-    ----------
-    results
-        ``NEEDED`` variables over the dimension ``rung``, one entry per rung.
-    rungs, truths
-        The settings, those of the reference among them, and independent values, if any.
+    ``results`` are ``NEEDED`` variables over ``rung``, one entry for each of the ``rungs``, those
+    of the reference among them; ``truths`` are independent values, if any.
 
     Returns
     -------
     xr.Dataset
-        ``error`` and ``bound`` (rung, output): relative, and what the setting is good for, see
-        :func:`bounds`; ``order`` (graded, output): observed along a ladder, NaN where errors come
-        near the reference's own; ``uncertainty`` (output): of the reference, relative;
-        ``reference`` (output): its value, in the output's unit, NaN for series (of the asynchrony
-        the largest value); ``frontier`` (rung, output): whether no other setting of the scene's
-        own model is both cheaper and better; ``cheapest`` (target, output): the rung among them,
-        -1 if there is none; ``cost`` (rung): processor time without the scatter of single timings,
-        s; counts, status and settings (rung); ``from_truth`` (rung, truth) and
-        ``reference_from_truth`` (truth): distances from the truths, relative.
+        Variables over ``rung``, ``output``, ``graded`` (ladders with an order), ``target`` and
+        ``truth``, described by their ``long_name`` and ``units``.  ``order`` is NaN where errors
+        come near the reference's own, ``reference`` for series (of the asynchrony it is the largest
+        value); ``frontier`` and ``cheapest`` are among settings of the scene's own model.
 
     Raises
     ------
@@ -122,8 +113,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         rows.append((path.replace(".", "_"), one, values, f"setting {path}", units))
     found = xr.Dataset(coords={"output": outputs, "target": list(TARGETS), "graded": graded})
     for name, dims, values, text, units in rows:
-        words = {"long_name": text} | ({"units": units} if units else {})
-        found[name] = (dims, values, words)
+        found[name] = (dims, values, {"long_name": text} | ({"units": units} if units else {}))
     return _add_truths(found, errors, truths)
 
 
@@ -211,8 +201,7 @@ def frontier(cost: Array, error: Array) -> NDArray[np.bool_]:
     costs, errors = cost[:, None, None], error[:, None, :]  # of the other one
     no_worse = (costs <= cost[:, None]) & (errors <= error)
     better = no_worse & ((costs < cost[:, None]) | (errors < error))
-    best: NDArray[np.bool_] = np.isfinite(error) & ~better.any(axis=0)
-    return best
+    return np.asarray(np.isfinite(error) & ~better.any(axis=0))
 
 
 def in_favour(cost: Array, ladders: Sequence[str]) -> Array:

@@ -87,13 +87,11 @@ def _errors(found: xr.Dataset) -> str:
     for rung in _distinct(found):
         row = found.isel(rung=rung)
         name = _name(found, rung) + (f" ({_end(found, rung)})" if row.status != Status.OK else "")
-        counts = [row[count].item() for count in ("steps", "residual_evaluations", "jacobians")]
+        counts = [f"{row[n].item():.0f}" for n in ("steps", "residual_evaluations", "jacobians")]
         times = [f"{row[time].item():.3g} s" for time in ("cpu_time", "cost")]
-        errors = [f"{e:.1e}" if np.isfinite(e) else "" for e in row.error.values]
-        errors = [
-            f"**{e}**" if bold else e for e, bold in zip(errors, row.frontier.values, strict=True)
-        ]
-        rows.append([name, *(f"{count:.0f}" for count in counts), *times, *errors])
+        pairs = zip(row.error.values, row.frontier.values, strict=True)  # no frontier has a NaN
+        errors = [f"**{e:.1e}**" if b else f"{e:.1e}" if np.isfinite(e) else "" for e, b in pairs]
+        rows.append([name, *counts, *times, *errors])
     own = zip(found.output.values, found.uncertainty.values, strict=True)
     last = ["" if name == "energy" else f"{e:.1e}" for name, e in own]
     rows.append(["uncertainty of the reference", *[""] * 5, *last])

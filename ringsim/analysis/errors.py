@@ -82,8 +82,7 @@ def reference(in_time: xr.DataArray, in_space: xr.DataArray) -> Limit:
 
 def largest(values: xr.DataArray) -> Array:
     """The largest size of each rung's values, shape (rung,)."""
-    found: Array = abs(values).max([dim for dim in values.dims if dim != "rung"]).to_numpy()
-    return found
+    return np.asarray(abs(values).max([dim for dim in values.dims if dim != "rung"]))
 
 
 def order(values: xr.DataArray, noise: float) -> float:

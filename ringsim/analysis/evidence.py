@@ -76,10 +76,9 @@ class Evidence(Model):
 
     def values_for(self, setting: Setting, scene: Scene) -> dict[str, Any]:
         """A setting's values for a scene: no fewer elements than it has, no step beyond its end."""
-        values = setting.values
-        return values | {
-            "solver.step": min(values["solver.step"], scene.solver.end_time),
-            "rods.elements": max(values["rods.elements"], scene.rods.elements),
+        return setting.values | {
+            "solver.step": min(setting.values["solver.step"], scene.solver.end_time),
+            "rods.elements": max(setting.values["rods.elements"], scene.rods.elements),
         }
 
     def require_like(self, scene: Scene) -> None:
@@ -130,13 +129,7 @@ def evidence_of(found: xr.Dataset) -> Evidence:
 
 
 def read_evidence(path: Path | Traversable) -> Evidence:
-    """The settings.toml of a study.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or holds something else.
-    """
+    """The settings.toml of a study; InputError if it cannot be read, or holds something else."""
     try:
         found = Evidence.model_validate(parse_toml(read_text(path), str(path)))
         if not all({"solver.step", "rods.elements"} <= set(s.values) for s in found.settings):

@@ -118,14 +118,7 @@ def chosen_for_check(cells: xr.Dataset, share: float, seed: int) -> NDArray[np.i
 
 
 def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> xr.Dataset:
-    """Compare cells with the same ones run with smaller steps.
-
-    Parameters
-    ----------
-    cells
-        The map.
-    which, finer
-        Numbers of the cells that were run again, and what they gave then, in this order.
+    """Compare cells, those with the numbers ``which``, with what they gave with smaller steps.
 
     Returns
     -------

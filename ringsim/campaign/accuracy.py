@@ -16,9 +16,8 @@ from ringsim.campaign.cases import Cases, run_cases
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.theory.energy_quadrature import opening_time
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.one_coordinate import OneCoordinate, opening_time
 from ringsim.variables import Status
 
 _STEP_LIMIT = 1_000_000

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.layout.bodies import OnRod
 from ringsim.layout.joints import JointOpening
 from ringsim.parts.persection import spread
-from ringsim.stepping.scales import Scales
+from ringsim.stepping.instant import Scales
 from ringsim.theory.one_coordinate import OneCoordinate
 
 _SLIGHT = 1e-3
@@ -25,9 +24,10 @@ def scales_of(built: Built) -> Scales:
     model, scene, structure = built.model, built.model.scene, built.model.scene.structure
     angles, rates = model.layout.opening_angles()
     travel, per_angle = math.pi - float(angles.mean()), float(rates.mean())
-    ideal = OneCoordinate(scene)
-    acceleration = per_angle * ideal.acceleration_from_rest(structure.coordinate)
-    inertia = ideal.motion(structure.coordinate).inertia / per_angle**2
+    ideal, start = OneCoordinate(scene), structure.coordinate
+    folding = ideal.motion(start).inertia
+    acceleration = per_angle * (ideal.work_rate(start) / folding)
+    inertia = folding / per_angle**2
     # The mean rate if the first acceleration lasted, at least that of the longest run.
     rate = max(math.sqrt(0.5 * abs(acceleration) * travel), travel / scene.solver.end_time)
     # Springs of its own set their own scale: what they would do along a rod.
@@ -42,8 +42,7 @@ def scales_of(built: Built) -> Scales:
         cable.axial_stiffness / float(length) * structure.path_slope(cable, angles[plane]) ** 2
         for (plane, cable), length in zip(cables, lengths, strict=True)
     )
-    return replace(
-        found,
+    return found._replace(
         first_step=_swing_step(inertia, stiffness, 50),
         slack_tension=float(widths.max()),
         slack_energy=0.1 * float(np.sum(widths * lengths)),

@@ -18,8 +18,7 @@ import numpy as np
 
 from ringsim.parts.solver import Solver
 from ringsim.stepping.constant_steps import unresolved
-from ringsim.stepping.instant import Instant
-from ringsim.stepping.scales import Scales
+from ringsim.stepping.instant import Instant, Scales
 from ringsim.variables import Cause, Reason
 
 GAIN, LOSS = 2.0, 5.0

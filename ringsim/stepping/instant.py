@@ -1,7 +1,8 @@
-"""What an engine tells of the states that it reaches."""
+"""What an engine tells of a run before it, and of the states that it reaches."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -34,3 +35,30 @@ class Instant(NamedTuple):
     energies: Energies
     gap: float = 0.0
     tensions: Array | None = None
+
+
+class Scales(NamedTuple):
+    """Reference numbers of a structure, from which steps and guards start.
+
+    Attributes
+    ----------
+    rate, energy
+        Reference opening rate (rad/s) of the run, and the kinetic energy at it (J).
+    travel, length
+        Opening angle to be covered (rad), and what gaps of joints are measured against (m).
+    contact_step, first_step
+        Steps that resolve a bounce on a stop at the tolerance 1e-4, and ropes that swing as a winch
+        starts, s; infinite without stops or cables.
+    slack_tension, slack_energy
+        Tension (N) that does not matter, and a tenth of it pulled along every path (J); None
+        without cables.
+    """
+
+    rate: float
+    energy: float
+    travel: float
+    length: float
+    contact_step: float = math.inf
+    first_step: float = math.inf
+    slack_tension: float | None = None
+    slack_energy: float | None = None

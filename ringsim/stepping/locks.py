@@ -30,13 +30,10 @@ class StopContact(NamedTuple):
 class Locks:
     """The V-joints' memory of their stops.
 
-    A joint that bounces has still reached its stop: all joints need not lie in it at the same
-    instant.  One that starts on the stowed stop has to leave it before it can come back.
-
-    Attributes
-    ----------
-    deployed, stowed
-        Whether each V-joint has reached 180 deg, and the stowed stop, shape (planes, sections).
+    ``deployed`` and ``stowed`` are whether each V-joint has reached 180 deg, and the stowed stop,
+    shape (planes, sections).  A joint that bounces has still reached its stop: all joints need not
+    lie in it at the same instant.  One that starts on the stowed stop has to leave it before it can
+    come back.
     """
 
     def __init__(self, angles: Array, stowed_angle: float | None) -> None:
@@ -77,12 +74,8 @@ class Locks:
 def lock_times(times: Array, angles: Array, rates: Array) -> Array:
     """First time at which each V-joint reaches 180 deg, shape (planes, sections), s; NaN if never.
 
-    The crossing is the root of the cubic that fits angles and rates at both ends of the step.
-
-    Parameters
-    ----------
-    times, angles, rates
-        Shapes (n,), (n, planes, sections) and the same; s, rad, rad/s.
+    The crossing is the root of the cubic that fits angles (rad) and rates (rad/s), both of shape
+    (n, planes, sections), at both ends of the step.
     """
     found = np.full(angles.shape[1:], np.nan)
     for place in np.ndindex(*found.shape):

@@ -14,8 +14,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from ringsim.parts.solver import TENSION_BEND, Solver
-from ringsim.stepping.instant import Array, Instant
-from ringsim.stepping.scales import Scales
+from ringsim.stepping.instant import Array, Instant, Scales
 
 GROWTH, FALL = 1.5, 0.2
 """Largest and smallest ratio of successive steps: a step behind a much shorter one would see that

@@ -46,13 +46,11 @@ def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Ou
         outcome = replace(outcome, reason=reason, cause=cause)
     if solver.error_bars and outcome.status == Status.OK:
         outcome = _with_bars(outcome, solve, used, error_bars)
-    found = {
-        "restarts": restarts,
-        "step_used": used.step,
-        "tolerance_used": used.tolerance if used.step_control == "motion" else np.nan,
-        **{f"total_{name}": totals[name] for name in COUNTS},
-    }
-    outcome.values.update({name: np.array(value) for name, value in found.items()})
+    tolerance = used.tolerance if used.step_control == "motion" else np.nan
+    outcome.values["restarts"] = np.array(restarts)
+    outcome.values["step_used"] = np.array(used.step)
+    outcome.values["tolerance_used"] = np.array(tolerance)
+    outcome.values.update({f"total_{name}": np.array(totals[name]) for name in COUNTS})
     return outcome
 
 

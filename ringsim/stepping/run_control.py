@@ -12,13 +12,11 @@ import numpy as np
 
 from ringsim.parts.solver import NO_DEVIATIONS, Solver
 from ringsim.stepping.constant_steps import ConstantSteps
-from ringsim.stepping.deviations import DeviationSteps
 from ringsim.stepping.guard import Guard
-from ringsim.stepping.instant import Instant
+from ringsim.stepping.instant import Instant, Scales
 from ringsim.stepping.locks import Locks, StopContact, lock_times
-from ringsim.stepping.motion_steps import MotionSteps
+from ringsim.stepping.motion_steps import DeviationSteps, MotionSteps
 from ringsim.stepping.repeats import EnergyImbalance, Indicator, TensionBend
-from ringsim.stepping.scales import Scales
 from ringsim.variables import Cause, Reason, Status
 
 _ROUND_OFF = 1e-12
@@ -28,14 +26,9 @@ _ROUND_OFF = 1e-12
 class RunControl:
     """Steps, care and guard of one run.
 
-    Attributes
-    ----------
-    now, goes_on
-        The last accepted state, and whether there is a step from there.
-    status, reason
-        How the run has ended, or must end.
-    repeats
-        Number of steps that were repeated with a smaller one.
+    ``now`` is the last accepted state, ``goes_on`` whether there is a step from there, ``status``
+    and ``reason`` how the run has ended or must end, and ``repeats`` the number of steps that were
+    repeated with a smaller one.
     """
 
     def __init__(
@@ -47,17 +40,11 @@ class RunControl:
         *,
         follow_deviations: bool = False,
     ) -> None:
-        """Begin a run.
+        """Begin a run at ``start``.
 
-        Parameters
-        ----------
-        start
-            The state that the run starts from.
-        locks
-            Memory of the V-joints' stops: the run ends when all have reached the same.  Without, it
-            ends at ``solver.end_time``.
-        follow_deviations
-            Whether steps resolve how the joints deviate from their mean angle.
+        It ends when the V-joints of ``locks`` have all reached the same stop, without them at
+        ``solver.end_time``.  With ``follow_deviations`` steps resolve how the joints deviate from
+        their mean angle.
         """
         self.now, self._solver, self._locks = start, solver, locks
         self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, locks is None)
@@ -103,14 +90,10 @@ class RunControl:
         return self._shorter
 
     def accept(self, found: Instant, struck: Instant | None = None) -> bool:
-        """Go on from here; returns whether there is a next step.
+        """Go on from where the step has led; returns whether there is a next step.
 
-        Parameters
-        ----------
-        found
-            Where the step has led.
-        struck
-            The same instant after faults have struck, if any have: the next step starts there.
+        ``struck`` is the same instant after faults have struck, if any have: the next step starts
+        there.
         """
         for indicator in self._indicators:
             indicator.accept(self.now, found)

@@ -42,9 +42,11 @@ def opening_angle_for(scene: Scene, time: float) -> float:
     end = min(max(_PATIENCE * time, scene.solver.step), _LONGEST)
     plain = scene.with_values({"record.stress": False, "solver.end_time": end})
     refuse_if_not_ideal(plain)
-    least = max(_LEAST, _least_of_brackets(scene))
-    if scene.stop is not None:
-        least = max(least, scene.stop.stowed_angle + _CLOSE)
+    cables = [] if scene.cables is None else [cable for _, cable in scene.cables.present()]
+    # From these angles on every cable's bracket opens the ring, and no stop is in contact.
+    held = [c.bracket.angle - 90.0 for c in cables if isinstance(c.bracket, BarHalfBracket)]
+    stowed = [] if scene.stop is None else [scene.stop.stowed_angle + _CLOSE]
+    least = max([_LEAST, *held, *stowed])
 
     def excess(angle: float) -> float:
         course = Course(plain.with_values({"structure.opening_angle": angle})).run()
@@ -80,10 +82,3 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         found = excess(middle)
         low, high, slow = (middle, high, found) if found >= 0.0 else (low, middle, slow)
     return float(brentq(excess, low, high, xtol=_CLOSE))
-
-
-def _least_of_brackets(scene: Scene) -> float:
-    """Opening angle from which every cable's bracket opens the ring, deg."""
-    cables = [] if scene.cables is None else [cable for _, cable in scene.cables.present()]
-    angles = [c.bracket.angle - 90.0 for c in cables if isinstance(c.bracket, BarHalfBracket)]
-    return max(angles, default=0.0)

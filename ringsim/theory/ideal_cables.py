@@ -11,32 +11,19 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.chain import Chain
-from ringsim.cable.faults.family import CableFault
 from ringsim.cable.state import ChainState
 from ringsim.cable.winding.family import FeedbackWinding, WinchState
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
-
-Array = NDArray[np.float64]
+from ringsim.theory.ideal_points import Array
 
 
 class Pull(NamedTuple):
-    """The cables at one instant.
-
-    Attributes
-    ----------
-    chain
-        See ringsim.cable.
-    force
-        Generalised force on (q, psi), N m.
-    commands
-        Speeds commanded by the laws of the winches with feedback, m/s.
-    loss, power, elastic
-        Power lost (W), power put in by the winches less the energy wound up with the rope (W),
-        elastic energy (J).
+    """The cables at one instant: their state; generalised force on (q, psi) (N m); speeds
+    commanded by the laws of the winches with feedback (m/s); power lost, and put in by the winches
+    less the energy wound up with the rope (W); elastic energy (J).
     """
 
     chain: ChainState
@@ -50,18 +37,11 @@ class Pull(NamedTuple):
 class IdealCables:
     """The cables of a scene on its ideal ring.
 
-    Attributes
-    ----------
-    planes
-        Planes of each cable: two where the cables of both planes are identical.
-    paths
-        Coefficients of all paths' points, winch, sheaves and far end, behind one another; shape
-        (points, 3, functions), m.
-    ropes
-        Which spans form one rope; ``strike`` changes them.
-    answering
-        Cable and end (0 first, 1 far) of the winches with feedback: their rope and speed are
-        states of the motion.
+    ``planes`` are those of each cable, two where the cables of both planes are identical; ``paths``
+    the coefficients of all paths' points, winch, sheaves and far end, behind one another, shape
+    (points, 3, functions), m; ``ropes`` which spans form one rope, which faults change;
+    ``answering`` cable and end (0 first, 1 far) of the winches with feedback, whose rope and speed
+    are states of the motion.
     """
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
@@ -95,23 +75,16 @@ class IdealCables:
 
     @property
     def nudges(self) -> tuple[float, float]:
-        """Increments of a length (m) and a rate (1/s) over which tensions are nearly linear.
-
-        A slack rope becomes taut within slack_width / EA of strain; friction turns within the
-        slip speed.
-        """
+        """Increments of a length (m) and a rate (1/s) over which tensions are nearly linear."""
+        # A slack rope becomes taut within this strain; friction turns within the slip speed.
         soft = min(cable.slack_width / cable.axial_stiffness for cable in self._cables)
         return min(max(1e-2 * soft, 1e-9), 1e-6), 1e-2 * self._slip
 
     def pull(self, time: float, now: Configuration, motors: Array) -> Pull:
-        """Evaluate the cables.
+        """Evaluate the cables at a time (s), that of the winches' laws.
 
-        Parameters
-        ----------
-        time
-            For the winches' laws, s.
-        motors
-            Rope wound by each winch with feedback and its speed, m and m/s, shape (2, winches).
+        ``motors`` are the rope wound by each winch with feedback and its speed, m and m/s, shape
+        (2, winches).
 
         Raises
         ------
@@ -138,10 +111,6 @@ class IdealCables:
             float(copies @ state.winch_power.sum(axis=1) - on_rope @ (density * state.wound_rates)),
             float(on_rope @ (density * state.natural)),
         )
-
-    def strike(self, fault: CableFault, state: ChainState) -> None:
-        """Let a fault change the ropes."""
-        self.ropes = fault.strike(self.ropes, state)
 
     def _commands(self, time: float, now: Configuration, state: ChainState) -> Array:
         """Speeds commanded by the laws with feedback, m/s, shape (winches,).

@@ -12,15 +12,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from ringsim.cable.ropes import Ropes
 from ringsim.scene import Scene
 from ringsim.theory.ideal_motion import IdealMotion
+from ringsim.theory.ideal_points import Array
 from ringsim.variables import Cause, Status
-
-Array = NDArray[np.float64]
 
 RELATIVE = 3e-7
 """Local error of a step, relative to every part of the state."""
@@ -40,13 +38,9 @@ _ALIKE = 1e-13
 class Piece:
     """Steps between two events, with their latches and ropes.
 
-    Attributes
-    ----------
-    times, states, rates
-        Beginning and end of every step, the states there and their derivatives.
-    inner
-        Times and states at the collocation points within the steps, where cables are: what is
-        stiff is in balance there, and nowhere else between a step's ends.
+    ``times``, ``states`` and ``rates`` are beginning and end of every step, the states there and
+    their derivatives; ``inner``, where cables are, times and states at the collocation points
+    within the steps: what is stiff is in balance there, and nowhere else between a step's ends.
     """
 
     latched: bool
@@ -72,14 +66,8 @@ class _Crossing:
 class Course:
     """One run of a scene's ideal ring.
 
-    Attributes
-    ----------
-    lock_time
-        When the V-joints reached 180 deg, s; NaN if they never did.
-    pieces
-        Each begins in time where the one before it ends.
-    evaluations, jacobians
-        Of the equations.
+    ``lock_time`` is when the V-joints reached 180 deg, s, NaN if they never did; each of the
+    ``pieces`` begins in time where the one before it ends.
     """
 
     def __init__(self, scene: Scene) -> None:

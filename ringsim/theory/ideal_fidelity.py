@@ -16,7 +16,6 @@ from ringsim.choice import kind_of
 from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.of_scene import layout_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
-from ringsim.parts.net import Net
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.faded_friction import with_remark
@@ -56,12 +55,9 @@ def refuse_if_not_ideal(scene: Scene) -> None:
             "record.stress = true: rigid rods carry no stress in the ideal fidelity (set it to "
             "false, or use the full fidelity)"
         )
-    if scene.net is not None:
-        _refuse_net(scene, scene.net)
-
-
-def _refuse_net(scene: Scene, net: Net) -> None:
-    layout = layout_of(scene)
+    if scene.net is None:
+        return
+    net, layout = scene.net, layout_of(scene)
     corners = np.array([layout.bodies[number].pose.place for number in layout.corners[0]])
     aside = FreeHub(net, len(corners)).imbalance(corners)
     if net.damping > 0.0 and aside > _CENTRED:

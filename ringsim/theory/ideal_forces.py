@@ -11,7 +11,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.pose import cross
@@ -19,26 +18,13 @@ from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.persection import at_section
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
-from ringsim.theory.ideal_points import Points
-
-Array = NDArray[np.float64]
+from ringsim.theory.ideal_points import Array, Points
 
 
 class Acting(NamedTuple):
-    """What acts at one instant.
-
-    Attributes
-    ----------
-    force
-        Generalised force on (q, psi), N m.
-    couple
-        Of the loads on the structure as one body, N m, shape (3,).
-    elastic
-        Energy in net and stops, J.
-    work
-        Work function of the loads, J.
-    loss
-        Power lost in joints, net and stops, W.
+    """What acts at one instant: generalised force on (q, psi) (N m); couple of the loads on the
+    structure as one body, shape (3,) (N m); energy in net and stops, and work function of the loads
+    (J); power lost in joints, net and stops (W).
     """
 
     force: Array
@@ -78,12 +64,8 @@ class _FrictionJoints:
 class Forces:
     """Everything that acts on the ideal ring of a scene, without its cables.
 
-    Attributes
-    ----------
-    loaded
-        Whether loads act.
-    slowest
-        Smallest characteristic rate of the joints' friction, rad/s; infinite without one.
+    ``loaded`` is whether loads act, ``slowest`` the smallest characteristic rate of the joints'
+    friction, rad/s; infinite without one.
     """
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
@@ -102,12 +84,8 @@ class Forces:
     def act(self, now: Configuration, up: Array, latched: bool) -> Acting:
         """Forces, energies and powers.
 
-        Parameters
-        ----------
-        up
-            Unit vector that points up in space, in the structure's axes: the loads' direction.
-        latched
-            Whether the latches hold.
+        ``up`` is the unit vector that points up in space, in the structure's axes (the loads'
+        direction); ``latched`` is whether the latches hold.
         """
         lifted = self._lift @ now.values
         force, loss, elastic = up @ self._lift @ now.by_place, 0.0, 0.0

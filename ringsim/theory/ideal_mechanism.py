@@ -21,13 +21,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.scene import Scene
-from ringsim.theory.ideal_points import UP, Points, body_of
-
-Array = NDArray[np.float64]
-
+from ringsim.theory.ideal_points import UP, Array, Points, body_of
 
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3))
 
@@ -81,17 +77,9 @@ class Configuration(NamedTuple):
         return self.functions[:, 1:-2]
 
     def moved(self, points: Array) -> tuple[Array, Array, Array]:
-        """Places of points, their derivatives after p, and velocities.
+        """Places of points, their derivatives after p, and velocities, from their coefficients.
 
-        Parameters
-        ----------
-        points
-            Coefficients, shape (points, 3, functions).
-
-        Returns
-        -------
-        tuple
-            Shapes (points, 3), (points, 3, n) and (points, 3).
+        Shapes (points, 3), (points, 3, n) and (points, 3), from (points, 3, functions).
         """
         # One product of two matrices: a stack of small ones takes five times as long.
         found = points.reshape(-1, len(self.functions)) @ self.functions
@@ -100,19 +88,13 @@ class Configuration(NamedTuple):
 
 
 class Mechanism:
-    """Coordinates, masses and equations of a scene's structure.
-
-    Parameters
-    ----------
-    at
-        See ``Points``.
+    """Coordinates, masses and equations of a scene's structure; ``at`` is as of ``Points``.
 
     Attributes
     ----------
-    points
-        Coefficients of its points.
-    upper_corners
-        Those of the upper hinge assemblies, shape (corners, 3, functions), m.
+    points, upper_corners
+        Coefficients of its points, and those of the upper hinge assemblies, shape (corners, 3,
+        functions), m.
     freedom
         Number of free coordinates: 1, or 4 or 5 for an open arc; q is the first.
     fixed
@@ -182,14 +164,8 @@ class Mechanism:
     ) -> tuple[Array, Array]:
         """Accelerations of the free coordinates, and W' of a base that floats; rad/s^2.
 
-        Parameters
-        ----------
-        spin
-            W, rad/s.
-        torque
-            On the structure as one body, N m, shape (3,).
-        forces
-            Generalised forces on p, N m.
+        ``spin`` is W (rad/s), ``torque`` acts on the structure as one body (N m, shape (3,)), and
+        ``forces`` are the generalised ones on p, N m.
         """
         first, second, matrix, turn = now.first, now.second, now.matrix, skew(spin)
         whirl, rigid = turn @ turn, 0 if self.fixed else 6

@@ -13,7 +13,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.faults.family import CableFault
 from ringsim.parts.faults.family import Fault
@@ -21,33 +20,19 @@ from ringsim.scene import Scene
 from ringsim.theory.ideal_cables import IdealCables, Pull
 from ringsim.theory.ideal_forces import Acting, Forces
 from ringsim.theory.ideal_mechanism import Mechanism, skew
-from ringsim.theory.ideal_points import UP
-
-Array = NDArray[np.float64]
+from ringsim.theory.ideal_points import UP, Array
 
 MOTOR_LAG = 1e-6
-"""Time constant in s with which a motor follows the speed that its law commands.
-
-The law depends on the tension, which depends on the speed: without this lag both would have to be
-solved together.  Cables oscillate within milliseconds.
-"""
+"""Time constant in s with which a motor follows the speed that its law commands: the law depends on
+the tension, which depends on the speed, and without this lag both would have to be solved together.
+Cables oscillate within milliseconds."""
 _ANGLE, _RATE = 1e-6, 1e-4
 """Largest increments of angles (rad) and rates (rad/s) for derivatives of the equations."""
 
 
 class IdealState(NamedTuple):
-    """Accelerations and energies at one instant.
-
-    Attributes
-    ----------
-    acceleration
-        Of the free coordinates, rad/s^2.
-    spin_rate
-        Derivative of the core's rotation, rad/s^2.
-    spin
-        Its rotation, rad/s.
-    kinetic
-        Energy, J.
+    """Accelerations of the free coordinates and of the core's rotation (rad/s^2), that rotation
+    (rad/s), kinetic energy (J), and what acts, at one instant.
     """
 
     acceleration: Array
@@ -66,15 +51,9 @@ class IdealState(NamedTuple):
 class IdealMotion:
     """The equations of a scene's ideal ring.
 
-    Attributes
-    ----------
-    latched
-        Whether the V-joints' latches hold.
-    until
-        Time at which something is switched on or off next, s: laws of winches are taken from
-        before it.
-    refusal
-        Why the cables could last not be evaluated; empty if they always could.
+    ``latched`` is whether the V-joints' latches hold; ``until`` the time (s) at which something is
+    switched on or off next, from before which laws of winches are taken; ``refusal`` why the
+    cables could last not be evaluated, empty if they always could.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -164,18 +143,16 @@ class IdealMotion:
             return state
         before = self.instant(time, state)
         assert before.pull is not None
-        self.cables.strike(fault, before.pull.chain)
+        self.cables.ropes = fault.strike(self.cables.ropes, before.pull.chain)
         found = state.copy()
         found[-2] += before.elastic - self.instant(time, state).elastic
         return found
 
     def tolerances(self, relative: float) -> Array:
-        """Absolute tolerance of every part of the state, for a relative one.
-
-        Coarser for the swings: an end assembly is light, and friction on its pins is stiff.
-        """
+        """Absolute tolerance of every part of the state, for a relative one."""
         n = self.mechanism.freedom
         found = np.full(self.size, 0.01 * relative)
+        # Coarser for the swings: an end assembly is light, and friction on its pins is stiff.
         found[1:n], found[n + 1 : 2 * n] = 0.3 * relative, 3.0 * relative
         found[-2:] = 1e-3 * relative
         return found

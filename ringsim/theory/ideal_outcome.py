@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BPoly, CubicHermiteSpline
 
 from ringsim.cable.state import ChainState
@@ -19,9 +18,9 @@ from ringsim.outputs.series import Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
 from ringsim.theory.ideal_course import Course, Piece
+from ringsim.theory.ideal_points import Array
 from ringsim.variables import COUNTS, Fidelity, Outcome
 
-Array = NDArray[np.float64]
 _Reader = Callable[[Reading], Array | float | None]
 
 
@@ -47,14 +46,13 @@ def to_outcome(course: Course, scene: Scene) -> Outcome:
     if course.motion.cables is not None:
         values |= {name: np.asarray(value) for name, value in ideal.cables().items()}
     coordinates = spanned(values, axes(scene))
-    found = {
-        "fidelity": int(Fidelity.IDEAL),
-        "restarts": 0,
-        "step_used": scene.solver.step,
-        "tolerance_used": np.nan,
-        **{f"total_{name}": ideal.run.counts[name] for name in COUNTS},
+    values |= {
+        "fidelity": np.array(int(Fidelity.IDEAL)),
+        "restarts": np.array(0),
+        "step_used": np.array(scene.solver.step),
+        "tolerance_used": np.array(np.nan),
+        **{f"total_{name}": np.array(ideal.run.counts[name]) for name in COUNTS},
     }
-    values |= {name: np.array(value) for name, value in found.items()}
     return Outcome(course.status, course.reason, coordinates, values, course.cause)
 
 
@@ -102,10 +100,11 @@ class _IdealRun:
         return {"peak_tension": peak, "peak_tension_time": moment, "slack_duration": slack}
 
     def _series(self, read: _Reader) -> Series:
-        def evaluate(where: Array) -> Array:
-            return _readings(read, self._instants(where))[1]
-
-        return _Evaluated(*_readings(read, self._steps), self._grid, evaluate)
+        return _Evaluated(
+            *_readings(read, self._steps),
+            self._grid,
+            lambda where: _readings(read, self._instants(where))[1],
+        )
 
     def _instants(self, where: Array) -> list[Reading]:
         """The run at some times; the later piece where two meet."""
@@ -163,16 +162,15 @@ def _stretches(chain: ChainState) -> Array:
 def _top(times: Array, series: Array) -> tuple[float, float]:
     """Largest value and its time, of the parabola through the largest one and its neighbours."""
     k = int(np.argmax(series))
-    if not 0 < k < len(series) - 1:
-        return float(series[k]), float(times[k])
-    t, x = times[k - 1 : k + 2] - times[k], series[k - 1 : k + 2] - series[k]
-    if t[0] == 0.0 or t[2] == 0.0:
-        return float(series[k]), float(times[k])
+    top, moment = float(series[k]), float(times[k])
+    if not 0 < k < len(series) - 1 or not times[k - 1] < moment < times[k + 1]:
+        return top, moment
+    t, x = times[k - 1 : k + 2] - moment, series[k - 1 : k + 2] - top
     bend = (x[2] / t[2] - x[0] / t[0]) / (t[2] - t[0])
     slope = x[0] / t[0] - bend * t[0]
     if bend >= 0.0:
-        return float(series[k]), float(times[k])
-    return float(series[k] - 0.25 * slope**2 / bend), float(times[k] - 0.5 * slope / bend)
+        return top, moment
+    return float(top - 0.25 * slope**2 / bend), float(moment - 0.5 * slope / bend)
 
 
 def _time_below_zero(times: Array, series: Array) -> float:

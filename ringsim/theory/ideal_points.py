@@ -41,18 +41,11 @@ _CLOSE = 1e-10
 class Points:
     """Coefficients P of the points of a scene.
 
-    Attributes
-    ----------
-    basis
-        The functions s of the structure and their derivatives, see ``Structure.basis``.
-    layout
-        One of those that they were found from: what is connected with what.
-    swinging
-        Bodies that swing: left upper, left lower, right upper, right lower; empty unless the
-        structure is an open arc with a basis.
-    pins, normals
-        Their pins' coefficients, shape (swinging, 3, functions of the structure), and axes,
-        shape (swinging, 3).
+    ``basis`` are the functions s of the structure and their derivatives, see ``Structure.basis``;
+    ``layout`` is one of those that P was found from: what is connected with what.  The bodies
+    ``swinging`` are left upper, left lower, right upper, right lower, or none unless the structure
+    is an open arc with a basis; ``pins`` are their pins' coefficients, shape (swinging, 3,
+    functions of the structure), and ``normals`` these pins' axes, shape (swinging, 3).
     """
 
     def __init__(self, scene: Scene, at: float | None = None) -> None:
@@ -92,17 +85,8 @@ class Points:
     def swung(self, read: Callable[[Layout], Pairs], bodies: Iterable[int]) -> Array:
         """Coefficients of points that are read, with the swings of their bodies.
 
-        Parameters
-        ----------
-        read
-            Of a layout, shapes (points, 3).
-        bodies
-            Number of each point's body; -1 for any part that cannot swing.
-
-        Returns
-        -------
-        Array
-            Shape (points, 3, functions), m.
+        ``read`` gives shapes (points, 3), ``bodies`` the number of each point's body, -1 for any
+        part that cannot swing; what is returned has the shape (points, 3, functions), m.
         """
         rigid, bodies = self.fit(read), np.array(list(bodies), dtype=int)
         more = np.zeros((*rigid.shape[:-1], 2 * len(self.swinging)))
@@ -117,11 +101,8 @@ class Points:
     def functions(self, p: Array, w: Array) -> Array:
         """The functions s at p = (q, psi) with its rates w, both of shape (n,), rad and rad/s.
 
-        Returns
-        -------
-        Array
-            s, its n derivatives after p, ds/dt, and d^2s/dt^2 with these rates constant; shape
-            (functions, n + 3).
+        The columns are s, its n derivatives after p, ds/dt, and d^2s/dt^2 with these rates
+        constant; shape (functions, n + 3).
         """
         s = self.basis(float(p[0]))
         first, swings = s.shape[1], np.arange(len(self.swinging))

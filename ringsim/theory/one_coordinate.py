@@ -8,6 +8,14 @@ I = sum m |dr/dq|^2 over all masses with the rigid-body motion taken out, W the 
 less the energy of the net.  A free structure keeps momentum and angular momentum at zero (its loads
 turn with it here; ringsim.theory.ideal_motion keeps them vertical); a support holds its body.  The
 end assemblies of an open arc are held upright, as they are at rest.
+
+From rest at q_0 the time until q_1 follows without time integration from a quadrature of the
+energy,
+
+    T = integral from q_1 to q_0 of sqrt(I / (2 (W - W(q_0)))) dq.
+
+The substitution q = q_0 - (q_0 - q_1) u^2 removes the singularity at the start; Gauss-Legendre
+panels do the rest.
 """
 
 from __future__ import annotations
@@ -16,25 +24,18 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.layout.free_hub import FreeHub, NetForces
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
+from ringsim.theory.ideal_points import Array
 
-Array = NDArray[np.float64]
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 class Motion(NamedTuple):
-    """Rates after q at one value of it.
-
-    Attributes
-    ----------
-    inertia
-        I(q), kg m^2.
-    velocity, rotation
-        Rigid motion to be subtracted from the layout's rates: a point at r moves with
-        r' - velocity - rotation x r.  Shapes (3,); m/rad and rad/rad.
+    """Inertia I(q), kg m^2, and the rigid motion to be subtracted from the layout's rates: a point
+    at r moves with r' - velocity - rotation x r, shapes (3,), m/rad and rad/rad.
     """
 
     inertia: float
@@ -69,10 +70,6 @@ class OneCoordinate:
         done = mechanism.points.load_work @ now.by_place[:, 0]
         return float(done + self._net(q).force[0])
 
-    def acceleration_from_rest(self, q: float) -> float:
-        """Q'' in rad/s^2 when released at rest."""
-        return self.work_rate(q) / self.motion(q).inertia
-
     def _at(self, q: float) -> tuple[Mechanism, Configuration]:
         """The mechanism, folding at rate 1 without swings."""
         mechanism = self._mechanism(q)
@@ -87,3 +84,42 @@ class OneCoordinate:
         places, slopes, _ = now.moved(mechanism.upper_corners)
         net = FreeHub(self._scene.net, len(places))
         return net.forces(places, slopes, 0.0 * now.rate)
+
+
+class OpeningTime(NamedTuple):
+    """A time in s and the difference to a quadrature with half as many panels."""
+
+    time: float
+    uncertainty: float
+
+
+def opening_time(
+    ring: OneCoordinate, phi_start: float, phi_end: float = 0.0, *, panels: int = 24
+) -> OpeningTime:
+    """Time from rest at the bar angle ``phi_start`` to ``phi_end`` (rad), the deployed ring's.
+
+    ``panels`` of 8 Gauss-Legendre nodes each are used.
+
+    Raises
+    ------
+    ValueError
+        If the ring does not reach ``phi_end`` because the work done turns negative before.
+    """
+    fine, coarse = (_integrate(ring, phi_start, phi_end, n) for n in (panels, panels // 2))
+    return OpeningTime(fine, abs(fine - coarse))
+
+
+def _integrate(ring: OneCoordinate, phi_start: float, phi_end: float, panels: int) -> float:
+    span, work_start, total = phi_start - phi_end, ring.work(phi_start), 0.0
+    places = (np.arange(panels)[:, None] + 0.5 + 0.5 * _NODES) / panels
+    for u, weight in zip(places.ravel(), np.tile(0.5 * _WEIGHTS / panels, panels), strict=True):
+        phi = phi_start - span * u**2
+        gained = ring.work(phi) - work_start
+        if gained <= 0.0:
+            raise ValueError(
+                f"the ring does not open: at an opening angle of "
+                f"{180.0 - 2.0 * np.degrees(phi):.2f} deg the work done is {gained:.3g} J"
+            )
+        slowness = np.sqrt(ring.motion(phi).inertia / 2.0 / gained)
+        total += weight * 2.0 * abs(span) * u * slowness
+    return float(total)

@@ -17,10 +17,9 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
 from ringsim.stepping.constant_steps import ConstantSteps
-from ringsim.stepping.instant import Energies, Instant
+from ringsim.stepping.instant import Energies, Instant, Scales
 from ringsim.stepping.locks import StopContact
 from ringsim.stepping.motion_steps import MotionSteps
-from ringsim.stepping.scales import Scales
 from ringsim.variables import Outcome, Status
 
 TIMES = np.linspace(0.0, 4.0, 41)

@@ -13,8 +13,7 @@ import ringsim
 from ringsim.layout.mobility import internal_mobility
 from ringsim.layout.of_scene import layout_of
 from ringsim.scene import Scene, scene_from_toml
-from ringsim.theory.energy_quadrature import opening_time
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.one_coordinate import OneCoordinate, opening_time
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,7 @@ from ringsim.analysis.stability import word_of
 from ringsim.parts.solver import Solver
 from ringsim.stepping.constant_steps import PEAK_BEND, STEPS
 from ringsim.stepping.guard import BLOW_UP, GAIN, GAP, LOSS, OVERRUN, SLIGHT, Guard
-from ringsim.stepping.instant import Energies, Instant
-from ringsim.stepping.scales import Scales
+from ringsim.stepping.instant import Energies, Instant, Scales
 
 TOLERANCE, LEAST, BAR = 0.02, 1e-3, 0.3
 SOLVER = Solver(energy_tolerance=TOLERANCE)

@@ -7,9 +7,8 @@ from ringsim.parts.solver import Solver
 from ringsim.scene import load_scene
 from ringsim.simulation import run
 from ringsim.stepping import repeats
-from ringsim.stepping.instant import Energies, Instant
+from ringsim.stepping.instant import Energies, Instant, Scales
 from ringsim.stepping.repeats import EnergyImbalance
-from ringsim.stepping.scales import Scales
 
 SOLVER = Solver(step=0.2, tolerance=1e-4)
 ALLOWED = {True: 0.3 * 1e-4 * (1.0 / 3.0) ** 0.5, False: 0.3 * 1e-4}

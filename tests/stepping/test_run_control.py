@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from ringsim.parts.solver import Solver
-from ringsim.stepping.instant import Energies, Instant
+from ringsim.stepping.instant import Energies, Instant, Scales
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
-from ringsim.stepping.scales import Scales
 from ringsim.variables import Status
 
 INERTIA, TORQUE, BEGIN = 0.2, 0.01, math.radians(20.0)
@@ -202,7 +201,7 @@ def test_the_next_step_starts_from_what_a_fault_has_left() -> None:
 
 def test_tensions_are_judged_until_the_last_lock() -> None:
     """A tension that jumps by 10 N, below the energy that matters."""
-    roped = Scales(**{**SCALES.__dict__, "slack_tension": 0.01, "slack_energy": 1e3})
+    roped = SCALES._replace(slack_tension=0.01, slack_energy=1e3)
     solver = Solver(settling_time=1.0)
     for locked in (False, True):
         motion = Motion()

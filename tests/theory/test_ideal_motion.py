@@ -11,8 +11,7 @@ from scipy.integrate import quad
 from ideal_cases import pulled, six
 from ringsim.outputs import VARIABLES
 from ringsim.simulation import run_ideal
-from ringsim.theory.energy_quadrature import opening_time
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.one_coordinate import OneCoordinate, opening_time
 from ringsim.variables import Status
 
 BALANCE = 1e-7
