@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
 
-from ringsim.sampling.designs.family import Design, Factor, Samples
-from ringsim.sampling.distributions.family import Array, inside
+from ringsim.sampling.designs.family import Design, Samples
+from ringsim.sampling.distributions.family import Array, Distribution, inside
 
 
 class LatinHypercube(Design):
@@ -20,7 +20,7 @@ class LatinHypercube(Design):
     kind: Literal["latin-hypercube"] = "latin-hypercube"
     samples: Samples
 
-    def points(self, factors: Sequence[Factor], seed: int) -> Array:
+    def points(self, factors: Mapping[str, Distribution], seed: int) -> Array:
         """Random places within randomly permuted intervals."""
         from scipy.stats import qmc
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.files import read_text
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import read_inputs
 from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.designs.family import Design, Factor
+from ringsim.sampling.designs.family import Design
+from ringsim.sampling.distributions.family import Distribution, Values
 
 
 class Listed(Design):
@@ -30,12 +30,12 @@ class Listed(Design):
 
     def table(
         self,
-        factors: Sequence[Factor],
+        factors: Mapping[str, Distribution],
         correlations: Sequence[Correlation],
         *,
         seed: int,
         folder: Path,
-    ) -> dict[str, NDArray[Any]]:
+    ) -> dict[str, Values]:
         """Values by path; see :meth:`Design.table`."""
         if factors or correlations:
             raise InputError(
@@ -51,7 +51,7 @@ class Listed(Design):
         return columns
 
 
-def _from_csv(path: Path) -> dict[str, NDArray[Any]]:
+def _from_csv(path: Path) -> dict[str, Values]:
     lines = csv.reader(read_text(path).splitlines())
     rows = [[word.strip() for word in row] for row in lines if row]
     if not rows:
@@ -72,7 +72,7 @@ def _from_csv(path: Path) -> dict[str, NDArray[Any]]:
     return {name: _typed(words) for name, words in zip(header, columns, strict=True)}
 
 
-def _typed(words: Sequence[str]) -> NDArray[Any]:
+def _typed(words: Sequence[str]) -> Values:
     """Whole numbers, numbers, true and false, or words: the narrowest that fits the column."""
     if words and all(word in ("true", "false") for word in words):
         return np.array([word == "true" for word in words])
@@ -84,7 +84,7 @@ def _typed(words: Sequence[str]) -> NDArray[Any]:
     return np.array(words)
 
 
-def _from_netcdf(path: Path) -> dict[str, NDArray[Any]]:
+def _from_netcdf(path: Path) -> dict[str, Values]:
     import netCDF4
 
     try:
@@ -92,7 +92,7 @@ def _from_netcdf(path: Path) -> dict[str, NDArray[Any]]:
             columns = read_inputs(file)
     except OSError as error:
         raise InputError(f"design.file = {path.name}: cannot be read: {error}") from None
-    found: dict[str, NDArray[Any]] = {}
+    found: dict[str, Values] = {}
     for column in columns:
         if column.dim:
             found |= {f"{column.path}[{k + 1}]": each for k, each in enumerate(column.values.T)}

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import ClassVar, Literal
+from collections.abc import Mapping
+from typing import Literal
 
 import numpy as np
 
 from ringsim.refusal import InputError
-from ringsim.sampling.designs.family import Design, Factor, Samples
-from ringsim.sampling.distributions.family import Array, inside
+from ringsim.sampling.designs.family import Design, Samples
+from ringsim.sampling.distributions.family import Array, Distribution, inside
 
 
 class Sobol(Design):
@@ -20,12 +20,10 @@ class Sobol(Design):
     Source: Joe and Kuo (2008) directions, Matousek (1998) scrambling, as in scipy.
     """
 
-    extendable: ClassVar[bool] = True
-
     kind: Literal["sobol"] = "sobol"
     samples: Samples
 
-    def points(self, factors: Sequence[Factor], seed: int) -> Array:
+    def points(self, factors: Mapping[str, Distribution], seed: int) -> Array:
         """The first points of the sequence that belongs to the seed."""
         from scipy.stats import qmc
 
