@@ -37,10 +37,7 @@ def launched_size() -> int:
 def mpi_world() -> Any:
     """The communicator of all processes that the launcher has started.
 
-    Raises
-    ------
-    InputError
-        If there is no MPI library, or if it does not belong to the launcher.
+    InputError if there is no MPI library, or if it does not belong to the launcher.
     """
     expected = launched_size()
     if "OMPI_COMM_WORLD_SIZE" in os.environ:

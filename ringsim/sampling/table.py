@@ -33,14 +33,10 @@ def draw(
     folder: Path,
     error_bars_every: int = 0,
 ) -> Table:
-    """Draw all samples of a campaign.
+    """Draw all samples of a campaign, which vary the scene ``base``.
 
     Parameters
     ----------
-    base
-        Scene that the samples vary.
-    inputs
-        Distribution by scene path.
     folder
         Where files that the design names are looked up.
     error_bars_every

@@ -42,10 +42,7 @@ class Journal:
     def append(self, result: Result) -> None:
         """Add one result; the first one creates the file.
 
-        Raises
-        ------
-        InputError
-            If the disk is full; the records before remain whole.
+        InputError if the disk is full; the records before remain whole.
         """
         header, body = result.header(), result.body
         check = _checksum(header, body, self._campaign)
@@ -68,13 +65,7 @@ class Journal:
                 self._sync()
 
     def close(self) -> None:
-        """Force everything to the disk and leave the file.
-
-        Raises
-        ------
-        InputError
-            If the disk refuses it.
-        """
+        """Force everything to the disk (InputError if it refuses) and leave the file."""
         if self._descriptor >= 0:
             with writing(self.path, GO_ON):
                 self._sync()

@@ -14,40 +14,27 @@ from ringsim.sampling.distributions.family import Array, Distribution, Values
 from ringsim.units import Model
 
 Samples = Annotated[int, Field(ge=1, le=10_000_000)]
+Factors = Mapping[str, Distribution]
+"""Scene paths with their distributions: each is an axis of the unit cube."""
 
 
 class Design(Model):
-    """How the samples of a campaign are placed.
-
-    Each factor, a scene path with its distribution, is an axis of the unit cube.
-    """
+    """How the samples of a campaign are placed."""
 
     correlated: ClassVar[bool] = True
     """Whether factors may depend on each other."""
 
-    def points(self, factors: Mapping[str, Distribution], seed: int) -> Array:
+    def points(self, factors: Factors, seed: int) -> Array:
         """Cumulative probabilities, shape (samples, factors); there is at least one factor."""
         raise NotImplementedError
 
     def table(
-        self,
-        factors: Mapping[str, Distribution],
-        correlations: Sequence[Correlation],
-        *,
-        seed: int,
-        folder: Path,
+        self, factors: Factors, correlations: Sequence[Correlation], *, seed: int, folder: Path
     ) -> dict[str, Values]:
         """Values by path, each of shape (samples,).
 
-        Parameters
-        ----------
-        folder
-            Where files that the design names are looked up.
-
-        Raises
-        ------
-        InputError
-            If the correlations contradict each other, or if the design has none.
+        Files that the design names are looked up in ``folder``.  InputError if the correlations
+        contradict each other, or if the design has none.
         """
         if correlations and not self.correlated:
             raise InputError(

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from ringsim.refusal import InputError, known_or_nearest
-from ringsim.sampling.designs.family import Design
-from ringsim.sampling.distributions.family import Array, Distribution
+from ringsim.sampling.designs.family import Design, Factors
+from ringsim.sampling.distributions.family import Array
 
 Levels = Annotated[int, Field(ge=1, le=100_000)]
 MOST_POINTS = 10_000_000
@@ -30,7 +29,7 @@ class Grid(Design):
     levels: Levels | dict[str, Levels] = 3
     """Points of every continuous input, or a table with one entry per path."""
 
-    def points(self, factors: Mapping[str, Distribution], seed: int) -> Array:
+    def points(self, factors: Factors, seed: int) -> Array:
         """All combinations of the inputs' levels."""
         counts, default = (self.levels, 3) if isinstance(self.levels, dict) else ({}, self.levels)
         for path in counts:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
 
-from ringsim.sampling.designs.family import Design, Samples
-from ringsim.sampling.distributions.family import Array, Distribution, inside
+from ringsim.sampling.designs.family import Design, Factors, Samples
+from ringsim.sampling.distributions.family import Array, inside
 
 
 class LatinHypercube(Design):
@@ -20,7 +19,7 @@ class LatinHypercube(Design):
     kind: Literal["latin-hypercube"] = "latin-hypercube"
     samples: Samples
 
-    def points(self, factors: Mapping[str, Distribution], seed: int) -> Array:
+    def points(self, factors: Factors, seed: int) -> Array:
         """Random places within randomly permuted intervals."""
         from scipy.stats import qmc
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -13,8 +13,8 @@ from ringsim.files import read_text
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import read_inputs
 from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.designs.family import Design
-from ringsim.sampling.distributions.family import Distribution, Values
+from ringsim.sampling.designs.family import Design, Factors
+from ringsim.sampling.distributions.family import Values
 
 
 class Listed(Design):
@@ -29,12 +29,7 @@ class Listed(Design):
     """Looked up beside the campaign file."""
 
     def table(
-        self,
-        factors: Mapping[str, Distribution],
-        correlations: Sequence[Correlation],
-        *,
-        seed: int,
-        folder: Path,
+        self, factors: Factors, correlations: Sequence[Correlation], *, seed: int, folder: Path
     ) -> dict[str, Values]:
         """Values by path; see :meth:`Design.table`."""
         if factors or correlations:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
 
-from ringsim.sampling.designs.family import Design, Samples
-from ringsim.sampling.distributions.family import Array, Distribution, inside
+from ringsim.sampling.designs.family import Design, Factors, Samples
+from ringsim.sampling.distributions.family import Array, inside
 
 
 class RandomDesign(Design):
@@ -17,7 +16,7 @@ class RandomDesign(Design):
     kind: Literal["random"] = "random"
     samples: Samples
 
-    def points(self, factors: Mapping[str, Distribution], seed: int) -> Array:
+    def points(self, factors: Factors, seed: int) -> Array:
         """One stream of random numbers per sample, in the order of the factors."""
         points = np.empty((self.samples, len(factors)))
         for sample in range(self.samples):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
 
 from ringsim.refusal import InputError
-from ringsim.sampling.designs.family import Design, Samples
-from ringsim.sampling.distributions.family import Array, Distribution, inside
+from ringsim.sampling.designs.family import Design, Factors, Samples
+from ringsim.sampling.distributions.family import Array, inside
 
 
 class Sobol(Design):
@@ -23,7 +22,7 @@ class Sobol(Design):
     kind: Literal["sobol"] = "sobol"
     samples: Samples
 
-    def points(self, factors: Mapping[str, Distribution], seed: int) -> Array:
+    def points(self, factors: Factors, seed: int) -> Array:
         """The first points of the sequence that belongs to the seed."""
         from scipy.stats import qmc
 
