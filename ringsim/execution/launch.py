@@ -27,11 +27,8 @@ print(MPI.Get_library_version())
 
 def launched_size() -> int:
     """Number of processes that a launcher says it has started; 1 without a launcher."""
-    for name in _SIZES:
-        size = os.environ.get(name, "")
-        if size.isdigit():
-            return int(size)
-    return 1
+    sizes = (os.environ.get(name, "") for name in _SIZES)
+    return next((int(size) for size in sizes if size.isdigit()), 1)
 
 
 def mpi_world() -> Any:

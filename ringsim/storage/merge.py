@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ringsim.files import whole
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.sampling.columns import Table, add_inputs
+from ringsim.storage.journal import Survey
 from ringsim.storage.netcdf import (
     CHUNK_BYTES,
     PER_SAMPLE,
@@ -21,7 +22,6 @@ from ringsim.storage.netcdf import (
     add_variable,
     blank,
 )
-from ringsim.storage.survey import Survey
 from ringsim.variables import Cause, Status, Variable
 
 NAME = "campaign.nc"

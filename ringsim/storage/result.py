@@ -30,9 +30,7 @@ class Result:
     """How one sample ended, and what it gave."""
 
     sample: int
-    """Index of the sample."""
     status: Status
-    """How the run ended."""
     reason: str
     """One sentence: why it ended so."""
     cause: Cause = Cause.NONE
@@ -75,16 +73,6 @@ class Result:
             found[name] = values.view(kind).reshape(shape)
             start += planes.size
         return found
-
-
-def precedence(status: Any, finished: Any) -> Any:
-    """Which of several results of one sample counts: that with the greatest number.
-
-    A run that went well counts before one that failed, whatever the clocks said; otherwise the
-    later one does.
-    """
-    # No clock is 1e12 s (30,000 years) wrong.
-    return np.asarray(finished) + 1e12 * (np.asarray(status) < Status.SOLVER_FAILED)
 
 
 def plain(text: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal
 
 import numpy as np
@@ -32,5 +31,5 @@ class Sobol(Design):
                 'use kind = "random"'
             )
         engine = qmc.Sobol(d=len(factors), scramble=True, rng=np.random.default_rng(seed), bits=30)
-        power = max(0, math.ceil(math.log2(self.samples)))
+        power = (self.samples - 1).bit_length()
         return inside(engine.random_base2(power)[: self.samples])
