@@ -16,10 +16,9 @@ from ringsim.refusal import InputError
 from ringsim.sampling.columns import Table
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.design_file import NAME, read_design, write_design
-from ringsim.storage.journal import FOLDER
+from ringsim.storage.journal import FOLDER, Survey, survey
 from ringsim.storage.locks import GO_ON, locked, tries
 from ringsim.storage.provenance import provenance
-from ringsim.storage.survey import Survey, survey
 
 
 @dataclass(frozen=True)

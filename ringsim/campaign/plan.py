@@ -15,8 +15,8 @@ from ringsim.execution.local import Local
 from ringsim.execution.work import Work
 from ringsim.sampling.columns import Table
 from ringsim.storage.design_file import NAME
+from ringsim.storage.journal import survey
 from ringsim.storage.result import Result
-from ringsim.storage.survey import survey
 
 
 def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver: str) -> list[str]:

@@ -15,9 +15,8 @@ from ringsim.campaign.run import Choices, run_campaign
 from ringsim.campaign.share import Share
 from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
 from ringsim.execution.launch import aborting, launched_size, mpi_world
-from ringsim.execution.local import Local
+from ringsim.execution.local import Local, Serial
 from ringsim.execution.mpi import Mpi
-from ringsim.execution.serial import Serial
 from ringsim.execution.work import Scheduler
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.refusal import InputError

@@ -27,20 +27,14 @@ print(MPI.Get_library_version())
 
 def launched_size() -> int:
     """Number of processes that a launcher says it has started; 1 without a launcher."""
-    for name in _SIZES:
-        size = os.environ.get(name, "")
-        if size.isdigit():
-            return int(size)
-    return 1
+    sizes = (os.environ.get(name, "") for name in _SIZES)
+    return next((int(size) for size in sizes if size.isdigit()), 1)
 
 
 def mpi_world() -> Any:
     """The communicator of all processes that the launcher has started.
 
-    Raises
-    ------
-    InputError
-        If there is no MPI library, or if it does not belong to the launcher.
+    InputError if there is no MPI library, or if it does not belong to the launcher.
     """
     expected = launched_size()
     if "OMPI_COMM_WORLD_SIZE" in os.environ:

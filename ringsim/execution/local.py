@@ -1,4 +1,4 @@
-"""Running samples on this machine, in several solver processes at a time."""
+"""Running samples on this machine: in several solver processes at a time, or in this very one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from multiprocessing.connection import wait
 
 from ringsim.execution.slot import TICK, Slot
+from ringsim.execution.solve import load_solver, solve
 from ringsim.execution.work import Scheduler, Work
+from ringsim.scene import Scene
 
 
 class Local(Scheduler):
@@ -23,8 +25,7 @@ class Local(Scheduler):
         slots = [Slot(work.solver, work.scene, work.limits) for _ in range(count)]
         try:
             while True:
-                reason = work.stop()
-                if reason:
+                if reason := work.stop():
                     return reason
                 for slot in slots:
                     slot.serve(queue, work)
@@ -35,3 +36,24 @@ class Local(Scheduler):
         finally:
             for slot in slots:
                 slot.close()
+
+
+class Serial(Scheduler):
+    """One sample after the other in this process, for debugging: a crash takes everything with it.
+
+    Limits do not hold.
+    """
+
+    description = "in one process"
+
+    def run(self, samples: Sequence[int], work: Work) -> str:
+        """Run samples; see :class:`Scheduler`."""
+        solver, base = load_solver(work.solver), Scene.model_validate(work.scene)
+        for sample in samples:
+            if reason := work.stop():
+                return reason
+            work.started(sample)
+            result = solve(solver, base, work.task(sample))
+            work.keep(result)
+            work.finished(result)
+        return work.stop()

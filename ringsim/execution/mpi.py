@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 from typing import Any, TypeVar, cast
 
@@ -52,13 +53,10 @@ class Mpi(Scheduler):
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """See :meth:`Scheduler.run`."""
-        slot = Slot(work.solver, work.scene, work.limits)
-        try:
+        with closing(Slot(work.solver, work.scene, work.limits)) as slot:
             if self.rank == 0:
                 return self._schedule(deque(samples), slot, work)
             return self._serve(slot, work)
-        finally:
-            slot.close()
 
     def _schedule(self, queue: deque[int], slot: Slot, work: Work) -> str:
         held: dict[int, deque[int]] = {rank: deque() for rank in range(1, self.workers)}

@@ -30,10 +30,7 @@ _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 class SolverProcess:
     """A process that serves a pipe (``ringsim.execution.child``), in a folder of its own.
 
-    Raises
-    ------
-    InputError
-        If it cannot be started.
+    InputError if it cannot be started.
     """
 
     def __init__(self, setup: dict[str, Any]) -> None:

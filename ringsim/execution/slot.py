@@ -90,10 +90,7 @@ class Slot:
     def serve(self, queue: deque[int], work: Work) -> Result | None:
         """Keep the result that is there, if there is one, and start the next sample if it is free.
 
-        Raises
-        ------
-        InputError
-            If the solver process cannot be started, or the result not be written.
+        InputError if the solver process cannot be started, or the result not be written.
         """
         result = self.poll() if self.busy else None
         if result is not None:

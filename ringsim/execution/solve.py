@@ -25,13 +25,7 @@ _ALWAYS_THERE = ("final_time", "energy_error", "constraint_error", "asynchrony_m
 
 
 def load_solver(name: str) -> Run:
-    """The function ``module:function``.
-
-    Raises
-    ------
-    InputError
-        If there is no such function.
-    """
+    """The function ``module:function``; InputError if there is none."""
     module, _, function = name.partition(":")
     try:
         solver: Run = getattr(importlib.import_module(module), function)
@@ -87,9 +81,8 @@ def not_finite(outcome: Outcome) -> str:
             return f"{name} is infinite: try a smaller solver.step"
         dims = VARIABLES[name].dims
         if "time" in dims and axis is not None and end is not None:
-            lasting = np.asarray(axis) <= float(end)
-            gaps = np.isnan(np.compress(lasting, array, axis=dims.index("time")))
             along = dims.index("time")
+            gaps = np.isnan(np.compress(np.asarray(axis) <= float(end), array, axis=along))
             broken = bool((gaps.any(axis=along) & ~gaps.all(axis=along)).any())
         else:
             broken = name in _ALWAYS_THERE and bool(np.isnan(array).any())

@@ -12,7 +12,6 @@ from ringsim.storage.result import Result
 from ringsim.units import Model, Second, Unit
 
 _T = TypeVar("_T")
-Bytes = Annotated[float, Field(ge=1e8, le=1e15), Unit("B")]
 
 
 class Limits(Model):
@@ -20,7 +19,7 @@ class Limits(Model):
 
     timeout: Second = 3600.0
     """Elapsed time of one run."""
-    memory: Bytes = 8e9
+    memory: Annotated[float, Field(ge=1e8, le=1e15), Unit("B")] = 8e9
     """Memory of the solver process."""
     recycle: Annotated[int, Field(ge=1)] = 2000
     """Runs after which a solver process is replaced by a fresh one."""

@@ -94,23 +94,13 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
 def read_inputs(file: Any) -> tuple[Column, ...]:
     """The inputs in an open netCDF4 dataset: every variable over samples with a scene path."""
     file.set_auto_maskandscale(False)
-    return tuple(
-        _column(variable)
-        for variable in file.variables.values()
-        if variable.dimensions[:1] == ("sample",) and "path" in variable.ncattrs()
-    )
-
-
-def _column(variable: Any) -> Column:
-    attributes = {name: variable.getncattr(name) for name in variable.ncattrs()}
-    values = np.asarray(variable[:])
-    if values.dtype.kind == "O":
-        values = values.astype(str)
-    return Column(
-        name=variable.name,
-        path=attributes["path"],
-        dim="".join(variable.dimensions[1:]),
-        units=attributes.get("units", "1"),
-        origin=attributes.get("distribution", ""),
-        values=values.astype(attributes.get("dtype", values.dtype)),
-    )
+    columns: list[Column] = []
+    for name, variable in file.variables.items():
+        says = {key: variable.getncattr(key) for key in variable.ncattrs()}
+        if variable.dimensions[:1] == ("sample",) and "path" in says:
+            values = np.asarray(variable[:])
+            kind = says.get("dtype", str if values.dtype.kind == "O" else values.dtype)
+            dim, origin = "".join(variable.dimensions[1:]), says.get("distribution", "")
+            units = says.get("units", "1")
+            columns.append(Column(name, says["path"], dim, units, origin, values.astype(kind)))
+    return tuple(columns)

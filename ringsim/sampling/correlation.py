@@ -26,22 +26,10 @@ class Correlation(Model):
 
 
 def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correlation]) -> Array:
-    """Make independent points of the unit cube depend on each other.
+    """Make independent points of the unit cube, shape (samples, axes), depend on each other.
 
-    Parameters
-    ----------
-    points
-        Cumulative probabilities, shape (samples, axes).
-    paths
-        One path per axis; ``a.b`` in a correlation also means every ``a.b[k]``, section by
-        section.
-    correlations
-        The pairs.
-
-    Raises
-    ------
-    InputError
-        If a pair names what is not drawn, or if the pairs contradict each other.
+    There is one path per axis; ``a.b`` in a correlation also means every ``a.b[k]``, section by
+    section.  InputError if a pair names what is not drawn, or if the pairs contradict each other.
     """
     pairs = [
         (first, second, pair.coefficient)

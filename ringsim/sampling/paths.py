@@ -19,13 +19,7 @@ FIXED = (
 
 
 def refuse_fixed(scene: Scene, path: str) -> None:
-    """Refuse a path that would change the shape of a result.
-
-    Raises
-    ------
-    InputError
-        If all samples of a campaign must share this value.
-    """
+    """Refuse (InputError) a path whose value all samples of a campaign must share."""
     for fixed in (*FIXED, *scene.structure.shaping):
         if path == fixed or path.startswith((f"{fixed}.", f"{fixed}[")):
             raise InputError(
@@ -53,13 +47,7 @@ def unit_at(scene: Scene, path: str) -> str:
 
 
 def each_of(scene: Scene, path: str, value: Any) -> int:
-    """How many values the list at a path has.
-
-    Raises
-    ------
-    InputError
-        If the field is one value for all sections.
-    """
+    """How many values the list at a path has; InputError if it is one value for all sections."""
     if section_of(path)[1] is not None:
         raise InputError(f"inputs: {path} is one section already: leave out each_section")
     scene.with_values({path: value})

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +14,8 @@ from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.designs.family import Design, Factor
-from ringsim.sampling.distributions.family import Distribution
+from ringsim.sampling.designs.family import Design
+from ringsim.sampling.distributions.family import Distribution, Values
 from ringsim.sampling.paths import each_of, field_at, refuse_fixed, unit_at
 from ringsim.scene import Scene, place_of
 
@@ -34,14 +33,10 @@ def draw(
     folder: Path,
     error_bars_every: int = 0,
 ) -> Table:
-    """Draw all samples of a campaign.
+    """Draw all samples of a campaign, which vary the scene ``base``.
 
     Parameters
     ----------
-    base
-        Scene that the samples vary.
-    inputs
-        Distribution by scene path.
     folder
         Where files that the design names are looked up.
     error_bars_every
@@ -52,19 +47,19 @@ def draw(
     InputError
         If a path or its values are refused by the scene.
     """
-    factors: list[Factor] = []
+    factors: dict[str, Distribution] = {}
     for path, distribution in inputs.items():
         refuse_fixed(base, path)
         middle = distribution.quantile(np.array([0.5]))[0].item()
         if distribution.each_section:
-            count = each_of(base, path, middle)
-            factors += [Factor(f"{path}[{k + 1}]", distribution) for k in range(count)]
+            own = [f"{path}[{k + 1}]" for k in range(each_of(base, path, middle))]
         else:
             base.with_values({path: middle})
-            factors.append(Factor(path, distribution))
-    for path, count in Counter(factor.path for factor in factors).items():
-        if count > 1:
-            raise InputError(f"inputs: {path} is drawn twice: leave out one of its inputs")
+            own = [path]
+        for each in own:
+            if each in factors:
+                raise InputError(f"inputs: {each} is drawn twice: leave out one of its inputs")
+            factors[each] = distribution
     drawn = design.table(factors, correlations, seed=seed, folder=folder)
     samples = len(next(iter(drawn.values()))) if drawn else getattr(design, "samples", 1)
     columns: list[Column] = []
@@ -90,7 +85,7 @@ def draw(
     return table
 
 
-def _column(base: Scene, path: str, values: NDArray[Any], origin: Distribution | None) -> Column:
+def _column(base: Scene, path: str, values: Values, origin: Distribution | None) -> Column:
     scene = base.with_values({path: values[0].tolist()})
     dim = ""
     if values.ndim == 2:
@@ -106,11 +101,9 @@ def _column(base: Scene, path: str, values: NDArray[Any], origin: Distribution |
 
 def _seeds(seed: int, samples: int) -> NDArray[np.int64]:
     """One seed per sample, from the campaign's seed and the sample's index alone."""
-    states = (
-        np.random.SeedSequence(seed, spawn_key=(sample,)).generate_state(1, np.uint64)
-        for sample in range(samples)
-    )
-    return np.array([int(state[0] >> np.uint64(1)) for state in states], dtype=np.int64)
+    sequences = (np.random.SeedSequence(seed, spawn_key=(k,)) for k in range(samples))
+    states = [int(each.generate_state(1, np.uint64)[0]) >> 1 for each in sequences]
+    return np.array(states, dtype=np.int64)
 
 
 def _check_extremes(base: Scene, table: Table) -> None:

@@ -20,10 +20,7 @@ NAME = "design.nc"
 def write_design(folder: Path, table: Table, attributes: Mapping[str, Any]) -> None:
     """Write all inputs of all samples; the attributes are identity, texts and provenance.
 
-    Raises
-    ------
-    OSError, RuntimeError
-        If the disk is full.
+    OSError or RuntimeError if the disk is full.
     """
     with whole(folder / NAME) as draft, netCDF4.Dataset(draft, "w") as file:
         file.setncatts(dict(attributes))
@@ -34,10 +31,7 @@ def write_design(folder: Path, table: Table, attributes: Mapping[str, Any]) -> N
 def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
     """The samples of a campaign, and the global attributes of its design.
 
-    Raises
-    ------
-    InputError
-        If the folder holds no campaign.
+    InputError if the folder holds no campaign.
     """
     path = folder / NAME
     if not path.is_file():

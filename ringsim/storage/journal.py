@@ -1,21 +1,32 @@
-"""Journals: every finished sample is in a file at once, one file for each process."""
+"""Journals: every finished sample is in a file at once, one file for each process.
+
+A :class:`Survey` says what all journals of a campaign hold.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import secrets
 import struct
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ringsim.files import sync, writing
 from ringsim.storage.locks import GO_ON
+from ringsim.storage.netcdf import NOT_RUN
 from ringsim.storage.result import Result
+from ringsim.variables import Status
 
 FOLDER = "journals"
+_log = logging.getLogger(__name__)
 _FRAME = struct.Struct("<8sIQ16s")
 _MAGIC = b"ringsim2"
 _SYNC_SECONDS = 1.0
@@ -42,10 +53,7 @@ class Journal:
     def append(self, result: Result) -> None:
         """Add one result; the first one creates the file.
 
-        Raises
-        ------
-        InputError
-            If the disk is full; the records before remain whole.
+        InputError if the disk is full; the records before remain whole.
         """
         header, body = result.header(), result.body
         check = _checksum(header, body, self._campaign)
@@ -68,13 +76,7 @@ class Journal:
                 self._sync()
 
     def close(self) -> None:
-        """Force everything to the disk and leave the file.
-
-        Raises
-        ------
-        InputError
-            If the disk refuses it.
-        """
+        """Force everything to the disk (InputError if it refuses) and leave the file."""
         if self._descriptor >= 0:
             with writing(self.path, GO_ON):
                 self._sync()
@@ -129,3 +131,79 @@ def _checksum(header: bytes, body: bytes, campaign: str) -> bytes:
     check = hashlib.blake2b(header, digest_size=16, key=campaign.encode())
     check.update(body)
     return check.digest()
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What a folder holds of every sample."""
+
+    campaign: str
+    journals: list[Path]
+    status: NDArray[np.int8]
+    """Status of each sample, NOT_RUN where there is no result."""
+    seconds: NDArray[np.float64]
+    """Elapsed time of each sample, NaN where there is no result."""
+    form: NDArray[np.int64]
+    """Form of each sample's result, an index of ``forms``; -1 where there is no result."""
+    forms: list[str]
+    """See :class:`Result`."""
+    owner: NDArray[np.int64]
+    """Journal with the result that counts of each sample, -1 where there is none."""
+    place: NDArray[np.int64]
+    """Where it begins there."""
+
+    @property
+    def missing(self) -> NDArray[np.int64]:
+        """Samples without a result."""
+        return np.flatnonzero(self.status == NOT_RUN)
+
+    @property
+    def failed(self) -> NDArray[np.int64]:
+        """Samples whose run failed."""
+        return np.flatnonzero(self.status >= Status.SOLVER_FAILED)
+
+    def results(self, samples: Sequence[int] | NDArray[np.int64]) -> Iterator[Result]:
+        """The results that count of some samples, in any order; nothing of missing ones."""
+        owner = self.owner[samples]
+        for number in np.unique(owner[owner >= 0]):
+            with self.journals[number].open("rb") as file:
+                for place in np.sort(self.place[samples][owner == number]):
+                    result = read_record(file, int(place), self.campaign)
+                    if result is None:
+                        raise OSError(f"{self.journals[number]} has been damaged meanwhile")
+                    yield result
+
+
+def survey(folder: Path, campaign: str, samples: int) -> Survey:
+    """Look through the journals of a campaign's folder.
+
+    Of several results of one sample, one that went well counts before one that failed, whatever
+    the clocks said; otherwise the later one does.
+
+    Records that are damaged, or of a campaign with another identity than ``campaign``, are told in
+    a warning of the log.
+    """
+    journals = sorted((folder / FOLDER).glob("*.journal"))
+    status = np.full(samples, NOT_RUN, dtype=np.int8)
+    seconds, best = np.full(samples, np.nan), np.full(samples, -np.inf)
+    form, owner, place = (np.full(samples, -1, dtype=np.int64) for _ in range(3))
+    forms: dict[str, int] = {}
+    for number, path in enumerate(journals):
+        damaged = 0
+        for start, result in read_journal(path, campaign):
+            if result is None:
+                damaged += 1
+                continue
+            # No clock is 1e12 s (30,000 years) wrong.
+            k, weight = result.sample, result.finished + 1e12 * (not result.status.failed)
+            if 0 <= k < samples and weight > best[k]:
+                status[k], seconds[k], best[k] = result.status, result.seconds, weight
+                form[k] = forms.setdefault(result.form, len(forms))
+                owner[k], place[k] = number, start
+        if damaged:
+            _log.warning(
+                "%s is damaged: %d of its records cannot be used, their samples run again",
+                path.name,
+                damaged,
+            )
+    return Survey(campaign, journals, status, seconds, form, list(forms), owner, place)

@@ -25,13 +25,8 @@ _LOCK_TRIES, _LOCK_PAUSE = 10, 0.1
 def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[bool]:
     """Hold an advisory lock; gives False at once if another process holds it, or else waits.
 
-    The file that carries the lock is created if it is not there.  A shared lock may be held by
-    others at the same time, shared as well.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be created.
+    The file that carries the lock is created if it is not there, or else OSError.  A shared lock
+    may be held by others at the same time, shared as well.
     """
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
@@ -57,10 +52,7 @@ def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[
 def reserved(folder: Path, writer: str, *, alone: bool) -> Iterator[None]:
     """Keep a second process from running the samples of the share ``writer``, or if ``alone`` any.
 
-    Raises
-    ------
-    InputError
-        If another process runs them already, or if the folder cannot be written to.
+    InputError if another process runs them already, or if the folder cannot be written to.
     """
     for _ in tries(folder):
         with contextlib.ExitStack() as held:
@@ -74,13 +66,7 @@ def reserved(folder: Path, writer: str, *, alone: bool) -> Iterator[None]:
 
 
 def tries(folder: Path) -> Iterator[int]:
-    """Count up, with pauses, for as long as it pays to wait for a lock.
-
-    Raises
-    ------
-    InputError
-        After that, since another process runs the campaign.
-    """
+    """Count up, with pauses, for as long as it pays to wait for a lock; after that InputError."""
     for number in range(_LOCK_TRIES):
         yield number
         time.sleep(_LOCK_PAUSE)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ringsim.files import whole
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.sampling.columns import Table, add_inputs
+from ringsim.storage.journal import Survey
 from ringsim.storage.netcdf import (
     CHUNK_BYTES,
     PER_SAMPLE,
@@ -21,7 +22,6 @@ from ringsim.storage.netcdf import (
     add_variable,
     blank,
 )
-from ringsim.storage.survey import Survey
 from ringsim.variables import Cause, Status, Variable
 
 NAME = "campaign.nc"
@@ -38,17 +38,9 @@ def write_merged(
 ) -> int:
     """Write ``campaign.nc`` of what was found in a folder, whole or not at all.
 
-    Samples that have not been run have the status "not_run" and missing values.
-
-    Returns
-    -------
-    int
-        Samples that count as failed because their coordinates differ from the others'.
-
-    Raises
-    ------
-    OSError, RuntimeError
-        If the disk is full; an older file stays.
+    Samples that have not been run have the status "not_run" and missing values.  Returns how many
+    count as failed because their coordinates differ from the others'.  OSError or RuntimeError if
+    the disk is full; an older file stays.
     """
     axes, names, fits = _common(found)
     scalars = {n for n, v in VARIABLES.items() if not v.dims and not v.needs}

@@ -30,9 +30,7 @@ class Result:
     """How one sample ended, and what it gave."""
 
     sample: int
-    """Index of the sample."""
     status: Status
-    """How the run ended."""
     reason: str
     """One sentence: why it ended so."""
     cause: Cause = Cause.NONE
@@ -77,21 +75,6 @@ class Result:
         return found
 
 
-def precedence(status: Any, finished: Any) -> Any:
-    """Which of several results of one sample counts: that with the greatest number.
-
-    A run that went well counts before one that failed, whatever the clocks said; otherwise the
-    later one does.
-
-    Parameters
-    ----------
-    status, finished
-        Of the results, numbers or arrays.
-    """
-    # No clock is 1e12 s (30,000 years) wrong.
-    return np.asarray(finished) + 1e12 * (np.asarray(status) < Status.SOLVER_FAILED)
-
-
 def plain(text: str) -> str:
     r"""The text without what cannot be stored in a file: half characters and zero bytes.
 
@@ -106,12 +89,8 @@ def pack(arrays: Mapping[str, NDArray[Any]]) -> tuple[str, bytes]:
 
     The body is compressed: a line of JSON with name, type and shape of each array, then their
     bytes, all first bytes of an array before all second ones (as in HDF5's shuffle filter),
-    since neighbouring numbers differ in their last bytes only.
-
-    Raises
-    ------
-    ValueError
-        If a name has no definition, or an array does not span its coordinates.
+    since neighbouring numbers differ in their last bytes only.  ValueError if a name has no
+    definition, or an array does not span its coordinates.
     """
     sizes = {name: np.shape(values) for name, values in arrays.items() if name in COORDINATES}
     described, parts, same = [], [], []

@@ -12,10 +12,9 @@ from ringsim.campaign.folder import open_folder
 from ringsim.execution.solve import load_solver, solve
 from ringsim.execution.work import Task
 from ringsim.refusal import InputError
-from ringsim.storage.journal import FOLDER, Journal, read_journal
+from ringsim.storage.journal import FOLDER, Journal, read_journal, survey
 from ringsim.storage.locks import reserved
 from ringsim.storage.result import Result
-from ringsim.storage.survey import survey
 from ringsim.variables import Status
 
 

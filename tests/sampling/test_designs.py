@@ -64,7 +64,7 @@ def test_same_seed_gives_the_same_samples_and_another_seed_others(kind, base):
 def test_extendable_designs_keep_their_first_samples(kind, base):
     small = drawn(base, {"kind": kind, "samples": 100})
     large = drawn(base, {"kind": kind, "samples": 200})
-    assert large.starts_with(small) == kinds_of(Design)[kind].extendable
+    assert large.starts_with(small) == (kind != "latin-hypercube")
     assert np.array_equal(large.seeds[:100], small.seeds)
 
 

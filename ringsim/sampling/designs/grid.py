@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from ringsim.refusal import InputError, known_or_nearest
-from ringsim.sampling.designs.family import Design, Factor
+from ringsim.sampling.designs.family import Design, Factors
 from ringsim.sampling.distributions.family import Array
 
 Levels = Annotated[int, Field(ge=1, le=100_000)]
@@ -30,18 +29,15 @@ class Grid(Design):
     levels: Levels | dict[str, Levels] = 3
     """Points of every continuous input, or a table with one entry per path."""
 
-    def points(self, factors: Sequence[Factor], seed: int) -> Array:
+    def points(self, factors: Factors, seed: int) -> Array:
         """All combinations of the inputs' levels."""
-        if isinstance(self.levels, dict):
-            known = [factor.path for factor in factors]
-            for path in self.levels:
-                if path not in known:
-                    raise InputError(
-                        f'design.levels."{path}" is not an input ({known_or_nearest(path, known)})'
-                    )
-        counts = self.levels if isinstance(self.levels, dict) else {}
-        default = 3 if isinstance(self.levels, dict) else self.levels
-        lines = [f.distribution.levels(counts.get(f.path, default)) for f in factors]
+        counts, default = (self.levels, 3) if isinstance(self.levels, dict) else ({}, self.levels)
+        for path in counts:
+            if path not in factors:
+                raise InputError(
+                    f'design.levels."{path}" is not an input ({known_or_nearest(path, factors)})'
+                )
+        lines = [each.levels(counts.get(path, default)) for path, each in factors.items()]
         size = math.prod(len(line) for line in lines)
         if size > MOST_POINTS:
             raise InputError(

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
-from ringsim.sampling.designs.family import Design, Factor, Samples
+from ringsim.sampling.designs.family import Design, Factors, Samples
 from ringsim.sampling.distributions.family import Array, inside
 
 
@@ -20,7 +19,7 @@ class LatinHypercube(Design):
     kind: Literal["latin-hypercube"] = "latin-hypercube"
     samples: Samples
 
-    def points(self, factors: Sequence[Factor], seed: int) -> Array:
+    def points(self, factors: Factors, seed: int) -> Array:
         """Random places within randomly permuted intervals."""
         from scipy.stats import qmc
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.files import read_text
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import read_inputs
 from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.designs.family import Design, Factor
+from ringsim.sampling.designs.family import Design, Factors
+from ringsim.sampling.distributions.family import Values
 
 
 class Listed(Design):
@@ -29,13 +29,8 @@ class Listed(Design):
     """Looked up beside the campaign file."""
 
     def table(
-        self,
-        factors: Sequence[Factor],
-        correlations: Sequence[Correlation],
-        *,
-        seed: int,
-        folder: Path,
-    ) -> dict[str, NDArray[Any]]:
+        self, factors: Factors, correlations: Sequence[Correlation], *, seed: int, folder: Path
+    ) -> dict[str, Values]:
         """Values by path; see :meth:`Design.table`."""
         if factors or correlations:
             raise InputError(
@@ -51,7 +46,7 @@ class Listed(Design):
         return columns
 
 
-def _from_csv(path: Path) -> dict[str, NDArray[Any]]:
+def _from_csv(path: Path) -> dict[str, Values]:
     lines = csv.reader(read_text(path).splitlines())
     rows = [[word.strip() for word in row] for row in lines if row]
     if not rows:
@@ -72,7 +67,7 @@ def _from_csv(path: Path) -> dict[str, NDArray[Any]]:
     return {name: _typed(words) for name, words in zip(header, columns, strict=True)}
 
 
-def _typed(words: Sequence[str]) -> NDArray[Any]:
+def _typed(words: Sequence[str]) -> Values:
     """Whole numbers, numbers, true and false, or words: the narrowest that fits the column."""
     if words and all(word in ("true", "false") for word in words):
         return np.array([word == "true" for word in words])
@@ -84,7 +79,7 @@ def _typed(words: Sequence[str]) -> NDArray[Any]:
     return np.array(words)
 
 
-def _from_netcdf(path: Path) -> dict[str, NDArray[Any]]:
+def _from_netcdf(path: Path) -> dict[str, Values]:
     import netCDF4
 
     try:
@@ -92,7 +87,7 @@ def _from_netcdf(path: Path) -> dict[str, NDArray[Any]]:
             columns = read_inputs(file)
     except OSError as error:
         raise InputError(f"design.file = {path.name}: cannot be read: {error}") from None
-    found: dict[str, NDArray[Any]] = {}
+    found: dict[str, Values] = {}
     for column in columns:
         if column.dim:
             found |= {f"{column.path}[{k + 1}]": each for k, each in enumerate(column.values.T)}

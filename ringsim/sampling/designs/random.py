@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
-from ringsim.sampling.designs.family import Design, Factor, Samples
+from ringsim.sampling.designs.family import Design, Factors, Samples
 from ringsim.sampling.distributions.family import Array, inside
 
 
 class RandomDesign(Design):
     """Plain Monte Carlo: sample i depends on the campaign's seed and on i alone."""
 
-    extendable: ClassVar[bool] = True
-
     kind: Literal["random"] = "random"
     samples: Samples
 
-    def points(self, factors: Sequence[Factor], seed: int) -> Array:
+    def points(self, factors: Factors, seed: int) -> Array:
         """One stream of random numbers per sample, in the order of the factors."""
         points = np.empty((self.samples, len(factors)))
         for sample in range(self.samples):

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
 from ringsim.refusal import InputError
-from ringsim.sampling.designs.family import Design, Factor, Samples
+from ringsim.sampling.designs.family import Design, Factors, Samples
 from ringsim.sampling.distributions.family import Array, inside
 
 
@@ -20,12 +18,10 @@ class Sobol(Design):
     Source: Joe and Kuo (2008) directions, Matousek (1998) scrambling, as in scipy.
     """
 
-    extendable: ClassVar[bool] = True
-
     kind: Literal["sobol"] = "sobol"
     samples: Samples
 
-    def points(self, factors: Sequence[Factor], seed: int) -> Array:
+    def points(self, factors: Factors, seed: int) -> Array:
         """The first points of the sequence that belongs to the seed."""
         from scipy.stats import qmc
 
@@ -35,5 +31,5 @@ class Sobol(Design):
                 'use kind = "random"'
             )
         engine = qmc.Sobol(d=len(factors), scramble=True, rng=np.random.default_rng(seed), bits=30)
-        power = max(0, math.ceil(math.log2(self.samples)))
+        power = (self.samples - 1).bit_length()
         return inside(engine.random_base2(power)[: self.samples])

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ringsim.sampling.distributions.family import Array, Distribution
+from ringsim.sampling.distributions.family import Array, Distribution, Values
 from ringsim.units import ListIn
 
 
@@ -49,10 +48,10 @@ class Discrete(Distribution):
         upper: Array = np.cumsum(shares)
         return upper
 
-    def quantile(self, probability: Array) -> NDArray[Any]:
+    def quantile(self, probability: Array) -> Values:
         """The value whose interval of cumulative probability holds the given one."""
         chosen = np.searchsorted(self._upper_ends()[:-1], probability, side="right")
-        values: NDArray[Any] = np.array(self.values)[chosen]
+        values: Values = np.array(self.values)[chosen]
         return values
 
     def levels(self, count: int) -> Array:

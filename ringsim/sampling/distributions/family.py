@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from ringsim.units import Model
 
 Array = NDArray[np.float64]
+Values = NDArray[Any]
+"""Numbers, words, or true and false."""
 
 
 class Distribution(Model):
@@ -21,7 +23,7 @@ class Distribution(Model):
     each_section: bool = False
     """Draw one independent value for every section instead of one for all."""
 
-    def quantile(self, probability: Array) -> NDArray[Any]:
+    def quantile(self, probability: Array) -> Values:
         """Values at cumulative probabilities in the open interval (0, 1), same shape."""
         raise NotImplementedError
 

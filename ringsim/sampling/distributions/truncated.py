@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
 from ringsim.choice import OneOf
-from ringsim.sampling.distributions.family import Array, Continuous, Distribution
+from ringsim.sampling.distributions.family import Array, Continuous, Distribution, Values
 
 LEAST_MASS = 1e-6
 """Probability between the bounds, at least: less is a mistake in the bounds."""
@@ -23,8 +22,6 @@ class Truncated(Distribution):
     >>> force.quantile(np.array([0.0])).tolist()
     [0.015]
     """
-
-    bounded: ClassVar[bool] = False
 
     kind: Literal["truncated"] = "truncated"
     of: Annotated[Continuous, OneOf()]
@@ -50,11 +47,9 @@ class Truncated(Distribution):
         above = 1.0 if self.high is None else self.of.probability(self.high)
         return below, above
 
-    def quantile(self, probability: Array) -> NDArray[Any]:
+    def quantile(self, probability: Array) -> Values:
         """Inverse of the cumulative distribution, inside the bounds to the bit."""
         below, above = self._ends()
         values = self.of.quantile(below + (above - below) * probability)
-        low = -np.inf if self.low is None else self.low
-        high = np.inf if self.high is None else self.high
-        clipped: NDArray[Any] = np.clip(values, low, high)
+        clipped: Values = np.clip(values, self.low, self.high)
         return clipped

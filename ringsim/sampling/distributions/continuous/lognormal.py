@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
-from scipy.special import ndtr, ndtri
 
+from ringsim.sampling.distributions.continuous.normal import Normal
 from ringsim.sampling.distributions.family import Array, Continuous
 
 
@@ -27,20 +26,15 @@ class Lognormal(Continuous):
     standard_deviation: Annotated[float, Field(gt=0.0)]
 
     @property
-    def _log_deviation(self) -> float:
-        return math.sqrt(math.log1p((self.standard_deviation / self.mean) ** 2))
+    def _logarithm(self) -> Normal:
+        deviation = math.sqrt(math.log1p((self.standard_deviation / self.mean) ** 2))
+        mean = math.log(self.mean) - 0.5 * deviation**2
+        return Normal.model_construct(mean=mean, standard_deviation=deviation)
 
-    @property
-    def _log_mean(self) -> float:
-        return math.log(self.mean) - 0.5 * self._log_deviation**2
-
-    def quantile(self, probability: Array) -> NDArray[Any]:
+    def quantile(self, probability: Array) -> Array:
         """Inverse of the cumulative distribution."""
-        values: Array = np.exp(self._log_mean + self._log_deviation * ndtri(probability))
-        return values
+        return np.exp(self._logarithm.quantile(probability))
 
     def probability(self, value: float) -> float:
         """Cumulative distribution."""
-        if value <= 0.0:
-            return 0.0
-        return float(ndtr((math.log(value) - self._log_mean) / self._log_deviation))
+        return self._logarithm.probability(math.log(value)) if value > 0.0 else 0.0

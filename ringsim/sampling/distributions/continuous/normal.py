@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from numpy.typing import NDArray
 from pydantic import Field
 from scipy.special import ndtr, ndtri
 
@@ -22,7 +21,7 @@ class Normal(Continuous):
     mean: float
     standard_deviation: Annotated[float, Field(gt=0.0)]
 
-    def quantile(self, probability: Array) -> NDArray[Any]:
+    def quantile(self, probability: Array) -> Array:
         """Inverse of the cumulative distribution."""
         values: Array = self.mean + self.standard_deviation * ndtri(probability)
         return values

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
 from ringsim.sampling.distributions.family import Array, Continuous
@@ -30,10 +29,9 @@ class Uniform(Continuous):
             raise ValueError(f"low = {self.low} must be below high = {self.high}")
         return self
 
-    def quantile(self, probability: Array) -> NDArray[Any]:
+    def quantile(self, probability: Array) -> Array:
         """Inverse of the cumulative distribution; its ends are low and high to the bit."""
-        values: Array = self.low * (1.0 - probability) + self.high * probability
-        return values
+        return self.low * (1.0 - probability) + self.high * probability
 
     def probability(self, value: float) -> float:
         """Cumulative distribution."""
