@@ -9,10 +9,9 @@ from typing import Any
 import click
 
 from ringsim.campaign.folder import prepare_folder
-from ringsim.campaign.plan import plan
-from ringsim.campaign.run import Choices, run_campaign
-from ringsim.campaign.share import Share
+from ringsim.campaign.run import Choices, Share, run_campaign
 from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
+from ringsim.campaign.status import plan
 from ringsim.cli.options import PATH
 from ringsim.execution.launch import aborting, launched_size, mpi_world
 from ringsim.execution.local import Local

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import click
 
-from ringsim.campaign.folder import open_folder
-from ringsim.campaign.merging import merge
+from ringsim.campaign.folder import merge, open_folder
 from ringsim.cli.options import FOLDER
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.outputs.family import COORDINATES, OUTPUTS, VARIABLES, Array, Output, axes, holds
-from ringsim.outputs.reading import Reading
-from ringsim.outputs.series import Run, Series, output_times
+from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
 from ringsim.stepping.locks import lock_times
