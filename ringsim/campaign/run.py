@@ -150,13 +150,10 @@ def _watched(
     missing = missing[share.holds(missing)]
     total = int(share.holds(np.arange(campaign.table.samples)).sum())
     progress = Progress(
-        path=campaign.path / f"progress-{share.writer}.json",
-        name=campaign.attributes["campaign_name"],
-        total=total,
-        done=total - len(missing),
-        failed=int(share.holds(failed).sum()),
+        campaign.path / f"progress-{share.writer}.json", campaign.attributes["campaign_name"],
+        total=total, done=total - len(missing), failed=int(share.holds(failed).sum()),
         workers=choices.scheduler.workers,
-    )
+    )  # fmt: skip
 
     def asked() -> str:
         progress.refresh()

@@ -76,9 +76,8 @@ def _parts(scene: Scene) -> list[tuple[str, str]]:
     )
     points = {
         "hinge assemblies": sum(map(len, layout.corners)),
-        "V-joints": families["vjoint"],
-        "pivots": families["pivot"],
-    }
+        "V-joints": families["vjoint"], "pivots": families["pivot"],
+    }  # fmt: skip
     lines = [
         ("rods", f"{len(layout.rods)} {kind_of(rods)} ({elements})"),
         ("points", ", ".join(f"{count} {name}" for name, count in points.items() if count)),
@@ -90,11 +89,9 @@ def _parts(scene: Scene) -> list[tuple[str, str]]:
 
 
 _JOINTS = {
-    "revolute": "revolute",
-    "prismatic": "prismatic joint",
-    "sleeve": "sliding joint",
-    "weld": "clamp",
-}
+    "revolute": "revolute", "prismatic": "prismatic joint",
+    "sleeve": "sliding joint", "weld": "clamp",
+}  # fmt: skip
 
 
 def _count(number: int, noun: str) -> str:

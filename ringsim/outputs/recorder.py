@@ -69,14 +69,9 @@ class Recorder:
             "jacobians": self.jacobians,
         }
         run = Run(
-            self._scene,
-            Series(times, angles, grid),
-            Series(times, rates, grid),
-            lock_times(times, angles, rates),
-            counts,
-            self.status,
-            self.reason.cause,
-        )
+            self._scene, Series(times, angles, grid), Series(times, rates, grid),
+            lock_times(times, angles, rates), counts, self.status, self.reason.cause,
+        )  # fmt: skip
 
         def series_of(output: Output) -> Series | None:
             readings = self._readings[output]
