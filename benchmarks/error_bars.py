@@ -158,7 +158,7 @@ def compare(seed: int) -> dict[str, Any]:
 def outputs_of(fine: Outcome, coarse: Outcome, truth: Outcome) -> dict[str, list[float]]:
     """Value, error and difference of every output; of the asynchrony at the time that is worst."""
     apart, errors = differences(fine, coarse), errors_of(fine, truth)
-    values = {name: largest(fine, name) for name in apart}
+    values = {name: largest(name, fine.values[name]) for name in apart}
     found = {n: [values[n], errors[n], apart[n]] for n in apart if n != "asynchrony"}
     error = np.abs(fine.values["asynchrony"] - truth.values["asynchrony"])
     bars = bar("asynchrony", apart["asynchrony"], values["asynchrony"], 1, 0.0)

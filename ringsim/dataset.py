@@ -89,12 +89,9 @@ def save(dataset: xr.Dataset, path: str | Path) -> None:
     require_place(path)
     with writing(path), whole(path) as draft:
         dataset.drop_encoding().to_netcdf(
-            draft,
-            engine="netcdf4",
-            format="NETCDF4",
-            encoding=_encoding(dataset),
+            draft, engine="netcdf4", format="NETCDF4", encoding=_encoding(dataset),
             unlimited_dims=[],
-        )
+        )  # fmt: skip
 
 
 def _array(variable: Variable, values: np.ndarray[Any, Any]) -> xr.DataArray:

@@ -16,7 +16,6 @@ RODS = (
     "bar_upper_left", "bar_upper_right", "bar_lower_left", "bar_lower_right",
 )  # fmt: skip
 
-
 COUNTS = ("steps", "newton_iterations", "jacobians")
 """What a start of a run takes; "total_" before the name counts all starts."""
 

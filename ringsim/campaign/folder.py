@@ -1,4 +1,4 @@
-"""A campaign's folder: its design, its identity, and whether it may be gone on with."""
+"""A campaign's folder: its design, its identity, whether it may be gone on with; its merging."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ringsim.campaign.specification import Campaign
 from ringsim.files import DRAFT, writing
@@ -18,7 +18,13 @@ from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.design_file import NAME, read_design, write_design
 from ringsim.storage.journal import FOLDER, Survey, survey
 from ringsim.storage.locks import GO_ON, locked, tries
+from ringsim.storage.merge import NAME as MERGED
+from ringsim.storage.merge import write_merged
+from ringsim.storage.netcdf import OutputTable
 from ringsim.storage.provenance import provenance
+
+_KEPT = ("identity", "seed", "solver", "campaign", "campaign_name", "scene", "output")
+"""Attributes of the design that a merged file has, too."""
 
 
 @dataclass(frozen=True)
@@ -165,3 +171,40 @@ def refuse_another(campaign: Campaign, old: Folder, table: Table, solver: str) -
             f"{old.path}: this folder holds another campaign ({what}): choose another folder with "
             "--out, or delete this one"
         )
+
+
+class Merged(NamedTuple):
+    """What a folder held when it was to be merged."""
+
+    left: int
+    """Samples that have no result; they are missing from a merged file."""
+    failed: int
+    path: Path | None
+    """The merged file, or None if it was not wanted yet."""
+
+
+def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
+    """Write ``campaign.nc``, one process at a time, so that it never loses samples it had.
+
+    It says in words who computed it, and is written ``partly`` if samples are left.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written to.
+    """
+    path = campaign.path / MERGED
+    with writing(path, GO_ON), locked(campaign.path / "lock-merge", wait=True):
+        for draft in campaign.path.glob(f".{MERGED}.*{DRAFT}"):
+            draft.unlink(missing_ok=True)
+        found = campaign.survey()
+        left, failed = len(found.missing), len(found.failed)
+        if left and not partly:
+            return Merged(left, failed, None)
+        design = campaign.attributes
+        made = provenance(name=design["campaign_name"], title=design["title"], action="merged")
+        attributes = made | {name: design[name] for name in _KEPT} | {"execution": execution}
+        attributes["history"] += f"\n{design['history']}"
+        output = OutputTable.model_validate_json(design["output"])
+        failed += write_merged(campaign.path, found, campaign.table, output, attributes)
+    return Merged(left, failed, path)

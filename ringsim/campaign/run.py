@@ -6,13 +6,12 @@ import contextlib
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ringsim.analysis.campaign_notes import budget_lines, restart_lines
-from ringsim.campaign.folder import Folder, open_folder
-from ringsim.campaign.merging import merge
-from ringsim.campaign.share import WHOLE, Share
+from ringsim.campaign.folder import Folder, merge, open_folder
 from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
 from ringsim.execution.cost import longest_first, relative_cost
 from ringsim.execution.work import Limits, Scheduler, Work
@@ -23,6 +22,45 @@ from ringsim.storage.locks import reserved
 
 
 @dataclass(frozen=True)
+class Share:
+    """Every ``count``-th sample of a campaign, starting at ``number`` - 1."""
+
+    number: int = 1
+    count: int = 1
+
+    @classmethod
+    def parse(cls, text: str) -> Share:
+        """The share that ``i/n`` names.
+
+        >>> Share.parse("2/8")
+        Share(number=2, count=8)
+
+        Raises
+        ------
+        InputError
+            If there is no such share.
+        """
+        number, _, count = text.partition("/")
+        if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
+            raise InputError(f"--part {text}: must read i/n with 1 <= i <= n, for example 2/8")
+        return cls(int(number), int(count))
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is all samples."""
+        return self.count == 1
+
+    @property
+    def writer(self) -> str:
+        """Start of the names of files that belong to this share alone."""
+        return "all" if self.whole else f"part{self.number}of{self.count}"
+
+    def holds(self, samples: Any) -> Any:
+        """Which of the samples belong to the share."""
+        return samples % self.count == self.number - 1
+
+
+@dataclass(frozen=True)
 class Choices:
     """How a campaign is to be run this time."""
 
@@ -30,7 +68,7 @@ class Choices:
     limits: Limits
     max_failed: int | None = None
     """Failures that are put up with, in the whole campaign; None for any number."""
-    share: Share = WHOLE
+    share: Share = Share()
     retry_failed: bool = False
 
 
@@ -73,13 +111,10 @@ def _run_missing(campaign: Folder, choices: Choices, stop: StopRequest) -> None:
     writer = f"{choices.share.writer}-rank{scheduler.rank}"
     journal = Journal(campaign.path, campaign.identity, writer)
     work = Work(
-        solver=campaign.solver,
-        scene=campaign.scene.to_table(),
-        values_of=campaign.table.values_of,
-        limits=choices.limits,
-        keep=journal.append,
+        solver=campaign.solver, scene=campaign.scene.to_table(),
+        values_of=campaign.table.values_of, limits=choices.limits, keep=journal.append,
         stop=lambda: stop.reason,
-    )
+    )  # fmt: skip
     samples: list[int] = []
     progress = None
     if scheduler.rank == 0:
@@ -115,13 +150,10 @@ def _watched(
     missing = missing[share.holds(missing)]
     total = int(share.holds(np.arange(campaign.table.samples)).sum())
     progress = Progress(
-        path=campaign.path / f"progress-{share.writer}.json",
-        name=campaign.attributes["campaign_name"],
-        total=total,
-        done=total - len(missing),
-        failed=int(share.holds(failed).sum()),
+        campaign.path / f"progress-{share.writer}.json", campaign.attributes["campaign_name"],
+        total=total, done=total - len(missing), failed=int(share.holds(failed).sum()),
         workers=choices.scheduler.workers,
-    )
+    )  # fmt: skip
 
     def asked() -> str:
         progress.refresh()

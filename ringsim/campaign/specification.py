@@ -84,14 +84,9 @@ class Campaign:
         wanted = self.specification
         try:
             return draw(
-                self.scene,
-                wanted.inputs,
-                wanted.correlations,
-                wanted.design,
-                seed=wanted.seed,
-                folder=self.file.parent,
-                error_bars_every=wanted.error_bars_every,
-            )
+                self.scene, wanted.inputs, wanted.correlations, wanted.design, seed=wanted.seed,
+                folder=self.file.parent, error_bars_every=wanted.error_bars_every,
+            )  # fmt: skip
         except InputError as error:
             raise InputError(f"{self.file.name}: {error}") from None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import os
 import sys
 from typing import Any
@@ -61,6 +62,7 @@ def cli() -> None:
     Exit codes: 0 done, 2 bad input, 3 the simulation failed or too many samples did,
     130 interrupted (run again to resume).
     """
+    logging.basicConfig(format="%(message)s")
 
 
 def main() -> None:

@@ -4,34 +4,28 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import click
 import tomli_w
 
+from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.files import write_text
-from ringsim.overrides import parse_assignment
 from ringsim.scene import load_scene
 
 
 @click.command("accuracy")
-@click.argument("scene", metavar="SCENE")
-@click.option(
-    "--set", "settings", metavar="PATH=VALUE", multiple=True, help="Override a scene field."
-)
-@click.option(
-    "--out", metavar="DIR", type=click.Path(path_type=Path),
-    help="Folder (default runs/accuracy-SCENE).",
-)  # fmt: skip
-@click.option(
-    "--workers", type=click.IntRange(1, 4096), help="Solver processes (default: all cores)."
-)
+@SCENE
+@SETTINGS
+@click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/accuracy-SCENE).")
+@click.option("--workers", type=WORKERS, help="Solver processes (default: all cores).")
 @click.option(
     "--timeout", type=click.FloatRange(0.0, min_open=True), default=1800.0, show_default=True,
     help="Longest time of one setting, s.",
 )  # fmt: skip
 def command(
-    scene: str, settings: tuple[str, ...], out: Path | None, workers: int | None, timeout: float
+    scene: str, settings: dict[str, Any], out: Path | None, workers: int | None, timeout: float
 ) -> int:
     """Compare numerical settings of SCENE: error against run time, and which to choose.
 
@@ -39,7 +33,7 @@ def command(
     same command again goes on with an interrupted study.  Exit codes: 0 done, 2 bad input, 3 a
     run that the reference needs did not end well.
     """
-    chosen = load_scene(scene).with_values(dict(parse_assignment(text) for text in settings))
+    chosen = load_scene(scene).with_values(settings)
     folder = out or Path("runs") / f"accuracy-{chosen.name}"
 
     from ringsim.analysis.accuracy_text import tables

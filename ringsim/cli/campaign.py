@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,10 +9,10 @@ from typing import Any
 import click
 
 from ringsim.campaign.folder import prepare_folder
-from ringsim.campaign.plan import plan
-from ringsim.campaign.run import Choices, run_campaign
-from ringsim.campaign.share import Share
+from ringsim.campaign.run import Choices, Share, run_campaign
 from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
+from ringsim.campaign.status import plan
+from ringsim.cli.options import PATH
 from ringsim.execution.launch import aborting, launched_size, mpi_world
 from ringsim.execution.local import Local, Serial
 from ringsim.execution.mpi import Mpi
@@ -23,34 +22,26 @@ from ringsim.refusal import InputError
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=PATH)
 @click.option(
-    "--workers",
-    type=click.IntRange(0, 4096),
+    "--workers", type=click.IntRange(0, 4096),
     help="Solver processes (default 1); 0 runs in this process, without isolation.",
-)
-@click.option("--out", type=click.Path(path_type=Path), help="Folder (default runs/NAME).")
+)  # fmt: skip
+@click.option("--out", type=PATH, help="Folder (default runs/NAME).")
 @click.option("--part", default="1/1", help="Run only the i-th of n shares of the samples: i/n.")
 @click.option("--retry-failed", is_flag=True, help="Run the failed samples again, too.")
 @click.option("--dry-run", is_flag=True, help="Show plan and predicted cost; keep nothing.")
 @click.option("--solver", default="", hidden=True)
 def command(
-    file: Path,
-    workers: int | None,
-    out: Path | None,
-    part: str,
-    *,
-    retry_failed: bool,
-    dry_run: bool,
-    solver: str,
-) -> int:
+    file: Path, workers: int | None, out: Path | None, part: str, *, retry_failed: bool,
+    dry_run: bool, solver: str,
+) -> int:  # fmt: skip
     """Run the campaign of FILE; the same command again goes on with what is missing.
 
     Under mpiexec or srun every rank computes, and --workers is left out.  Exit codes: 0 all
     samples have run (some may have failed, up to max_failed), 3 too many or all of them failed,
     130 stopped by a signal.
     """
-    logging.basicConfig(format="%(message)s")
     size = launched_size()
 
     def asked_for() -> tuple[Campaign, Path, str, Share]:

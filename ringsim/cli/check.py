@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
 import click
 
 from ringsim.choice import kind_of
+from ringsim.cli.options import SETTINGS
 from ringsim.layout.layout import Layout
 from ringsim.layout.mobility import internal_mobility
 from ringsim.layout.of_scene import layout_of
-from ringsim.overrides import parse_assignment
 from ringsim.refusal import show
 from ringsim.scene import Scene, load_scene
 from ringsim.units import Model
@@ -21,22 +22,19 @@ MOST_SECTIONS_FOR_MOBILITY = 72
 
 @click.command("check", short_help="Check a scene file and say what it builds.")
 @click.argument("scene", metavar="FILE")
-@click.option(
-    "--set", "assignments", multiple=True, metavar="PATH=VALUE",
-    help="Replace a value, e.g. loads.force=0.02, rods.young_modulus[3]=1e11, net=none.",
-)  # fmt: skip
+@SETTINGS
 @click.option(
     "--deploys-in", "time", type=float, metavar="SECONDS",
     help="Find the initial opening angle from which the ideal fidelity deploys in this time.",
 )  # fmt: skip
-def command(scene: str, assignments: tuple[str, ...], time: float | None) -> None:
+def command(scene: str, settings: dict[str, Any], time: float | None) -> None:
     """Check FILE (a scene file, or the name of a built-in scene) without running it.
 
     Bad input ends with exit code 2 and one line that names the field, its value and the cure.
     """
     loaded = load_scene(scene)
-    if assignments:
-        loaded = loaded.with_values(dict(parse_assignment(text) for text in assignments))
+    if settings:
+        loaded = loaded.with_values(settings)
     if time is not None:
         from ringsim.theory.calibration import opening_angle_for
 
@@ -71,33 +69,29 @@ def _parts(scene: Scene) -> list[tuple[str, str]]:
     counts = Counter(joint.kind for joint in layout.joints)
     families = Counter(joint.family for joint in layout.joints)
     masses = layout.masses()
+    parts = ", ".join(f"{name} {mass:.4g}" for name, mass in masses.items())
+    elements = ", ".join(
+        f"{_count(count, 'element')} in {group}"
+        for group, count in {rod.group: len(rod.stations) - 1 for rod in layout.rods}.items()
+    )
     points = {
         "hinge assemblies": sum(map(len, layout.corners)),
-        "V-joints": families["vjoint"],
-        "pivots": families["pivot"],
-    }
+        "V-joints": families["vjoint"], "pivots": families["pivot"],
+    }  # fmt: skip
     lines = [
-        ("rods", f"{len(layout.rods)} {kind_of(rods)} ({_elements(layout)})"),
+        ("rods", f"{len(layout.rods)} {kind_of(rods)} ({elements})"),
         ("points", ", ".join(f"{count} {name}" for name, count in points.items() if count)),
         ("joints", ", ".join(_count(count, _JOINTS[kind]) for kind, count in counts.items())),
         ("mobility", _mobility(layout)),
-        ("mass", f"{sum(masses.values()):.4g} kg: {_listed(masses)}"),
+        ("mass", f"{sum(masses.values()):.4g} kg: {parts}"),
     ]
     return [(label, text) for label, text in lines if text]
 
 
 _JOINTS = {
-    "revolute": "revolute",
-    "prismatic": "prismatic joint",
-    "sleeve": "sliding joint",
-    "weld": "clamp",
-}
-
-
-def _elements(layout: Layout) -> str:
-    """Elements of the rods, by what they are called."""
-    found = {rod.group: len(rod.stations) - 1 for rod in layout.rods}
-    return ", ".join(f"{_count(count, 'element')} in {group}" for group, count in found.items())
+    "revolute": "revolute", "prismatic": "prismatic joint",
+    "sleeve": "sliding joint", "weld": "clamp",
+}  # fmt: skip
 
 
 def _count(number: int, noun: str) -> str:
@@ -109,12 +103,7 @@ def _mobility(layout: Layout) -> str:
     if sections > MOST_SECTIONS_FOR_MOBILITY:
         return f"not computed above {MOST_SECTIONS_FOR_MOBILITY} sections"
     freedom = internal_mobility(layout)
-    noun = "internal degree" if freedom == 1 else "internal degrees"
-    return f"{freedom} {noun} of freedom with rigid rods"
-
-
-def _listed(masses: dict[str, float]) -> str:
-    return ", ".join(f"{name} {mass:.4g}" for name, mass in masses.items())
+    return f"{_count(freedom, 'internal degree')} of freedom with rigid rods"
 
 
 def _fields(part: Model) -> str:

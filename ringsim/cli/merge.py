@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import click
 
-from ringsim.campaign.folder import open_folder
-from ringsim.campaign.merging import merge
+from ringsim.campaign.folder import merge, open_folder
+from ringsim.cli.options import FOLDER
 
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@FOLDER
 def command(folder: Path) -> None:
     """Write campaign.nc in FOLDER from the samples that are done; the others are missing values.
 
     It may be called at any time and any number of times, also while the campaign runs.
     """
-    logging.basicConfig(format="%(message)s")
     campaign = open_folder(folder)
     merged = merge(campaign, execution="merged on its own", partly=True)
     click.echo(

@@ -9,6 +9,7 @@ import click
 import numpy as np
 
 from ringsim.campaign.folder import open_folder
+from ringsim.cli.options import FOLDER, PATH
 from ringsim.execution.solve import load_solver, solve
 from ringsim.execution.work import Task
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
@@ -19,10 +20,10 @@ from ringsim.variables import TIMINGS, Outcome
 
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@FOLDER
 @click.argument("sample", type=int)
 @click.option("--scene", is_flag=True, help="Print the sample's scene and do not run it.")
-@click.option("--save", type=click.Path(path_type=Path), help="Write the run to a netCDF file.")
+@click.option("--save", type=PATH, help="Write the run to a netCDF file.")
 def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
     """Run SAMPLE of the campaign in FOLDER again in this process, and compare the results.
 

@@ -10,22 +10,18 @@ import click
 import numpy as np
 
 from ringsim.choice import kind_of
+from ringsim.cli.options import PATH, SCENE, SETTINGS
 from ringsim.exit_codes import EXIT_FAILED
 from ringsim.files import require_place
-from ringsim.overrides import parse_assignment
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 
 
 @click.command("run")
-@click.argument("scene", metavar="SCENE")
-@click.option(
-    "--set", "settings", metavar="PATH=VALUE", multiple=True, help="Override a scene field."
-)
-@click.option(
-    "--out", metavar="FILE", type=click.Path(path_type=Path), help="netCDF file to write."
-)
+@SCENE
+@SETTINGS
+@click.option("--out", metavar="FILE", type=PATH, help="netCDF file to write.")
 @click.option(
     "--fidelity", type=click.Choice(["full", "ideal"]), default="full", show_default=True,
     help="Full model, or the ideal ring of rigid rods (in seconds; no asynchrony, no stress).",
@@ -40,31 +36,23 @@ from ringsim.scene import Scene, load_scene
     help="Aim --accuracy at another output: loads, asynchrony, peak_tension, ...",
 )  # fmt: skip
 @click.option(
-    "--evidence", metavar="FILE", type=click.Path(path_type=Path),
+    "--evidence", metavar="FILE", type=PATH,
     help="settings.toml of ringsim accuracy (default: that of the built-in scene most alike).",
 )  # fmt: skip
 @click.option("--plot", is_flag=True, help="Draw figures beside the netCDF file.")
 def command(
-    scene: str,
-    settings: tuple[str, ...],
-    out: Path | None,
-    fidelity: str,
-    accuracy: float | None,
-    of: str | None,
-    evidence: Path | None,
-    *,
-    plot: bool,
-) -> None:
+    scene: str, settings: dict[str, Any], out: Path | None, fidelity: str,
+    accuracy: float | None, of: str | None, evidence: Path | None, *, plot: bool,
+) -> None:  # fmt: skip
     """Run SCENE (a built-in name or a TOML file) and write SCENE.nc."""
     chosen = load_scene(scene)
-    given = dict(parse_assignment(text) for text in settings)
     if accuracy is not None:
-        chosen = _with_accuracy(chosen, accuracy, of, evidence, given, fidelity)
+        chosen = _with_accuracy(chosen, accuracy, of, evidence, settings, fidelity)
     for name, value in (("--of", of), ("--evidence", evidence)):
         if value is not None and accuracy is None:
             raise InputError(f"{name} {value}: says nothing without --accuracy; give both")
-    if given:
-        chosen = chosen.with_values(given)
+    if settings:
+        chosen = chosen.with_values(settings)
     if fidelity == "ideal" and chosen.record.stress:
         chosen = chosen.with_values({"record.stress": False})
         click.echo("stress is left out: the rods of the ideal ring are rigid")
@@ -122,13 +110,9 @@ def restarted(values: dict[str, Any], asked: Solver) -> str:
 
 
 def _with_accuracy(
-    scene: Scene,
-    accuracy: float,
-    of: str | None,
-    file: Path | None,
-    given: dict[str, Any],
+    scene: Scene, accuracy: float, of: str | None, file: Path | None, given: dict[str, Any],
     fidelity: str,
-) -> Scene:
+) -> Scene:  # fmt: skip
     """The scene with the cheapest settings that were measured to be so accurate."""
     from ringsim.analysis.evidence import CHOICES, JUDGED_BY, evidence_for, read_evidence
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.files import write_text
-from ringsim.overrides import parse_assignment
 from ringsim.scene import load_scene
 
 if TYPE_CHECKING:
@@ -22,36 +21,28 @@ _SEED = 1
 
 
 @click.command("stability")
-@click.argument("scene", metavar="SCENE")
-@click.option(
-    "--set", "settings", metavar="PATH=VALUE", multiple=True, help="Override a scene field."
-)
+@SCENE
+@SETTINGS
 @click.option(
     "--over", metavar="PATH=LOW..HIGH", multiple=True,
     help="Axis of a panel; every two make one (x, then y). cables.*.NAME is that of all cables. "
     "Default: panels chosen from what the scene holds.",
 )  # fmt: skip
 @click.option(
-    "--points",
-    type=click.IntRange(2, 30),
-    default=5,
-    show_default=True,
+    "--points", type=click.IntRange(2, 30), default=5, show_default=True,
     help="Values of each axis.",
-)
+)  # fmt: skip
 @click.option(
-    "--out", metavar="DIR", type=click.Path(path_type=Path),
+    "--out", metavar="DIR", type=PATH,
     help="Folder for the map and its campaigns (default runs/stability-SCENE).",
 )  # fmt: skip
-@click.option(
-    "--workers", type=click.IntRange(1, 4096), default=1, show_default=True,
-    help="Solver processes.",
-)  # fmt: skip
+@click.option("--workers", type=WORKERS, default=1, show_default=True, help="Solver processes.")
 @click.option(
     "--check", "percent", type=click.FloatRange(0.0, 100.0, min_open=True), default=10.0,
     show_default=True, help="Percentage of the ok cells that are run again with smaller steps.",
 )  # fmt: skip
 def command(
-    scene: str, settings: tuple[str, ...], over: tuple[str, ...], points: int, out: Path | None,
+    scene: str, settings: dict[str, Any], over: tuple[str, ...], points: int, out: Path | None,
     workers: int, percent: float,
 ) -> int:  # fmt: skip
     """Map around SCENE: which pairs of values run well, and how runs end elsewhere.
@@ -62,7 +53,7 @@ def command(
     after an interruption.  Exit codes: 0 every cell is ok, or ended with a named cause; 2 bad
     input; 3 some cells are wrong.
     """
-    chosen = load_scene(scene).with_values(dict(parse_assignment(text) for text in settings))
+    chosen = load_scene(scene).with_values(settings)
 
     from ringsim.campaign.panels import panels_over
 
@@ -85,7 +76,6 @@ def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float
     from ringsim.plots import style
     from ringsim.plots.stability import stability
 
-    logging.basicConfig(format="%(message)s")
     whole = run_map(folder, panels, workers)
     whole = run_check(folder, panels, whole, share=0.01 * percent, seed=_SEED, workers=workers)
     save(whole, folder / "stability.nc")

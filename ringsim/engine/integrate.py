@@ -20,8 +20,8 @@ from ringsim.engine.scales import residual_tolerance, scales_of
 from ringsim.engine.settings import raise_own, solver_settings
 from ringsim.engine.stress import BendingMeter, StressMeter
 from ringsim.layout.halves import halves
-from ringsim.outputs.reading import Reading
 from ringsim.outputs.recorder import Recorder
+from ringsim.outputs.series import Reading
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import Locks

@@ -51,9 +51,11 @@ def error_bars(
     """
     if run.status != Status.OK or other.status != Status.OK:
         return {}
+    apart = differences(run, other)
+    values = {name: largest(name, run.values[name]) for name in apart}
     return {
-        f"{name}_error": bar(name, scale * apart, largest(run, name), elements, tolerance)
-        for name, apart in differences(run, other).items()
+        f"{name}_error": bar(name, scale * apart[name], values[name], elements, tolerance)
+        for name in apart
     }
 
 
@@ -73,17 +75,13 @@ def differences(one: Outcome, other: Outcome) -> dict[str, Array]:
         judged = rule.judged_by or name
         if judged in one.values:
             first, second = one.values[judged], other.values[judged]
-            found = _largest(name, np.abs(first - second))
+            found = largest(name, np.abs(first - second))
             apart[name] = np.where(np.isfinite(first), found, np.nan) if found.ndim else found
     return apart
 
 
-def largest(outcome: Outcome, name: str) -> Array:
+def largest(name: str, values: Array) -> Array:
     """Value of a result, or the largest of its series; of one over time up to each time."""
-    return _largest(name, outcome.values[name])
-
-
-def _largest(name: str, values: Array) -> Array:
     if VARIABLES[name].dims == ("time",):
         return np.asarray(np.fmax.accumulate(values))
     return np.asarray(np.fmax.reduce(values, axis=None))

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.choice import kind_of
-from ringsim.outputs.reading import Array, Reading
-from ringsim.outputs.series import Run, Series, output_times
+from ringsim.outputs.series import Array, Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.variables import ErrorBar, Variable
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.outputs.family import COORDINATES, OUTPUTS, VARIABLES, Array, Output, axes, holds
-from ringsim.outputs.reading import Reading
-from ringsim.outputs.series import Run, Series, output_times
+from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
 from ringsim.stepping.locks import lock_times
@@ -70,14 +69,9 @@ class Recorder:
             "jacobians": self.jacobians,
         }
         run = Run(
-            self._scene,
-            Series(times, angles, grid),
-            Series(times, rates, grid),
-            lock_times(times, angles, rates),
-            counts,
-            self.status,
-            self.reason.cause,
-        )
+            self._scene, Series(times, angles, grid), Series(times, rates, grid),
+            lock_times(times, angles, rates), counts, self.status, self.reason.cause,
+        )  # fmt: skip
 
         def series_of(output: Output) -> Series | None:
             readings = self._readings[output]

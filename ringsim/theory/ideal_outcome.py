@@ -12,9 +12,8 @@ from scipy.interpolate import BPoly, CubicHermiteSpline
 from ringsim.cable.state import ChainState
 from ringsim.outputs.cable_tension import CableTension
 from ringsim.outputs.family import Output, Values, axes
-from ringsim.outputs.reading import Reading
 from ringsim.outputs.recorder import outputs_of, reduced, spanned
-from ringsim.outputs.series import Run, Series, output_times
+from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
 from ringsim.theory.ideal_course import Course, Piece
