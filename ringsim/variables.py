@@ -10,11 +10,6 @@ from typing import Any
 import numpy as np
 
 PLANES = ("upper", "lower")
-RODS = (
-    "diagonal_rising_left", "diagonal_rising_right",
-    "diagonal_falling_left", "diagonal_falling_right",
-    "bar_upper_left", "bar_upper_right", "bar_lower_left", "bar_lower_right",
-)  # fmt: skip
 
 COUNTS = ("steps", "newton_iterations", "jacobians")
 """What a start of a run takes; "total_" before the name counts all starts."""

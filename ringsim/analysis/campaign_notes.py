@@ -35,7 +35,7 @@ def budget_lines(campaign: xr.Dataset) -> list[str]:
 
 
 def restart_lines(campaign: xr.Dataset) -> list[str]:
-    """One line if samples started anew with smaller steps (``restarts`` above 0), else none."""
+    """One line if samples were restarted with smaller steps (``restarts`` above 0), else none."""
     if not {"restarts", "steps", "total_steps"} <= set(campaign.data_vars):
         return []
     anew = int((campaign["restarts"] > 0).sum())
@@ -43,8 +43,8 @@ def restart_lines(campaign: xr.Dataset) -> list[str]:
     counted, every = (float(campaign[n].clip(min=0).sum()) for n in ("steps", "total_steps"))
     if not anew:
         return []
+    lost = 1.0 - counted / max(every, 1.0)
     return [
-        f"{anew} of {campaign.sizes['sample']} samples started anew with smaller steps (restarts, "
-        f"step_used): {1.0 - counted / max(every, 1.0):.0%} of all {every:.0f} steps went to "
-        "starts that failed"
+        f"{anew} of {campaign.sizes['sample']} samples were restarted with smaller steps "
+        f"(restarts, step_used): {lost:.0%} of all {every:.0f} steps went to attempts that failed"
     ]

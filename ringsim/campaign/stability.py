@@ -62,7 +62,7 @@ def run_check(
 ) -> xr.Dataset:  # fmt: skip
     """Run a random share of the ok cells again with smaller steps, compare, and judge again.
 
-    The largest step is a quarter, the tolerance a sixteenth of those of the start that counts;
+    The largest step is a quarter, the tolerance a sixteenth of those of the last attempt;
     constant steps are a quarter of those that Newton let the cell take.  ``whole`` is what
     :func:`run_map` gave; ``share`` and ``seed`` choose the cells.
     """

@@ -104,7 +104,7 @@ def restarted(values: dict[str, Any], asked: Solver) -> str:
         tolerance = values["tolerance_used"].item()
         used += f", solver.tolerance = {tolerance:.2g} instead of {asked.tolerance:.2g}"
     return (
-        f"started anew {times} times: computed with {used} (solver.restarts = 0 to see the "
+        f"restarted {times} times: computed with {used} (solver.restarts = 0 to see the "
         "first start fail instead)"
     ).replace("1 times", "once")
 

@@ -176,7 +176,6 @@ class Integration:
         self.history.note(
             Reading(
                 *now[:5],
-                latched=self._latched,
                 chain=self._chain,
                 planes=() if cables is None else tuple((plane,) for plane, _ in cables.present()),
                 stress=None if self._stress is None else self._stress.read(),

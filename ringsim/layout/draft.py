@@ -135,6 +135,8 @@ class Draft:
         if axes is None:
             rods = [self.rods[part.number] for part in parts if isinstance(part, RodRef)]
             axes = rods[0].start.axes if rods else SPACE
+        if parts[1] is None:  # a place in space comes first, as those who read supports expect
+            parts = parts[::-1]
         first, second = (self._mount(part, at, real_of(axes), family or kind) for part in parts)
         self.joints.append(Joint(kind, family, section, first, second))
         return len(self.joints) - 1
@@ -201,12 +203,20 @@ class Draft:
             )
         return mount
 
+    def _require_corners(self, part: str, planes: int) -> None:
+        if len(self.corners) < planes:
+            raise ValueError(
+                f"{part}: this structure has no corners to hold one in {planes} of its planes: "
+                f'leave it out ({part} = "none")'
+            )
+
     def _boom(self) -> BoomBeam | None:
         """A flexible boom; a rigid one becomes a lump of the body at its top."""
         boom = self.scene.boom
         if boom is None:
             return None
-        top, low = (OnBody(plane[0].number) for plane in self.corners)
+        self._require_corners("boom", 2)
+        top, low = (OnBody(plane[0].number) for plane in self.corners[:2])
         body = self.bodies[top.body]
         if boom.base == "fixed":
             self.joints.append(Joint("weld", "", 0, InSpace(body.pose.place, SPACE), top))
@@ -225,6 +235,7 @@ class Draft:
         net = self.scene.net
         if net is None:
             return None
+        self._require_corners("net", 1)
         held = tuple(ref.number for ref in self.corners[0])
         hub = FreeHub(net, len(held)).hub(np.array([self.bodies[k].pose.place for k in held]))
         return HubNet(net, hub, held)
@@ -244,6 +255,11 @@ class Draft:
     def _paths(self) -> tuple[tuple[Sheave, ...], ...]:
         cables, found = self.scene.cables, []
         for plane, cable in () if cables is None else cables.present():
+            if plane not in self.tracks:
+                raise ValueError(
+                    f"cables: this structure has no track for a cable in plane {plane + 1}: leave "
+                    "it out, or give Draft.tracks one"
+                )
             track = self.tracks[plane]
             path = [self._sheave(plane, cable, station) for station in track.stations]
             if cable.end == "last":

@@ -10,25 +10,23 @@ def _number(name: str, long_name: str, summary: tuple[str, str] | None = None) -
 
 
 class Effort(Output):
-    """Counts of the start that counts; ``ringsim.stepping.restarts`` adds those of all starts."""
+    """Counts of the last attempt; ``ringsim.stepping.restarts`` adds those of all attempts."""
 
     rank = 70
     variables = (
-        _number("steps", "time steps of the start that counts", ("steps", "10d")),
+        _number("steps", "time steps of the last attempt", ("steps", "10d")),
         _number("repeated_steps", "steps that were repeated with a smaller one"),
-        _number("newton_iterations", "Newton iterations of the start that counts"),
-        _number("jacobians", "Jacobian factorisations of the start that counts"),
-        _number("restarts", "new starts with a smaller step after a run that failed"),
+        _number("newton_iterations", "Newton iterations of the last attempt"),
+        _number("jacobians", "Jacobian factorisations of the last attempt"),
+        _number("restarts", "restarts with smaller steps after a failed attempt"),
         _number(
-            "total_steps", "time steps of all starts of the run", ("steps of all starts", "10d")
+            "total_steps", "time steps of all attempts of the run", ("steps of all attempts", "10d")
         ),
-        _number("total_newton_iterations", "Newton iterations of all starts"),
-        _number("total_jacobians", "Jacobian factorisations of all starts"),
+        _number("total_newton_iterations", "Newton iterations of all attempts"),
+        _number("total_jacobians", "Jacobian factorisations of all attempts"),
         _number("fidelity", "model: 0 full multibody, 1 ideal ring of rigid rods"),
-        Variable(
-            "step_used", (), "s", "largest step allowed, solver.step, of the start that counts"
-        ),
-        Variable("tolerance_used", (), "1", "solver.tolerance of the start that counts"),
+        Variable("step_used", (), "s", "largest step allowed, solver.step, of the last attempt"),
+        Variable("tolerance_used", (), "1", "solver.tolerance of the last attempt"),
         Variable("final_time", (), "s", "time at which the run ended"),
         Variable("wall_time", (), "s", "elapsed time of the run", summary=("wall time", "10.2f")),
         Variable("cpu_time", (), "s", "processor time of the run"),

@@ -11,7 +11,10 @@ class EnergyBalance(Output):
     rank = 60
     variables = (
         Variable("kinetic_energy", ("time",), "J", "kinetic energy"),
-        Variable("elastic_energy", ("time",), "J", "energy stored in rods, net and stops"),
+        Variable(
+            "elastic_energy", ("time",), "J",
+            "elastic energy of rods, springs, net, stops and cables",
+        ),
         Variable("work", ("time",), "J", "work done on the structure by forces and winches"),
         Variable("dissipation", ("time",), "J", "energy lost in joints, dampers and stops"),
         Variable(

@@ -27,8 +27,8 @@ VARIABLES: dict[str, Variable] = {}
 COORDINATES = {
     variable.name: variable
     for variable in (
-        Variable("plane", ("plane",), "1", "plane of the ring", "str"),
-        Variable("section", ("section",), "1", "section number, counted from the boom", "i4"),
+        Variable("plane", ("plane",), "1", "plane of the structure", "str"),
+        Variable("section", ("section",), "1", "section number, from 1", "i4"),
         Variable("time", ("time",), "s", "time since the start of the run"),
         Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
     )
@@ -88,7 +88,7 @@ def _declared(output: type[Output]) -> dict[str, Variable]:
     found = {v.name: replace(v, needs=output.needs) for v in output.variables}
     for name, variable in list(found.items()):
         if variable.error_bar is not None:
-            words = f"what the {variable.error_bar.words} may be wrong by"
+            words = f"numerical error bar of the {variable.error_bar.words}"
             dims = variable.dims if variable.dims == ("time",) else ()
             words += " at any time up to then" if dims else ""
             needs = ("error bars", *output.needs)

@@ -36,8 +36,6 @@ class Reading:
     """Outputs read ``work`` with what the winches put in, and ``lost``, since the start."""
     gap: float = 0.0
     """Largest distance of points that a joint holds together, m."""
-    latched: NDArray[np.bool_] | None = None
-    """Whether each V-joint's latch holds, shape (planes, sections)."""
     chain: ChainState | None = None
     """All cables; None if the scene has none."""
     planes: tuple[tuple[int, ...], ...] = ()

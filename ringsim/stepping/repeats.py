@@ -74,7 +74,7 @@ class Indicator(ABC):
 
 
 class EnergyImbalance(Indicator):
-    """Steps that conjure up or swallow energy.
+    """Steps that add or lose energy.
 
     A rope becomes taut within a small part of the step that the motion asks for, and throws what it
     pulls.  A step across that balances neither the work of the winch nor the energy of the rope:

@@ -28,7 +28,7 @@ def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Ou
     Outcome
         That of the last start.  ``restarts`` says how many there were, ``step_used`` and
         ``tolerance_used`` with which settings the last one ran (NaN where steps are constant);
-        ``total_steps``, ... count those of all starts.
+        ``total_steps``, ... count those of all attempts.
     """
     used, outcome, restarts = solver, solve(solver), 0
     first, totals = outcome, _counts(outcome)

@@ -146,7 +146,7 @@ class PantographRing(Structure):
     def describe(self) -> dict[str, str]:
         """See ``Structure``."""
         geometry = self.geometry()
-        shape = "closed ring" if self.closed else f"open arc of a {self.polygon}-gon"
+        shape = "closed ring" if self.closed else f"open arc of a polygon with {self.polygon} sides"
         # The first corner lies on the major axis of the ellipse.
         chord = 2.0 * (self.half_bar + self.hinge_offset)
         major, (x, y) = geometry.plan[0, 0], geometry.plan[1, :2]

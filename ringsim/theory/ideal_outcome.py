@@ -141,7 +141,6 @@ class _IdealRun:
             np.full(self._shape, opening),
             np.full(self._shape, rate),
             Energies(now.kinetic, now.elastic, work, state[-2]),
-            latched=np.full(self._shape, motion.latched),
             chain=None if now.pull is None else now.pull.chain,
             planes=() if motion.cables is None else tuple(motion.cables.planes),
         )

@@ -71,6 +71,12 @@ class Points:
         ValueError
             If it is not linear in the structure's basis.
         """
+        count, rank = self._known.shape[1], np.linalg.matrix_rank(self._known)
+        if rank < count:
+            raise ValueError(
+                f"structure: basis() has {count} functions, but only {rank} can be told apart at "
+                f"{len(self._layouts)} coordinates: leave out those that depend on others"
+            )
         values = np.stack([part for layout in self._layouts for part in read(layout)])
         flat = values.reshape(len(values), -1)
         found = np.linalg.lstsq(self._known, flat, rcond=None)[0]

@@ -20,7 +20,7 @@ def test_every_variable_is_explained() -> None:
 def test_a_variable_has_units_meaning_and_needs() -> None:
     words = explain("peak_tension_error")
     assert " N " in words
-    assert "what the largest tension may be wrong by" in words
+    assert "numerical error bar of the largest tension" in words
     assert "only with error bars, cables" in words
 
 

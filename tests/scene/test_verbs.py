@@ -72,7 +72,7 @@ def test_check_of_an_open_arc_without_parts() -> None:
         "check", "ring18", "--set", "structure.closed=false", "--set", "structure.sections=2",
         "--set", "boom=none", "--set", "net=none", "--set", "loads=none", "--set", "stop=none",
     )  # fmt: skip
-    assert "open arc of a 18-gon, 2 sections" in line(summary, "structure")
+    assert "open arc of a polygon with 18 sides, 2 sections" in line(summary, "structure")
     assert line(summary, "points") == "6 hinge assemblies, 4 V-joints, 2 pivots"
     assert line(summary, "mobility").startswith("5 internal degrees of freedom")
     for part in ("boom", "net", "loads", "stop"):

@@ -125,11 +125,11 @@ def test_the_summary_of_a_run_says_that_it_started_anew(endings, tmp_path) -> No
     endings(Status.DIVERGED, Status.DIVERGED, Status.OK)
     arguments = ["run", "truss2", "--out", str(tmp_path / "run.nc")]
     lines = CliRunner().invoke(cli, arguments).output.splitlines()
-    (told,) = [line for line in lines if "started anew" in line]
-    assert "started anew 2 times" in told
+    (told,) = [line for line in lines if "restarted" in line]
+    assert "restarted 2 times" in told
     assert "solver.step = 0.00625 s instead of 0.1 s" in told
     assert "solver.tolerance = 1.2e-06 instead of 0.0003" in told
-    assert any(line.split() == ["steps", "of", "all", "starts", "30"] for line in lines)
+    assert any(line.split() == ["steps", "of", "all", "attempts", "30"] for line in lines)
     endings(Status.OK)
     plain = CliRunner().invoke(cli, arguments).output
     assert "anew" not in plain
@@ -140,7 +140,7 @@ def test_a_campaign_says_how_many_samples_started_anew() -> None:
     counts = {"restarts": [0, 2, 1, -1], "steps": [10, 40, 20, -1], "total_steps": [10, 70, 40, -1]}
     whole = xr.Dataset({name: ("sample", np.array(n)) for name, n in counts.items()})
     (line,) = restart_lines(whole)
-    assert line.startswith("2 of 4 samples started anew")
+    assert line.startswith("2 of 4 samples were restarted")
     assert "42% of all 120 steps" in line  # (30 + 20) of 120
     assert restart_lines(whole.isel(sample=[0, 3])) == []
 
