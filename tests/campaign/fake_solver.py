@@ -65,7 +65,7 @@ def poisoned(scene: Scene) -> Outcome:
             while True:
                 pass
         case 5:
-            return run(scene) and _eat()
+            return _eat()
         case 6:
             outcome = run(scene)
             outcome.values["asynchrony"][1] = np.nan
