@@ -8,12 +8,13 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from ring_rods import RODS
 
 from ringsim.dataset import save, to_dataset
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_table, scene_from_toml
-from ringsim.variables import RODS, Cause, Outcome, Status
+from ringsim.variables import Cause, Outcome, Status
 
 TIMES = np.array([0.0, 0.1, 0.25])
 

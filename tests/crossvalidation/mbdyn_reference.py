@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from ring_rods import RODS
 from scipy.interpolate import CubicSpline
 
 import ringsim
 from ringsim.scene import Scene
-from ringsim.variables import RODS
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import xarray as xr
+from ring_rods import RODS
 
 from ringsim.dataset import to_dataset
 from ringsim.scene import Scene, scene_from_table
@@ -14,12 +15,6 @@ from ringsim.variables import PLANES, Outcome, Status
 
 DEPLOYED = 17.58
 REASON = "the step fell below its bound at 9.3 s: lower solver.step or raise solver.tolerance"
-
-RODS = (
-    "diagonal_rising_left", "diagonal_rising_right",
-    "diagonal_falling_left", "diagonal_falling_right",
-    "bar_upper_left", "bar_upper_right", "bar_lower_left", "bar_lower_right",
-)  # fmt: skip
 
 
 def _scene_of(sections: int = 18, *, closed: bool = True, parts: bool = True) -> Scene:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -124,7 +123,7 @@ def test_an_unknown_balance_stops_nothing() -> None:
 
 def unresolved(tensions, times, slack_tension: float | None = 0.05) -> str:
     """What constant steps have not resolved of a run that went well otherwise."""
-    scales = replace(SCALES, slack_tension=slack_tension)
+    scales = SCALES._replace(slack_tension=slack_tension)
     watching = Guard(SOLVER.model_copy(update={"step_control": "constant"}), scales)
     for time, tension in zip(times, tensions, strict=True):
         instant = Instant(time, *np.zeros((2, 2, 3)), REST, 0.0, np.array([tension]))
