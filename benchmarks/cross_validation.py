@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "crossvalidation"))
+TESTS = Path(__file__).parents[1] / "tests"
+sys.path[:0] = [str(TESTS / "crossvalidation"), str(TESTS)]
 
 from mbdyn_reference import CASES, Comparison, rods_of, scene_of, tight_settings
 from ringsim.overrides import parse_assignment
