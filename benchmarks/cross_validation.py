@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-TESTS = Path(__file__).parents[1] / "tests"
-sys.path[:0] = [str(TESTS / "crossvalidation"), str(TESTS)]
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "crossvalidation"))
 
 from mbdyn_reference import CASES, Comparison, rods_of, scene_of, tight_settings
 from ringsim.overrides import parse_assignment
