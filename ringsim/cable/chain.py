@@ -44,13 +44,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from ringsim.cable import slack
 from ringsim.cable.records import Cable
 from ringsim.cable.ropes import Array, Ropes
-from ringsim.cable.state import ChainState, RopeMaterial
+from ringsim.cable.state import ChainState
 
 
 class Chain:
@@ -88,20 +89,19 @@ class Chain:
     """
 
     def __init__(self, cables: Sequence[Cable], points_per_cable: Sequence[int]) -> None:
-        self.cables = tuple(cables)
-        self.points_per_cable = tuple(points_per_cable)
-        pulleys = [points - 2 for points in points_per_cable]
-        for number, (cable, count) in enumerate(zip(cables, pulleys, strict=True), 1):
-            given = cable.friction.coefficients.shape
-            if given not in ((), (count,)):
+        self.cables, self._points_per_cable = tuple(cables), tuple(points_per_cable)
+        ends = np.cumsum([points - 2 for points in points_per_cable])
+        self._pulleys = [slice(*ends_of) for ends_of in pairwise([0, *ends])]
+        slip = []
+        for number, (cable, points) in enumerate(zip(cables, points_per_cable, strict=True), 1):
+            given, pulleys = cable.friction.coefficients.shape, points - 2
+            if given not in ((), (pulleys,)):
                 raise ValueError(
                     f"cable {number}: friction.coefficient has {given[0]} values, but there "
-                    f"are {count} pulleys: give one value for all, or one for each"
+                    f"are {pulleys} pulleys: give one value for all, or one for each"
                 )
-        slip = [cable.slip_speed_over(n) for cable, n in zip(cables, pulleys, strict=True)]
-        self._slip_speed = np.repeat(slip, pulleys)
-        ends = np.cumsum(pulleys)
-        self._pulleys = [slice(end - n, end) for n, end in zip(pulleys, ends, strict=True)]
+            slip += [cable.slip_speed_over(pulleys)] * pulleys
+        self._slip_speed = np.array(slip)
         self._material = np.array(
             [[c.axial_stiffness, c.damping_time, c.slack_width] for c in cables]
         ).T
@@ -111,10 +111,12 @@ class Chain:
 
         The points are those of all cables behind one another, in metre, shape (points, 3).
         """
-        ropes = Ropes.whole(self.points_per_cable)
+        spans = np.asarray(self._points_per_cable) - 1
+        content = np.array([cable.initial_slack for cable in self.cables])
+        alive = np.ones(len(spans), dtype=bool)
+        ropes = Ropes(self._points_per_cable, np.cumsum(spans) - spans, content, alive)
         lengths = np.linalg.norm(points[ropes.far] - points[ropes.near], axis=1)
-        slack_rope = np.array([cable.initial_slack for cable in self.cables])
-        return replace(ropes, content=ropes.along(lengths) + slack_rope)
+        return replace(ropes, content=ropes.along(lengths) + content)
 
     def state(
         self, ropes: Ropes, points: Array, velocities: Array, wound: Array, wound_rate: Array
@@ -147,9 +149,23 @@ class Chain:
             )
         winding = ropes.per_rope(wound_rate)
 
-        angles = _angles(directions, ropes)
+        before, behind = directions[ropes.behind - 1], directions[ropes.behind]
+        sine, cosine = (
+            np.sqrt(np.einsum("ij,ij->i", sides, sides))
+            for sides in (before + behind, behind - before)
+        )
+        angles = 2.0 * np.arctan2(sine, cosine)
         log_decays = self._log_decays(angles)
-        speeds = _speeds(ropes, lengths, rates, paths, path_rates, natural, winding, wound_rate)
+
+        rope = ropes.of_pulley
+        last, inner = ropes.ends[rope] - 1, ropes.behind - 1
+        total, total_rate = np.cumsum(lengths), np.cumsum(rates)
+        beyond = (total[last] - total[inner]) / paths[rope]
+        beyond_rate = total_rate[last] - total_rate[inner]
+        inflow = np.zeros(len(paths))
+        inflow[ropes.of_end[:, 1]] = -wound_rate[:, 1]
+        share_rate = (beyond_rate - beyond * path_rates[rope]) * (natural / paths)[rope]
+        speeds = (inflow[rope] + winding[rope] * beyond - share_rate) * ropes.slips
         exponents = np.tanh(speeds / self._slip_speed)
 
         steps = np.zeros(ropes.spans)
@@ -159,11 +175,11 @@ class Chain:
         weights = np.exp(logs - np.maximum.reduceat(logs, ropes.starts)[ropes.of_span])
         shares = weights / (ropes.along(weights * lengths) / paths)[ropes.of_span]
 
-        material = RopeMaterial(*self._material[:, ropes.cable])
+        material = stiffness, damping_time, slack_width = self._material[:, ropes.cable]
         strains = paths / natural - 1.0
         strain_rates = (path_rates + paths / natural * winding) / natural
-        forces = material.axial_stiffness * (strains + material.damping_time * strain_rates)
-        tension = ropes.alive * slack.tension(forces, material.slack_width)
+        forces = stiffness * (strains + damping_time * strain_rates)
+        tension = ropes.alive * slack.tension(forces, slack_width)
         return ChainState(
             ropes=ropes,
             material=material,
@@ -197,31 +213,3 @@ class Chain:
     def _log_slopes(self, angles: Array) -> Array:
         own = zip(self.cables, self._pulleys, strict=True)
         return np.concatenate([c.friction.log_slope(angles[n], c.pulley_radius) for c, n in own])
-
-
-def _angles(directions: Array, ropes: Ropes) -> Array:
-    before, behind = directions[ropes.behind - 1], directions[ropes.behind]
-    total, change = before + behind, behind - before
-    sine = np.sqrt(np.einsum("ij,ij->i", total, total))
-    cosine = np.sqrt(np.einsum("ij,ij->i", change, change))
-    return np.asarray(2.0 * np.arctan2(sine, cosine))
-
-
-def _speeds(
-    ropes: Ropes,
-    lengths: Array,
-    rates: Array,
-    paths: Array,
-    path_rates: Array,
-    natural: Array,
-    winding: Array,
-    wound_rate: Array,
-) -> Array:
-    rope, last = ropes.of_pulley, ropes.ends[ropes.of_pulley] - 1
-    total, total_rate = np.cumsum(lengths), np.cumsum(rates)
-    beyond = (total[last] - total[ropes.behind - 1]) / paths[rope]
-    beyond_rate = total_rate[last] - total_rate[ropes.behind - 1]
-    inflow = np.zeros(len(paths))
-    inflow[ropes.last] = -wound_rate[:, 1]
-    share_rate = (beyond_rate - beyond * path_rates[rope]) * (natural / paths)[rope]
-    return np.asarray((inflow[rope] + winding[rope] * beyond - share_rate) * ropes.slips)

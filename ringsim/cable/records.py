@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from ringsim.cable import regularisation
@@ -12,8 +11,7 @@ from ringsim.cable.bracket.bisector import BisectorBracket
 from ringsim.cable.bracket.family import Bracket
 from ringsim.cable.friction.family import PulleyFriction
 from ringsim.cable.friction.frictionless import Frictionless
-from ringsim.cable.ropes import Array
-from ringsim.cable.winding.family import FeedbackWinding, PrescribedWinding, WinchState, Winding
+from ringsim.cable.winding.family import PrescribedWinding, Winding
 from ringsim.choice import OneOf
 from ringsim.units import (
     AxialStiffness,
@@ -49,27 +47,21 @@ class Winch(Model):
             )
         return self
 
-    @property
-    def feedback(self) -> bool:
-        """Whether its law depends on the tension (``ringsim.cable.winches``)."""
-        return isinstance(self.winding, FeedbackWinding)
-
     def turns(self, time: float) -> bool:
         """Whether the motor is switched on at a time (s)."""
         return self.start_time <= time and (self.stop_time is None or time < self.stop_time)
 
-    def at(self, time: float, state: WinchState) -> WinchState:
-        """Rope wound and its rate at a time within the present step.
+    def at(self, time: float, held: float = 0.0) -> tuple[float, float]:
+        """Rope wound (m) and its rate (m/s) at a time (s) by a prescribed law.
 
-        A prescribed law answers exactly and ignores ``state``; one with feedback goes on from
-        ``state`` at the speed held.
+        A law with feedback prescribes neither: the drum holds the rope that it has, ``held``.
         """
-        if isinstance(self.winding, PrescribedWinding):
-            last = time if self.stop_time is None else min(time, self.stop_time)
-            clock = max(last - self.start_time, 0.0)
-            rate = self.winding.wound_rate(clock) if self.turns(time) else 0.0
-            return WinchState(time, self.winding.wound(clock), rate)
-        return state.at(time)
+        if not isinstance(self.winding, PrescribedWinding):
+            return held, 0.0
+        last = time if self.stop_time is None else min(time, self.stop_time)
+        clock = max(last - self.start_time, 0.0)
+        rate = self.winding.wound_rate(clock) if self.turns(time) else 0.0
+        return self.winding.wound(clock), rate
 
 
 class Cable(Model):
@@ -126,16 +118,10 @@ class Cable(Model):
         winding = sum(winch.winding.usual_speed() for winch in self.winches)
         return regularisation.slip_speed(winding, pulleys)
 
-    def path_slope(self, half_bar: float, opening: ArrayLike) -> Array:
-        """Derivative of one section's path after its opening angle (rad), m/rad."""
-        return self.bracket.path_slope(half_bar, self.block_offset, opening)
-
     @property
     def winches(self) -> tuple[Winch, ...]:
         """The winch at the path's beginning, and the one at its end if there is one."""
-        if self.end != "both":
-            return (self.winch,)
-        return (self.winch, self.far_winch or self.winch)
+        return (self.winch, self.far_winch or self.winch)[: 1 + (self.end == "both")]
 
 
 def pulleys_of(sections: int, *, winches: int = 1) -> int:

@@ -7,7 +7,6 @@ over which the cable slips.  Two ropes of a cable meet at a jammed pulley.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -36,15 +35,6 @@ class Ropes:
     alive: Flags
     """Whether the rope can carry tension, shape (ropes,)."""
 
-    @classmethod
-    def whole(cls, points_per_cable: Sequence[int]) -> Ropes:
-        """One rope per cable, still without content."""
-        spans = np.asarray(points_per_cable, dtype=np.intp) - 1
-        if spans.min() < 1:
-            raise ValueError("a cable needs at least two points")
-        starts, count = np.cumsum(spans) - spans, len(spans)
-        return cls(tuple(points_per_cable), starts, np.zeros(count), np.ones(count, dtype=bool))
-
     @cached_property
     def cable_starts(self) -> Indices:
         """First span of each cable, with the number of all spans behind, shape (cables + 1,)."""
@@ -59,8 +49,9 @@ class Ropes:
     @cached_property
     def near(self) -> Indices:
         """Point at each span's end nearer to the winch, shape (spans,)."""
-        cable = np.repeat(np.arange(len(self.points_per_cable)), np.diff(self.cable_starts))
-        return np.arange(self.spans) + cable
+        return np.delete(
+            np.arange(sum(self.points_per_cable)), np.cumsum(self.points_per_cable) - 1
+        )
 
     @cached_property
     def far(self) -> Indices:
@@ -93,14 +84,9 @@ class Ropes:
         return np.asarray(~np.isin(self.behind, self.starts), dtype=float)
 
     @cached_property
-    def first(self) -> Indices:
-        """Rope at the winch of each cable, shape (cables,)."""
-        return self.of_span[self.cable_starts[:-1]]
-
-    @cached_property
-    def last(self) -> Indices:
-        """Rope at the far end of each cable, shape (cables,)."""
-        return self.of_span[self.cable_starts[1:] - 1]
+    def of_end(self) -> Indices:
+        """Rope at both ends of each cable, the first winch's first, shape (cables, 2)."""
+        return self.of_span[np.stack([self.cable_starts[:-1], self.cable_starts[1:] - 1], axis=-1)]
 
     @cached_property
     def cable(self) -> Indices:
@@ -135,28 +121,21 @@ class Ropes:
 
     def per_rope(self, ends: Array) -> Array:
         """Sum over a rope's ends of a quantity of the winches; (cables, 2) -> (ropes,)."""
-        total = np.zeros(len(self.starts))
-        total[self.first] += ends[:, 0]
-        total[self.last] += ends[:, 1]
-        return total
+        total = np.bincount(self.of_end.ravel(), ends.ravel(), len(self.starts))
+        return np.asarray(total, dtype=float)
 
     def jam(self, cable: int, pulley: int, stored: Array, wound: Array) -> Ropes:
         """The ropes after a pulley seizes the rope; cable and pulley count from 0 at the winch.
 
-        Parameters
-        ----------
-        stored
-            Natural length in each span at that instant, in metre, shape (spans,).
-        wound
-            Rope wound at the two ends of each cable until then, in metre, shape (cables, 2).
+        At that instant ``stored`` is the natural length in each span, m, shape (spans,), and
+        ``wound`` the rope wound at the two ends of each cable, m, shape (cables, 2).
 
         Raises
         ------
         ValueError
             If there is no such pulley.
         """
-        self._check(cable, pulley, 2, "pulley")
-        start = int(self.cable_starts[cable]) + pulley + 1
+        start = self._span(cable, pulley, 2, "pulley") + 1
         if start in self.starts:
             return self
         k = int(self.of_span[start])
@@ -175,20 +154,20 @@ class Ropes:
         ValueError
             If there is no such span.
         """
-        self._check(cable, span, 1, "span")
         alive = self.alive.copy()
-        alive[self.of_span[self.cable_starts[cable] + span]] = False
+        alive[self.of_span[self._span(cable, span, 1, "span")]] = False
         return replace(self, alive=alive)
 
     def _no_length(self, lengths: Array) -> str:
         if not np.all(np.isfinite(lengths)):
             return "the points of the cables are not finite"
         span = int(np.argmin(lengths))
-        cable = int(np.searchsorted(self.cable_starts, span, side="right")) - 1
-        number = span - int(self.cable_starts[cable]) + 1
+        cable = self.cable[self.of_span[span]]
+        number = span - self.cable_starts[cable] + 1
         return f"cable {cable + 1}: span {number} has no length, its two points coincide"
 
-    def _check(self, cable: int, place: int, fewer: int, what: str) -> None:
+    def _span(self, cable: int, place: int, fewer: int, what: str) -> int:
+        """The span at a place of a cable, among all cables'."""
         cables = len(self.points_per_cable)
         if not 0 <= cable < cables:
             raise ValueError(f"there is no cable {cable + 1} (there are 1 to {cables})")
@@ -197,3 +176,4 @@ class Ropes:
             raise ValueError(
                 f"cable {cable + 1} has no {what} {place + 1} (there are 1 to {count})"
             )
+        return int(self.cable_starts[cable]) + place

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,20 +12,13 @@ from ringsim.cable.ropes import Array, Flags, Ropes
 from ringsim.cable.winding.family import WinchReading
 
 
-class RopeMaterial(NamedTuple):
-    """EA (N), Kelvin-Voigt time (s) and slack width (N) of each rope, shape (ropes,)."""
-
-    axial_stiffness: Array
-    damping_time: Array
-    slack_width: Array
-
-
 @dataclass(frozen=True)
 class ChainState:
     """All spans, pulleys and ropes at one instant; see ``ringsim.cable.chain``."""
 
     ropes: Ropes
-    material: RopeMaterial
+    material: Array
+    """EA (N), Kelvin-Voigt time (s) and slack width (N) of each rope, shape (3, ropes)."""
     lengths: Array
     rates: Array
     """Length of each span (m) and its rate (m/s), shape (spans,)."""
@@ -128,8 +120,8 @@ class ChainState:
     @property
     def viscous_forces(self) -> Array:
         """Viscous part of each rope's mean tension, in N, shape (ropes,)."""
-        elastic = self.material.axial_stiffness * self.strains
-        statically = slack.tension(elastic, self.material.slack_width)
+        stiffness, _, width = self.material
+        statically = slack.tension(stiffness * self.strains, width)
         return self.mean_tensions - self.ropes.alive * statically
 
     @property
@@ -140,8 +132,8 @@ class ChainState:
     @property
     def energy_density(self) -> Array:
         """Elastic energy of each rope per natural length, in J/m, shape (ropes,)."""
-        stiffness = self.material.axial_stiffness
-        elastic = slack.energy(stiffness * self.strains, self.material.slack_width)
+        stiffness, _, width = self.material
+        elastic = slack.energy(stiffness * self.strains, width)
         return np.asarray(self.ropes.alive * elastic / stiffness)
 
     @property
@@ -152,8 +144,7 @@ class ChainState:
     @property
     def winch_forces(self) -> Array:
         """Force of the winches at both ends of each cable per natural length, in N, (cables, 2)."""
-        strain = np.stack([self.strains[self.ropes.first], self.strains[self.ropes.last]], axis=-1)
-        return self.winch_tensions * (1.0 + strain)
+        return self.winch_tensions * (1.0 + self.strains[self.ropes.of_end])
 
     @property
     def winch_power(self) -> Array:
@@ -163,7 +154,7 @@ class ChainState:
     def reading(self, cable: int, end: int = 0, path_slope: float = 0.0) -> WinchReading:
         """Readings of the winch at an end (0 first, 1 far) of a cable (from 0)."""
         ropes = self.ropes
-        rope = int((ropes.last if end else ropes.first)[cable])
+        rope = int(ropes.of_end[cable, end])
         present = float(self.wound_rate[cable, end])
         inner = ropes.inner(rope)
         part = self.lengths[ropes.starts[rope] : ropes.ends[rope]] / self.paths[rope]
@@ -181,15 +172,8 @@ class ChainState:
         return WinchReading(tension_ratio=ratio, path_rate=path_rate, path_slope=path_slope)
 
 
-class ChainWork(NamedTuple):
-    """Energies in J: put in by the winches, less what is wound up; lost by friction, damping."""
-
-    driven: float
-    lost: float
-
-
-def work_between(before: ChainState, after: ChainState) -> ChainWork:
-    """Work on the cables from one instant to a later one.
+def work_between(before: ChainState, after: ChainState) -> tuple[float, float]:
+    """Energies in J: put in by the winches, less what is wound up; lost by friction, damping.
 
     The work of a force is its mean at both instants times the displacement: rope wound on a drum,
     rope slipped over a pulley, strain of a rope.  The trapezoidal rule balances exactly these
@@ -200,15 +184,15 @@ def work_between(before: ChainState, after: ChainState) -> ChainWork:
     """
     ropes = after.ropes
     if before.ropes is not ropes:
-        return ChainWork(0.0, 0.0)
+        return 0.0, 0.0
     wound = after.wound - before.wound
     pulls = 0.5 * (before.winch_forces + after.winch_forces)
     carried = 0.5 * (before.energy_density + after.energy_density) * ropes.per_rope(wound)
     slipped = before.held_beyond - after.held_beyond
-    beyond = ropes.last[ropes.cable[ropes.of_pulley]] == ropes.of_pulley
-    slipped -= beyond * wound[ropes.cable[ropes.of_pulley], 1]
+    cable = ropes.cable[ropes.of_pulley]
+    slipped -= (ropes.of_end[cable, 1] == ropes.of_pulley) * wound[cable, 1]
     friction = 0.5 * (before.friction_forces + after.friction_forces) * slipped
     viscous = 0.5 * (before.viscous_forces + after.viscous_forces)
     viscous = viscous * 0.5 * (before.natural + after.natural) * (after.strains - before.strains)
     driven = float(np.sum(pulls * wound) - np.sum(carried))
-    return ChainWork(driven, lost=float(np.sum(friction) + np.sum(viscous)))
+    return driven, float(np.sum(friction) + np.sum(viscous))

@@ -57,16 +57,16 @@ def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent
 
     The velocities are those that the state was evaluated with, in m/s, shape (points, 3).
     """
-    ropes, material = state.ropes, state.material
+    ropes, (stiffness, damping_time, slack_width) = state.ropes, state.material[:, rope]
     spans = slice(int(ropes.starts[rope]), int(ropes.ends[rope]))
     unit, length = state.directions[spans], state.lengths[spans]
     relative = velocities[ropes.far[spans]] - velocities[ropes.near[spans]]
     swing = (relative - unit * state.rates[spans, None]) / length[:, None]
     across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
     natural = state.natural[rope]
-    elastic = material.axial_stiffness[rope] / natural * ropes.alive[rope]
-    elastic *= slack.slope(state.forces[rope], material.slack_width[rope])
-    viscous = elastic * material.damping_time[rope]
+    elastic = stiffness / natural * ropes.alive[rope]
+    elastic *= slack.slope(state.forces[rope], slack_width)
+    viscous = elastic * damping_time
     stretched = elastic + viscous * state.wound_rates[rope] / natural
     return RopeTangent(
         spans=spans,
@@ -83,48 +83,36 @@ def decay_tangent(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[A
     These are the derivatives of each span's tension after each difference of points (N/m) and
     after each difference of velocities (N s/m), shape (n, n, 3) each.
     """
-    spans, swing = tangent.spans, tangent.swing
-    unit, share, tension = state.directions[spans], state.shares[spans], state.tensions[spans]
-    spread, by_place, by_velocity = _distribution(state, spans, rope, swing)
-    flat = (tension[:, None] * spread) @ np.stack([by_place, by_velocity]).reshape(2, -1, unit.size)
-    decay, drag = flat.reshape(2, len(unit), *unit.shape)
-    decay += tension[:, None, None] * (((1.0 - share) / state.paths[rope])[:, None] * unit)
-    return decay, drag
-
-
-def _distribution(
-    state: ChainState, spans: slice, rope: int, swing: Array
-) -> tuple[Array, Array, Array]:
-    """Derivatives of ln(c_i) - sum omega_k ln(c_k) as a product: spread (spans, pulleys) times
-    the derivatives of each pulley's logarithm after the differences of points (1/m) and after
-    those of velocities (s/m), shape (pulleys, spans, 3) each.
-    """
-    inner = state.ropes.inner(rope)
+    spans, inner = tangent.spans, state.ropes.inner(rope)
     length, rate, unit = state.lengths[spans], state.rates[spans], state.directions[spans]
     path, path_rate = float(state.paths[rope]), float(state.path_rates[rope])
     ratio = float(state.natural[rope]) / path
-    weight = state.shares[spans] * length / path
-    count = len(length)
+    share, tension, count = state.shares[spans], state.tensions[spans], len(length)
     beyond = (np.arange(count) >= np.arange(1, count)[:, None]).astype(float)
-    share, share_rate = beyond @ length / path, beyond @ rate
-    beyond_less_share = beyond - share[:, None]
+    part, part_rate = beyond @ length / path, beyond @ rate
+    beyond_less_part = beyond - part[:, None]
 
+    # Each pulley's p ln(eta) after the differences, shape (pulleys, spans, 3).
     exponent = state.exponents[inner]
     sensitivity = state.log_decays[inner] * (1.0 - exponent**2) / state.slip_speeds[inner]
     steadily = float(state.wound_rates[rope]) + ratio * path_rate
-    by_length = (sensitivity * (steadily / path))[:, None] * beyond_less_share
-    by_length += (sensitivity * (ratio / path) * (share_rate - share * path_rate))[:, None]
-    by_rate = (-ratio * sensitivity)[:, None] * beyond_less_share
-
+    by_length = (sensitivity * (steadily / path))[:, None] * beyond_less_part
+    by_length += (sensitivity * (ratio / path) * (part_rate - part * path_rate))[:, None]
+    by_rate = (-ratio * sensitivity)[:, None] * beyond_less_part
     by_place = by_length[:, :, None] * unit
-    by_place += by_rate[:, :, None] * swing
+    by_place += by_rate[:, :, None] * tangent.swing
     before, behind = _angle_gradients(unit, length)
     turned = (exponent * state.friction_slopes()[inner])[:, None]
     pulley = np.arange(count - 1)
     by_place[pulley, pulley] += turned * before
     by_place[pulley, pulley + 1] += turned * behind
-    remaining = weight[::-1].cumsum()[::-1][1:]
-    return beyond.T - remaining, by_place, by_rate[:, :, None] * unit
+
+    # ln(c_i) - sum omega_k ln(c_k) after those logarithms, shape (spans, pulleys).
+    spread = beyond.T - (share * length / path)[::-1].cumsum()[::-1][1:]
+    both = np.stack([by_place, by_rate[:, :, None] * unit]).reshape(2, -1, unit.size)
+    decay, drag = ((tension[:, None] * spread) @ both).reshape(2, count, *unit.shape)
+    decay += tension[:, None, None] * (((1.0 - share) / path)[:, None] * unit)
+    return decay, drag
 
 
 def _angle_gradients(unit: Array, length: Array) -> tuple[Array, Array]:

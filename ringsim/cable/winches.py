@@ -24,10 +24,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from ringsim.cable.records import Cable, Winch
+from ringsim.cable.records import Cable
 from ringsim.cable.ropes import Array, Ropes
 from ringsim.cable.state import ChainState
-from ringsim.cable.winding.family import FeedbackWinding, WinchReading, WinchState
+from ringsim.cable.winding.family import FeedbackWinding, WinchReading
 
 _NUDGE = 1e-8
 """Change of path in m by which the answer of the winches to the structure is measured: a hundred
@@ -35,27 +35,19 @@ million roundings of a path of 1 m, and still a force of 1e-3 N at EA = 1e5 N.""
 
 
 @dataclass(frozen=True)
-class _Member:
-    """A winch with feedback that runs in this step."""
-
-    number: int
-    law: FeedbackWinding
-    reading: WinchReading
-
-
-@dataclass(frozen=True)
 class _Rope:
-    """A rope that such winches wind in this step, as it was at the beginning."""
+    """A rope that winches with feedback wind in this step, as it was at the beginning."""
 
-    members: list[_Member]
-    start: float
     path: float
-    """Beginning of the step (s) and path of the rope then (m)."""
-    material: tuple[float, ...]
+    material: list[float]
     """EA (N), Kelvin-Voigt time (s) and width of the passage from slack to taut (N)."""
+    members: dict[tuple[int, int], tuple[FeedbackWinding, WinchReading]]
+    """Laws and readings by cable and end (0 first, 1 far)."""
 
-    def speeds(self, time: float, path: float, rate: float, natural: float, rest: float) -> Array:
-        """Speed of every member, m/s.
+    def speeds(
+        self, elapsed: float, path: float, rate: float, natural: float, rest: float
+    ) -> Array:
+        """Speed of every member (m/s) at a time (s) after the beginning of the step.
 
         Parameters
         ----------
@@ -66,13 +58,12 @@ class _Rope:
         rest
             Speed of the other winches on the rope, m/s.
         """
-        elapsed, count = time - self.start, len(self.members)
+        count, (stiffness, damping_time, width) = len(self.members), self.material
         follow = (path - self.path) / elapsed if elapsed > 0.0 else rate
         laws = [
-            (m.law, replace(m.reading, path_rate=(follow + rest) / count), m.law.limits())
-            for m in self.members
+            (law, replace(reading, path_rate=(follow + rest) / count), law.limits())
+            for law, reading in self.members.values()
         ]
-        stiffness, damping_time, width = self.material
 
         def commands(total: float) -> list[float]:
             left = natural - total * elapsed
@@ -81,15 +72,11 @@ class _Rope:
             # slack.tension of one number: numpy takes ten times as long in the root finder.
             mean = max(force, 0.0) + width * math.log1p(math.exp(-abs(force) / width))
             return [
-                min(
-                    max(law.command(mean * reading.tension_ratio(total / count), reading), least),
-                    most,
-                )
-                for law, reading, (least, most) in laws
+                min(max(law.command(mean * now.tension_ratio(total / count), now), least), most)
+                for law, now, (least, most) in laws
             ]
 
-        low = sum(limits[0] for *_, limits in laws)
-        high = sum(limits[1] for *_, limits in laws)
+        low, high = (sum(bounds) for bounds in zip(*(limits for *_, limits in laws), strict=True))
         if sum(commands(high)) >= high:
             total = high
         elif sum(commands(low)) <= low:
@@ -105,16 +92,13 @@ class Winches:
     """Rope wound and speeds at both ends of each cable."""
 
     def __init__(self, cables: Sequence[Cable]) -> None:
-        self._cables = len(cables)
-        self._winches: list[tuple[int, int, Winch]] = [
-            (number, end, winch)
+        self._winches = {
+            (number, end): winch
             for number, cable in enumerate(cables)
             for end, winch in enumerate(cable.winches)
-        ]
-        self._held = [WinchState() for _ in self._winches]
+        }
+        self._start, self._held = 0.0, np.zeros((len(cables), 2))
         self._ropes: dict[int, _Rope] = {}
-        self._speeds: dict[int, float] = {}
-        self._prescribed: tuple[float, Array, Array] | None = None
 
     @property
     def answering(self) -> bool:
@@ -128,27 +112,20 @@ class Winches:
 
         The paths of the ropes (m) and their rates (m/s) are not needed if no winch answers.
         """
-        if not self._ropes and self._prescribed is not None and self._prescribed[0] == time:
-            return self._prescribed[1:]
-        wound, speed = np.zeros((self._cables, 2)), np.zeros((self._cables, 2))
-        answering = {m.number for rope in self._ropes.values() for m in rope.members}
-        for place, ((number, end, winch), held) in enumerate(
-            zip(self._winches, self._held, strict=True)
-        ):
-            state = WinchState(time, held.wound) if place in answering else winch.at(time, held)
-            wound[number, end], speed[number, end] = state.wound, state.speed
+        wound, speed = self._held.copy(), np.zeros_like(self._held)
+        for place, winch in self._winches.items():
+            wound[place], speed[place] = winch.at(time, float(self._held[place]))
         if not self._ropes or paths is None or rates is None:
-            self._prescribed = time, wound, speed
             return wound, speed
-        natural, rest = ropes.content - ropes.per_rope(wound), ropes.per_rope(speed)
+        elapsed = time - self._start
+        lengths = np.stack(
+            [paths, rates, ropes.content - ropes.per_rope(wound), ropes.per_rope(speed)]
+        ).T
         for k, rope in self._ropes.items():
-            found = rope.speeds(
-                time, float(paths[k]), float(rates[k]), float(natural[k]), float(rest[k])
-            )
-            for member, value in zip(rope.members, found, strict=True):
-                number, end, _ = self._winches[member.number]
-                speed[number, end] = self._speeds[member.number] = float(value)
-                wound[number, end] += float(value) * (time - rope.start)
+            answer = rope.speeds(elapsed, *lengths[k].tolist())
+            for place, found in zip(rope.members, answer, strict=True):
+                speed[place] = found
+                wound[place] += found * elapsed
         return wound, speed
 
     def stiffness_left(self, time: float, ropes: Ropes, paths: Array, rates: Array) -> Array:
@@ -167,22 +144,10 @@ class Winches:
 
         ``slopes`` are the derivatives of the cables' ideal paths after the opening angle, m/rad.
         """
-        self._prescribed = None
-        self._held = [
-            WinchState(time, float(state.wound[number, end]), self._speeds.get(place, 0.0))
-            for place, (number, end, _) in enumerate(self._winches)
-        ]
-        self._ropes = {}
-        for place, (number, end, winch) in enumerate(self._winches):
-            law = winch.winding
-            if not isinstance(law, FeedbackWinding):
-                continue
-            if not winch.turns(time):
-                self._held[place] = WinchState(time, self._held[place].wound, 0.0)
-                continue
-            k = int((state.ropes.last if end else state.ropes.first)[number])
-            if k not in self._ropes:
-                material = tuple(float(values[k]) for values in state.material)
-                self._ropes[k] = _Rope([], time, float(state.paths[k]), material)
-            reading = state.reading(number, end, float(slopes[number]))
-            self._ropes[k].members.append(_Member(place, law, reading))
+        self._start, self._held, self._ropes = time, state.wound, {}
+        for place, winch in self._winches.items():
+            if isinstance(winch.winding, FeedbackWinding) and winch.turns(time):
+                k = int(state.ropes.of_end[place])
+                begun = _Rope(float(state.paths[k]), state.material[:, k].tolist(), {})
+                reading = state.reading(*place, float(slopes[place[0]]))
+                self._ropes.setdefault(k, begun).members[place] = winch.winding, reading

@@ -19,7 +19,7 @@ class SlackDuration(Output):
     def read(self, now: Reading) -> Array | None:
         """1 where the rope at the first winch is slack, else 0, shape (planes,)."""
         chain = now.chain
-        return None if chain is None else now.by_plane(chain.is_slack[chain.ropes.first])
+        return None if chain is None else now.by_plane(chain.is_slack[chain.ropes.of_end[:, 0]])
 
     def reduce(self, run: Run, series: Series) -> Values:
         """The sum of the steps, of which those that begin or end taut count half."""

@@ -162,7 +162,7 @@ class PantographRing(Structure):
 
     def path_slope(self, cable: Any, angles: Any) -> float:
         """See ``Structure``."""
-        return float(np.sum(cable.path_slope(self.half_bar, angles)))
+        return float(np.sum(cable.bracket.path_slope(self.half_bar, cable.block_offset, angles)))
 
     def basis(self, coordinate: float) -> NDArray[np.float64]:
         """See ``Structure``: 1, cos(phi), sin(phi) and sin(theta), d cos(theta) = l cos(phi).

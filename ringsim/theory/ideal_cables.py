@@ -14,7 +14,7 @@ import numpy as np
 
 from ringsim.cable.chain import Chain
 from ringsim.cable.state import ChainState
-from ringsim.cable.winding.family import FeedbackWinding, WinchState
+from ringsim.cable.winding.family import FeedbackWinding
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
 from ringsim.theory.ideal_points import Array
@@ -65,7 +65,11 @@ class IdealCables:
             for number, cable in enumerate(self._cables)
             for end, winch in enumerate(cable.winches)
         }
-        self.answering = [place for place, winch in self._winches.items() if winch.feedback]
+        self.answering = [
+            place
+            for place, winch in self._winches.items()
+            if isinstance(winch.winding, FeedbackWinding)
+        ]
 
     @property
     def breaks(self) -> list[float]:
@@ -95,9 +99,7 @@ class IdealCables:
         ropes, copies = self.ropes, self._copies
         wound, speed = np.zeros((2, len(copies), 2))
         for place, winch in self._winches.items():
-            if not winch.feedback:
-                law = winch.at(time, WinchState())
-                wound[place], speed[place] = law.wound, law.speed
+            wound[place], speed[place] = winch.at(time)
         for place, *motor in zip(self.answering, *motors, strict=True):
             wound[place], speed[place] = motor
         state = self._chain.state(ropes, points, velocities, wound, speed)
@@ -120,9 +122,8 @@ class IdealCables:
         if not self.answering:
             return np.zeros(0)
         opening = np.full(self._structure.sections, math.pi - 2.0 * float(now.place[0]))
-        rope_of = np.stack([self.ropes.first, self.ropes.last], axis=1)
         on = [place for place in self.answering if self._winches[place].turns(time)]
-        running = [rope_of[place] for place in on]
+        running = [self.ropes.of_end[place] for place in on]
         rest = state.path_rates + state.wound_rates
         for place, rope in zip(on, running, strict=True):
             rest[rope] -= state.wound_rate[place]

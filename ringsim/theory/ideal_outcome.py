@@ -153,7 +153,7 @@ def _readings(read: _Reader, instants: list[Reading]) -> tuple[Array, Array]:
 
 def _stretches(chain: ChainState) -> Array:
     """Path less natural length of the rope at each cable's first winch, m; -1 if it is cut."""
-    first = chain.ropes.first
+    first = chain.ropes.of_end[:, 0]
     return np.where(chain.ropes.alive[first], (chain.paths - chain.natural)[first], -1.0)
 
 

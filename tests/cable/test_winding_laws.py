@@ -15,7 +15,7 @@ from cable_cases import LAWS, cable, random_case, still
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winches import Winches
 from ringsim.cable.winding.constant import ConstantWinding
-from ringsim.cable.winding.family import WinchState, Winding
+from ringsim.cable.winding.family import Winding
 from ringsim.cable.winding.ramp import RampWinding
 from ringsim.cable.winding.stall import StallWinding
 from ringsim.cable.winding.table import TableWinding
@@ -91,17 +91,14 @@ def test_a_table_that_cannot_be_followed_is_refused(table, text):
 
 def test_a_winch_keeps_its_hours():
     winch = Winch(winding=ConstantWinding(speed=0.1), start_time=2.0, stop_time=5.0)
-    nothing = WinchState()
     for time, wound, speed in [(1.0, 0.0, 0.0), (2.0, 0.0, 0.1), (4.0, 0.2, 0.1), (9.0, 0.3, 0.0)]:
-        now = winch.at(time, nothing)
-        assert (now.wound, now.speed) == pytest.approx((wound, speed))
+        assert winch.at(time) == pytest.approx((wound, speed))
     with pytest.raises(ValidationError, match="must not be before start_time"):
         Winch(winding=ConstantWinding(speed=0.1), start_time=2.0, stop_time=1.0)
 
 
 def test_a_winch_with_feedback_keeps_its_hours_too():
     winch = Winch(winding=STALL, start_time=2.0, stop_time=5.0)
-    assert winch.feedback
     case = still([[0, 0, 0], [1, 0, 0]], 0.0, initial_slack=0.5, winch=winch)
     winches = Winches(case.chain.cables)
     for time, wound, speed in [

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from ringsim.cable.bracket.family import Array, Bracket
+from ringsim.cable.bracket.family import Bracket
+from ringsim.cable.ropes import Array
 from ringsim.units import Unit
 
 
@@ -50,14 +51,6 @@ class BarHalfBracket(Bracket):
 
     def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
         """Offsets a and b with theta - delta / 2 = theta - 90 deg + phi."""
-        turn = np.radians(self.angle - 90.0) + np.asarray(phi, dtype=float)
-        return self._sign * distance * np.cos(turn), distance * np.sin(turn)
-
-    def rate(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
-        """Derivatives of the same."""
-        aside, inward = self.place(phi, distance)
-        return -self._sign * inward, self._sign * aside
-
-    @property
-    def _sign(self) -> float:
-        return 1.0 if self.half == "first" else -1.0
+        turn = np.radians(self.angle - 90.0) + np.asarray(phi)
+        sign = 1.0 if self.half == "first" else -1.0
+        return sign * distance * np.cos(turn), distance * np.sin(turn)

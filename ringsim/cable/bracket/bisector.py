@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ringsim.cable.bracket.family import Array, Bracket
+from ringsim.cable.bracket.family import Bracket
+from ringsim.cable.ropes import Array
 
 
 class BisectorBracket(Bracket):
@@ -22,8 +23,3 @@ class BisectorBracket(Bracket):
         """Offsets a = 0, b = h."""
         size = np.shape(phi)
         return np.zeros(size), np.full(size, distance)
-
-    def rate(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
-        """Both are constant."""
-        del distance
-        return np.zeros(np.shape(phi)), np.zeros(np.shape(phi))

@@ -7,17 +7,19 @@ either side of it have the lengths
 
     L_1, L_2 = sqrt((l cos(phi) +- a)^2 + (l sin(phi) + b)^2).
 
-A kind gives a and b and their derivatives after phi; b is the h of paper 000, eqs 20 and 21.
+A kind gives a and b; b is the h of paper 000, eqs 20 and 21.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ringsim.cable.ropes import Array
 from ringsim.units import Model
 
-Array = NDArray[np.float64]
+_STEP = 1e-30
+"""rad; its square, which the complex step neglects, is nothing beside any angle."""
 
 
 class Bracket(Model):
@@ -25,32 +27,24 @@ class Bracket(Model):
 
     def refusal(self, opening_angle: float) -> str | None:
         """Why it cannot open a ring that is stowed at this angle (deg), or None if it can."""
-        del opening_angle
         return None
 
     def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
-        """Offsets a and b in m at bar angles (rad), of their shape."""
-        raise NotImplementedError
+        """Offsets a and b in m at bar angles (rad), of their shape.
 
-    def rate(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
-        """Their derivatives after phi, m/rad."""
+        Analytic in phi, which may be complex: ``path_slope`` differentiates it so.
+        """
         raise NotImplementedError
 
     def spans(self, half_bar: float, distance: float, opening: ArrayLike) -> tuple[Array, Array]:
         """Lengths L_1 and L_2 at opening angles in rad, m."""
-        phi = 0.5 * (np.pi - np.asarray(opening, dtype=float))
+        phi = 0.5 * (np.pi - np.asarray(opening))
         aside, inward = self.place(phi, distance)
         reach, drop = half_bar * np.cos(phi), half_bar * np.sin(phi) + inward
-        return np.hypot(reach + aside, drop), np.hypot(reach - aside, drop)
+        return np.sqrt((reach + aside) ** 2 + drop**2), np.sqrt((reach - aside) ** 2 + drop**2)
 
     def path_slope(self, half_bar: float, distance: float, opening: ArrayLike) -> Array:
         """Derivative of L_1 + L_2 after the opening angle, m/rad; a cable opens where negative."""
-        phi = 0.5 * (np.pi - np.asarray(opening, dtype=float))
-        (aside, inward), (by_aside, by_inward) = self.place(phi, distance), self.rate(phi, distance)
-        reach, drop = half_bar * np.cos(phi), half_bar * np.sin(phi) + inward
-        by_reach, by_drop = -half_bar * np.sin(phi), half_bar * np.cos(phi) + by_inward
-        total = np.zeros_like(phi)
-        for sign in (1.0, -1.0):
-            run, by_run = reach + sign * aside, by_reach + sign * by_aside
-            total += (run * by_run + drop * by_drop) / np.hypot(run, drop)
-        return np.asarray(-0.5 * total)
+        # Complex step: no difference of nearby lengths, hence exact to round-off.
+        lengths = self.spans(half_bar, distance, np.asarray(opening) + 1j * _STEP)
+        return np.asarray(sum(lengths).imag / _STEP)

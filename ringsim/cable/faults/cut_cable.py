@@ -23,5 +23,4 @@ class CutCable(CableFault):
 
     def strike(self, ropes: Ropes, state: ChainState) -> Ropes:
         """Let go of the rope that holds the span."""
-        del state
         return ropes.cut(self.cable - 1, self.span - 1)

@@ -6,7 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from ringsim.cable.friction.family import Array, PulleyFriction
+from ringsim.cable.friction.family import PulleyFriction
+from ringsim.cable.ropes import Array
 from ringsim.parts.persection import PerSection
 from ringsim.units import MetreOrZero
 
@@ -16,11 +17,6 @@ class Bearing(PulleyFriction):
 
     coefficient: PerSection[MetreOrZero]
     """f in metre: one value for all pulleys, or one for each in order from the winch."""
-
-    @property
-    def coefficients(self) -> Array:
-        """Coefficient f in metre, shape () or (pulleys,)."""
-        return np.asarray(self.coefficient, dtype=float)
 
     def refusal(self, radius: float) -> str | None:
         """Bound f < R: otherwise a rope that turns back could not be pulled over the pulley."""

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from ringsim.cable.friction.bearing import Bearing
-from ringsim.cable.friction.family import Array
+from ringsim.cable.ropes import Array
 
 
 class ExactBearingFriction(Bearing):

@@ -6,7 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from ringsim.cable.friction.family import Array, PulleyFriction
+from ringsim.cable.friction.family import PulleyFriction
+from ringsim.cable.ropes import Array
 from ringsim.parts.persection import PerSection
 from ringsim.units import FrictionCoefficient
 
@@ -25,17 +26,10 @@ class CapstanFriction(PulleyFriction):
     coefficient: PerSection[FrictionCoefficient]
     """mu: one value for all sheaves, or one for each in order from the winch."""
 
-    @property
-    def coefficients(self) -> Array:
-        """mu, shape () or (pulleys,)."""
-        return np.asarray(self.coefficient, dtype=float)
-
     def log_decay(self, angle: Array, radius: float) -> Array:
         """ln(eta) = -mu (pi - a)."""
-        del radius
         return np.asarray(-self.coefficients * (np.pi - angle))
 
     def log_slope(self, angle: Array, radius: float) -> Array:
         """The coefficient mu, whatever the angle."""
-        del radius
         return np.broadcast_to(self.coefficients, angle.shape).astype(float)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ringsim.cable.ropes import Array
 from ringsim.units import Model
-
-Array = NDArray[np.float64]
 
 
 class PulleyFriction(Model):
@@ -21,12 +19,11 @@ class PulleyFriction(Model):
 
     @property
     def coefficients(self) -> Array:
-        """One coefficient for all pulleys (shape ()), or one for each (shape (pulleys,))."""
-        return np.zeros(())
+        """Its field ``coefficient``, if it has one: shape (), or (pulleys,) for one each."""
+        return np.asarray(getattr(self, "coefficient", 0.0), dtype=float)
 
     def refusal(self, radius: float) -> str | None:
         """Why the law has no solution on pulleys of this radius (m), or None if it has."""
-        del radius
         return None
 
     def log_decay(self, angle: Array, radius: float) -> Array:

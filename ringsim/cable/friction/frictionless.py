@@ -6,7 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from ringsim.cable.friction.family import Array, PulleyFriction
+from ringsim.cable.friction.family import PulleyFriction
+from ringsim.cable.ropes import Array
 
 
 class Frictionless(PulleyFriction):
@@ -20,10 +21,8 @@ class Frictionless(PulleyFriction):
 
     def log_decay(self, angle: Array, radius: float) -> Array:
         """Zero for every pulley."""
-        del radius
         return np.zeros_like(angle)
 
     def log_slope(self, angle: Array, radius: float) -> Array:
         """Zero for every pulley."""
-        del radius
         return np.zeros_like(angle)

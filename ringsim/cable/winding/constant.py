@@ -24,5 +24,4 @@ class ConstantWinding(PrescribedWinding):
 
     def wound_rate(self, time: float) -> float:
         """The speed, in m/s."""
-        del time
         return self.speed

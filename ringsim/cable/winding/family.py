@@ -9,19 +9,6 @@ from ringsim.units import Model
 
 
 @dataclass(frozen=True)
-class WinchState:
-    """Rope wound (m) at ``time`` (s, of the winch) and the speed (m/s) held from then on."""
-
-    time: float = 0.0
-    wound: float = 0.0
-    speed: float = 0.0
-
-    def at(self, time: float) -> WinchState:
-        """The state at a later time, the speed being held."""
-        return WinchState(time, self.wound + self.speed * (time - self.time), self.speed)
-
-
-@dataclass(frozen=True)
 class WinchReading:
     """Readings of a winch at the beginning of a step."""
 
@@ -32,24 +19,22 @@ class WinchReading:
     """Rate of the path length and of another winch on the same rope, in m/s: negative while
     the structure gives rope free."""
     path_slope: float = 0.0
-    """Derivative of the ideal path length after the opening angle at the measured angles, in
-    m/rad."""
+    """Derivative of the ideal path length after the measured opening angle, in m/rad."""
 
 
 class Winding(Model):
     """Any winding law; time counts from the start of its winch."""
 
     def usual_speed(self) -> float:
-        """Speed at which the law winds, or pays out, for most of its time, m/s; 0 if it rests.
+        """Speed of the winch for most of its time, m/s, as far as known beforehand; never negative.
 
-        As far as it is known beforehand: the friction of the pulleys is regularised
-        below it, see ``ringsim.cable.regularisation``.
+        The friction of the pulleys is regularised below it (``ringsim.cable.regularisation``).
         """
         raise NotImplementedError
 
 
 class PrescribedWinding(Winding):
-    """A prescribed law."""
+    """A law of time alone."""
 
     def wound(self, time: float) -> float:
         """Rope taken up since the start, in metre."""
@@ -63,10 +48,8 @@ class PrescribedWinding(Winding):
 class FeedbackWinding(Winding):
     """A law whose speed depends on the tension, solved within the step.
 
-    The rope is so stiff that a speed chosen from the present tension would overshoot within
-    one step.  The law therefore uses the tension at the end of the step, see
-    ``ringsim.cable.winches``: T grows with the speed and the command falls with T, so there is
-    one solution for any EA and step, and the loop is stable.
+    The rope is so stiff that a speed chosen from the present tension would overshoot within one
+    step: the law uses the tension at the end of the step, see ``ringsim.cable.winches``.
     """
 
     def command(self, tension: float, reading: WinchReading) -> float:

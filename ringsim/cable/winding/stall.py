@@ -30,7 +30,6 @@ class StallWinding(FeedbackWinding):
 
     def command(self, tension: float, reading: WinchReading) -> float:
         """Speed of the motor at a tension (N), in m/s."""
-        del reading
         return self.speed * (1.0 - tension / self.max_tension) / self.band
 
     def limits(self) -> tuple[float, float]:

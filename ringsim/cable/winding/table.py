@@ -50,10 +50,6 @@ class TableWinding(PrescribedWinding):
 
         return PchipInterpolator(self.times, self.lengths)
 
-    @cached_property
-    def _speed(self) -> Any:
-        return self._curve.derivative()
-
     def usual_speed(self) -> float:
         """Median over time of the mean speeds between the table's times at which it moves, m/s."""
         step, speed = np.diff(self.times), np.abs(np.diff(self.lengths) / np.diff(self.times))
@@ -71,4 +67,4 @@ class TableWinding(PrescribedWinding):
     def wound_rate(self, time: float) -> float:
         """Its rate, in m/s; 0 outside the table."""
         inside = self.times[0] <= time < self.times[-1]
-        return float(self._speed(time)) if inside else 0.0
+        return float(self._curve(time, 1)) if inside else 0.0
