@@ -30,13 +30,8 @@ With m_i = L_i M / S (each span at the mean strain) and b_j = sum_{i >= j} L_i /
     s_j = s_n + w b_j - (M / S) (d/dt sum_{i >= j} L_i - b_j dS/dt).
 
 It gives s_0 and s_n exactly, and needs no rate of the tension.  What it leaves out, the change
-in how the stretch is distributed, is of second order in strain.  It also closes the energy:
-multiply dL_i/dt = (1 + e) dm_i/dt + m_i de/dt by T_i and sum up,
-
-    (1 + e) (T_0 s_0 - T_n-1 s_n) = - sum T_i dL_i/dt + (1 + e) sum (T_j-1 - T_j) s_j + M q de/dt
-
-winch power = power into the structure + friction + elastic energy and damping, an identity of
-the model.  T_j-1 - T_j has the sign of s_j: friction never feeds energy in.
+in how the stretch is distributed, is of second order in strain.  Energy is conserved identically:
+see docs/cables.md.
 """
 
 from __future__ import annotations
@@ -57,12 +52,7 @@ from ringsim.cable.state import ChainState
 class Chain:
     """The cables of a scene, ready to be evaluated at any motion of their pulleys.
 
-    Parameters
-    ----------
-    cables
-        The record of each cable.
-    points_per_cable
-        Points of each cable's path: winch, pulleys, far end.
+    ``points_per_cable`` counts the points of each path: winch, pulleys, far end.
 
     Raises
     ------
@@ -115,7 +105,7 @@ class Chain:
         content = np.array([cable.initial_slack for cable in self.cables])
         alive = np.ones(len(spans), dtype=bool)
         ropes = Ropes(self._points_per_cable, np.cumsum(spans) - spans, content, alive)
-        lengths = np.linalg.norm(points[ropes.far] - points[ropes.near], axis=1)
+        lengths = np.linalg.norm(points[ropes.near + 1] - points[ropes.near], axis=1)
         return replace(ropes, content=ropes.along(lengths) + content)
 
     def state(

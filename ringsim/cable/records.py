@@ -74,8 +74,7 @@ class Cable(Model):
     """Where the winch is: at section 1, at the last section, or one at either end."""
     winch: Winch
     far_winch: Winch | None = None
-    """With end = "both", the winch at the last section, as far from its pulley as the first one
-    from its own; left out, it is like the first."""
+    """With end = "both", the winch at the last section; left out, it is like the first."""
     axial_stiffness: AxialStiffness = 1e5
     """Young's modulus times cross-section (EA)."""
     damping_time: SecondOrZero = 0.0
@@ -83,20 +82,17 @@ class Cable(Model):
     pulley_radius: Metre = 0.01
     friction: AnyFriction = Frictionless()
     slip_speed: PositiveSpeed | None = None
-    """Rope speed over a pulley at which 76 % of its friction acts (regularisation).  Left out, it
-    follows the winding: see ``ringsim.cable.regularisation``."""
+    """Rope speed over a pulley at which 76 % of its friction acts; left out, it follows the winding
+    (``ringsim.cable.regularisation``)."""
     slack_width: Annotated[Tension, Field(ge=1e-6)] = 0.05
     """Width of the transition from slack to taut; tension at the natural length is 0.69 of it."""
     initial_slack: SignedMetre = 0.0
     """Natural length minus path length at the start; negative: the cable is pre-stretched."""
     block_offset: MetreOrZero = 0.105
-    """Distance of the V pulleys from the V-joint's axis; the bracket says in which direction.
+    """Distance of the V pulleys from the V-joint's axis; at 0 a cable does no work.
 
-    Without it the V pulley would sit on the axis, its spans would keep their lengths and the
-    cable would do no work.  Source: h in paper 000, fig. 3; the value is inferred from its
-    deployment time.
+    Source: h in paper 000, fig. 3; the value is inferred from its deployment time.
     """
-
     bracket: AnyBracket = BisectorBracket()
     """What holds the V pulleys: a block on the bisector, or an element fixed to a bar half."""
 
@@ -132,19 +128,16 @@ def pulleys_of(sections: int, *, winches: int = 1) -> int:
 class Cables(Model):
     """Driving cables along the ring, each with its own winch, friction and faults.
 
-    The path of a cable: winch, then for every section the pulley on its first hinge assembly,
-    the pulley on its V-joint's block and the pulley on its second hinge assembly.  With one winch
-    the last of these holds the cable's end: N sections have 3 N spans and 3 N - 1 pulleys.  With
-    a winch at either end the rope runs over it as well and down to the far winch, as it comes up
-    from the first: 3 N + 1 spans and 3 N pulleys, the same path from both ends.
-    Source: paper 000, figs 1-3.
+    The path of a cable: winch, then for every section the pulleys on its first hinge assembly, its
+    V-joint's block and its second hinge assembly.  With one winch the last of these holds the
+    cable's end: N sections have 3 N spans and 3 N - 1 pulleys.  With a winch at either end the rope
+    runs over it as well: 3 N + 1 spans and 3 N pulleys.  Source: paper 000, figs 1-3.
     """
 
     upper: Cable | None = None
     lower: Cable | None = None
     winch_distance: Metre = 0.3
-    """From a winch to its nearest pulley, along the boom (paper 000: the first span does not
-    change its length)."""
+    """From a winch to its nearest pulley, along the boom; that span keeps its length."""
 
     @model_validator(mode="after")
     def _any(self) -> Cables:

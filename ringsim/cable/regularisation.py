@@ -1,20 +1,17 @@
 r"""Slip speed that regularises pulley friction, and the error that it causes at low speed.
 
 Friction reverses with the rope; p_j = tanh(s_j / s_slip) of the full decay makes that smooth
-(``ringsim.cable.chain``).  Its share of the rope's speed decides what is left out.  On a ring of
-N sections that open evenly the 2 N spans beside the V pulleys give the rope free, so a pulley
-with m of them beyond it sees
+(``ringsim.cable.chain``).  On a ring of N sections that open evenly the 2 N spans beside the V
+pulleys give the rope free, so a pulley with m of them beyond it sees
 
     s = m v,   v = winding speed / (2 N) = 1.5 winding speed / (spans of the cable),
 
 falling to v at the V pulley next to the fixed end; with two winches m counts from where the rope
-rests between them.  Such pulleys alone lose friction, so the tension there is too high by
+rests between them.  The tension there is too high by
 
     exp(sum over pulleys of \|ln eta\| (1 - tanh(m v / s_slip))) - 1,
 
-which hardly depends on N.  With s_slip = 0.5 winding speed / spans the slowest pulley has
-tanh(3) = 0.995 of its friction: 0.03 % at f / R = 0.04, below 1 % up to f / R = 0.9.  Rope that
-is wound fast keeps the slip speed of 2e-4 m/s, below that share.
+which hardly depends on N; docs/cables.md lists it.
 """
 
 from __future__ import annotations
@@ -28,7 +25,8 @@ from ringsim.cable.ropes import Array
 LARGEST_SLIP_SPEED = 2e-4
 """Metre per second; the slip speed of rope that is wound fast, or not at all."""
 SHARE = 0.5
-"""Slip speed over the winding speed per span."""
+"""Slip speed over the winding speed per span: the slowest pulley has tanh(3) = 0.995 of its
+friction, an excess of 0.03 % at f / R = 0.04 and below 1 % up to f / R = 0.9."""
 TOLERATED = 0.01
 """Relative error of the far end's tension below which a run does not mention it."""
 _MOVES = 1e-3
@@ -49,14 +47,7 @@ def slip_speed(winding: float, pulleys: int) -> float:
 def excess(slip: float, winding: float, pulleys: int, decay: float) -> float:
     """Relative excess of the tension where the rope is slowest.
 
-    Parameters
-    ----------
-    slip, winding
-        Slip speed and winding speed, m/s.
-    pulleys
-        Number of pulleys of the cable.
-    decay
-        Largest -ln(eta) of its pulleys.
+    Slip speed and winding speed are in m/s; ``decay`` is the largest -ln(eta) of the pulleys.
     """
     spans = np.arange(1, max(2 * (pulleys + 1) // 3, 2))
     alike = 2.0 - spans % 2  # one V pulley, then the two hinge pulleys of neighbouring sections

@@ -1,8 +1,8 @@
 """Which spans form one rope: a cable is one rope until a fault splits it.
 
 The points of all cables stand behind one another, each cable's in order from its winch.  A
-cable of p points has p - 1 spans and p - 2 pulleys (its inner points); a rope is a run of spans
-over which the cable slips.  Two ropes of a cable meet at a jammed pulley.
+cable of p points has p - 1 spans and p - 2 pulleys (its inner points); two of its ropes meet at a
+jammed pulley.
 """
 
 from __future__ import annotations
@@ -38,8 +38,7 @@ class Ropes:
     @cached_property
     def cable_starts(self) -> Indices:
         """First span of each cable, with the number of all spans behind, shape (cables + 1,)."""
-        spans = np.asarray(self.points_per_cable) - 1
-        return np.concatenate([[0], np.cumsum(spans)]).astype(np.intp)
+        return np.cumsum([0, *(points - 1 for points in self.points_per_cable)], dtype=np.intp)
 
     @cached_property
     def spans(self) -> int:
@@ -48,15 +47,9 @@ class Ropes:
 
     @cached_property
     def near(self) -> Indices:
-        """Point at each span's end nearer to the winch, shape (spans,)."""
-        return np.delete(
-            np.arange(sum(self.points_per_cable)), np.cumsum(self.points_per_cable) - 1
-        )
-
-    @cached_property
-    def far(self) -> Indices:
-        """Point at the other end, shape (spans,)."""
-        return self.near + 1
+        """Point at each span's end nearer to the winch, shape (spans,); the other: one more."""
+        points = np.cumsum(self.points_per_cable)
+        return np.delete(np.arange(points[-1]), points - 1)
 
     @cached_property
     def ends(self) -> Indices:
@@ -100,19 +93,15 @@ class Ropes:
     def measured(self, points: Array, velocities: Array) -> tuple[Array, Array, Array]:
         """Lengths (m), unit vectors away from the winch and rates of length (m/s) of all spans.
 
-        Points and velocities are those of all cables, m and m/s, shape (points, 3).
-
-        Raises
-        ------
-        ValueError
-            If a span has no length.
+        Points and velocities are those of all cables, m and m/s, shape (points, 3).  ValueError if
+        a span has no length.
         """
-        apart = points[self.far] - points[self.near]
+        apart = points[self.near + 1] - points[self.near]
         lengths = np.sqrt(np.einsum("ij,ij->i", apart, apart))
         if not lengths.min() > SHORTEST:
             raise ValueError(self._no_length(lengths))
         units = apart / lengths[:, None]
-        moving = velocities[self.far] - velocities[self.near]
+        moving = velocities[self.near + 1] - velocities[self.near]
         return lengths, units, np.einsum("ij,ij->i", units, moving)
 
     def along(self, spans: Array) -> Array:
@@ -128,12 +117,8 @@ class Ropes:
         """The ropes after a pulley seizes the rope; cable and pulley count from 0 at the winch.
 
         At that instant ``stored`` is the natural length in each span, m, shape (spans,), and
-        ``wound`` the rope wound at the two ends of each cable, m, shape (cables, 2).
-
-        Raises
-        ------
-        ValueError
-            If there is no such pulley.
+        ``wound`` the rope wound at the two ends of each cable, m, shape (cables, 2).  ValueError if
+        there is no such pulley.
         """
         start = self._span(cable, pulley, 2, "pulley") + 1
         if start in self.starts:
@@ -147,13 +132,7 @@ class Ropes:
         return split
 
     def cut(self, cable: int, span: int) -> Ropes:
-        """The ropes after a span parts; both count from 0.
-
-        Raises
-        ------
-        ValueError
-            If there is no such span.
-        """
+        """The ropes after a span parts; both count from 0.  ValueError if there is no such span."""
         alive = self.alive.copy()
         alive[self.of_span[self._span(cable, span, 1, "span")]] = False
         return replace(self, alive=alive)

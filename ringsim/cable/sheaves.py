@@ -1,7 +1,6 @@
-"""What a cable's path runs over, in order from its winch; winch and far end are points as well.
+"""What a cable's path runs over; its winch and far end are points as well.
 
-A node is whatever names a moving frame where the path is used: a number of a layout, or a node of
-an engine.
+A node names a moving frame where the path is used: a mount of a layout, or a node of an engine.
 """
 
 from __future__ import annotations

@@ -7,8 +7,6 @@ With width b (N) the elastic force y (N, negative when the rope is longer than i
     energy    integral of q dy from -inf = b^2 (-Li2(-exp(y / b))).
 
 Above y = 10 b the tension exceeds y by less than 5e-5 b, below y = -10 b it is less than that.
-No exponential can overflow, and below y = -200 b the tension stays at 1e-87 b: numbers near
-the smallest double would overflow in a division.
 """
 
 from __future__ import annotations

@@ -73,13 +73,12 @@ class ChainState:
     def point_forces(self) -> Array:
         """Force of the cable on each point of its path, in N, shape (points, 3).
 
-        F = T_behind u_behind - T_before u_before; on a pulley that is its reaction, at the
-        ends the pull on the winch and on the fixing.
+        F = T_behind u_behind - T_before u_before, and one of the two at the ends.
         """
         pull = self.tensions[:, None] * self.directions
         forces = np.zeros((self.ropes.spans + len(self.ropes.points_per_cable), 3))
         forces[self.ropes.near] = pull
-        forces[self.ropes.far] -= pull
+        forces[self.ropes.near + 1] -= pull
         return forces
 
     @property
@@ -92,10 +91,7 @@ class ChainState:
 
     @property
     def held_beyond(self) -> Array:
-        """Rope between each pulley and its rope's far end, in m, shape (pulleys,).
-
-        Natural length at the mean strain; its decrease is what slips over the pulley.
-        """
+        """Natural length from each pulley to its rope's far end, m, shape (pulleys,)."""
         rope = self.ropes.of_pulley
         total = np.append(0.0, np.cumsum(self.lengths))
         beyond = total[self.ropes.ends[rope]] - total[self.ropes.behind]
@@ -105,8 +101,7 @@ class ChainState:
     def friction_forces(self) -> Array:
         """Loss of tension over each pulley, in N per speed of the rope, shape (pulleys,).
 
-        (T_before - T_behind) times the stretch of the rope that passes, with
-        T_behind = T_before exp(exponent * log_decay).
+        T_before (1 - exp(exponent * log_decay)) times the stretch of the rope that passes.
         """
         before = self.tensions[self.ropes.behind - 1] * self.ropes.slips
         lost = -np.expm1(self.exponents * self.log_decays)
@@ -176,9 +171,8 @@ def work_between(before: ChainState, after: ChainState) -> tuple[float, float]:
     """Energies in J: put in by the winches, less what is wound up; lost by friction, damping.
 
     The work of a force is its mean at both instants times the displacement: rope wound on a drum,
-    rope slipped over a pulley, strain of a rope.  The trapezoidal rule balances exactly these
-    works; products of force and rate at the instants alone miss the displacement between them.
-    Nothing moves while a fault changes the ropes: states of different ropes have no work.
+    rope slipped over a pulley, strain of a rope.  Products of force and rate at the instants alone
+    would miss the displacement between them.  Nothing moves while a fault changes the ropes.
     Source: the energy balance of Belytschko, Liu and Moran, Nonlinear Finite Elements for
     Continua and Structures (2000), sec. 6.2.3.
     """

@@ -13,10 +13,8 @@ first, T_i = q c_i / cbar with cbar = sum c_k L_k / S, and weights omega_k = c_k
     dq = q'(y) EA (dS / M + t_d (w dS / M^2 + d(dS/dt) / M)),
     dln c_i = sum_{j <= i} (p_j dln eta_j/da da_j + ln eta_j (1 - p_j^2) / s_slip ds_j).
 
-For a taut rope at full friction the material part is the rank-one matrix
--(EA S / (M sum c_k L_k)) (sum c_k grad L_k) (sum grad L_k)^T, and without friction it is
-symmetric.  L_i, dL_i/dt, a_j and s_j depend on neighbouring points alone, so everything is
-written on the differences of points: no product of full matrices is formed.
+L_i, dL_i/dt, a_j and s_j depend on neighbouring points alone, so everything is written on the
+differences of points: no product of full matrices is formed.
 
 Where the rope runs straight over a pulley the angle has a kink (the wrap angle cannot be
 negative); its derivative is taken as zero there, the mean of both sides.
@@ -60,7 +58,7 @@ def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent
     ropes, (stiffness, damping_time, slack_width) = state.ropes, state.material[:, rope]
     spans = slice(int(ropes.starts[rope]), int(ropes.ends[rope]))
     unit, length = state.directions[spans], state.lengths[spans]
-    relative = velocities[ropes.far[spans]] - velocities[ropes.near[spans]]
+    relative = velocities[ropes.near[spans] + 1] - velocities[ropes.near[spans]]
     swing = (relative - unit * state.rates[spans, None]) / length[:, None]
     across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
     natural = state.natural[rope]

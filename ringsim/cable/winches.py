@@ -8,11 +8,9 @@ natural length without V,
     V = sum_i command_i(r_i(V) q(y)),   y = EA (S / (M - V h) - 1 + t_d de/dt),
 
 r_i(V) the ratio of the tension at a winch to the rope's mean tension, were the n winches of the
-rope to turn at V / n each while the structure moves as at the beginning of the step: a motor that
-comes to rest takes the friction of its pulleys with it.  Commands fall with the tension and y
-grows with V, so there is one solution for any EA and step.
-A law that follows the structure uses the path taken up so far in the step, S_0 - S, not the rate
-at its start: its tension then answers to its own correction alone, whatever the structure does.
+rope to turn at V / n each while the structure moves as at the beginning of the step.  Commands
+fall with the tension and y grows with V, so there is one solution for any EA and step.  A law that
+follows the structure uses the path taken up so far in the step, S_0 - S, not the rate at its start.
 """
 
 from __future__ import annotations
@@ -47,16 +45,10 @@ class _Rope:
     def speeds(
         self, elapsed: float, path: float, rate: float, natural: float, rest: float
     ) -> Array:
-        """Speed of every member (m/s) at a time (s) after the beginning of the step.
+        """Speed of every member (m/s) so long after the beginning of the step (s).
 
-        Parameters
-        ----------
-        path, rate
-            Path of the rope and its rate, m and m/s.
-        natural
-            Natural length if the members had not wound since the start of the step, m.
-        rest
-            Speed of the other winches on the rope, m/s.
+        ``natural`` is the rope's natural length (m) had they not wound since, and ``rest`` the
+        speed of its other winches (m/s).
         """
         count, (stiffness, damping_time, width) = len(self.members), self.material
         follow = (path - self.path) / elapsed if elapsed > 0.0 else rate

@@ -55,7 +55,7 @@ class JacobianPattern:
         self._spans = ropes.spans
         self.unknowns = _PER_SPAN * ropes.spans + most_ropes
         # Every leg of the two points of every span; the far point adds to the difference.
-        ends = np.stack([ropes.near, ropes.far], axis=1).ravel()
+        ends = np.stack([ropes.near, ropes.near + 1], axis=1).ravel()
         end, self._leg = np.nonzero(path.leg_point == ends[:, None])
         self._span, self._sign = end // 2, 2.0 * (end % 2) - 1.0
         nodes = path.leg_node[self._leg]

@@ -21,15 +21,12 @@ class BarHalfBracket(Bracket):
 
         b = H sin((2 theta - delta) / 2),   a = +-H cos((2 theta - delta) / 2)
 
-    (+ on the first half).  b is h of paper 000, eq. 21; "sin^-1" there is no arc sine, and theta
-    is the angle from the bar's normal.  The paper neglects a and has equal spans; a pulley
-    fixed to a half is off the bisector.  The span to that half's own hinge pulley then keeps its
-    length, and the other has
+    (+ on the first half).  b is h of paper 000, eq. 21, which neglects a; see docs/cables.md.  The
+    span to that half's own hinge pulley keeps its length, and the other has
 
         L^2 = l^2 + H^2 + 2 l H sin(theta - delta),
 
-    which falls all the way from the stowed angle on for 90 deg <= theta <= 90 deg + delta: outside
-    the rope would fold the bars somewhere.
+    which falls from the stowed angle on all the way if 90 deg <= theta <= 90 deg + delta.
     """
 
     kind: Literal["bar-half"] = "bar-half"

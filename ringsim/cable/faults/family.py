@@ -20,9 +20,6 @@ class CableFault(Fault):
     def strike(self, ropes: Ropes, state: ChainState) -> Ropes:
         """The ropes after the fault, from those before it and the chain at that instant.
 
-        Raises
-        ------
-        ValueError
-            If the cable or the place on it does not exist.
+        ValueError if the cable or the place on it does not exist.
         """
         raise NotImplementedError

@@ -34,10 +34,9 @@ class BearingFriction(Bearing):
     """eta = (R - f cos(a/2)) / (R + f cos(a/2)), that is ln(eta) = -2 artanh((f/R) cos(a/2)).
 
     f is the bearing's friction moment over its radial force: Palmgren's constant times the
-    pitch diameter.  Source: paper 000, eqs 11 and 19.  It follows from the exact balance
-    (kind "bearing-exact") with the radial force taken as 2 cos(a/2) times the mean of the two
-    tensions, and therefore lacks terms of third order: ln(eta) is too small in magnitude by
-    (f/R)^3 cos(a/2) sin(a/2)^2 + O((f/R)^5), at most 0.385 (f/R)^3.
+    pitch diameter.  Source: paper 000, eqs 11 and 19.  With the radial force taken as 2 cos(a/2)
+    times the mean of the two tensions, ln(eta) is smaller than the exact one ("bearing-exact") in
+    magnitude by (f/R)^3 cos(a/2) sin(a/2)^2 + O((f/R)^5), at most 0.385 (f/R)^3.
 
     >>> law = BearingFriction(coefficient=0.0004)
     >>> round(float(np.exp(law.log_decay(np.array([0.5 * np.pi]), 0.01))[0]), 6)

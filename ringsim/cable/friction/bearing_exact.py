@@ -18,9 +18,8 @@ class ExactBearingFriction(Bearing):
 
         eta = (q - k cos(a/2)) / (q + k cos(a/2)),   q = sqrt(1 - k^2 sin(a/2)^2),
 
-    because q^2 - k^2 cos(a/2)^2 = 1 - k^2 and (q + k cos(a/2))^2 = 1 + k^2 cos a
-    + 2 q k cos(a/2).  The closed form (kind "bearing") is the case q = 1; both agree for
-    a = 0 and a = pi.  Source of the balance: paper 000, eq. 18.
+    as q^2 - k^2 cos(a/2)^2 = 1 - k^2.  The closed form (kind "bearing") is the case q = 1; both
+    agree for a = 0 and a = pi.  Source of the balance: paper 000, eq. 18.
 
     >>> law = ExactBearingFriction(coefficient=0.0004)
     >>> round(float(np.exp(law.log_decay(np.array([0.5 * np.pi]), 0.01))[0]), 6)

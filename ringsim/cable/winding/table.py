@@ -53,11 +53,10 @@ class TableWinding(PrescribedWinding):
     def usual_speed(self) -> float:
         """Median over time of the mean speeds between the table's times at which it moves, m/s."""
         step, speed = np.diff(self.times), np.abs(np.diff(self.lengths) / np.diff(self.times))
-        order = np.argsort(speed)
-        order = order[speed[order] > 0.0]
-        elapsed = np.cumsum(step[order])
-        if not len(order):
+        order = [k for k in np.argsort(speed) if speed[k] > 0.0]
+        if not order:
             return 0.0
+        elapsed = np.cumsum(step[order])
         return float(speed[order[np.searchsorted(elapsed, 0.5 * elapsed[-1])]])
 
     def wound(self, time: float) -> float:

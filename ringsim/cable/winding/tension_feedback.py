@@ -14,15 +14,12 @@ class TensionFeedbackWinding(FeedbackWinding):
         speed = take-up + gain * (target - T),   cut to -max_payout .. max_speed
 
     The measured angles give the path of the rope, hence its stretch and its tension, without
-    a force sensor.  The take-up is -dS/d(delta) * opening_rate: the speed that lets the
-    sections open at that rate, almost nothing at the stowed end where the path hardly depends
-    on the angle; a constant speed starts there with a jerk, accelerates the structure ahead and
-    lets the rope go slack.  Without an opening rate it is the measured -dS/dt: stretch then
-    answers to the correction alone, d(stretch)/dt = gain * (target - T), and T settles at the
-    target within a time of S / (EA * gain), whatever the structure does below max_speed.
+    a force sensor.  The take-up is -dS/d(delta) * opening_rate, the speed that lets the sections
+    open at that rate: almost nothing at the stowed end, where a constant speed starts with a jerk.
+    Without an opening rate it is the measured -dS/dt: T then settles at the target within a time
+    of S / (EA * gain), whatever the structure does below max_speed.
 
-    Source: control on measured angles is what paper 000 proposes as further work; the law is
-    this project's.
+    Paper 000 proposes control on measured angles as further work; the law is this project's.
     """
 
     kind: Literal["tension-feedback"] = "tension-feedback"
