@@ -111,17 +111,11 @@ class Chain:
     def state(
         self, ropes: Ropes, points: Array, velocities: Array, wound: Array, wound_rate: Array
     ) -> ChainState:
-        """Evaluate the chain.
+        """Evaluate the chain with ropes from ``start``, and after faults.
 
-        Parameters
-        ----------
-        ropes
-            From ``start``, and after faults.
-        points, velocities
-            Of all cables behind one another, m and m/s, shape (points, 3).
-        wound, wound_rate
-            Of the winches at both ends of each cable, m and m/s, shape (cables, 2); zero at a
-            fixed end.
+        Points and velocities are those of all cables behind one another, m and m/s, shape
+        (points, 3); rope wound and its rate those of the winches at both ends of each cable, m and
+        m/s, shape (cables, 2), zero at a fixed end.
 
         Raises
         ------

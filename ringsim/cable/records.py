@@ -65,10 +65,7 @@ class Winch(Model):
 
 
 class Cable(Model):
-    """A cable over the pulleys of its plane, with a winch at one end or both.
-
-    Its tension falls from the winch on; see ``ringsim.cable.chain`` for the equations.
-    """
+    """A cable over the pulleys of its plane; see ``ringsim.cable.chain`` for the equations."""
 
     end: Literal["first", "last", "both"] = "first"
     """Where the winch is: at section 1, at the last section, or one at either end."""
@@ -89,10 +86,8 @@ class Cable(Model):
     initial_slack: SignedMetre = 0.0
     """Natural length minus path length at the start; negative: the cable is pre-stretched."""
     block_offset: MetreOrZero = 0.105
-    """Distance of the V pulleys from the V-joint's axis; at 0 a cable does no work.
-
-    Source: h in paper 000, fig. 3; the value is inferred from its deployment time.
-    """
+    """Distance of the V pulleys from the V-joint's axis; at 0 a cable does no work.  Source: h in
+    paper 000, fig. 3, with a value inferred from its deployment time."""
     bracket: AnyBracket = BisectorBracket()
     """What holds the V pulleys: a block on the bisector, or an element fixed to a bar half."""
 

@@ -29,18 +29,12 @@ class FixedSheave:
 class BlockSheave:
     """A V pulley on a block that stays on the bisector of two bar halves."""
 
-    left: Any
-    right: Any
-    """Nodes of the halves at their V-joint."""
+    nodes: tuple[Any, ...]
+    """Nodes of the first and the second half at their V-joint."""
     sense: float
     """+1 in the upper plane, -1 in the lower: the block stands inside of the joint."""
     offset: float
     """Distance from the joint's axis, m."""
-
-    @property
-    def nodes(self) -> tuple[Any, ...]:
-        """All nodes that carry it."""
-        return (self.left, self.right)
 
 
 Sheave = FixedSheave | BlockSheave

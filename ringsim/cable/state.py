@@ -71,10 +71,7 @@ class ChainState:
 
     @property
     def point_forces(self) -> Array:
-        """Force of the cable on each point of its path, in N, shape (points, 3).
-
-        F = T_behind u_behind - T_before u_before, and one of the two at the ends.
-        """
+        """T_behind u_behind - T_before u_before on each point of the paths, N, (points, 3)."""
         pull = self.tensions[:, None] * self.directions
         forces = np.zeros((self.ropes.spans + len(self.ropes.points_per_cable), 3))
         forces[self.ropes.near] = pull
@@ -99,10 +96,7 @@ class ChainState:
 
     @property
     def friction_forces(self) -> Array:
-        """Loss of tension over each pulley, in N per speed of the rope, shape (pulleys,).
-
-        T_before (1 - exp(exponent * log_decay)) times the stretch of the rope that passes.
-        """
+        """Loss of tension over each pulley times the stretch there, in N, shape (pulleys,)."""
         before = self.tensions[self.ropes.behind - 1] * self.ropes.slips
         lost = -np.expm1(self.exponents * self.log_decays)
         return np.asarray(before * lost * (1.0 + self.strains[self.ropes.of_pulley]))

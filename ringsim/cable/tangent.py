@@ -78,8 +78,8 @@ def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent
 def decay_tangent(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[Array, Array]:
     """The decay part of one rope: how the shares of its spans change.
 
-    These are the derivatives of each span's tension after each difference of points (N/m) and
-    after each difference of velocities (N s/m), shape (n, n, 3) each.
+    Derivatives of each span's tension after each difference of points (N/m) and of velocities
+    (N s/m), shape (n, n, 3) each.
     """
     spans, inner = tangent.spans, state.ropes.inner(rope)
     length, rate, unit = state.lengths[spans], state.rates[spans], state.directions[spans]

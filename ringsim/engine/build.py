@@ -68,8 +68,8 @@ def build(scene: Scene) -> Built:
 def _on_nodes(model: Multibody, sheave: Sheave) -> Sheave:
     """A sheave of the layout on the nodes that carry it."""
     if isinstance(sheave, BlockSheave):
-        left, right = (model.side_of(mount)[0] for mount in (sheave.left, sheave.right))
-        return BlockSheave(left, right, sheave.sense, sheave.offset)
+        nodes = tuple(model.side_of(mount)[0] for mount in sheave.nodes)
+        return BlockSheave(nodes, sheave.sense, sheave.offset)
     node, arm = model.side_of(sheave.node)
     axes = sheave.node.axes if isinstance(sheave.node, OnBody) else np.eye(3)
     return FixedSheave(node, arm + axes @ sheave.arm)

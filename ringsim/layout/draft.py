@@ -282,7 +282,7 @@ class Draft:
         joint, bracket = self.joints[opening.joint], cable.bracket
         halves = joint.first, joint.second
         if not isinstance(bracket, BarHalfBracket):
-            return BlockSheave(*halves, opening.sense, cable.block_offset)
+            return BlockSheave(halves, opening.sense, cable.block_offset)
         frames = [pose_of(half, self.bodies, self.rods).axes for half in halves]
         bar, normal = frames[0][:, 0], frames[0][:, 2]
         chord = bar + frames[1][:, 0]

@@ -112,7 +112,7 @@ class Layout:
         """Place of a sheave in space and its derivative after the coordinate, shape (3,), m."""
         if not isinstance(sheave, BlockSheave):
             return self.pose(sheave.node).at(sheave.arm)
-        left, right = self.pose(sheave.left), self.pose(sheave.right)
+        left, right = map(self.pose, sheave.nodes)
         both = left.axes[:, 1] + right.axes[:, 1]
         both = both + sheave.sense * (right.axes[:, 0] - left.axes[:, 0])
         arm = -sheave.sense * sheave.offset * both / np.linalg.norm(both)

@@ -15,10 +15,10 @@ class WinchReading:
     tension_ratio: Callable[[float], float]
     """Tension at the winch over the mean tension of the rope as a function of the winch's
     speed (m/s), not falling; 1 without friction."""
-    path_rate: float = 0.0
+    path_rate: float
     """Rate of the path length and of another winch on the same rope, in m/s: negative while
     the structure gives rope free."""
-    path_slope: float = 0.0
+    path_slope: float
     """Derivative of the ideal path length after the measured opening angle, in m/rad."""
 
 
