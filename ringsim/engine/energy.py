@@ -94,8 +94,8 @@ class EnergyMeter:
         The displacement of a damper is the mean of its rates times the step, which differs from
         that of generalised-alpha by a hundredth of the rates' change over the step at most.
         """
-        (time, forces, rates, chain), system = now, self._assembly.system
-        lost = math.nan if self._untold else self._assembly.dampers.lost(system, time)
+        time, forces, rates, chain = now
+        lost = math.nan if self._untold else self._assembly.dampers.lost(time)
         driven = 0.0
         if self._kept is not None:
             begin, old_forces, old_rates, old_chain = self._kept

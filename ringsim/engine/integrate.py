@@ -61,11 +61,9 @@ class Integration:
             self._bending = BendingMeter(model, structure.gauge)
             coordinates["station"] = self._bending.stations
         self._gaps = joint_groups(model)
-        self._state.refresh()
         angles = self._openings.read(self._state)[0]
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
         self._locks = Locks(angles, stowed) if scene.structure.locks else None
-        self._latched = np.zeros(angles.shape, dtype=bool)
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
@@ -157,7 +155,7 @@ class Integration:
         found = self._weighed or self._measure(time)
         goes_on = self._control.accept(found, self._read(found))
         if self._locks is not None and self._built.stops is not None:
-            self._latched = self._built.stops.latch(self._locks.deployed)
+            self._built.stops.latch(self._locks.deployed)
         return goes_on
 
     def _read(self, now: Instant) -> Instant:

@@ -31,9 +31,9 @@ from typing import Any, NamedTuple
 import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ringsim.engine.rotations import Array
+
 _SHIFT = exu.OutputVariableType.DisplacementLocal
 _TURN = exu.OutputVariableType.Rotation
 _VELOCITY = exu.OutputVariableType.VelocityLocal
@@ -67,7 +67,8 @@ class RodDampers:
         N m, shape (dampers, 6).
     """
 
-    def __init__(self) -> None:
+    def __init__(self, system: Any) -> None:
+        self._system = system
         self.numbers: dict[int, int] = {}
         self.latest = np.zeros((0, 6))
         self._dampers: list[Any] = []
@@ -75,26 +76,19 @@ class RodDampers:
         self._short = 0.0
         self._past: list[tuple[float, Array]] = []
         self._prepared = (-1.0, -1.0)
-        self._lead = 0.0
-        self._offsets = np.zeros(6)
-        self._by_velocity = False
+        self._lead, self._offsets, self._by_velocity = 0.0, np.zeros(6), False
         self._found: _Reading | None = None
         self._kept: _Reading | None = None
 
-    def add(self, system: Any, markers: list[Any], damping: Array, relaxation: float) -> int:
+    def add(self, markers: list[Any], damping: Array, relaxation: float) -> int:
         """A damper between two markers that coincide; returns its row in ``latest``.
 
-        Parameters
-        ----------
-        damping
-            C, shape (6, 6), N s/m and N m s.
-        relaxation
-            The rod's Kelvin-Voigt time tau, s.
+        ``damping`` is C, shape (6, 6), N s/m and N m s, and ``relaxation`` the rod's tau, s.
         """
         damper = item.ObjectConnectorRigidBodySpringDamper(
             markerNumbers=markers, useIntrinsicFormulation=True
         )
-        self._dampers.append(system.AddObject(damper))
+        self._dampers.append(self._system.AddObject(damper))
         self._matrices.append(damping)
         self._short = max(self._short, _SHORT * relaxation)
         return len(self._dampers) - 1
@@ -115,30 +109,27 @@ class RodDampers:
         matrices, by_velocity = np.array(self._matrices), time - start < self._short
         if by_velocity != self._by_velocity:
             self._by_velocity = by_velocity
-            self._intrinsic(system, wanted=not by_velocity)
-            self._set(system, "stiffness", np.zeros_like(matrices))
-            self._set(system, "damping", by_velocity * matrices)
+            self._intrinsic(wanted=not by_velocity)
+            self._set("stiffness", np.zeros_like(matrices))
+            self._set("damping", by_velocity * matrices)
         if not by_velocity:
             self._lead, self._offsets = _difference(time, self._past)
-            self._set(system, "stiffness", self._lead * matrices)
-            self._set(system, "offset", self._offsets)
+            self._set("stiffness", self._lead * matrices)
+            self._set("offset", self._offsets)
 
-    def lost(self, system: Any, time: float) -> float:
+    def lost(self, time: float) -> float:
         """Energy taken since the reading that was kept last, J: mean force times change of strain.
 
-        Parameters
-        ----------
-        time
-            Of the current state, s, which ends the step that was prepared last.
+        ``time`` is that of the current state, s, which ends the step that was prepared last.
         """
         if not self._dampers:
             return 0.0
         if self._by_velocity:
-            rates = self._outputs(system, _VELOCITY, _SPIN)
-            self._intrinsic(system, wanted=True)
-        strains = self._outputs(system, _SHIFT, _TURN)
+            rates = self._outputs(_VELOCITY, _SPIN)
+            self._intrinsic(wanted=True)
+        strains = self._outputs(_SHIFT, _TURN)
         if self._by_velocity:
-            self._intrinsic(system, wanted=False)
+            self._intrinsic(wanted=False)
         else:
             rates = self._lead * (strains - self._offsets)
         before = self._kept
@@ -156,15 +147,15 @@ class RodDampers:
         """Count what is lost from the last reading on."""
         self._kept = self._found
 
-    def _intrinsic(self, system: Any, *, wanted: bool) -> None:
-        self._set(system, "useIntrinsicFormulation", [wanted] * len(self._dampers))
+    def _intrinsic(self, *, wanted: bool) -> None:
+        self._set("useIntrinsicFormulation", [wanted] * len(self._dampers))
 
-    def _set(self, system: Any, name: str, values: Sequence[Any] | Array) -> None:
+    def _set(self, name: str, values: Sequence[Any] | Array) -> None:
         for damper, value in zip(self._dampers, values, strict=True):
-            system.SetObjectParameter(damper, name, value)
+            self._system.SetObjectParameter(damper, name, value)
 
-    def _outputs(self, system: Any, shift: Any, turn: Any) -> Array:
-        output = system.GetObjectOutput
+    def _outputs(self, shift: Any, turn: Any) -> Array:
+        output = self._system.GetObjectOutput
         return np.array([[*output(d, shift), *output(d, turn)] for d in self._dampers])
 
 
