@@ -33,8 +33,10 @@ class CableDrive:
 
     Attributes
     ----------
+    present
+        The cables with their planes.
     path
-        What the cables run over, on the model's nodes.
+        What they run over, on the model's nodes.
     chain, ropes
         See ringsim.cable; faults replace the ropes.
     winches
@@ -46,7 +48,8 @@ class CableDrive:
     """
 
     def __init__(self, assembly: Assembly, cables: Cables, path: CablePath, faults: int) -> None:
-        present = [cable for _, cable in cables.present()]
+        self.present = cables.present()
+        present = [cable for _, cable in self.present]
         self.path, self._assembly = path, assembly
         parameter = assembly.system.GetNodeParameter
         reference = [parameter(node, "referenceCoordinates") for node in path.nodes]
