@@ -15,7 +15,7 @@ from ringsim.engine.build import Built
 from ringsim.engine.model import Multibody
 from ringsim.engine.readings import State
 from ringsim.engine.rotations import Array
-from ringsim.layout.halves import Half, halves
+from ringsim.layout.halves import halves
 from ringsim.stepping.instant import Energies
 
 _KINETIC = exu.OutputVariableType.KineticEnergy
@@ -47,21 +47,11 @@ class EnergyMeter:
         self._last: _Passing | None = None
 
     def read(
-        self,
-        time: float,
-        state: State,
-        angles: Array,
-        rates: Array,
-        chain: ChainState | None = None,
+        self, time: float, state: State, angles: Array, rates: Array, chain: ChainState | None
     ) -> Energies:
         """Energies at the current state, and what passed since the one that was kept last.
 
-        Parameters
-        ----------
-        angles, rates
-            Opening angles and their rates, shape (planes, sections), rad and rad/s.
-        chain
-            The cables, if there are any.
+        Opening angles and their rates have the shape (planes, sections), rad and rad/s.
         """
         kinetic = sum(self._output(body, _KINETIC) for body in self._assembly.bodies)
         elastic = sum(self._output(element, _POTENTIAL) for element in self._elements)
@@ -74,8 +64,8 @@ class EnergyMeter:
             resisted.append(np.ravel(resisting))
         if chain is not None:
             elastic += chain.elastic_energy.sum()
-        self._last = now = time, np.concatenate(forces), np.concatenate(resisted), chain
-        driven, lost = self._passed(now)
+        self._last = time, np.concatenate(forces), np.concatenate(resisted), chain
+        driven, lost = self._passed(*self._last)
         work = float(np.sum(self._forces * moved))
         return Energies(float(kinetic), float(elastic), work, lost, driven)
 
@@ -86,20 +76,20 @@ class EnergyMeter:
 
     def note(self) -> str:
         """What a run's reason must add about its balance; empty if it is known."""
-        if not self._untold:
-            return ""
-        return (
+        unknown = (
             "; the energy balance is unknown, since slope-vector rods do not tell what their "
             "damping takes: set rods.damping = 0 to have it"
         )
+        return unknown if self._untold else ""
 
-    def _passed(self, now: _Passing) -> tuple[float, float]:
+    def _passed(
+        self, time: float, forces: Array, rates: Array, chain: ChainState | None
+    ) -> tuple[float, float]:
         """Energy put in by the winches and lost, J: mean force times displacement.
 
         The displacement of a damper is the mean of its rates times the step, which differs from
         that of generalised-alpha by a hundredth of the rates' change over the step at most.
         """
-        time, forces, rates, chain = now
         lost = math.nan if self._untold else self._assembly.dampers.lost(time)
         driven = 0.0
         if self._kept is not None:
@@ -121,10 +111,17 @@ class StressMeter:
     def __init__(self, model: Multibody) -> None:
         self._assembly = model.assembly
         rows = [*halves(model.layout).values()]
-        ends = [end for row in rows for half in row for end in _ends(model, half)]
         self._shape = len(rows), len(rows[0]), 2
-        self._elements, *numbers = zip(*ends, strict=True)
-        self._outside, self._area, self._per_moment = np.array(numbers)
+        self._elements, numbers = [], []
+        for half in (half for row in rows for half in row):
+            part, elements = model.layout.rods[half.rod], model.rods[half.rod].elements
+            per_moment = 0.5 * part.tube.outer_diameter / part.tube.second_moment
+            for k, end in ((half.first, -0.5), (half.last - 1, 0.5)):
+                self._elements.append(elements[k])
+                numbers.append((end * part.lengths[k], part.tube.area, per_moment))
+        # Places of the outer ends from the elements' middles (m); by what force is divided (m^2)
+        # and moment multiplied (1/m^3) to give stress.
+        self._outside, self._area, self._per_moment = np.array(numbers).T
         dampers = model.assembly.dampers.numbers
         self._damped = [dampers[int(e)] for e in self._elements] if dampers else None
 
@@ -132,7 +129,7 @@ class StressMeter:
         """Stresses at the current state, shape (rod halves, sections), Pa."""
         force, torque = _in_the_middle(self._assembly, self._elements)
         if self._damped is not None:
-            carried = self._assembly.dampers.latest[self._damped].T
+            carried = self._assembly.dampers.latest.forces[self._damped].T
             force, torque = force + carried[:3], torque + carried[3:]
         x = self._outside
         moment = np.hypot(torque[1] + force[2] * x, torque[2] - force[1] * x)
@@ -170,13 +167,3 @@ def _in_the_middle(assembly: Assembly, elements: Sequence[Any]) -> list[Array]:
     """Force (N) and moment (N m) of elements in their axes, shape (3, elements) each."""
     output = assembly.system.GetObjectOutputBody
     return [np.array([output(e, kind, [0.0] * 3) for e in elements]).T for kind in _KINDS]
-
-
-def _ends(model: Multibody, half: Half) -> list[tuple[Any, float, float, float]]:
-    """First and last element of a half, the place (m) of its outer end from the element's middle,
-    and by what force and moment are divided and multiplied to give stress (m^2, 1/m^3).
-    """
-    part, elements = model.layout.rods[half.rod], model.rods[half.rod].elements
-    per_moment = 0.5 * part.tube.outer_diameter / part.tube.second_moment
-    ends = (half.first, -0.5), (half.last - 1, 0.5)
-    return [(elements[k], s * part.lengths[k], part.tube.area, per_moment) for k, s in ends]

@@ -34,10 +34,7 @@ import numpy as np
 
 from ringsim.engine.rotations import Array
 
-_SHIFT = exu.OutputVariableType.DisplacementLocal
-_TURN = exu.OutputVariableType.Rotation
-_VELOCITY = exu.OutputVariableType.VelocityLocal
-_SPIN = exu.OutputVariableType.AngularVelocityLocal
+_KIND = exu.OutputVariableType
 _SHORT = 0.25
 """Steps below this share of tau take velocities: the spring is 1.5 / 0.25 times as stiff as the rod
 there, which ``STIFFENING`` allows for."""
@@ -45,8 +42,11 @@ STIFFENING = 1.0 + 1.5 / _SHORT
 """Largest stiffness of a rod with its damper over that of the rod alone; 3/2 is a0 h of BDF2."""
 
 
-class _Reading(NamedTuple):
-    """Time (s), strains, their rates and the forces of all dampers, shape (dampers, 6)."""
+class Reading(NamedTuple):
+    """Time (s), strains, their rates and the forces of all dampers, shape (dampers, 6).
+
+    These are forces and moments in the elements' middles, tension positive, N and N m.
+    """
 
     time: float
     strains: Array
@@ -63,22 +63,21 @@ class RodDampers:
     numbers
         Damper of each damped element, by the element's number.
     latest
-        Forces and moments in the elements' middles at the last reading, tension positive, N and
-        N m, shape (dampers, 6).
+        The last reading.
     """
 
     def __init__(self, system: Any) -> None:
         self._system = system
         self.numbers: dict[int, int] = {}
-        self.latest = np.zeros((0, 6))
+        none = np.zeros((0, 6))
+        self.latest = Reading(-1.0, none, none, none, by_velocity=False)
         self._dampers: list[Any] = []
         self._matrices: list[Array] = []
         self._short = 0.0
         self._past: list[tuple[float, Array]] = []
         self._prepared = (-1.0, -1.0)
         self._lead, self._offsets, self._by_velocity = 0.0, np.zeros(6), False
-        self._found: _Reading | None = None
-        self._kept: _Reading | None = None
+        self._kept: Reading | None = None
 
     def add(self, markers: list[Any], damping: Array, relaxation: float) -> int:
         """A damper between two markers that coincide; returns its row in ``latest``.
@@ -103,9 +102,9 @@ class RodDampers:
         self._prepared = start, time
         if not self._past or start > self._past[-1][0]:
             # By now exudyn has moved the current state on: only a reading knows the start's.
-            if self._found is None or self._found.time != start:
+            if self.latest.time != start:
                 raise RuntimeError(f"the rods' dampers were not read at {start:.9g} s")
-            self._past = [*self._past[-1:], (start, self._found.strains)]
+            self._past = [*self._past[-1:], (start, self.latest.strains)]
         matrices, by_velocity = np.array(self._matrices), time - start < self._short
         if by_velocity != self._by_velocity:
             self._by_velocity = by_velocity
@@ -125,27 +124,27 @@ class RodDampers:
         if not self._dampers:
             return 0.0
         if self._by_velocity:
-            rates = self._outputs(_VELOCITY, _SPIN)
+            rates = self._outputs(_KIND.VelocityLocal, _KIND.AngularVelocityLocal)
             self._intrinsic(wanted=True)
-        strains = self._outputs(_SHIFT, _TURN)
+        strains = self._outputs(_KIND.DisplacementLocal, _KIND.Rotation)
         if self._by_velocity:
             self._intrinsic(wanted=False)
         else:
             rates = self._lead * (strains - self._offsets)
         before = self._kept
-        self.latest = np.einsum("nij,nj->ni", np.array(self._matrices), rates)
-        self._found = _Reading(time, strains, rates, self.latest, self._by_velocity)
+        forces = np.einsum("nij,nj->ni", np.array(self._matrices), rates)
+        self.latest = Reading(time, strains, rates, forces, self._by_velocity)
         if before is None:
             return 0.0
         moved = strains - before.strains
         if before.by_velocity and self._by_velocity:
             # The rates that the forces are made of balance an impact twice as well.
             moved = 0.5 * (time - before.time) * (before.rates + rates)
-        return 0.5 * float(np.sum((before.forces + self.latest) * moved))
+        return 0.5 * float(np.sum((before.forces + forces) * moved))
 
     def keep(self) -> None:
         """Count what is lost from the last reading on."""
-        self._kept = self._found
+        self._kept = self.latest
 
     def _intrinsic(self, *, wanted: bool) -> None:
         self._set("useIntrinsicFormulation", [wanted] * len(self._dampers))
