@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
+from types import SimpleNamespace
 from typing import Any
 
 import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
-from numpy.typing import NDArray
+from exudyn.advancedUtilities import CreateSymbolicUserFunction
 
 from ringsim.engine.rod_dampers import RodDampers
-from ringsim.engine.rotations import turn_of, turn_rates
+from ringsim.engine.rotations import Array, Indices, turn_of, turn_rates
 from ringsim.layout.pose import Pose
 
-Array = NDArray[np.float64]
-_SAME = np.eye(3)
+_SAME, _ORIGIN = np.eye(3), np.zeros(3)
 exu.config.printToConsole = False
+
+SYMBOLIC = SimpleNamespace(
+    minimum=exu.symbolic.min,
+    maximum=exu.symbolic.max,
+    where=exu.symbolic.IfThenElse,
+    **{name: getattr(exu.symbolic, name) for name in ("tanh", "exp", "sqrt", "abs", "sign")},
+)
+"""What a law of ``ringsim.parts`` takes as its ``xp``: numpy's names for exudyn's functions."""
+
+TORSION = "ObjectConnectorTorsionalSpringDamper"
 
 
 class Assembly:
@@ -33,8 +44,6 @@ class Assembly:
         Nodes with Euler parameters.
     dampers
         Dampers of the rods.
-    laws
-        Force laws in exudyn's expressions (``ringsim.engine.laws``).
     """
 
     def __init__(self) -> None:
@@ -43,9 +52,9 @@ class Assembly:
         self.starts: dict[int, Array] = {}
         self.bodies: list[Any] = []
         self.rigid_nodes: list[Any] = []
-        self.dampers = RodDampers()
-        self.laws: dict[Any, Any] = {}
-        self._places: dict[int, NDArray[np.int64]] = {}
+        self.dampers = RodDampers(self.system)
+        self._laws: dict[Hashable, Any] = {}
+        self._places: dict[int, Indices] = {}
         self._size = 0
 
     def add_node(self, node: Any, acceleration: Array) -> Any:
@@ -56,7 +65,7 @@ class Assembly:
         self._size += len(acceleration)
         return number
 
-    def coordinates_of(self, node: Any) -> NDArray[np.int64]:
+    def coordinates_of(self, node: Any) -> Indices:
         """Indices of a node's coordinates in the system vector: exudyn keeps the nodes' order."""
         return self._places[int(node)]
 
@@ -71,24 +80,16 @@ class Assembly:
         self.rigid_nodes.append(node)
         return node
 
-    def add_body(self, node: Any, mass: float, inertia: Array, centre: Array | None = None) -> Any:
-        """A rigid body on a rigid node.
+    def add_body(self, node: Any, mass: float, inertia: Array, centre: Array = _ORIGIN) -> Any:
+        """A rigid body on a rigid node, in its axes.
 
-        Parameters
-        ----------
-        inertia
-            Tensor about the node, shape (3, 3), kg m^2.
-        centre
-            Centre of mass in body coordinates, shape (3,), m.
-
+        ``inertia`` is the tensor about the node, shape (3, 3), kg m^2, and ``centre`` the centre
+        of mass, shape (3,), m.
         """
         terms = inertia[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
         body = self.system.AddObject(
             item.ObjectRigidBody(
-                nodeNumber=node,
-                mass=mass,
-                inertia=list(terms),
-                centerOfMass=[0.0, 0.0, 0.0] if centre is None else list(centre),
+                nodeNumber=node, mass=mass, inertia=list(terms), centerOfMass=list(centre)
             )
         )
         if mass > 0.0:
@@ -102,8 +103,33 @@ class Assembly:
 
     def node_marker(self, node: Any, axes: Array = _SAME) -> Any:
         """A marker with position and orientation on a node."""
-        frame = exu.HT(rotation=axes, translation=[0.0, 0.0, 0.0])
+        frame = exu.HT(rotation=axes, translation=list(_ORIGIN))
         return self.system.AddMarker(item.MarkerNodeRigid(nodeNumber=node, localHT=frame))
+
+    def symbolic_law(
+        self, kind: str, key: Hashable, law: Callable[[Any, Any, Any], Any]
+    ) -> dict[str, Any]:
+        """The setting that gives a spring-damper connector its law; equal keys share one.
+
+        Parameters
+        ----------
+        kind
+            Type of the connector in exudyn.
+        law
+            Force or torque from displacement (angle), rate, and the connector's last parameter.
+        """
+
+        def function(
+            mbs: Any, t: Any, item: Any, x: Any, rate: Any, stiffness: Any, damping: Any, last: Any
+        ) -> Any:
+            return law(x, rate, last)
+
+        argument = "springTorqueUserFunction" if kind == TORSION else "springForceUserFunction"
+        if key not in self._laws:
+            self._laws[key] = CreateSymbolicUserFunction(
+                self.system, function, argument, itemTypeName=kind
+            )
+        return {argument: self._laws[key]}
 
     def finish(self) -> None:
         """Assemble the system and set its initial accelerations."""

@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import exudyn.itemInterface as item
 import numpy as np
 
 from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
-from ringsim.engine.boom import add_boom
+from ringsim.choice import kind_of
 from ringsim.engine.cable_path import CablePath
 from ringsim.engine.cables import CableDrive
-from ringsim.engine.connectors import Reacting, Stops, connect
-from ringsim.engine.faults import Faults
+from ringsim.engine.connectors import Faults, Reacting, Stops, connect
 from ringsim.engine.model import Multibody
-from ringsim.engine.rods import Formulation
-from ringsim.engine.rods_ancf import Ancf
-from ringsim.engine.rods_geometrically_exact import GeometricallyExact
+from ringsim.engine.rods import Ancf
 from ringsim.layout.bodies import OnBody
-from ringsim.parts.rods.ancf import AncfRods
-from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
+from ringsim.layout.springs import BoomBeam
+from ringsim.parts.boom.flexible import FlexibleBoom
 from ringsim.scene import Scene
-
-FORMULATIONS: dict[type, Formulation] = {
-    GeometricallyExactRods: GeometricallyExact(),
-    AncfRods: Ancf(),
-}
 
 
 class Built(NamedTuple):
@@ -48,10 +41,17 @@ class Built(NamedTuple):
 
 
 def build(scene: Scene) -> Built:
-    """Build every part that the scene names, and nothing else."""
-    model = Multibody(scene, FORMULATIONS[type(scene.rods)])
-    add_boom(model)
-    connectors, stops, cables = connect(model), None, None
+    """Build every part that the scene names, and nothing else.
+
+    Raises
+    ------
+    InputError
+        If the structure has no joint for a friction law, the stop or a fault.
+    """
+    model, stops, cables = Multibody(scene), None, None
+    if model.layout.boom is not None:
+        _add_boom(model, model.layout.boom)
+    connectors = connect(model)
     if scene.stop is not None:
         stops = Stops(model, scene.stop)
         connectors.append(stops.reaction)
@@ -73,3 +73,68 @@ def _on_nodes(model: Multibody, sheave: Sheave) -> Sheave:
     node, arm = model.side_of(sheave.node)
     axes = sheave.node.axes if isinstance(sheave.node, OnBody) else np.eye(3)
     return FixedSheave(node, arm + axes @ sheave.arm)
+
+
+def _add_boom(model: Multibody, beam: BoomBeam) -> None:
+    """A flexible boom: a chain of elements, clamped at its top, with a body that slides along it.
+
+    A rigid one is part of its hinge assembly.
+    """
+    assembly, boom = model.assembly, beam.record
+    if not isinstance(boom, FlexibleBoom):
+        raise TypeError(f"no builder for a boom of kind {kind_of(boom)}")
+    ends = beam.top.body, beam.low.body
+    top, low = (model.layout.bodies[number].pose.place for number in ends)
+    (top_body, top_node), (low_body, _) = (model.bodies[number] for number in ends)
+    start = assembly.starts[int(top_node)]
+    spin = 2.0 * start[4:7]
+    nodes = []
+    for drop in np.linspace(0.0, boom.length, boom.elements + 1):
+        arm = np.array([0.0, 0.0, -drop])
+        node = assembly.add_node(
+            item.NodePointSlope1(referenceCoordinates=[*(top + arm), 0.0, 0.0, -1.0]),
+            np.concatenate([start[:3] + np.cross(spin, arm), np.cross(spin, [0.0, 0.0, -1.0])]),
+        )
+        nodes.append(node)
+    length = boom.length / boom.elements
+    cables = [
+        assembly.system.AddObject(
+            item.ObjectANCFCable(
+                nodeNumbers=nodes[k : k + 2],
+                length=length,
+                massPerLength=boom.density * boom.tube.area,
+                bendingStiffness=boom.young_modulus * boom.tube.second_moment,
+                axialStiffness=boom.young_modulus * boom.tube.area,
+            )
+        )
+        for k in range(boom.elements)
+    ]
+    assembly.bodies += cables
+    # The elements' nodes have a slope but no orientation: a second spherical joint holds the
+    # direction, and the boom is inextensible between the two.
+    for drop in (0.0, 0.1 * length):
+        place = item.MarkerBodyPosition(bodyNumber=cables[0], localPosition=[drop, 0.0, 0.0])
+        upper = assembly.body_marker(top_body, np.array([0.0, 0.0, -drop]))
+        clamp = [upper, assembly.system.AddMarker(place)]
+        assembly.system.AddObject(item.ObjectJointSpherical(markerNumbers=clamp))
+    _slide(model, low_body, cables, length, float(top[2] - low[2]))
+
+
+def _slide(model: Multibody, body: Any, cables: list[Any], length: float, place: float) -> None:
+    """Let the lower hinge assembly slide along elements of a length, from a place (m) on them."""
+    system = model.assembly.system
+    markers = [system.AddMarker(item.MarkerBodyBeamShape(bodyNumber=c)) for c in cables]
+    element = min(int(place / length), len(cables) - 1)
+    data = system.AddNode(
+        item.NodeGenericData(initialCoordinates=[element, place], numberOfDataCoordinates=2)
+    )
+    system.AddObject(
+        item.ObjectJointSliding(
+            markerNumbers=[model.assembly.body_marker(body, np.zeros(3)), markers[element]],
+            slidingMarkerNumbers=markers,
+            slidingMarkerOffsets=[k * length for k in range(len(cables))],
+            nodeNumber=data,
+            constrainRotations=[0, 0, 0],
+            constrainTranslations=[1, 1, 1],
+        )
+    )

@@ -20,51 +20,38 @@ from ringsim.cable.tangent import RopeTangent, decay_tangent, rope_tangent
 from ringsim.engine.cable_path import CablePath, Placed
 from ringsim.engine.rotations import Array, Indices
 
-_PER_SPAN = 4
-"""Auxiliary unknowns of a span: three for its difference vector, one for its tension."""
-
 
 class JacobianPattern:
     """Rows and columns of the Jacobian, found once, and its values.
 
     The object's equation is mass * acceleration - force = 0; what follows is its left-hand side.
-
-    Parameters
-    ----------
-    most_ropes
-        Largest number of ropes that faults can make of the cables.
-
-    Attributes
-    ----------
-    unknowns
-        Number of auxiliary unknowns.
-    steady
-        Share of the full friction from which its changes with the rope's speed do not matter: the
-        decay of a rope above it over all its pulleys is left out.
-    negligible
-        Decay entries are left out below this share of the largest geometric stiffness T / L.
-        Newton needs one iteration more at most (tests/cable_engine/test_newton.py).
+    ``most_ropes`` is the largest number of ropes that faults can make of the cables, and
+    ``unknowns`` the number of auxiliary ones.
     """
 
     steady = 0.9999
+    """Share of the full friction from which its changes with the rope's speed do not matter: the
+    decay of a rope above it over all its pulleys is left out."""
     negligible = 0.02
+    """Decay entries are left out below this share of the largest geometric stiffness T / L.
+    Newton needs one iteration more at most (tests/cable_engine/test_newton.py)."""
 
     def __init__(self, path: CablePath, ropes: Ropes, most_ropes: int) -> None:
-        self._path = path
-        self._size = path.size
-        self._spans = ropes.spans
-        self.unknowns = _PER_SPAN * ropes.spans + most_ropes
+        self._path, spans = path, ropes.spans
+        self.unknowns = 4 * spans + most_ropes
+        every = np.arange(path.size, path.size + self.unknowns)
+        # The unknowns: differences of all spans, their tensions, and the ropes' mean tensions.
+        self._differences = every[: 3 * spans].reshape(-1, 3)
+        self._tensions, self._means = every[3 * spans : 4 * spans], every[4 * spans :]
         # Every leg of the two points of every span; the far point adds to the difference.
         ends = np.stack([ropes.near, ropes.near + 1], axis=1).ravel()
         end, self._leg = np.nonzero(path.leg_point == ends[:, None])
         self._span, self._sign = end // 2, 2.0 * (end % 2) - 1.0
         nodes = path.leg_node[self._leg]
         own, width = path.spots[nodes], path.width
-        differences = self._difference(self._span)
-        tension = self._tension(self._span)
+        differences, tension = self._differences[self._span], self._tensions[self._span]
         first, second = path.turning_pairs
         turn = path.spots[path.leg_node, 3:]
-        every = np.arange(self._size, self._size + self.unknowns)
         turned = np.ones((len(self._leg), width, 3), dtype=bool)
         turned[:, :3] = path.leg_carries[self._leg, None, None] > 0.0
         turned &= own[:, :, None] >= 0
@@ -88,17 +75,9 @@ class JacobianPattern:
         self._entries[:, 0] = np.concatenate([every, rows[self._kept]])
         self._entries[:, 1] = np.concatenate([every, columns[self._kept]])
 
-    def _difference(self, span: Indices) -> Indices:
-        return np.asarray(self._size + 3 * span[:, None] + np.arange(3))
-
-    def _tension(self, span: Indices) -> Indices:
-        return np.asarray(self._size + 3 * self._spans + span)
-
     def empty(self) -> Array:
         """Entries of a cable that pulls nothing, shape (entries, 3)."""
-        empty = self._entries[: self.unknowns].copy()
-        empty[:, 2] = 1.0
-        return empty
+        return self._entries[: self.unknowns] * [1.0, 1.0, 0.0] + [0.0, 0.0, 1.0]
 
     def triplets(
         self,
@@ -106,26 +85,22 @@ class JacobianPattern:
         placed: Placed,
         by_q: float,
         by_rate: float,
-        left: Array | None = None,
+        left: Array | float = 1.0,
     ) -> Array:
         """All entries as (row, column, value), shape (entries, 3), until the next call.
 
-        Parameters
-        ----------
-        by_q, by_rate
-            What the derivatives after coordinates and after rates are multiplied with.
-        left
-            Share of each rope's stiffness that its winches do not answer; None for all of it.
+        ``by_q`` and ``by_rate`` multiply the derivatives after coordinates and after rates;
+        ``left`` is the share of each rope's stiffness that its winches do not answer.
         """
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
         turned = maps.transpose(0, 2, 1)
-        directions = np.empty((self._spans, 3, 3))
+        directions = np.empty((len(self._tensions), 3, 3))
+        shares = np.broadcast_to(left, len(state.natural))
         parts: list[Array] = []
         for rope in range(len(state.natural)):
             tangent = rope_tangent(state, placed.velocities, rope)
             directions[tangent.spans] = tangent.by_direction
-            share = 1.0 if left is None else float(left[rope])
-            parts += self._rope(state, tangent, rope, by_q, by_rate, share)
+            parts += self._rope(state, tangent, rope, by_q, by_rate, float(shares[rope]))
         blocks = [
             -maps,
             turned @ state.directions[self._span, :, None],
@@ -133,19 +108,15 @@ class JacobianPattern:
             *(-block for block in self._path.turning(placed, state.point_forces)),
         ]
         values = np.concatenate([block.ravel() for block in blocks])
-        entries = self._with_room(self._known + sum(len(part) for part in parts))
+        count = self._known + sum(len(part) for part in parts)
+        if len(self._entries) < count:  # a buffer that is kept: its first places stay the same
+            room = np.empty((count // 4, 3))
+            self._entries = np.concatenate([self._entries[: self._known], *parts, room])
+        entries = self._entries[:count]
         entries[: self.unknowns, 2] = by_q
         np.multiply(values[self._kept], by_q, out=entries[self.unknowns : self._known, 2])
         np.concatenate(parts, out=entries[self._known :])
         return entries
-
-    def _with_room(self, count: int) -> Array:
-        """So many entries of a buffer that is kept: the places of the first ones stay the same."""
-        if len(self._entries) < count:
-            kept = self._entries
-            self._entries = np.empty((count + count // 4, 3))
-            self._entries[: self._known] = kept[: self._known]
-        return self._entries[:count]
 
     def _rope(
         self,
@@ -157,9 +128,8 @@ class JacobianPattern:
         left: float,
     ) -> list[Array]:
         """How a rope's span tensions follow its mean tension and the differences of its points."""
-        spans = np.arange(tangent.spans.start, tangent.spans.stop)
-        tension, difference = self._tension(spans)[:, None], self._difference(spans).reshape(1, -1)
-        mean = np.array([[self._size + _PER_SPAN * self._spans + rope]])
+        spans, mean = tangent.spans, self._means[rope : rope + 1, None]
+        tension, difference = self._tensions[spans, None], self._differences[spans].reshape(1, -1)
         mean_values = by_q * left * tangent.mean_by_place + by_rate * tangent.mean_by_velocity
         entries = [
             _entries(tension, mean, -by_q * state.shares[spans]),
@@ -168,7 +138,7 @@ class JacobianPattern:
         if np.all(np.abs(state.exponents[state.ropes.inner(rope)]) > self.steady):
             return entries
         by_place, by_velocity = decay_tangent(state, tangent, rope)
-        flat = (by_q * by_place + by_rate * by_velocity).reshape(len(spans), -1)
+        flat = (by_q * by_place + by_rate * by_velocity).reshape(len(tension), -1)
         stiffest = float(np.max(state.tensions[spans] / state.lengths[spans]))
         row, column = np.nonzero(np.abs(flat) > by_q * self.negligible * max(stiffest, 1.0))
         decay = [tension[row, 0], difference[0, column], -flat[row, column]]

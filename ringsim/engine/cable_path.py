@@ -33,17 +33,16 @@ WIDTH = 7
 
 @dataclass(frozen=True)
 class Placed:
-    """All points of all paths at one instant."""
+    """All points of all paths at one instant: places (m), velocities (m/s) and arms from the
+    carrying nodes' positions (m, global), shape (points, 3); Euler parameters of all nodes, shape
+    (nodes, 4); the blocks between nodes with slope vectors, if there are such nodes.
+    """
 
     points: Array
     velocities: Array
-    """Shape (points, 3), m and m/s."""
     arms: Array
-    """From the carrying node's position to the point, global, shape (points, 3), m."""
     turns: Array
-    """Euler parameters of all nodes, shape (nodes, 4)."""
     blocks: PlacedBlocks | None
-    """The blocks between nodes with slope vectors, if there are such nodes."""
 
     @cached_property
     def gyrations(self) -> Array:
@@ -54,19 +53,15 @@ class Placed:
 class CablePath:
     """Points, velocities and generalised forces of the cables' paths.
 
-    Parameters
-    ----------
-    paths
-        What each cable runs over, in order from its winch; nodes are exudyn's.
-    slopes
-        Whether the nodes at the blocks have slope vectors.
+    ``paths`` are what each cable runs over, in order from its winch, on exudyn's nodes; ``slopes``
+    is whether the nodes at the blocks have slope vectors.
 
     Attributes
     ----------
     nodes
         exudyn nodes whose coordinates the path depends on.
-    width
-        Most coordinates of a node.
+    width, size
+        Most coordinates of a node, and those of all nodes.
     per_cable
         Number of points of each cable.
     leg_point, leg_node, leg_share
@@ -85,16 +80,16 @@ class CablePath:
         self.per_cable = [len(path) for path in paths]
         self.nodes: list[Any] = list({int(n): n for s in sheaves for n in s.nodes}.values())
         number = {int(node): place for place, node in enumerate(self.nodes)}
-        fixed = [(k, s) for k, s in enumerate(sheaves) if isinstance(s, FixedSheave)]
-        block = [(k, s) for k, s in enumerate(sheaves) if isinstance(s, BlockSheave)]
-        self._fixed = np.array([k for k, _ in fixed], dtype=np.int64)
-        self._fixed_node = np.array([number[int(s.node)] for _, s in fixed], dtype=np.int64)
-        self._fixed_arm = np.array([s.arm for _, s in fixed])
-        self._block = np.array([k for k, _ in block], dtype=np.int64)
-        ends = [[number[int(node)] for node in s.nodes] for _, s in block]
+        blocks = np.array([isinstance(sheave, BlockSheave) for sheave in sheaves])
+        self._fixed, self._block = np.flatnonzero(~blocks), np.flatnonzero(blocks)
+        fixed = [sheave for sheave in sheaves if isinstance(sheave, FixedSheave)]
+        block = [sheave for sheave in sheaves if isinstance(sheave, BlockSheave)]
+        self._fixed_node = np.array([number[int(s.node)] for s in fixed], dtype=np.int64)
+        self._fixed_arm = np.array([s.arm for s in fixed])
+        ends = [[number[int(node)] for node in s.nodes] for s in block]
         self._ends = np.array(ends, dtype=np.int64).reshape(-1, 2).T
-        self._sense = np.array([[s.sense] for _, s in block]).reshape(-1, 1)
-        self._offset = np.array([[s.offset] for _, s in block]).reshape(-1, 1)
+        self._sense = np.array([s.sense for s in block]).reshape(-1, 1)
+        self._offset = np.array([s.offset for s in block]).reshape(-1, 1)
         self._carrier = np.empty(len(sheaves), dtype=np.int64)
         self._carrier[self._fixed], self._carrier[self._block] = self._fixed_node, self._ends[0]
 
@@ -103,6 +98,7 @@ class CablePath:
         widths = np.full(len(self.nodes), WIDTH)
         widths[self._ends] = self.width
         self._held = np.arange(self.width) < widths[:, None]
+        self.size = int(self._held.sum())
         self.spots = np.where(self._held, np.cumsum(self._held).reshape(self._held.shape) - 1, -1)
 
         legs = np.concatenate([self._fixed_node, *self._ends])
@@ -117,15 +113,8 @@ class CablePath:
         self._sloped = np.flatnonzero((order >= len(fixed)) & slopes)
         self._place = np.divmod(order[self._sloped] - len(fixed), max(len(block), 1))
 
-    @property
-    def size(self) -> int:
-        """Coordinates of all nodes."""
-        return int(self._held.sum())
-
     def by_node(self, values: Array) -> Array:
         """Values of all coordinates, (size,), as (nodes, width); 0 where a node has fewer."""
-        if self._held.all():
-            return values.reshape(self._held.shape)
         found = np.zeros(self._held.shape, dtype=values.dtype)
         found[self._held] = values
         return found
@@ -186,11 +175,10 @@ class CablePath:
         return maps
 
     def turning(self, placed: Placed, forces: Array) -> tuple[Array, Array]:
-        """Change of the generalised forces of constant forces on all points with the nodes' turns.
-
-        These are derivatives of the moments arm x F by the pairs of ``turning_pairs``, and of
-        what moments do on each leg's own node, shape (pairs or legs, width - 3, width - 3).  What
-        blocks do on slope vectors stands among the pairs.
+        """Change of the generalised forces of constant forces on all points with the nodes' turns:
+        of the moments arm x F by the pairs of ``turning_pairs``, where blocks on slope vectors
+        stand as well, and of what moments do on each leg's own node, shape (pairs or legs,
+        width - 3, width - 3).
         """
         pull, arms = forces[self.leg_point], placed.arms[self.leg_point]
         kernel = arms[:, :, None] * pull[:, None, :]

@@ -24,29 +24,25 @@ from ringsim.engine.rotations import Array, Indices
 
 
 class CableDrive:
-    """The cables of a scene, with their winches.
-
-    Parameters
-    ----------
-    faults
-        Number of the scene's faults: each may split one rope in two.
+    """The cables of a scene, with their winches; each of the scene's ``faults`` may split a rope.
 
     Attributes
     ----------
+    present
+        The cables with their planes.
     path
-        What the cables run over, on the model's nodes.
+        What they run over, on the model's nodes.
     chain, ropes
         See ringsim.cable; faults replace the ropes.
     winches
         What winds them.
-    auxiliary
-        Unknowns of the object beyond the nodes' coordinates.
     refusal
         Why the chain last had no answer to a state that Newton tried; empty if it always had.
     """
 
     def __init__(self, assembly: Assembly, cables: Cables, path: CablePath, faults: int) -> None:
-        present = [cable for _, cable in cables.present()]
+        self.present = cables.present()
+        present = [cable for _, cable in self.present]
         self.path, self._assembly = path, assembly
         parameter = assembly.system.GetNodeParameter
         reference = [parameter(node, "referenceCoordinates") for node in path.nodes]
@@ -57,8 +53,7 @@ class CableDrive:
         self.winches = Winches(present)
         self._answered: tuple[tuple[float, bytes, bytes], ChainState, Placed] | None = None
         self.pattern = JacobianPattern(path, self.ropes, len(present) + faults)
-        self.auxiliary = self.pattern.unknowns
-        self._size = path.size + self.auxiliary
+        self._size = path.size + self.pattern.unknowns
         self.refusal = ""
         self._add_object()
 
@@ -92,13 +87,13 @@ class CableDrive:
         return np.concatenate([self._assembly.coordinates_of(node) for node in self.path.nodes])
 
     def _add_object(self) -> None:
-        zeros = np.zeros(self.auxiliary)
+        zeros = np.zeros(self.pattern.unknowns)
         auxiliary = self._assembly.system.AddNode(
             item.NodeGenericODE2(
                 referenceCoordinates=zeros,
                 initialCoordinates=zeros,
                 initialCoordinates_t=zeros,
-                numberOfODE2Coordinates=self.auxiliary,
+                numberOfODE2Coordinates=len(zeros),
             )
         )
         mass = exu.MatrixContainer()
@@ -142,7 +137,7 @@ class CableDrive:
         try:
             with np.errstate(all="ignore"):
                 state, placed = self._answer(q, q_t, t)
-                left = None
+                left: Array | float = 1.0
                 if self.winches.answering:
                     left = self.winches.stiffness_left(t, self.ropes, state.paths, state.path_rates)
                 triplets = self.pattern.triplets(state, placed, by_q, by_rate, left)

@@ -1,7 +1,7 @@
-"""What pushes, pulls and brakes between the parts of a model.
+"""What pushes, pulls and brakes between the parts of a model, and the faults that strike it.
 
-Each law acts in exudyn's connectors while a step is solved, and is evaluated again with numpy for
-the energy balance.
+Each law of ``ringsim.parts`` acts in exudyn's connectors, as exudyn's expression, while a step is
+solved, and is evaluated again with numpy for the energy balance.
 """
 
 from __future__ import annotations
@@ -14,9 +14,13 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.laws import SYMBOLIC, TORSION, symbolic_law
-from ringsim.engine.model import Multibody
+from ringsim.cable.faults.family import CableFault
+from ringsim.cable.state import ChainState
+from ringsim.engine.assembly import SYMBOLIC, TORSION
+from ringsim.engine.cables import CableDrive
+from ringsim.engine.model import BuiltJoint, Multibody
 from ringsim.engine.readings import JointGroup, State
+from ringsim.engine.rotations import Array
 from ringsim.layout.pose import turned_about_z
 from ringsim.layout.springs import Contact, HubNet
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
@@ -25,8 +29,8 @@ from ringsim.parts.net import Net
 from ringsim.parts.persection import at_section
 from ringsim.parts.springs import Reaction
 from ringsim.parts.stop.family import Stop
+from ringsim.refusal import InputError
 
-Array = NDArray[np.float64]
 Reacting = Callable[[State, Array, Array], tuple[Reaction, Array]]
 """The reactions of one law at all its places, and the rates (m/s or rad/s) that they resist, from
 the state, the opening angles and their rates, shape (planes, sections), rad and rad/s."""
@@ -54,33 +58,29 @@ class Stops:
 
     def __init__(self, model: Multibody, stop: Stop) -> None:
         self._law, self._system = stop, model.assembly.system
-        self._objects: list[list[Any]] = []
-        for plane in model.openings():
-            self._objects.append([])
-            for joint, sense in plane:
-                quarter = turned_about_z(sense * 0.5 * math.pi)
-                markers = model.assembly.node_marker(joint.nodes[0], quarter), joint.markers[1]
-                self._objects[-1].append(_torsion(model, markers, **self._settings(model, sense)))
-        self._latched = np.zeros([len(self._objects), len(self._objects[0])], dtype=bool)
+        planes = _opening_joints(model, "stop", 'stop = "none"')
+        self._objects = [[self._add(model, *one) for one in plane] for plane in planes]
+        self._latched = np.zeros((len(planes), len(planes[0])), dtype=bool)
 
-    def _settings(self, model: Multibody, sense: float) -> dict[str, Any]:
+    def _add(self, model: Multibody, joint: BuiltJoint, sense: float) -> Any:
         def torque(angle: Any, rate: Any, offset: Any) -> Any:
             folded = sense * angle + 0.5 * math.pi
             return sense * self._law.torque(folded, sense * rate, offset > 0.5, SYMBOLIC).total
 
-        return symbolic_law(model.assembly, TORSION, ("stop", sense), torque)
+        quarter = turned_about_z(sense * 0.5 * math.pi)
+        markers = model.assembly.node_marker(joint.nodes[0], quarter), joint.markers[1]
+        law = model.assembly.symbolic_law(TORSION, ("stop", sense), torque)
+        return _torsion(model, markers, **law)
 
-    def latch(self, deployed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Hold these V-joints from both sides from now on, if there are latches.
-
-        Returns those that are held, both of shape (planes, sections).
+    def latch(self, deployed: NDArray[np.bool_]) -> None:
+        """Hold these V-joints, shape (planes, sections), from both sides from now on, if there are
+        latches.
         """
         if self._law.latch:
             for plane, section in np.argwhere(deployed & ~self._latched):
                 # A stop has no use for the connector's offset; its law reads it as a switch.
                 self._system.SetObjectParameter(self._objects[plane][section], "offset", 1.0)
-            self._latched = deployed.copy()
-        return self._latched
+            self._latched |= deployed
 
     def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
         """See ``Reacting``."""
@@ -93,7 +93,8 @@ class StuckJoint:
     def __init__(self, model: Multibody, fault: StuckVJoint) -> None:
         self._law, self._system = fault, model.assembly.system
         self._place = model.scene.structure.planes.index(fault.plane), fault.section - 1
-        joint, self._sense = model.openings()[self._place[0]][self._place[1]]
+        planes = _opening_joints(model, 'faults of kind "stuck-vjoint"', "faults")
+        joint, self._sense = planes[self._place[0]][self._place[1]]
         linear = {"stiffness": fault.stiffness, "damping": fault.damping}
         self._object = _torsion(model, joint.markers, activeConnector=False, **linear)
         self._angle: float | None = None
@@ -113,6 +114,54 @@ class StuckJoint:
         return self._law.torque(float(angles[self._place]) - self._angle, rate), rate
 
 
+class Faults:
+    """The faults of a scene, in the order of their times, each struck between two steps.
+
+    Attributes
+    ----------
+    joints
+        V-joints that stick.
+    """
+
+    def __init__(self, model: Multibody, drive: CableDrive | None) -> None:
+        self._drive = drive
+        self._waiting = [
+            (fault, StuckJoint(model, fault) if isinstance(fault, StuckVJoint) else None)
+            for fault in sorted(model.scene.faults, key=lambda fault: fault.time)
+        ]
+        self.joints = [joint for _, joint in self._waiting if joint is not None]
+
+    @property
+    def next_time(self) -> float:
+        """Time of the next fault, s; infinite if there is none left."""
+        return self._waiting[0][0].time if self._waiting else math.inf
+
+    def strike(self, time: float, angles: Array, state: ChainState | None) -> bool:
+        """Strike all faults that are due; returns whether there was one.
+
+        ``angles`` are the opening angles, shape (planes, sections), rad, and ``state`` the cables
+        now, if the scene has any.
+        """
+        due = [one for one in self._waiting if one[0].time <= time + 1e-12]
+        del self._waiting[: len(due)]
+        for fault, joint in due:
+            if joint is not None:
+                joint.strike(angles)
+            elif isinstance(fault, CableFault) and self._drive is not None and state is not None:
+                self._drive.ropes = fault.strike(self._drive.ropes, state)
+        return bool(due)
+
+
+def _opening_joints(model: Multibody, part: str, out: str) -> list[list[tuple[BuiltJoint, float]]]:
+    planes = model.openings()
+    if not all(planes):
+        raise InputError(
+            f"{part}: this structure has no joints that open, which would be held: leave it out "
+            f"({out})"
+        )
+    return planes
+
+
 def _torsion(model: Multibody, markers: Sequence[Any], **settings: Any) -> Any:
     """A torsion spring-damper about the common z axis of two markers."""
     return model.assembly.system.AddObject(
@@ -123,10 +172,24 @@ def _torsion(model: Multibody, markers: Sequence[Any], **settings: Any) -> Any:
 def _friction(model: Multibody, family: str, law: JointFriction) -> Reacting:
     """Friction of the joints of a family."""
     joints = [joint for joint in model.joints if joint.part.family == family]
+    if not joints:
+        known = ", ".join(sorted({joint.part.family for joint in model.joints} - {""}))
+        raise InputError(
+            f"joints.{family}: this structure has no joint of that family (it has: "
+            f'{known or "none"}): leave it out (joints.{family} = "none")'
+        )
+
+    def settings(own: JointFriction) -> dict[str, Any]:
+        damping = own.linear_damping()
+        if damping is not None:
+            return {"damping": damping} if damping > 0.0 else {}
+        return model.assembly.symbolic_law(
+            TORSION, own, lambda _angle, rate, _: own.torque(rate, SYMBOLIC)
+        )
+
     for joint in joints:
-        settings = _friction_settings(model, at_section(law, joint.part.section))
-        if settings:
-            _torsion(model, joint.markers, **settings)
+        if found := settings(at_section(law, joint.part.section)):
+            _torsion(model, joint.markers, **found)
     group = JointGroup(model, joints)
     each = at_section(law, np.array([joint.part.section for joint in joints]))
 
@@ -135,15 +198,6 @@ def _friction(model: Multibody, family: str, law: JointFriction) -> Reacting:
         return Reaction(0.0, each.torque(rate), 0.0), rate
 
     return reaction
-
-
-def _friction_settings(model: Multibody, law: JointFriction) -> dict[str, Any]:
-    damping = law.linear_damping()
-    if damping is not None:
-        return {"damping": damping} if damping > 0.0 else {}
-    return symbolic_law(
-        model.assembly, TORSION, law, lambda _angle, rate, _: law.torque(rate, SYMBOLIC)
-    )
 
 
 def _net(model: Multibody, held: HubNet) -> Reacting:
@@ -160,21 +214,20 @@ def _net(model: Multibody, held: HubNet) -> Reacting:
     )
     mass = item.ObjectMassPoint(nodeNumber=hub, mass=net.hub_mass)
     assembly.bodies.append(assembly.system.AddObject(mass))
-    settings = [_string_settings(model, at_section(net, k)) for k in range(len(nodes))]
+
+    def settings(law: Net) -> dict[str, Any]:
+        if law.two_sided:
+            return {"stiffness": law.stiffness, "damping": law.damping}
+        return assembly.symbolic_law(
+            "ObjectConnectorSpringDamper",
+            law,
+            lambda stretch, rate, _: law.tension(stretch, rate, SYMBOLIC).total,
+        )
+
+    own = [settings(at_section(net, k)) for k in range(len(nodes))]
     each, free = at_section(net, np.arange(len(nodes))), net.neutral_length
     pairs = [(hub, node) for node in nodes]
-    return _strings(model, pairs, lambda s, rate: each.tension(s - free, rate), free, settings)
-
-
-def _string_settings(model: Multibody, net: Net) -> dict[str, Any]:
-    if net.two_sided:
-        return {"stiffness": net.stiffness, "damping": net.damping}
-    return symbolic_law(
-        model.assembly,
-        "ObjectConnectorSpringDamper",
-        net,
-        lambda stretch, rate, _: net.tension(stretch, rate, SYMBOLIC).total,
-    )
+    return _strings(model, pairs, lambda s, rate: each.tension(s - free, rate), free, own)
 
 
 def _strings(
@@ -184,14 +237,9 @@ def _strings(
     free_length: float,
     settings: Sequence[dict[str, Any]],
 ) -> Reacting:
-    """Springs with dampers along the lines between pairs of nodes.
+    """Springs with dampers along the lines between pairs of nodes, with exudyn's settings of each.
 
-    Parameters
-    ----------
-    law
-        Reaction to the lengths (m) and their rates (m/s).
-    settings
-        exudyn's of each.
+    ``law`` is the reaction to the lengths (m) and their rates (m/s).
     """
     system = model.assembly.system
     for pair, own in zip(pairs, settings, strict=True):
@@ -218,8 +266,7 @@ def _contact(model: Multibody, contact: Contact) -> Reacting:
         system.AddMarker(item.MarkerNodeCoordinate(nodeNumber=end, coordinate=contact.axis))
         for end in (system.AddNode(item.NodePointGround()), node)
     ]
-    settings = symbolic_law(
-        model.assembly,
+    settings = model.assembly.symbolic_law(
         "ObjectConnectorCoordinateSpringDamper",
         law,
         lambda moved, rate, room: -law.push(room - moved, -rate, SYMBOLIC).total,

@@ -9,16 +9,14 @@ from typing import Any
 
 import exudyn as exu
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.state import ChainState
+from ringsim.engine.assembly import Assembly
 from ringsim.engine.build import Built, build
-from ringsim.engine.energy import EnergyMeter
-from ringsim.engine.predictor import Predictor
+from ringsim.engine.meters import BendingMeter, EnergyMeter, StressMeter
 from ringsim.engine.readings import Openings, State, joint_groups
-from ringsim.engine.scales import residual_tolerance, scales_of
-from ringsim.engine.settings import raise_own, solver_settings
-from ringsim.engine.stress import BendingMeter, StressMeter
+from ringsim.engine.rotations import Array
+from ringsim.engine.settings import residual_tolerance, scales_of, solver_settings
 from ringsim.layout.halves import halves
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
@@ -28,7 +26,6 @@ from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
 from ringsim.variables import Cause, Outcome, Reason
 
-Array = NDArray[np.float64]
 _REFUSE = 10.0
 """Error that makes exudyn repeat a step; its tolerance is 1."""
 
@@ -54,18 +51,15 @@ class Integration:
         self._openings = Openings(model)
         self._energy = EnergyMeter(built)
         self._stress = StressMeter(model) if scene.record.stress else None
-        structure = scene.structure
+        gauge = scene.structure.gauge
+        self._bending = BendingMeter(model, gauge) if gauge else None
         coordinates = {"rod": np.array(list(halves(model.layout)))}
-        self._bending: BendingMeter | None = None
-        if structure.gauge:
-            self._bending = BendingMeter(model, structure.gauge)
+        if self._bending is not None:
             coordinates["station"] = self._bending.stations
         self._gaps = joint_groups(model)
-        self._state.refresh()
         angles = self._openings.read(self._state)[0]
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
         self._locks = Locks(angles, stowed) if scene.structure.locks else None
-        self._latched = np.zeros(angles.shape, dtype=bool)
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
@@ -80,20 +74,23 @@ class Integration:
 
     def run(self) -> Recorder:
         """Integrate until all V-joints have locked and settled, or to the end time."""
-        history, solver, control = self.history, self._solver, self._control
-        predictor = Predictor(self._built.model.assembly, solver)
-        solver.SetUserFunctionUpdateCurrentTime(self._system, self._update_time)
-        self._system.SetPostStepUserFunction(self._after_step)
-        self._system.SetPreNewtonResidualUserFunction(predictor.apply)
+        history, solver, control, system = self.history, self._solver, self._control, self._system
+        solver.SetUserFunctionUpdateCurrentTime(system, self._update_time)
+        system.SetPostStepUserFunction(self._after_step)
+        predictor = _Predictor(self._built.model.assembly, solver)
+        system.SetPreNewtonResidualUserFunction(predictor.apply)
         if self._scene.solver.step_control == "motion":
             self._settings.timeIntegration.discontinuous.ignoreMaxIterations = False
-            self._system.SetPostNewtonUserFunction(self._weigh)
+            system.SetPostNewtonUserFunction(self._weigh)
         cause = "it stopped before the end"  # exudyn may give up without raising
         try:
-            if control.goes_on and solver.InitializeSolver(self._system, self._settings):
-                solver.SolveSteps(self._system, self._settings)
+            if control.goes_on and solver.InitializeSolver(system, self._settings):
+                solver.SolveSteps(system, self._settings)
         except exu.ExudynError as error:
-            raise_own(error, self._refusal())
+            # What our own functions raise is no failure of the solver, as exudyn calls it: smaller
+            # steps would not help.  Cables that have no answer say so in this way, too.
+            if "USER FUNCTION" in str(error) and not self._refusal():
+                raise RuntimeError(" ".join(str(error).split())) from error
             cause = _detail(str(error))
         if control.goes_on:
             control.fail(self._refusal() or cause)
@@ -102,20 +99,18 @@ class Integration:
         history.repeats = control.repeats
         history.newton_iterations = int(solver.it.newtonStepsCount)
         history.jacobians = int(solver.it.newtonJacobiCount)
-        self._close()
+        # exudyn keeps the callbacks, and they keep the system that they were given to.  Such a
+        # circle through C++ is invisible to Python's garbage collector: unless it is cut, every
+        # run leaves its system behind (10 MB for a ring of 18 sections, 20 MB with cables).
+        solver.SetUserFunctionUpdateCurrentTime(system, lambda *_: None)
+        system.SetPostStepUserFunction(0)
+        system.SetPreNewtonResidualUserFunction(0)
+        system.SetPostNewtonUserFunction(0)
         return history
 
-    def _close(self) -> None:
-        """Take the callbacks away.
-
-        exudyn keeps them, and they keep the system that they were given to.  Such a circle through
-        C++ is invisible to Python's garbage collector: unless it is cut, every run leaves its
-        system behind (10 MB for a ring of 18 sections, 20 MB with cables).
-        """
-        self._solver.SetUserFunctionUpdateCurrentTime(self._system, lambda *_: None)
-        self._system.SetPostStepUserFunction(0)
-        self._system.SetPreNewtonResidualUserFunction(0)
-        self._system.SetPostNewtonUserFunction(0)
+    def _refusal(self) -> str:
+        """What the cables could not answer, if that is why a step failed."""
+        return "" if self._built.cables is None else self._built.cables.refusal
 
     def _update_time(self, solver: Any, system: Any, settings: Any) -> None:
         """Set the step: the next one, or the reduced one of a retry."""
@@ -123,10 +118,9 @@ class Integration:
         if self._fresh:
             solver.it.currentStepSize = control.next_step(self._built.faults.next_time)
             self._fresh = False
-            if cables is not None and self._chain is not None and self._scene.cables is not None:
-                now, present = control.now, self._scene.cables.present()
-                slope = self._scene.structure.path_slope
-                slopes = [slope(cable, now.angles[plane]) for plane, cable in present]
+            if cables is not None and self._chain is not None:
+                now, slope = control.now, self._scene.structure.path_slope
+                slopes = [slope(cable, now.angles[plane]) for plane, cable in cables.present]
                 cables.advance(now.time, self._chain, np.array(slopes))
         else:
             solver.it.currentStepSize = control.retry(solver.it.currentStepSize)
@@ -157,7 +151,7 @@ class Integration:
         found = self._weighed or self._measure(time)
         goes_on = self._control.accept(found, self._read(found))
         if self._locks is not None and self._built.stops is not None:
-            self._latched = self._built.stops.latch(self._locks.deployed)
+            self._built.stops.latch(self._locks.deployed)
         return goes_on
 
     def _read(self, now: Instant) -> Instant:
@@ -172,12 +166,12 @@ class Integration:
             energies = after.energies._replace(lost=lost, driven=now.energies.driven)
             now = after._replace(energies=energies)
         self._energy.keep()
-        cables = self._scene.cables
+        cables = self._built.cables
         self.history.note(
             Reading(
                 *now[:5],
                 chain=self._chain,
-                planes=() if cables is None else tuple((plane,) for plane, _ in cables.present()),
+                planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
                 stress=None if self._stress is None else self._stress.read(),
                 strain=None if self._bending is None else self._bending.read(),
             )
@@ -195,10 +189,56 @@ class Integration:
         tensions = None if self._chain is None else self._chain.tensions
         return Instant(time, angles, rates, energies, gap, tensions)
 
-    def _refusal(self) -> str:
-        """What the cables could not answer, if that is why a step failed."""
-        cables = self._built.cables
-        return "" if cables is None else cables.refusal
+
+class _Predictor:
+    """Start Newton from the acceleration of the last step instead of zero acceleration.
+
+    exudyn starts a step with zero acceleration at its end, which is off by h^2 beta a in the
+    positions; with stiff rods that costs Newton iterations.  Moving the guess along the
+    integrator's own update (a, h gamma a*, h^2 beta a*), a* = a (1 - alpha_f) / (1 - alpha_m),
+    changes where Newton starts, not what it converges to.  The acceleration is the difference
+    quotient of the velocities, which is smoother than the integrator's own.  Euler parameters are
+    brought back to unit length: their second-order growth would stretch the stiff rods.
+    """
+
+    def __init__(self, assembly: Assembly, solver: Any) -> None:
+        self._data, self._solver = assembly.system.systemData, solver
+        self._dampers = assembly.dampers
+        self._turns = np.array([assembly.coordinates_of(n)[3:7] for n in assembly.rigid_nodes])
+        reference = np.array(self._data.GetODE2Coordinates(exu.ConfigurationType.Reference))
+        self._unturned = reference[self._turns]
+        self._time = -1.0
+        self._last: tuple[float, Array] | None = None
+
+    def apply(self, system: Any, time: float, newton: int, discontinuous: int) -> None:
+        """Called by exudyn before every residual; acts once per step, before the first.
+
+        The rods' dampers come first: they read the state that the step starts from.
+        """
+        self._dampers.prepare(system, time, newton, discontinuous)
+        if newton != 0 or discontinuous != 0 or time == self._time:
+            return
+        self._time = time
+        data, solver, last = self._data, self._solver, self._last
+        start = data.GetSystemStateDict(exu.ConfigurationType.StartOfStep, reference=True)
+        begin = data.GetTime(exu.ConfigurationType.StartOfStep)
+        guess = np.array(start["ODE2Coords_tt"])
+        if last is None or begin > last[0]:
+            self._last = begin, np.array(start["ODE2Coords_t"])
+            if last is not None:
+                guess = (self._last[1] - last[1]) / (begin - last[0])
+        step = solver.it.currentStepSize
+        smooth = (1.0 - solver.alphaF) / (1.0 - solver.alphaM)
+        now = data.GetSystemStateDict(reference=True)
+        place = now["ODE2Coords"]
+        moved = step**2 * solver.newmarkBeta * smooth * guess
+        turned = (place + moved)[self._turns] + self._unturned
+        stretch = 1.0 / np.linalg.norm(turned, axis=1) - 1.0
+        moved[self._turns] += stretch[:, None] * turned
+        guess = moved / (step**2 * solver.newmarkBeta * smooth)
+        place[:] += moved
+        now["ODE2Coords_t"][:] += step * solver.newmarkGamma * smooth * guess
+        now["ODE2Coords_tt"][:] += guess
 
 
 def _detail(message: str) -> str:

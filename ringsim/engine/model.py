@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
 import exudyn.itemInterface as item
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.engine.assembly import Assembly
-from ringsim.engine.rods import BuiltRod, Formulation, add_rod
+from ringsim.engine.rods import FORMULATIONS, BuiltRod, add_rod
+from ringsim.engine.rotations import Array
 from ringsim.layout import joints as parts
 from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod
 from ringsim.layout.layout import Layout
@@ -19,7 +20,6 @@ from ringsim.layout.pose import Pose, cross
 from ringsim.scene import Scene
 from ringsim.theory.one_coordinate import OneCoordinate
 
-Array = NDArray[np.float64]
 _JOINTS: dict[str, Any] = {
     "revolute": item.ObjectJointRevoluteZ,
     "prismatic": item.ObjectJointPrismaticX,
@@ -53,18 +53,19 @@ class Multibody:
         In the order of the layout.
     """
 
-    def __init__(self, scene: Scene, formulation: Formulation) -> None:
-        self.scene, self.formulation, self.layout = scene, formulation, layout_of(scene)
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.layout = scene, layout_of(scene)
+        self.formulation = formulation = FORMULATIONS[type(scene.rods)]
         self.assembly = assembly = Assembly()
-        start = _Start(scene, self.layout)
+        started = _started(scene, self.layout)
         self.bodies: list[tuple[Any, Any]] = []
         for body in self.layout.bodies:
-            node = assembly.add_rigid_node(start.of(body.pose))
+            node = assembly.add_rigid_node(started(body.pose))
             number = assembly.add_body(node, body.mass, body.inertia, body.centre)
             self.bodies.append((number, node))
         self.rods: list[BuiltRod] = []
         for part in self.layout.rods:
-            poses = [start.of(part.station(share)) for share in part.stations]
+            poses = [started(part.station(share)) for share in part.stations]
             rod = add_rod(assembly, formulation, part, poses, scene.rods)
             self.rods.append(rod)
             for station, mass in part.masses:
@@ -112,22 +113,21 @@ class Multibody:
         return self.assembly.node_marker(node)
 
 
-class _Start:
-    """Accelerations of the structure with rigid rods, released at rest.
+def _started(scene: Scene, layout: Layout) -> Callable[[Pose], Pose]:
+    """Gives poses accelerations, those of the structure with rigid rods released at rest, in place
+    of their derivatives.
 
     One with springs of its own starts without: it rests against them on its cables.
     """
+    pull, velocity, rotation = 0.0, np.zeros(3), np.zeros(3)
+    if not layout.springs:
+        ideal, q = OneCoordinate(scene), scene.structure.coordinate
+        motion = ideal.motion(q)
+        pull = ideal.work_rate(q) / motion.inertia
+        velocity, rotation = motion.velocity, motion.rotation
 
-    def __init__(self, scene: Scene, layout: Layout) -> None:
-        self._pull, self._velocity, self._rotation = 0.0, np.zeros(3), np.zeros(3)
-        if not layout.springs:
-            ideal, q = OneCoordinate(scene), scene.structure.coordinate
-            motion = ideal.motion(q)
-            self._pull = ideal.work_rate(q) / motion.inertia
-            self._velocity, self._rotation = motion.velocity, motion.rotation
+    def started(pose: Pose) -> Pose:
+        moving = pose.rate - velocity - cross(rotation, pose.place)
+        return Pose(pose.place, pose.axes, pull * moving, pull * (pose.turn - rotation))
 
-    def of(self, pose: Pose) -> Pose:
-        """A pose with its accelerations in place of its derivatives."""
-        moving = pose.rate - self._velocity - cross(self._rotation, pose.place)
-        turning = pose.turn - self._rotation
-        return Pose(pose.place, pose.axes, self._pull * moving, self._pull * turning)
+    return started

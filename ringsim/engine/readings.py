@@ -8,16 +8,11 @@ from typing import Any
 
 import exudyn as exu
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.engine.model import BuiltJoint, Multibody
-from ringsim.engine.rods import NodeFrames
-from ringsim.engine.rods_geometrically_exact import GeometricallyExact
-from ringsim.engine.rotations import axes_of, spin
+from ringsim.engine.rods import GeometricallyExact, NodeFrames
+from ringsim.engine.rotations import Array, Indices, axes_of, spin
 from ringsim.layout.joints import ChordOpening
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 class State:
@@ -26,8 +21,7 @@ class State:
     def __init__(self, model: Multibody) -> None:
         self._data = model.assembly.system.systemData
         self.reference = np.array(self._data.GetODE2Coordinates(exu.ConfigurationType.Reference))
-        self.position = self.reference
-        self.velocity = np.zeros_like(self.reference)
+        self.refresh()
 
     def refresh(self) -> None:
         """Copy exudyn's current state."""
@@ -39,15 +33,16 @@ class State:
         return bool(np.isfinite(self.position).all() and np.isfinite(self.velocity).all())
 
 
-class Side:
-    """One side of some joints: places and frames of n mounts on nodes of one kind."""
+class _Side:
+    """One side of joints whose mounts there are on nodes of one kind."""
 
-    def __init__(self, model: Multibody, nodes: list[Any], arms: list[Array]) -> None:
-        found = [model.assembly.coordinates_of(node) for node in nodes]
+    def __init__(self, model: Multibody, joints: list[BuiltJoint], side: int) -> None:
+        found = [model.assembly.coordinates_of(joint.nodes[side]) for joint in joints]
+        arms = np.array([joint.arms[side] for joint in joints])
         self._where = np.array(found)
         rigid = len(found[0]) == 7
         self._read = GeometricallyExact().read if rigid else model.formulation.read
-        self._arms = np.array(arms) if rigid and np.any(arms) else None
+        self.arms = arms if rigid and arms.any() else None
 
     def frames(self, state: State) -> NodeFrames:
         """Frames of the nodes."""
@@ -59,11 +54,11 @@ class Side:
         return np.asarray(np.sum(spin(place[:, 3:7], rates[:, 3:7]) * axes, axis=1))
 
     def points(self, state: State) -> Array:
-        """Places, shape (n, 3), m."""
+        """Places of the mounts, shape (n, 3), m."""
         nodes = state.position[self._where]
-        if self._arms is None:
+        if self.arms is None:
             return np.array(nodes[:, :3])
-        turned = np.einsum("nij,nj->ni", axes_of(nodes[:, 3:7]), self._arms)
+        turned = np.einsum("nij,nj->ni", axes_of(nodes[:, 3:7]), self.arms)
         return np.asarray(nodes[:, :3] + turned)
 
 
@@ -71,10 +66,7 @@ class JointGroup:
     """Joints of one family, read together."""
 
     def __init__(self, model: Multibody, joints: list[BuiltJoint]) -> None:
-        self._first, self._second = (
-            Side(model, [j.nodes[k] for j in joints], [j.arms[k] for j in joints]) for k in (0, 1)
-        )
-        self._bodies = any(np.any(joint.arms[1]) for joint in joints)
+        self._first, self._second = (_Side(model, joints, side) for side in (0, 1))
 
     def turn(self, state: State) -> tuple[Array, Array]:
         """Angle in (-pi, pi] from the first rods' frames to the second's about z, and its rate."""
@@ -86,7 +78,9 @@ class JointGroup:
     def rate(self, state: State) -> Array:
         """Relative angular rate about the joint axis, rad/s."""
         rod, second = self._first.frames(state), self._second
-        other = second.spin_about(state, rod.z) if self._bodies else second.frames(state).spin
+        # A second side with arms is on bodies, whose own z is not the joint's axis.
+        bodies = second.arms is not None
+        other = second.spin_about(state, rod.z) if bodies else second.frames(state).spin
         return np.asarray(other - rod.spin)
 
     def gaps(self, state: State) -> Array:

@@ -31,13 +31,10 @@ from typing import Any, NamedTuple
 import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-_SHIFT = exu.OutputVariableType.DisplacementLocal
-_TURN = exu.OutputVariableType.Rotation
-_VELOCITY = exu.OutputVariableType.VelocityLocal
-_SPIN = exu.OutputVariableType.AngularVelocityLocal
+from ringsim.engine.rotations import Array
+
+_KIND = exu.OutputVariableType
 _SHORT = 0.25
 """Steps below this share of tau take velocities: the spring is 1.5 / 0.25 times as stiff as the rod
 there, which ``STIFFENING`` allows for."""
@@ -45,8 +42,11 @@ STIFFENING = 1.0 + 1.5 / _SHORT
 """Largest stiffness of a rod with its damper over that of the rod alone; 3/2 is a0 h of BDF2."""
 
 
-class _Reading(NamedTuple):
-    """Time (s), strains, their rates and the forces of all dampers, shape (dampers, 6)."""
+class Reading(NamedTuple):
+    """Time (s), strains, their rates and the forces of all dampers, shape (dampers, 6).
+
+    These are forces and moments in the elements' middles, tension positive, N and N m.
+    """
 
     time: float
     strains: Array
@@ -63,38 +63,31 @@ class RodDampers:
     numbers
         Damper of each damped element, by the element's number.
     latest
-        Forces and moments in the elements' middles at the last reading, tension positive, N and
-        N m, shape (dampers, 6).
+        The last reading.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, system: Any) -> None:
+        self._system = system
         self.numbers: dict[int, int] = {}
-        self.latest = np.zeros((0, 6))
+        none = np.zeros((0, 6))
+        self.latest = Reading(-1.0, none, none, none, by_velocity=False)
         self._dampers: list[Any] = []
         self._matrices: list[Array] = []
         self._short = 0.0
         self._past: list[tuple[float, Array]] = []
         self._prepared = (-1.0, -1.0)
-        self._lead = 0.0
-        self._offsets = np.zeros(6)
-        self._by_velocity = False
-        self._found: _Reading | None = None
-        self._kept: _Reading | None = None
+        self._lead, self._offsets, self._by_velocity = 0.0, np.zeros(6), False
+        self._kept: Reading | None = None
 
-    def add(self, system: Any, markers: list[Any], damping: Array, relaxation: float) -> int:
+    def add(self, markers: list[Any], damping: Array, relaxation: float) -> int:
         """A damper between two markers that coincide; returns its row in ``latest``.
 
-        Parameters
-        ----------
-        damping
-            C, shape (6, 6), N s/m and N m s.
-        relaxation
-            The rod's Kelvin-Voigt time tau, s.
+        ``damping`` is C, shape (6, 6), N s/m and N m s, and ``relaxation`` the rod's tau, s.
         """
         damper = item.ObjectConnectorRigidBodySpringDamper(
             markerNumbers=markers, useIntrinsicFormulation=True
         )
-        self._dampers.append(system.AddObject(damper))
+        self._dampers.append(self._system.AddObject(damper))
         self._matrices.append(damping)
         self._short = max(self._short, _SHORT * relaxation)
         return len(self._dampers) - 1
@@ -109,62 +102,59 @@ class RodDampers:
         self._prepared = start, time
         if not self._past or start > self._past[-1][0]:
             # By now exudyn has moved the current state on: only a reading knows the start's.
-            if self._found is None or self._found.time != start:
+            if self.latest.time != start:
                 raise RuntimeError(f"the rods' dampers were not read at {start:.9g} s")
-            self._past = [*self._past[-1:], (start, self._found.strains)]
+            self._past = [*self._past[-1:], (start, self.latest.strains)]
         matrices, by_velocity = np.array(self._matrices), time - start < self._short
         if by_velocity != self._by_velocity:
             self._by_velocity = by_velocity
-            self._intrinsic(system, wanted=not by_velocity)
-            self._set(system, "stiffness", np.zeros_like(matrices))
-            self._set(system, "damping", by_velocity * matrices)
+            self._intrinsic(wanted=not by_velocity)
+            self._set("stiffness", np.zeros_like(matrices))
+            self._set("damping", by_velocity * matrices)
         if not by_velocity:
             self._lead, self._offsets = _difference(time, self._past)
-            self._set(system, "stiffness", self._lead * matrices)
-            self._set(system, "offset", self._offsets)
+            self._set("stiffness", self._lead * matrices)
+            self._set("offset", self._offsets)
 
-    def lost(self, system: Any, time: float) -> float:
+    def lost(self, time: float) -> float:
         """Energy taken since the reading that was kept last, J: mean force times change of strain.
 
-        Parameters
-        ----------
-        time
-            Of the current state, s, which ends the step that was prepared last.
+        ``time`` is that of the current state, s, which ends the step that was prepared last.
         """
         if not self._dampers:
             return 0.0
         if self._by_velocity:
-            rates = self._outputs(system, _VELOCITY, _SPIN)
-            self._intrinsic(system, wanted=True)
-        strains = self._outputs(system, _SHIFT, _TURN)
+            rates = self._outputs(_KIND.VelocityLocal, _KIND.AngularVelocityLocal)
+            self._intrinsic(wanted=True)
+        strains = self._outputs(_KIND.DisplacementLocal, _KIND.Rotation)
         if self._by_velocity:
-            self._intrinsic(system, wanted=False)
+            self._intrinsic(wanted=False)
         else:
             rates = self._lead * (strains - self._offsets)
         before = self._kept
-        self.latest = np.einsum("nij,nj->ni", np.array(self._matrices), rates)
-        self._found = _Reading(time, strains, rates, self.latest, self._by_velocity)
+        forces = np.einsum("nij,nj->ni", np.array(self._matrices), rates)
+        self.latest = Reading(time, strains, rates, forces, self._by_velocity)
         if before is None:
             return 0.0
         moved = strains - before.strains
         if before.by_velocity and self._by_velocity:
             # The rates that the forces are made of balance an impact twice as well.
             moved = 0.5 * (time - before.time) * (before.rates + rates)
-        return 0.5 * float(np.sum((before.forces + self.latest) * moved))
+        return 0.5 * float(np.sum((before.forces + forces) * moved))
 
     def keep(self) -> None:
         """Count what is lost from the last reading on."""
-        self._kept = self._found
+        self._kept = self.latest
 
-    def _intrinsic(self, system: Any, *, wanted: bool) -> None:
-        self._set(system, "useIntrinsicFormulation", [wanted] * len(self._dampers))
+    def _intrinsic(self, *, wanted: bool) -> None:
+        self._set("useIntrinsicFormulation", [wanted] * len(self._dampers))
 
-    def _set(self, system: Any, name: str, values: Sequence[Any] | Array) -> None:
+    def _set(self, name: str, values: Sequence[Any] | Array) -> None:
         for damper, value in zip(self._dampers, values, strict=True):
-            system.SetObjectParameter(damper, name, value)
+            self._system.SetObjectParameter(damper, name, value)
 
-    def _outputs(self, system: Any, shift: Any, turn: Any) -> Array:
-        output = system.GetObjectOutput
+    def _outputs(self, shift: Any, turn: Any) -> Array:
+        output = self._system.GetObjectOutput
         return np.array([[*output(d, shift), *output(d, turn)] for d in self._dampers])
 
 

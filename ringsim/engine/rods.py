@@ -1,20 +1,21 @@
-"""Building rods: one function a formulation, found by the kind of the scene's rods."""
+"""Rods as chains of beam elements, in the formulation of the scene's kind of rods."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import exudyn as exu
+import exudyn.itemInterface as item
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.engine.assembly import Assembly
+from ringsim.engine.rotations import Array, axes_of, spin
 from ringsim.layout import bodies as parts
 from ringsim.layout.pose import Pose
+from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
-
-Array = NDArray[np.float64]
+from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 
 
 class BuiltRod(NamedTuple):
@@ -35,25 +36,96 @@ class NodeFrames(NamedTuple):
     spin: Array
 
 
-class Formulation(Protocol):
-    """What a rod formulation must offer."""
+class GeometricallyExact:
+    """Geometrically exact beams of constant strain on nodes with Euler parameters."""
 
-    has_strains: bool
-    """Whether exudyn reports strains, forces and moments of its elements."""
-    constant_curvature: bool
+    has_strains = True
+    """Whether exudyn reports strains, forces and moments of the elements."""
+    constant_curvature = True
     """Whether the curvature is constant in an element."""
 
     def add_node(self, assembly: Assembly, pose: Pose) -> Any:
-        """A node of this formulation; as for ``Assembly.add_rigid_node``."""
+        """A node at a pose; as for ``Assembly.add_rigid_node``."""
+        return assembly.add_rigid_node(pose)
 
     def add_element(self, assembly: Assembly, nodes: list[Any], length: float, section: Any) -> Any:
-        """An element between two nodes."""
+        """Exudyn's ObjectBeamGeometricallyExact, and a damper if the section is damped.
+
+        exudyn's element takes no damping and says nothing of it.  Its strains are constant, so
+        damping C eps_dot is a damper C / L between its ends' frames moved to its middle, where
+        they coincide (``ringsim.engine.rod_dampers``).
+        """
+        damping = np.array(section.dampingMatrix) / length
+        if damping.any():
+            middle = np.array([0.5 * length, 0.0, 0.0])
+            markers = [
+                assembly.body_marker(assembly.add_body(node, 0.0, np.zeros((3, 3))), arm)
+                for node, arm in zip(nodes, (middle, -middle), strict=True)
+            ]
+            tau = float(section.dampingMatrix[0][0] / section.stiffnessMatrix[0][0])
+            number = assembly.dampers.add(markers, damping, tau)
+        element = assembly.system.AddObject(
+            item.ObjectBeamGeometricallyExact(nodeNumbers=nodes, length=length, sectionData=section)
+        )
+        if damping.any():
+            assembly.dampers.numbers[int(element)] = number
+        return element
 
     def add_mass(self, assembly: Assembly, node: Any, mass: float) -> None:
-        """A point mass at a node."""
+        """A body without inertia of its own: the beam lends the node its rotary inertia."""
+        assembly.add_body(node, mass, np.zeros((3, 3)))
 
     def read(self, coordinates: Array, rates: Array) -> NodeFrames:
-        """Frames of nodes from their total coordinates and rates, shape (n, coordinates)."""
+        """Frames of nodes from their total coordinates and rates, shape (n, 7)."""
+        turned = coordinates[:, 3:7]
+        axes, spins = axes_of(turned), spin(turned, rates[:, 3:7])
+        z = axes[:, :, 2]
+        return NodeFrames(axes[:, :, 1], z, np.sum(spins * z, axis=1))
+
+
+class Ancf:
+    """The papers' beams: absolute nodal coordinates, 9 a node with two slope vectors.
+
+    Attributes and methods are those of ``GeometricallyExact``.
+    """
+
+    has_strains = False
+    constant_curvature = False
+
+    def add_node(self, assembly: Assembly, pose: Pose) -> Any:
+        """A node with position and the slope vectors along y and z."""
+        y, z = pose.axes[:, 1], pose.axes[:, 2]
+        return assembly.add_node(
+            item.NodePointSlope23(referenceCoordinates=[*pose.place, *y, *z]),
+            np.concatenate([pose.rate, np.cross(pose.turn, y), np.cross(pose.turn, z)]),
+        )
+
+    def add_element(self, assembly: Assembly, nodes: list[Any], length: float, section: Any) -> Any:
+        """Exudyn's ObjectANCFBeam."""
+        return assembly.system.AddObject(
+            item.ObjectANCFBeam(nodeNumbers=nodes, length=length, sectionData=section)
+        )
+
+    def add_mass(self, assembly: Assembly, node: Any, mass: float) -> None:
+        """A mass matrix that acts on the node's position alone."""
+        matrix = np.diag([*[mass] * 3, *[0.0] * 6])
+        body = item.ObjectGenericODE2(nodeNumbers=[node], massMatrix=matrix)
+        assembly.bodies.append(assembly.system.AddObject(body))
+
+    def read(self, coordinates: Array, rates: Array) -> NodeFrames:
+        """The spin is that of the slope along y about the one along z; shape (n, 9)."""
+        y, z = coordinates[:, 3:6], coordinates[:, 6:9]
+        length = np.linalg.norm(y, axis=1)
+        normal = z / np.linalg.norm(z, axis=1)[:, None]
+        spin = np.sum(np.cross(y, rates[:, 3:6]) * normal, axis=1) / length**2
+        return NodeFrames(y / length[:, None], normal, spin)
+
+
+Formulation = GeometricallyExact | Ancf
+FORMULATIONS: dict[type[Rods], Formulation] = {
+    GeometricallyExactRods: GeometricallyExact(),
+    AncfRods: Ancf(),
+}
 
 
 def beam_section(rods: Rods, part: parts.Rod, constant_over: float) -> Any:

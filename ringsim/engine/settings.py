@@ -1,21 +1,30 @@
-"""Settings of exudyn's solver that all structures share."""
+"""Settings of exudyn's solver, and reference numbers of a structure for the control of its run."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import exudyn as exu
+import numpy as np
 
+from ringsim.engine.build import Built
+from ringsim.engine.model import Multibody
+from ringsim.engine.rod_dampers import STIFFENING
+from ringsim.layout.bodies import OnRod
+from ringsim.layout.joints import JointOpening
+from ringsim.parts.persection import spread
 from ringsim.scene import Scene
+from ringsim.stepping.instant import Scales
+from ringsim.theory.one_coordinate import OneCoordinate
+
+_SLIGHT = 1e-3
+"""Energy that does not matter, over the largest force of a structure's springs along a rod."""
 
 
 def solver_settings(scene: Scene, tolerance: float) -> Any:
-    """Generalised-alpha with modified Newton; the step is set by a user function.
-
-    Parameters
-    ----------
-    tolerance
-        Residual norm at which Newton stops, N.
+    """Generalised-alpha with modified Newton, which stops at a residual norm ``tolerance`` (N); the
+    step is set by a user function.
     """
     settings = exu.SimulationSettings()
     settings.solution.file.write = False
@@ -39,16 +48,72 @@ def solver_settings(scene: Scene, tolerance: float) -> Any:
     return settings
 
 
-def raise_own(error: Exception, refusal: str) -> None:
-    """Raise again what one of our own functions raised inside exudyn, which calls it a failure of
-    the solver; smaller steps would not help.
+def scales_of(built: Built) -> Scales:
+    """What the ideal structure, as stowed, the stops and the cables say before a run."""
+    model, scene, structure = built.model, built.model.scene, built.model.scene.structure
+    angles, rates = model.layout.opening_angles()
+    travel, per_angle = math.pi - float(angles.mean()), float(rates.mean())
+    ideal, start = OneCoordinate(scene), structure.coordinate
+    folding = ideal.motion(start).inertia
+    acceleration = per_angle * (ideal.work_rate(start) / folding)
+    inertia = folding / per_angle**2
+    # The mean rate if the first acceleration lasted, at least that of the longest run.
+    rate = max(math.sqrt(0.5 * abs(acceleration) * travel), travel / scene.solver.end_time)
+    # Springs of its own set their own scale: what they would do along a rod.
+    pushed = _SLIGHT * structure.push * structure.reach
+    energy = pushed or 0.5 * inertia * rate**2
+    found = Scales(rate, energy, travel, structure.reach, contact_step=_contact_step(model))
+    if built.cables is None:
+        return found
+    cables, lengths = built.cables.present, np.abs(built.cables.ropes.content)
+    widths = np.array([cable.slack_width for _, cable in cables])
+    stiffness = sum(
+        cable.axial_stiffness / float(length) * structure.path_slope(cable, angles[plane]) ** 2
+        for (plane, cable), length in zip(cables, lengths, strict=True)
+    )
+    return found._replace(
+        first_step=_swing_step(inertia, stiffness, 50),
+        slack_tension=float(widths.max()),
+        slack_energy=0.1 * float(np.sum(widths * lengths)),
+    )
 
-    Parameters
-    ----------
-    error
-        What exudyn raised.
-    refusal
-        What the cables could not answer; they say so by an exception that is none of these.
+
+def _swing_step(inertia: float, stiffness: float, steps: int) -> float:
+    """Step in s that takes so many to the period 2 pi sqrt(I / k) of a swing (kg m^2, N m/rad).
+
+    20 for a bounce on a stop: the period is right to (w h)^2 / 12 = 0.8 %.  50 for ropes: a winch
+    that starts at once throws the structure into its swing on them, often with the largest tension
+    of the run, and the first V-joint moves before the others, that is faster than the period says.
     """
-    if "USER FUNCTION" in str(error) and not refusal:
-        raise RuntimeError(" ".join(str(error).split())) from error
+    return 2.0 * math.pi * math.sqrt(inertia / stiffness) / steps
+
+
+def _contact_step(model: Multibody) -> float:
+    """Of the first V-joint with its two rods; infinite without stops or V-joints."""
+    opening, stop = model.layout.openings[0][0], model.scene.stop
+    if stop is None or not isinstance(opening, JointOpening):
+        return math.inf
+    joint, inertia = model.layout.joints[opening.joint], 0.0
+    for mount in (joint.first, joint.second):
+        if isinstance(mount, OnRod):
+            rod = model.layout.rods[mount.rod]
+            ends = sum(mass for _, mass in rod.masses)
+            inertia += (rod.mass / 3.0 + ends) * rod.length**2
+    return _swing_step(inertia, stop.stiffness, 20)
+
+
+def residual_tolerance(built: Built) -> float:
+    """Residual norm in N at which Newton stops: a share of the driving forces, but above what
+    round-off lets it reach, the rate EA / L of the stiffest element times coordinates of order 1 m.
+    """
+    scene, layout = built.model.scene, built.model.layout
+    drive = float(np.linalg.norm([force for _, force in layout.forces])) + scene.structure.push
+    if layout.net is not None:
+        net, springs = layout.net.law, len(layout.net.bodies)
+        drive += float(np.linalg.norm(spread(net.stiffness, springs))) * net.neutral_length
+    stiffest = max(rod.young_modulus * rod.tube.area / rod.lengths.min() for rod in layout.rods)
+    if scene.rods.damping > 0.0:
+        stiffest *= STIFFENING
+    size = built.model.assembly.system.systemData.ODE2Size()
+    reached = 4.0 * float(np.finfo(float).eps) * float(stiffest) * math.sqrt(size)
+    return max(scene.solver.newton_tolerance * drive, reached)

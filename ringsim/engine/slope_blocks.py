@@ -76,12 +76,8 @@ class HalfFrame:
 class PlacedBlocks:
     """Blocks at one instant, between a left and a right node each.
 
-    Parameters
-    ----------
-    slopes, rates
-        Slopes of the left and the right nodes and their rates, shape (2, blocks, 6).
-    sense, offset
-        Of ``BlockSheave``, shape (blocks, 1); m.
+    They are found from the nodes' slopes and their rates, shape (2, blocks, 6), and ``sense`` and
+    ``offset`` (m) of ``BlockSheave``, shape (blocks, 1).
 
     Attributes
     ----------

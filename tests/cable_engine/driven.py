@@ -112,7 +112,7 @@ class Bench:
 
     def force(self, place: Array, rates: Array, time: float = 0.0) -> Array:
         """Generalised forces that the solver sees, (nodes * 7,)."""
-        still = np.zeros(self.drive.auxiliary)
+        still = np.zeros(self.drive.pattern.unknowns)
         q = np.concatenate([(place - self.reference).ravel(), still])
         q_t = np.concatenate([rates.ravel(), still])
         return self.drive._force(None, time, 0, q, q_t)[: self.width]
@@ -140,7 +140,7 @@ class Bench:
         if whole:
             write_all(self.drive)
         entries = self.drive.pattern.triplets(state, placed, 1.0, by_rate)
-        size = self.width + self.drive.auxiliary
+        size = self.width + self.drive.pattern.unknowns
         matrix = np.zeros((size, size))
         np.add.at(matrix, (entries[:, 0].astype(int), entries[:, 1].astype(int)), entries[:, 2])
         own, rest = slice(None, self.width), slice(self.width, None)

@@ -105,7 +105,7 @@ def eliminated(own: CableDrive, place: Array, rates: Array, by_rate: float) -> A
     write_all(own)
     entries = own.pattern.triplets(state, placed, 1.0, by_rate)
     own_size = own.path.size
-    size = own_size + own.auxiliary
+    size = own_size + own.pattern.unknowns
     whole = np.zeros((size, size))
     np.add.at(whole, (entries[:, 0].astype(int), entries[:, 1].astype(int)), entries[:, 2])
     first, rest = slice(None, own_size), slice(own_size, None)

@@ -13,8 +13,7 @@ from scipy.integrate import quad, solve_ivp
 
 from law_cases import records
 from ringsim.choice import kinds_of
-from ringsim.engine.assembly import Assembly
-from ringsim.engine.laws import SYMBOLIC, TORSION, symbolic_law
+from ringsim.engine.assembly import SYMBOLIC, TORSION, Assembly
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.net import Net
@@ -64,7 +63,7 @@ LAWS = {
 def by_exudyn(law: Any, place: float, rate: float) -> float:
     """The law as exudyn evaluates it in a run."""
     assembly = Assembly()
-    setting = symbolic_law(assembly, TORSION, "law", lambda x, v, _: law(x, v, SYMBOLIC))
+    setting = assembly.symbolic_law(TORSION, "law", lambda x, v, _: law(x, v, SYMBOLIC))
     function = setting["springTorqueUserFunction"]
     return float(function.Evaluate(assembly.system, 0.0, 0, place, rate, 0.0, 0.0, 0.0))
 

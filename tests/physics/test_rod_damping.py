@@ -6,7 +6,7 @@ import pytest
 
 from ring_runs import Array, ring, run
 from ringsim.engine.assembly import Assembly
-from ringsim.engine.rods_geometrically_exact import GeometricallyExact
+from ringsim.engine.rods import GeometricallyExact
 from ringsim.layout.pose import Pose
 
 LENGTH, MASS, INERTIA, RELAXATION = 0.3, 1.0, 1e-2, 1e-3
@@ -59,7 +59,7 @@ def swing(
     rows: list[list[float]] = []
 
     def note(system: exu.MainSystem, time: float) -> bool:
-        assembly.dampers.lost(system, time)
+        assembly.dampers.lost(time)
         places = [np.array(system.GetNodeOutput(n, kind.Position)) for n in nodes]
         turns = [np.array(system.GetNodeOutput(n, kind.AngularVelocityLocal)) for n in nodes]
         reach = float(np.linalg.norm(places[1] - places[0]))
@@ -68,7 +68,7 @@ def swing(
 
     assembly.system.SetPostStepUserFunction(note)
     assembly.system.SetPreNewtonResidualUserFunction(assembly.dampers.prepare)
-    assembly.dampers.lost(assembly.system, 0.0)
+    assembly.dampers.lost(0.0)
     assembly.system.SolveDynamic(settings)
     table = np.array(rows)
     return table[:, 0], table[:, 1:]

@@ -7,8 +7,7 @@ import pytest
 
 from ring_runs import ring
 from ringsim.engine.assembly import Assembly
-from ringsim.engine.rods import add_rod
-from ringsim.engine.rods_geometrically_exact import GeometricallyExact
+from ringsim.engine.rods import GeometricallyExact, add_rod
 from ringsim.layout.bodies import Rod
 from ringsim.layout.pose import Pose
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods

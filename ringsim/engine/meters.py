@@ -1,0 +1,169 @@
+"""What is read of every state of a run: energies and their balance, stress and bending strain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import exudyn as exu
+import numpy as np
+
+from ringsim.cable.state import ChainState, work_between
+from ringsim.engine.assembly import Assembly
+from ringsim.engine.build import Built
+from ringsim.engine.model import Multibody
+from ringsim.engine.readings import State
+from ringsim.engine.rotations import Array
+from ringsim.layout.halves import halves
+from ringsim.stepping.instant import Energies
+
+_KINETIC = exu.OutputVariableType.KineticEnergy
+_POTENTIAL = exu.OutputVariableType.PotentialEnergy
+_KINDS = exu.OutputVariableType.ForceLocal, exu.OutputVariableType.TorqueLocal
+_Passing = tuple[float, Array, Array, ChainState | None]
+"""Time (s), damping forces (N, N m) and the rates that they resist (m/s, rad/s), cables."""
+
+
+class EnergyMeter:
+    """Measures the energies of a model.
+
+    Rods and bodies report theirs through exudyn; connectors, loads and losses are evaluated here.
+    What damping in the rods takes is read from their dampers; exudyn's slope-vector beams damp
+    inside and do not tell, so with damping their balance is unknown (NaN).
+    """
+
+    def __init__(self, built: Built) -> None:
+        model = built.model
+        self._assembly, self._connectors = model.assembly, built.connectors
+        self._output = model.assembly.system.GetObjectOutputBody
+        self._elements = [element for rod in model.rods for element in rod.elements]
+        nodes = [model.joints[joint].nodes[0] for joint, _ in model.layout.forces]
+        found = [model.assembly.coordinates_of(node)[:3] for node in nodes]
+        self._loaded = np.array(found, dtype=np.int64)
+        self._forces = np.array([force for _, force in model.layout.forces])
+        self._untold = model.scene.rods.damping > 0.0 and not model.formulation.has_strains
+        self._kept: _Passing | None = None
+        self._last: _Passing | None = None
+
+    def read(
+        self, time: float, state: State, angles: Array, rates: Array, chain: ChainState | None
+    ) -> Energies:
+        """Energies at the current state, and what passed since the one that was kept last.
+
+        Opening angles and their rates have the shape (planes, sections), rad and rad/s.
+        """
+        kinetic = sum(self._output(body, _KINETIC) for body in self._assembly.bodies)
+        elastic = sum(self._output(element, _POTENTIAL) for element in self._elements)
+        moved = (state.position - state.reference)[self._loaded]
+        forces, resisted = [np.zeros(0)], [np.zeros(0)]
+        for connector in self._connectors:
+            reaction, resisting = connector(state, angles, rates)
+            elastic += np.sum(reaction.stored)
+            forces.append(np.ravel(reaction.damping))
+            resisted.append(np.ravel(resisting))
+        if chain is not None:
+            elastic += chain.elastic_energy.sum()
+        self._last = time, np.concatenate(forces), np.concatenate(resisted), chain
+        driven, lost = self._passed(*self._last)
+        work = float(np.sum(self._forces * moved))
+        return Energies(float(kinetic), float(elastic), work, lost, driven)
+
+    def keep(self) -> None:
+        """Count from the last reading on."""
+        self._kept = self._last
+        self._assembly.dampers.keep()
+
+    def note(self) -> str:
+        """What a run's reason must add about its balance; empty if it is known."""
+        unknown = (
+            "; the energy balance is unknown, since slope-vector rods do not tell what their "
+            "damping takes: set rods.damping = 0 to have it"
+        )
+        return unknown if self._untold else ""
+
+    def _passed(
+        self, time: float, forces: Array, rates: Array, chain: ChainState | None
+    ) -> tuple[float, float]:
+        """Energy put in by the winches and lost, J: mean force times displacement.
+
+        The displacement of a damper is the mean of its rates times the step, which differs from
+        that of generalised-alpha by a hundredth of the rates' change over the step at most.
+        """
+        lost = math.nan if self._untold else self._assembly.dampers.lost(time)
+        driven = 0.0
+        if self._kept is not None:
+            begin, old_forces, old_rates, old_chain = self._kept
+            lost += 0.25 * (time - begin) * float((forces + old_forces) @ (rates + old_rates))
+            if chain is not None and old_chain is not None:
+                driven, lost_in_cables = work_between(old_chain, chain)
+                lost += lost_in_cables
+        return driven, lost
+
+
+class StressMeter:
+    """Stress |N| / A + |M| r / I of every rod half: the larger of its two ends.
+
+    exudyn gives the elastic moment in the middle of an element, the rods' dampers add what damping
+    carries there; along it the moment follows the shear force, dM_z/dx = -Q_y and dM_y/dx = Q_z.
+    """
+
+    def __init__(self, model: Multibody) -> None:
+        self._assembly = model.assembly
+        rows = [*halves(model.layout).values()]
+        self._shape = len(rows), len(rows[0]), 2
+        self._elements, numbers = [], []
+        for half in (half for row in rows for half in row):
+            part, elements = model.layout.rods[half.rod], model.rods[half.rod].elements
+            per_moment = 0.5 * part.tube.outer_diameter / part.tube.second_moment
+            for k, end in ((half.first, -0.5), (half.last - 1, 0.5)):
+                self._elements.append(elements[k])
+                numbers.append((end * part.lengths[k], part.tube.area, per_moment))
+        # Places of the outer ends from the elements' middles (m); by what force is divided (m^2)
+        # and moment multiplied (1/m^3) to give stress.
+        self._outside, self._area, self._per_moment = np.array(numbers).T
+        dampers = model.assembly.dampers.numbers
+        self._damped = [dampers[int(e)] for e in self._elements] if dampers else None
+
+    def read(self) -> Array:
+        """Stresses at the current state, shape (rod halves, sections), Pa."""
+        force, torque = _in_the_middle(self._assembly, self._elements)
+        if self._damped is not None:
+            carried = self._assembly.dampers.latest.forces[self._damped].T
+            force, torque = force + carried[:3], torque + carried[3:]
+        x = self._outside
+        moment = np.hypot(torque[1] + force[2] * x, torque[2] - force[1] * x)
+        stress = np.abs(force[0]) / self._area + moment * self._per_moment
+        return np.asarray(stress.reshape(self._shape).max(axis=2))
+
+
+class BendingMeter:
+    """Bending strain of a rod's outer fibre at its nodes, on the side of its y axis's negative.
+
+    Where two elements meet their moments differ by what turns the node alone; their mean counts.
+    ``stations`` are the nodes' distances from the rod's first end, m.
+    """
+
+    def __init__(self, model: Multibody, name: str) -> None:
+        number = next(k for k, rod in enumerate(model.layout.rods) if rod.name == name)
+        rod, self._elements = model.layout.rods[number], model.rods[number].elements
+        self._lengths = rod.lengths
+        self.stations = np.array(rod.stations) * rod.length
+        self._assembly = model.assembly
+        self._per_moment = (
+            0.5 * rod.tube.outer_diameter / (rod.young_modulus * rod.tube.second_moment)
+        )
+
+    def read(self) -> Array:
+        """Strains at the current state, shape (nodes,)."""
+        force, torque = _in_the_middle(self._assembly, self._elements)
+        change = 0.5 * force[1] * self._lengths
+        first, last = torque[2] + change, torque[2] - change
+        at_nodes = np.concatenate([first[:1], 0.5 * (first[1:] + last[:-1]), last[-1:]])
+        return np.asarray(-self._per_moment * at_nodes)
+
+
+def _in_the_middle(assembly: Assembly, elements: Sequence[Any]) -> list[Array]:
+    """Force (N) and moment (N m) of elements in their axes, shape (3, elements) each."""
+    output = assembly.system.GetObjectOutputBody
+    return [np.array([output(e, kind, [0.0] * 3) for e in elements]).T for kind in _KINDS]
