@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from ringsim.engine.laws import SYMBOLIC, TORSION, symbolic_law
 from ringsim.engine.model import Multibody
 from ringsim.engine.readings import JointGroup, State
+from ringsim.layout.layout import Contact, HubNet
 from ringsim.layout.pose import turned_about_z
-from ringsim.layout.springs import Contact, HubNet
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.net import Net

@@ -19,7 +19,6 @@ from ringsim.engine.readings import Openings, State, joint_groups
 from ringsim.engine.scales import residual_tolerance, scales_of
 from ringsim.engine.settings import raise_own, solver_settings
 from ringsim.engine.stress import BendingMeter, StressMeter
-from ringsim.layout.halves import halves
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
 from ringsim.scene import Scene
@@ -55,7 +54,7 @@ class Integration:
         self._energy = EnergyMeter(built)
         self._stress = StressMeter(model) if scene.record.stress else None
         structure = scene.structure
-        coordinates = {"rod": np.array(list(halves(model.layout)))}
+        coordinates = {"rod": np.array(list(model.layout.halves()))}
         self._bending: BendingMeter | None = None
         if structure.gauge:
             self._bending = BendingMeter(model, structure.gauge)

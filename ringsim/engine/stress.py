@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.model import Multibody
-from ringsim.layout.halves import Half, halves
+from ringsim.layout.layout import Half
 
 Array = NDArray[np.float64]
 _KINDS = exu.OutputVariableType.ForceLocal, exu.OutputVariableType.TorqueLocal
@@ -26,7 +26,7 @@ class StressMeter:
 
     def __init__(self, model: Multibody) -> None:
         self._assembly = model.assembly
-        rows = [*halves(model.layout).values()]
+        rows = [*model.layout.halves().values()]
         ends = [end for row in rows for half in row for end in _ends(model, half)]
         self._shape = len(rows), len(rows[0]), 2
         self._elements, *numbers = zip(*ends, strict=True)

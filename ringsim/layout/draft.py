@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.cable.records import Cable
@@ -19,14 +18,12 @@ from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
 from ringsim.layout.bodies import SPACE, Body, InSpace, Lump, Mount, OnBody, OnRod, Rod, pose_of
 from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.joints import ChordOpening, Joint, JointOpening, Opening
-from ringsim.layout.layout import Layout
-from ringsim.layout.pose import Pose, axes_along, rate_of, real_of
-from ringsim.layout.springs import BoomBeam, Contact, HubNet, Spring
+from ringsim.layout.layout import BoomBeam, Contact, HubNet, Layout, Spring
+from ringsim.layout.pose import Array, Pose, axes_along, rate_of, real_of
 from ringsim.parts.boom.rigid import RigidBoom
 from ringsim.parts.persection import spread
 from ringsim.parts.tube import Tube
 
-Array = NDArray[np.float64]
 _CLOSE = 1e-9
 """Points that coincide, over the size of the part: round-off leaves 1e-15."""
 
@@ -89,7 +86,7 @@ class Draft:
         tube: Tube,
         stations: Sequence[float],
         young_modulus: float,
-        masses: tuple[tuple[int, float], ...] = (),
+        masses: tuple[tuple[int, float, str], ...] = (),
     ) -> RodRef:
         """A straight rod whose joints turn about ``normal``; see ``Rod`` for what it is made of.
 

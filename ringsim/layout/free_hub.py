@@ -11,13 +11,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ringsim.layout.pose import Array
 from ringsim.parts.net import Net
 from ringsim.parts.persection import at_section, spread
 from ringsim.parts.springs import Reaction
-
-Array = NDArray[np.float64]
 
 _MOST = 60
 """Newton steps to the hub, each a tenth of the net's size long at most."""

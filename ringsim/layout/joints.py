@@ -5,12 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ringsim.layout.bodies import Mount
-
-Array = NDArray[np.float64]
+from ringsim.layout.pose import Array
 
 
 @dataclass(frozen=True)

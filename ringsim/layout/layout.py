@@ -4,18 +4,63 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.sheaves import BlockSheave, Sheave
-from ringsim.layout.bodies import Body, InSpace, Mount, Rod, pose_of
+from ringsim.layout.bodies import Body, InSpace, Lump, Mount, OnBody, OnRod, Rod, pose_of
 from ringsim.layout.joints import Joint, JointOpening, Opening
-from ringsim.layout.pose import Pose, cross
-from ringsim.layout.springs import BoomBeam, Contact, HubNet, Spring
+from ringsim.layout.pose import STEP, Array, Pose, cross
+from ringsim.parts.net import Net
 
-Array = NDArray[np.float64]
+
+class Spring(NamedTuple):
+    """A linear spring with a damper between the origins of two bodies.
+
+    ``law`` is its record (ringsim.parts): ``stiffness``, ``damping``, ``free_length``, and
+    ``tension(length, rate)`` as a ``ringsim.parts.springs.Reaction``.
+    """
+
+    first: int
+    second: int
+    law: Any
+
+
+class Contact(NamedTuple):
+    """A body's origin that may not come closer than ``room`` to the plane x_axis = 0.
+
+    ``law`` is its record, with ``push(depth, rate, xp)`` as a ``Reaction``.
+    """
+
+    body: int
+    axis: int
+    room: float
+    law: Any
+
+
+class HubNet(NamedTuple):
+    """Springs from the origins of bodies to a hub that is free, where they balance.
+
+    ``law`` is the scene's, ``hub`` a place in space, shape (3,), m.
+    """
+
+    law: Net
+    hub: Array
+    bodies: tuple[int, ...]
+
+
+class BoomBeam(NamedTuple):
+    """A flexible boom: clamped at ``top``, while ``low`` slides along it.
+
+    ``record`` is the scene's, ``lump`` what it would be as a rigid part of the body at its top.
+    """
+
+    top: OnBody
+    low: OnBody
+    record: Any
+    lump: Lump
 
 
 class PointMasses(NamedTuple):
@@ -27,6 +72,14 @@ class PointMasses(NamedTuple):
     bodies: NDArray[np.int_]
     places: Array
     rates: Array
+
+
+class Half(NamedTuple):
+    """Elements ``first`` to ``last`` - 1 of a rod."""
+
+    rod: int
+    first: int
+    last: int
 
 
 @dataclass(frozen=True)
@@ -69,7 +122,7 @@ class Layout:
         """Mass of each group of parts, kg."""
         parts = [(rod.group, rod.mass) for rod in self.rods]
         parts += [(lump.group, lump.mass) for body in self.bodies for lump in body.lumps]
-        parts += [("V-joints", mass) for rod in self.rods for _, mass in rod.masses]
+        parts += [(group, mass) for rod in self.rods for _, mass, group in rod.masses]
         if self.boom is not None:
             parts.append(("boom", self.boom.lump.mass))
         if self.net is not None:
@@ -103,7 +156,7 @@ class Layout:
             across = math.sqrt(3.0 * tube.second_moment / tube.area)
             arms = np.diag([0.5 * rod.length, across, across])
             found += [(rod.mass / 6.0, -1, *middle.at(r)) for r in (*arms, *-arms)]
-            for station, mass in rod.masses:
+            for station, mass, _ in rod.masses:
                 pose = rod.station(rod.stations[station])
                 found.append((mass, -1, pose.place, pose.rate))
         return PointMasses(*map(np.array, zip(*found, strict=True)))
@@ -140,3 +193,56 @@ class Layout:
     def supports(self) -> tuple[Joint, ...]:
         """Joints to places in space."""
         return tuple(j for j in self.joints if isinstance(j.first, InSpace))
+
+    def halves(self) -> dict[str, list[Half]]:
+        """Rows of results by name, in the order of the layout, with a value a section: a rod with
+        a joint inside is two, left and right of it.
+        """
+        inside = {
+            mount.rod: mount.station
+            for joint in self.joints
+            for mount in (joint.first, joint.second)
+            if isinstance(mount, OnRod)
+            and 0 < mount.station < len(self.rods[mount.rod].stations) - 1
+        }
+        rows: dict[str, list[Half]] = {}
+        for number, rod in enumerate(self.rods):
+            last, middle = len(rod.stations) - 1, inside.get(number)
+            if middle is None:
+                rows.setdefault(rod.name, []).append(Half(number, 0, last))
+            else:
+                rows.setdefault(f"{rod.name}_left", []).append(Half(number, 0, middle))
+                rows.setdefault(f"{rod.name}_right", []).append(Half(number, middle, last))
+        return rows
+
+
+def layout_of(scene: Any, coordinate: float | None = None) -> Layout:
+    """The layout of a scene's structure at a coordinate (rad), or as it starts.
+
+    >>> from ringsim.scene import load_scene
+    >>> layout = layout_of(load_scene("truss2"))
+    >>> len(layout.bodies), len(layout.rods), len(layout.joints)
+    (6, 12, 24)
+    """
+    q = scene.structure.coordinate if coordinate is None else coordinate
+    layout: Layout = scene.structure.layout(scene, q + 1j * STEP)
+    return layout
+
+
+def layout_at_opening(scene: Any, opening: float) -> Layout:
+    """The layout at which the mean opening angle has a value (rad), by Newton's method.
+
+    Raises
+    ------
+    ValueError
+        If the structure never opens so far.
+    """
+    q = float(scene.structure.coordinate)
+    for _ in range(30):
+        layout = layout_of(scene, q)
+        angles, rates = layout.opening_angles()
+        missing = opening - float(angles.mean())
+        if abs(missing) < 1e-12:
+            return layout
+        q += missing / float(rates.mean())
+    raise ValueError(f"no state of the structure has a mean opening angle of {opening:.4g} rad")

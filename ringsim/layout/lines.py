@@ -5,14 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.layout.bodies import OnBody, OnRod
-from ringsim.layout.halves import halves
 from ringsim.layout.joints import JointOpening
 from ringsim.layout.layout import Layout
-
-Array = NDArray[np.float64]
+from ringsim.layout.pose import Array
 
 
 def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> dict[str, Array]:
@@ -46,7 +43,7 @@ def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> di
             if isinstance(opening, JointOpening):
                 _open(layout, ends, opening, float(angle))
     found: dict[str, list[Any]] = {}
-    for half in (half for row in halves(layout).values() for half in row):
+    for half in (half for row in layout.halves().values() for half in row):
         line = ends[half.rod, half.first], ends[half.rod, half.last]
         found.setdefault(layout.rods[half.rod].group, []).append(line)
     corners = {number for plane in layout.corners for number in plane}

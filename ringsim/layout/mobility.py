@@ -20,13 +20,11 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.layout.bodies import InSpace, Mount, OnBody
 from ringsim.layout.joints import Joint
 from ringsim.layout.layout import Layout
-
-Array = NDArray[np.float64]
+from ringsim.layout.pose import Array
 
 RANK_TOLERANCE = 1e-9
 """Singular values below this fraction of the largest are zeros.  Round-off leaves 1e-15; the

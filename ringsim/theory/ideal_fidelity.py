@@ -14,7 +14,7 @@ import numpy as np
 
 from ringsim.choice import kind_of
 from ringsim.layout.free_hub import FreeHub
-from ringsim.layout.of_scene import layout_of
+from ringsim.layout.layout import layout_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.refusal import InputError
 from ringsim.scene import Scene

@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 
 from ringsim.cable.sheaves import FixedSheave
 from ringsim.layout.bodies import Mount, OnBody
-from ringsim.layout.layout import Layout
-from ringsim.layout.of_scene import layout_of
+from ringsim.layout.layout import Layout, layout_of
 from ringsim.scene import Scene
 
 Array = NDArray[np.float64]
