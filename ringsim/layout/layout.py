@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,8 @@ from ringsim.parts.net import Net
 class Spring(NamedTuple):
     """A linear spring with a damper between the origins of two bodies.
 
-    ``law`` is its record (ringsim.parts): ``stiffness``, ``damping``, ``free_length``, and
-    ``tension(length, rate)`` as a ``ringsim.parts.springs.Reaction``.
+    ``law`` has ``stiffness``, ``damping``, ``free_length``, and ``tension(length, rate)`` as a
+    ``ringsim.parts.springs.Reaction``.
     """
 
     first: int
@@ -31,7 +32,7 @@ class Spring(NamedTuple):
 class Contact(NamedTuple):
     """A body's origin that may not come closer than ``room`` to the plane x_axis = 0.
 
-    ``law`` is its record, with ``push(depth, rate, xp)`` as a ``Reaction``.
+    ``law`` has ``push(depth, rate, xp)`` as a ``Reaction``.
     """
 
     body: int
@@ -41,10 +42,7 @@ class Contact(NamedTuple):
 
 
 class HubNet(NamedTuple):
-    """Springs from the origins of bodies to a hub that is free, where they balance.
-
-    ``law`` is the scene's, ``hub`` a place in space, shape (3,), m.
-    """
+    """Springs from the origins of bodies to a free ``hub``, where they balance, shape (3,), m."""
 
     law: Net
     hub: Array
@@ -54,7 +52,7 @@ class HubNet(NamedTuple):
 class BoomBeam(NamedTuple):
     """A flexible boom: clamped at ``top``, while ``low`` slides along it.
 
-    ``record`` is the scene's, ``lump`` what it would be as a rigid part of the body at its top.
+    ``lump`` is what it would be as a rigid part of the body at its top.
     """
 
     top: OnBody
@@ -64,8 +62,8 @@ class BoomBeam(NamedTuple):
 
 
 class PointMasses(NamedTuple):
-    """Masses (kg) and numbers of their bodies, -1 for rods, shape (n,); where they are (m) and the
-    derivatives of that after the coordinate, shape (n, 3).
+    """Masses (kg) and numbers of their bodies, -1 for rods, shape (n,); places (m) and their
+    derivatives after the coordinate, shape (n, 3).
     """
 
     masses: Array
@@ -86,20 +84,10 @@ class Half(NamedTuple):
 class Layout:
     """Everything that a structure consists of, with its rates; SI units throughout.
 
-    Attributes
-    ----------
-    bodies, rods, joints
-        Numbered by their place here.
-    openings
-        Opening angles by plane and section.
-    corners
-        Hinge assemblies by plane and corner, as numbers of bodies.
-    paths
-        Sheaves of each cable of the scene in order, from its first winch to its far end.
-    springs, contacts, net, boom
-        What else acts between bodies.
-    forces
-        Constant forces: number of the joint whose first mount they act on, and vector, N.
+    ``openings`` are by plane and section, ``corners`` hinge assemblies by plane and corner, as
+    numbers of bodies; ``paths`` sheaves of each cable of the scene in order, from its first winch
+    to its far end; ``forces`` constant ones: number of the joint whose first mount they act on,
+    and vector, N.
     """
 
     bodies: tuple[Body, ...]
@@ -119,7 +107,7 @@ class Layout:
         return pose_of(mount, self.bodies, self.rods)
 
     def masses(self) -> dict[str, float]:
-        """Mass of each group of parts, kg."""
+        """Of each group of parts, kg."""
         parts = [(rod.group, rod.mass) for rod in self.rods]
         parts += [(lump.group, lump.mass) for body in self.bodies for lump in body.lumps]
         parts += [(group, mass) for rod in self.rods for _, mass, group in rod.masses]
@@ -162,7 +150,7 @@ class Layout:
         return PointMasses(*map(np.array, zip(*found, strict=True)))
 
     def sheave(self, sheave: Sheave) -> tuple[Array, Array]:
-        """Place of a sheave in space and its derivative after the coordinate, shape (3,), m."""
+        """Place of a sheave and its derivative after the coordinate, shape (3,), m."""
         if not isinstance(sheave, BlockSheave):
             return self.pose(sheave.node).at(sheave.arm)
         left, right = self.pose(sheave.left), self.pose(sheave.right)
@@ -198,21 +186,15 @@ class Layout:
         """Rows of results by name, in the order of the layout, with a value a section: a rod with
         a joint inside is two, left and right of it.
         """
-        inside = {
-            mount.rod: mount.station
-            for joint in self.joints
-            for mount in (joint.first, joint.second)
-            if isinstance(mount, OnRod)
-            and 0 < mount.station < len(self.rods[mount.rod].stations) - 1
-        }
+        sides = (side for joint in self.joints for side in (joint.first, joint.second))
+        held = {(mount.rod, mount.station) for mount in sides if isinstance(mount, OnRod)}
         rows: dict[str, list[Half]] = {}
         for number, rod in enumerate(self.rods):
-            last, middle = len(rod.stations) - 1, inside.get(number)
-            if middle is None:
-                rows.setdefault(rod.name, []).append(Half(number, 0, last))
-            else:
-                rows.setdefault(f"{rod.name}_left", []).append(Half(number, 0, middle))
-                rows.setdefault(f"{rod.name}_right", []).append(Half(number, middle, last))
+            last = len(rod.stations) - 1
+            middle = [station for station in range(1, last) if (number, station) in held]
+            names = ("_left", "_right") if middle else ("",)
+            for name, ends in zip(names, pairwise((0, *middle[-1:], last)), strict=True):
+                rows.setdefault(rod.name + name, []).append(Half(number, *ends))
         return rows
 
 
@@ -225,8 +207,7 @@ def layout_of(scene: Any, coordinate: float | None = None) -> Layout:
     (6, 12, 24)
     """
     q = scene.structure.coordinate if coordinate is None else coordinate
-    layout: Layout = scene.structure.layout(scene, q + 1j * STEP)
-    return layout
+    return cast(Layout, scene.structure.layout(scene, q + 1j * STEP))
 
 
 def layout_at_opening(scene: Any, opening: float) -> Layout:

@@ -15,9 +15,9 @@ import numpy as np
 from ringsim.cable.chain import Chain
 from ringsim.cable.state import ChainState
 from ringsim.cable.winding.family import FeedbackWinding, WinchState
+from ringsim.layout.pose import Array
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
-from ringsim.theory.ideal_points import Array
 
 
 class Pull(NamedTuple):

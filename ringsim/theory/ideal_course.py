@@ -15,9 +15,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ringsim.cable.ropes import Ropes
+from ringsim.layout.pose import Array
 from ringsim.scene import Scene
 from ringsim.theory.ideal_motion import IdealMotion
-from ringsim.theory.ideal_points import Array
 from ringsim.variables import Cause, Status
 
 RELATIVE = 3e-7

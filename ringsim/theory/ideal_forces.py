@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.layout.free_hub import FreeHub
-from ringsim.layout.pose import cross
+from ringsim.layout.pose import Array, cross
 from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.persection import at_section
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
-from ringsim.theory.ideal_points import Array, Points
+from ringsim.theory.ideal_points import Points
 
 
 class Acting(NamedTuple):

@@ -22,15 +22,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ringsim.layout.pose import Array, skew
 from ringsim.scene import Scene
-from ringsim.theory.ideal_points import UP, Array, Points, body_of
+from ringsim.theory.ideal_points import UP, Points, body_of
 
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3))
-
-
-def skew(r: Array) -> Array:
-    """The matrix [r]x."""
-    return np.asarray(-_LEVI_CIVITA @ r)
 
 
 def _axial(w: Array) -> Array:

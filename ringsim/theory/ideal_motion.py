@@ -15,12 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.cable.faults.family import CableFault
+from ringsim.layout.pose import Array, skew
 from ringsim.parts.faults.family import Fault
 from ringsim.scene import Scene
 from ringsim.theory.ideal_cables import IdealCables, Pull
 from ringsim.theory.ideal_forces import Acting, Forces
-from ringsim.theory.ideal_mechanism import Mechanism, skew
-from ringsim.theory.ideal_points import UP, Array
+from ringsim.theory.ideal_mechanism import Mechanism
+from ringsim.theory.ideal_points import UP
 
 MOTOR_LAG = 1e-6
 """Time constant in s with which a motor follows the speed that its law commands: the law depends on

@@ -19,14 +19,13 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.sheaves import FixedSheave
 from ringsim.layout.bodies import Mount, OnBody
 from ringsim.layout.layout import Layout, layout_of
+from ringsim.layout.pose import Array
 from ringsim.scene import Scene
 
-Array = NDArray[np.float64]
 Pairs = tuple[Array, Array]
 """Places, or axes, and their derivatives after the coordinate, shape (..., 3) each."""
 

@@ -26,9 +26,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.layout.free_hub import FreeHub, NetForces
+from ringsim.layout.pose import Array
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
-from ringsim.theory.ideal_points import Array
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
