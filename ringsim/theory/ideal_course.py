@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -38,9 +38,9 @@ _ALIKE = 1e-13
 class Piece:
     """Steps between two events, with their latches and ropes.
 
-    ``times``, ``states`` and ``rates`` are beginning and end of every step, the states there and
-    their derivatives; ``inner``, where cables are, times and states at the collocation points
-    within the steps: what is stiff is in balance there, and nowhere else between a step's ends.
+    ``times`` and ``states`` are those at the steps' ends, ``rates`` the states' derivatives;
+    ``inner``, where cables are, times and states at the collocation points within the steps: what
+    is stiff is in balance there, and nowhere else between a step's ends.
     """
 
     latched: bool
@@ -51,13 +51,12 @@ class Piece:
     inner: list[tuple[float, Array]] = field(default_factory=list)
 
 
+@dataclass
 class _Crossing:
     """An event of scipy: the first coordinate passes a level."""
 
-    terminal = True
-
-    def __init__(self, level: float) -> None:
-        self.level = level
+    level: float
+    terminal: ClassVar = True
 
     def __call__(self, time: float, state: Array) -> float:
         return float(state[0]) - self.level
@@ -101,11 +100,10 @@ class Course:
             self.cause = Cause.STEP_LIMIT if too_long else Cause.NEWTON
             self.reason = f"the ideal ring's solver gave up at {self._time:.6g} s: {error}"
         if self.status == Status.UNFINISHED:
-            joints = 2 * self._scene.structure.sections
             self.cause = Cause.END_TIME
             self.reason = (
                 f"solver.end_time = {self._scene.solver.end_time:g} s was reached with 0 of "
-                f"{joints} V-joints locked"
+                f"{2 * self._scene.structure.sections} V-joints locked"
             )
         return self
 
@@ -133,9 +131,8 @@ class Course:
     def _advance(self, target: float) -> None:
         """Take steps until ``target``, or until a stop is met or left."""
         phi = float(self._state[0])
-        levels = [self._stowed + math.copysign(BEYOND, self._stowed - phi)]
-        if not self.motion.latched:
-            levels.append(math.copysign(BEYOND, -phi))
+        stops = [self._stowed] if self.motion.latched else [self._stowed, 0.0]
+        levels = [stop + math.copysign(BEYOND, stop - phi) for stop in stops]
         found = self._solve(target, levels if self._contacts < MOST_CONTACTS else [])
         crossed = [k for k, times in enumerate(found.t_events or []) if len(times)]
         if crossed:
@@ -173,7 +170,6 @@ class Course:
         return self.motion.jacobian(time, state)
 
     def _judge(self) -> None:
-        """Locks and ends."""
         phi, rate = float(self._state[0]), float(self._state[self.motion.mechanism.freedom])
         stop = self._scene.stop
         if math.isnan(self.lock_time) and phi <= 0.0 and rate < 0.0:

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.pose import Array, cross
 from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.persection import at_section
@@ -22,9 +21,9 @@ from ringsim.theory.ideal_points import Points
 
 
 class Acting(NamedTuple):
-    """What acts at one instant: generalised force on (q, psi) (N m); couple of the loads on the
-    structure as one body, shape (3,) (N m); energy in net and stops, and work function of the loads
-    (J); power lost in joints, net and stops (W).
+    """What acts at one instant: generalised force on (q, psi), and couple of the loads on the whole
+    structure, shape (3,) (N m); energy in net and stops, and work function of the loads (J); power
+    lost in joints, net and stops (W).
     """
 
     force: Array
@@ -41,13 +40,9 @@ class _FrictionJoints:
         joints = [joint for joint in points.layout.joints if joint.family == family]
         self._law = at_section(law, np.array([joint.section for joint in joints]))
         axes = np.array([points.layout.pose(joint.first).axes[:, 2] for joint in joints])
-        self._sides = [
-            (np.cross(axes[:, :, None], along, axis=1), along)
-            for along in (
-                points.directions([joint.first for joint in joints]),
-                points.directions([joint.second for joint in joints]),
-            )
-        ]
+        sides = [joint.first for joint in joints], [joint.second for joint in joints]
+        alongs = map(points.directions, sides)
+        self._sides = [(np.cross(axes[:, :, None], along, axis=1), along) for along in alongs]
 
     def act(self, now: Configuration) -> tuple[Array, float]:
         """Generalised force and power lost."""
@@ -62,10 +57,9 @@ class _FrictionJoints:
 
 
 class Forces:
-    """Everything that acts on the ideal ring of a scene, without its cables.
+    """Everything that acts on the ideal ring of a scene but its cables.
 
-    ``loaded`` is whether loads act, ``slowest`` the smallest characteristic rate of the joints'
-    friction, rad/s; infinite without one.
+    ``slowest`` is the least characteristic rate of the joints' friction, rad/s; infinite without.
     """
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
@@ -74,7 +68,6 @@ class Forces:
         loads, places = points.forces
         self.loaded = bool(loads.any())
         self._lift = np.tensordot(loads[:, 2], places, 1)
-        self._net = None if scene.net is None else FreeHub(scene.net, len(mechanism.upper_corners))
         laws = scene.joints.present()
         self._joints = [_FrictionJoints(points, *item) for item in laws.items()]
         rates = [law.characteristic_rate() for law in laws.values()]
@@ -82,20 +75,17 @@ class Forces:
         self._stops = sum(map(len, points.layout.openings))
 
     def act(self, now: Configuration, up: Array, latched: bool) -> Acting:
-        """Forces, energies and powers.
+        """Forces, energies and powers, ``latched`` or not.
 
-        ``up`` is the unit vector that points up in space, in the structure's axes (the loads'
-        direction); ``latched`` is whether the latches hold.
+        The loads act along ``up``, the unit vector up in space, in the structure's axes.
         """
         lifted = self._lift @ now.values
-        force, loss, elastic = up @ self._lift @ now.by_place, 0.0, 0.0
+        force, loss = up @ self._lift @ now.by_place, 0.0
         for joints in self._joints:
             torque, lost = joints.act(now)
             force, loss = force + torque, loss + lost
-        if self._net is not None:
-            places, slopes, _ = now.moved(self._mechanism.upper_corners)
-            net = self._net.forces(places, slopes, now.rate)
-            force, elastic, loss = force + net.force, net.energy, loss + net.loss
+        net = self._mechanism.net(now, now.rate)
+        force, elastic, loss = force + net.force, net.energy, loss + net.loss
         stop, folded, rate = self._stop, 2.0 * float(now.place[0]), 2.0 * float(now.rate[0])
         if stop is not None and (latched or not 0.0 <= folded <= stop.most_folded):
             reaction = stop.torque(folded, rate, latched)

@@ -22,6 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ringsim.layout.bodies import OnBody
+from ringsim.layout.free_hub import FreeHub, NetForces
 from ringsim.layout.pose import Array, skew
 from ringsim.scene import Scene
 from ringsim.theory.ideal_points import UP, Points, body_of
@@ -47,8 +49,8 @@ class Configuration(NamedTuple):
     functions
         ``Points.functions`` there.
     first, second
-        Sums of m P s_k and of m (P s_j) (P s_k)^T, where j and k count the columns of
-        ``functions``, j the first n + 1; shapes (3, n + 3) and (n + 1, n + 3, 3, 3).
+        Sums of m P s_k and of m (P s_j) (P s_k)^T over columns k of ``functions`` and the first
+        n + 1 of them j; shapes (3, n + 3) and (n + 1, n + 3, 3, 3).
     matrix
         Mass matrix of (V, W, p'), shape (6 + n, 6 + n).
     """
@@ -88,9 +90,8 @@ class Mechanism:
 
     Attributes
     ----------
-    points, upper_corners
-        Coefficients of its points, and those of the upper hinge assemblies, shape (corners, 3,
-        functions), m.
+    points
+        Coefficients of its points.
     freedom
         Number of free coordinates: 1, or 4 or 5 for an open arc; q is the first.
     fixed
@@ -104,7 +105,9 @@ class Mechanism:
         self._mass, self._first = float(masses.sum()), np.tensordot(masses, places, 1)
         second = ((flat.T * masses) @ flat).reshape(3, count, 3, count)
         self._second = second.transpose(1, 3, 0, 2).reshape(count, -1)
-        self.upper_corners = points.upper_corners()
+        corners = points.layout.corners
+        self._corners = points.places([OnBody(body) for body in corners[0]] if corners else [])
+        self._net = None if scene.net is None else FreeHub(scene.net, len(self._corners))
         held = [body_of(support.second) for support in points.layout.supports]
         self.fixed = bool(held)
         self._held = points.frame(held[0]) if held else np.zeros(0)
@@ -114,7 +117,7 @@ class Mechanism:
         if self._on_boom:
             pins = points.pins
             self._height = pins[0, 2] - pins[1, 2]
-            self._offset = float(np.linalg.norm(self.upper_corners[0, :, pins.shape[-1]]))
+            self._offset = float(np.linalg.norm(self._corners[0, :, pins.shape[-1]]))
 
     def configuration(self, free: Array, rates: Array) -> Configuration:
         """The mechanism at free coordinates (rad) and their rates (rad/s)."""
@@ -136,6 +139,13 @@ class Mechanism:
         matrix[3:6, :3] = matrix[:3, 3:6].T
         matrix[6:, :6] = matrix[:6, 6:].T
         return Configuration(place, rate, slopes, bias, s, first, second, matrix)
+
+    def net(self, now: Configuration, rate: Array) -> NetForces:
+        """What the net does while p changes at a rate (rad/s)."""
+        if self._net is None:
+            return NetForces(np.zeros(len(rate)), 0.0, 0.0)
+        places, slopes, _ = now.moved(self._corners)
+        return self._net.forces(places, slopes, rate)
 
     def vertical(self, now: Configuration) -> Array:
         """Unit vector that points up in space, in the structure's axes, if it cannot pitch."""

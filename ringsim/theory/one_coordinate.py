@@ -25,7 +25,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.layout.free_hub import FreeHub, NetForces
 from ringsim.layout.pose import Array
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
@@ -34,8 +33,8 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 class Motion(NamedTuple):
-    """Inertia I(q), kg m^2, and the rigid motion to be subtracted from the layout's rates: a point
-    at r moves with r' - velocity - rotation x r, shapes (3,), m/rad and rad/rad.
+    """Inertia I(q), kg m^2, and the rigid motion in the layout's rates: a point at r moves with
+    r' - velocity - rotation x r, shapes (3,), m/rad and rad/rad.
     """
 
     inertia: float
@@ -47,7 +46,6 @@ class OneCoordinate:
     """Masses, loads and net of a scene; joint friction, stops, springs and cables are left out."""
 
     def __init__(self, scene: Scene) -> None:
-        self._scene = scene
         known = scene.structure.basis(scene.structure.coordinate).size
         everywhere = Mechanism(scene) if known else None
         self._mechanism = lru_cache(maxsize=4)(lambda q: everywhere or Mechanism(scene, q))
@@ -62,28 +60,20 @@ class OneCoordinate:
     def work(self, q: float) -> float:
         """Work function W(q) in J, up to a constant."""
         mechanism, now = self._at(q)
-        return float(mechanism.points.load_work @ now.values) - self._net(q).energy
+        done = np.tensordot(*mechanism.points.forces, 2) @ now.values
+        return float(done) - mechanism.net(now, 0.0 * now.rate).energy
 
     def work_rate(self, q: float) -> float:
         """Generalised force dW/dq, J/rad."""
         mechanism, now = self._at(q)
-        done = mechanism.points.load_work @ now.by_place[:, 0]
-        return float(done + self._net(q).force[0])
+        done = np.tensordot(*mechanism.points.forces, 2) @ now.by_place[:, 0]
+        return float(done + mechanism.net(now, 0.0 * now.rate).force[0])
 
     def _at(self, q: float) -> tuple[Mechanism, Configuration]:
         """The mechanism, folding at rate 1 without swings."""
         mechanism = self._mechanism(q)
         folding = np.eye(mechanism.freedom)[0]
         return mechanism, mechanism.configuration(q * folding, folding)
-
-    def _net(self, q: float) -> NetForces:
-        """What the net does, nothing where there is none."""
-        if self._scene.net is None:
-            return NetForces(np.zeros(1), 0.0, 0.0)
-        mechanism, now = self._at(q)
-        places, slopes, _ = now.moved(mechanism.upper_corners)
-        net = FreeHub(self._scene.net, len(places))
-        return net.forces(places, slopes, 0.0 * now.rate)
 
 
 class OpeningTime(NamedTuple):
@@ -103,7 +93,7 @@ def opening_time(
     Raises
     ------
     ValueError
-        If the ring does not reach ``phi_end`` because the work done turns negative before.
+        If the work done turns negative before the ring reaches ``phi_end``.
     """
     fine, coarse = (_integrate(ring, phi_start, phi_end, n) for n in (panels, panels // 2))
     return OpeningTime(fine, abs(fine - coarse))
