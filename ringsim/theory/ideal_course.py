@@ -1,8 +1,7 @@
-"""Integrating an ideal ring from its release to its end.
+"""Integrating an ideal ring from its release to its end, by scipy's Radau IIA (order 5, stiff).
 
-Steps are those of scipy's Radau IIA (order 5, for stiff equations).  A stop is a kink of the
-equations: a step that meets or leaves one is repeated to end there.  Switching a winch, and
-every fault, restarts the integration.
+A stop is a kink of the equations: a step that meets or leaves one is repeated to end there.
+Switching a winch, and every fault, restarts the integration.
 """
 
 from __future__ import annotations
@@ -23,8 +22,8 @@ from ringsim.variables import Cause, Status
 RELATIVE = 3e-7
 """Local error of a step, relative to every part of the state."""
 BEYOND = 1e-10
-"""Angle in rad beyond a stop at which it counts as met, and before it as left: more than
-round-off, so that no step begins with the crossing that ended the one before it."""
+"""Angle in rad beyond a stop at which it counts as met, and before it as left: above round-off, so
+that no step begins with the crossing that ended the one before it."""
 MOST_EVALUATIONS = 400_000
 """Evaluations of the equations after which a run is given up."""
 MOST_CONTACTS = 1000
@@ -36,7 +35,7 @@ _ALIKE = 1e-13
 
 @dataclass
 class Piece:
-    """Steps between two events, with their latches and ropes.
+    """Steps between two events.
 
     ``times`` and ``states`` are those at the steps' ends, ``rates`` the states' derivatives;
     ``inner``, where cables are, times and states at the collocation points within the steps: what
@@ -65,8 +64,7 @@ class _Crossing:
 class Course:
     """One run of a scene's ideal ring.
 
-    ``lock_time`` is when the V-joints reached 180 deg, s, NaN if they never did; each of the
-    ``pieces`` begins in time where the one before it ends.
+    ``lock_time`` is when the V-joints reached 180 deg, s, NaN if they never did.
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -1,10 +1,9 @@
 """The ideal ring in motion: one system of ordinary differential equations.
 
-The state holds the free coordinates and their rates; the direction up in space along the core's
-axes and the core's rotation, where loads act on a base that floats (they stay vertical while the
-ring tilts; without them it has no angular momentum, which gives the rotation); the rope wound by
-each winch with feedback, and its speed, which follows the law's command within ``MOTOR_LAG``; and
-the energies lost and supplied so far.
+The state holds the free coordinates and their rates; the direction up along the core's axes and the
+core's rotation, where loads act on a base that floats (they stay vertical while the ring tilts;
+without them it has no angular momentum); the rope wound by each winch with feedback, and its speed;
+and the energies lost and supplied so far.
 """
 
 from __future__ import annotations
@@ -19,8 +18,7 @@ from ringsim.cable.faults.family import CableFault
 from ringsim.layout.pose import Array, skew
 from ringsim.parts.faults.family import Fault
 from ringsim.scene import Scene
-from ringsim.theory.ideal_cables import IdealCables, Pull
-from ringsim.theory.ideal_forces import Acting, Forces
+from ringsim.theory.ideal_forces import Acting, Forces, IdealCables, Pull
 from ringsim.theory.ideal_mechanism import Mechanism
 from ringsim.theory.ideal_points import UP
 

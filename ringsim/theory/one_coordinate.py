@@ -7,15 +7,11 @@ With rigid rods every point is a function of q, so
 I = sum m |dr/dq|^2 over all masses with the rigid-body motion taken out, W the work of the loads
 less the energy of the net.  A free structure keeps momentum and angular momentum at zero (its loads
 turn with it here; ringsim.theory.ideal_motion keeps them vertical); a support holds its body.  The
-end assemblies of an open arc are held upright, as they are at rest.
-
-From rest at q_0 the time until q_1 follows without time integration from a quadrature of the
-energy,
+end assemblies of an open arc are held upright.  From rest at q_0 the time until q_1 is
 
     T = integral from q_1 to q_0 of sqrt(I / (2 (W - W(q_0)))) dq.
 
-The substitution q = q_0 - (q_0 - q_1) u^2 removes the singularity at the start; Gauss-Legendre
-panels do the rest.
+The substitution q = q_0 - (q_0 - q_1) u^2 removes the singularity at the start.
 """
 
 from __future__ import annotations
@@ -86,9 +82,7 @@ class OpeningTime(NamedTuple):
 def opening_time(
     ring: OneCoordinate, phi_start: float, phi_end: float = 0.0, *, panels: int = 24
 ) -> OpeningTime:
-    """Time from rest at the bar angle ``phi_start`` to ``phi_end`` (rad), the deployed ring's.
-
-    ``panels`` of 8 Gauss-Legendre nodes each are used.
+    """Time from rest at ``phi_start`` to ``phi_end`` (rad), by panels of 8 Gauss-Legendre nodes.
 
     Raises
     ------
