@@ -12,9 +12,8 @@ import numpy as np
 import ringsim
 from ringsim.layout.bodies import Lump
 from ringsim.layout.draft import Draft
-from ringsim.layout.layout import Layout
+from ringsim.layout.layout import Layout, layout_of
 from ringsim.layout.mobility import internal_mobility
-from ringsim.layout.of_scene import layout_of
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.structures.pantograph_sections import add_sections
 from ringsim.units import Metre

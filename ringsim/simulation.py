@@ -20,8 +20,7 @@ from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.stepping.restarts import run_with_restarts
-from ringsim.theory.faded_friction import with_remark
-from ringsim.theory.ideal_fidelity import run_ideal
+from ringsim.theory.ideal_fidelity import run_ideal, with_remark
 from ringsim.variables import Cause, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:

@@ -9,9 +9,8 @@ import click
 
 from ringsim.choice import kind_of
 from ringsim.cli.options import SETTINGS
-from ringsim.layout.layout import Layout
+from ringsim.layout.layout import Layout, layout_of
 from ringsim.layout.mobility import internal_mobility
-from ringsim.layout.of_scene import layout_of
 from ringsim.refusal import show
 from ringsim.scene import Scene, load_scene
 from ringsim.units import Model

@@ -21,8 +21,8 @@ from ringsim.engine.cables import CableDrive
 from ringsim.engine.model import BuiltJoint, Multibody
 from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.rotations import Array
+from ringsim.layout.layout import Contact, HubNet
 from ringsim.layout.pose import turned_about_z
-from ringsim.layout.springs import Contact, HubNet
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.net import Net

@@ -17,7 +17,6 @@ from ringsim.engine.meters import BendingMeter, EnergyMeter, StressMeter
 from ringsim.engine.readings import Openings, State, joint_groups
 from ringsim.engine.rotations import Array
 from ringsim.engine.settings import residual_tolerance, scales_of, solver_settings
-from ringsim.layout.halves import halves
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
 from ringsim.scene import Scene
@@ -53,7 +52,7 @@ class Integration:
         self._stress = StressMeter(model) if scene.record.stress else None
         gauge = scene.structure.gauge
         self._bending = BendingMeter(model, gauge) if gauge else None
-        coordinates = {"rod": np.array(list(halves(model.layout)))}
+        coordinates = {"rod": np.array(list(model.layout.halves()))}
         if self._bending is not None:
             coordinates["station"] = self._bending.stations
         self._gaps = joint_groups(model)

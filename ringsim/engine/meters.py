@@ -15,7 +15,6 @@ from ringsim.engine.build import Built
 from ringsim.engine.model import Multibody
 from ringsim.engine.readings import State
 from ringsim.engine.rotations import Array
-from ringsim.layout.halves import halves
 from ringsim.stepping.instant import Energies
 
 _KINETIC = exu.OutputVariableType.KineticEnergy
@@ -110,7 +109,7 @@ class StressMeter:
 
     def __init__(self, model: Multibody) -> None:
         self._assembly = model.assembly
-        rows = [*halves(model.layout).values()]
+        rows = [*model.layout.halves().values()]
         self._shape = len(rows), len(rows[0]), 2
         self._elements, numbers = [], []
         for half in (half for row in rows for half in row):

@@ -14,8 +14,7 @@ from ringsim.engine.rods import FORMULATIONS, BuiltRod, add_rod
 from ringsim.engine.rotations import Array
 from ringsim.layout import joints as parts
 from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod
-from ringsim.layout.layout import Layout
-from ringsim.layout.of_scene import layout_of
+from ringsim.layout.layout import Layout, layout_of
 from ringsim.layout.pose import Pose, cross
 from ringsim.scene import Scene
 from ringsim.theory.one_coordinate import OneCoordinate
@@ -68,7 +67,7 @@ class Multibody:
             poses = [started(part.station(share)) for share in part.stations]
             rod = add_rod(assembly, formulation, part, poses, scene.rods)
             self.rods.append(rod)
-            for station, mass in part.masses:
+            for station, mass, _ in part.masses:
                 formulation.add_mass(assembly, rod.nodes[station], mass)
         self.joints = [self._joint(joint) for joint in self.layout.joints]
         for number, force in self.layout.forces:

@@ -97,7 +97,7 @@ def _contact_step(model: Multibody) -> float:
     for mount in (joint.first, joint.second):
         if isinstance(mount, OnRod):
             rod = model.layout.rods[mount.rod]
-            ends = sum(mass for _, mass in rod.masses)
+            ends = sum(mass for _, mass, _ in rod.masses)
             inertia += (rod.mass / 3.0 + ends) * rod.length**2
     return _swing_step(inertia, stop.stiffness, 20)
 

@@ -1,4 +1,4 @@
-"""Rigid bodies and elastic rods."""
+"""Rigid bodies, elastic rods, and places on them."""
 
 from __future__ import annotations
 
@@ -8,19 +8,14 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ringsim.layout.pose import Pose
+from ringsim.layout.pose import Array, Pose
 from ringsim.parts.tube import Tube
-
-Array = NDArray[np.float64]
 
 
 class Lump(NamedTuple):
-    """A mass (kg) that belongs to a body; ``group`` is what it is called where masses are listed.
-
-    Centre of mass and inertia about the body's origin are in the body's axes; shapes (3,) and
-    (3, 3), m and kg m^2.
+    """A mass (kg) of a body, listed under ``group``; centre of mass, m, shape (3,), and inertia
+    about the body's origin, kg m^2, shape (3, 3), in the body's axes.
     """
 
     group: str
@@ -64,12 +59,12 @@ class Rod:
         What it is called where masses are listed and lines are drawn.
     start, end
         Poses of its ends, with the same axes: x along the rod, z along its joints' axis.
-    tube, young_modulus, density
-        Cross-section, Pa and kg/m^3.
+    young_modulus, density
+        Pa and kg/m^3.
     stations
         Shares of the length at which it has nodes, from 0 to 1; its elements lie between.
     masses
-        Point masses on nodes: station and kg.
+        Point masses on nodes: station, kg, and what they are called where masses are listed.
     """
 
     name: str
@@ -81,7 +76,7 @@ class Rod:
     young_modulus: float
     density: float
     stations: tuple[float, ...]
-    masses: tuple[tuple[int, float], ...] = ()
+    masses: tuple[tuple[int, float, str], ...] = ()
 
     @cached_property
     def length(self) -> float:

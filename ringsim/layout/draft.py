@@ -1,17 +1,16 @@
 """A layout under construction: what a structure calls to say what it consists of.
 
-Places and axes are computed at q + i STEP (ringsim.layout.pose), so that no structure has to
-differentiate anything; what is fixed in a part is found from where it stands.
+Places and axes are given at q + i STEP (ringsim.layout.pose): no structure differentiates anything.
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.cable.records import Cable
@@ -19,14 +18,12 @@ from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
 from ringsim.layout.bodies import SPACE, Body, InSpace, Lump, Mount, OnBody, OnRod, Rod, pose_of
 from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.joints import ChordOpening, Joint, JointOpening, Opening
-from ringsim.layout.layout import Layout
-from ringsim.layout.pose import Pose, axes_along, rate_of, real_of
-from ringsim.layout.springs import BoomBeam, Contact, HubNet, Spring
+from ringsim.layout.layout import BoomBeam, Contact, HubNet, Layout, Spring
+from ringsim.layout.pose import Array, Pose, axes_along, rate_of, real_of
 from ringsim.parts.boom.rigid import RigidBoom
 from ringsim.parts.persection import spread
 from ringsim.parts.tube import Tube
 
-Array = NDArray[np.float64]
 _CLOSE = 1e-9
 """Points that coincide, over the size of the part: round-off leaves 1e-15."""
 
@@ -68,7 +65,7 @@ class Draft:
     bodies: list[Body] = field(default_factory=list)
     rods: list[Rod] = field(default_factory=list)
     joints: list[Joint] = field(default_factory=list)
-    openings: dict[int, list[Opening]] = field(default_factory=dict)
+    openings: dict[int, list[Opening]] = field(default_factory=lambda: defaultdict(list))
     corners: list[list[BodyRef]] = field(default_factory=list)
     springs: list[Spring] = field(default_factory=list)
     contacts: list[Contact] = field(default_factory=list)
@@ -89,7 +86,7 @@ class Draft:
         tube: Tube,
         stations: Sequence[float],
         young_modulus: float,
-        masses: tuple[tuple[int, float], ...] = (),
+        masses: tuple[tuple[int, float, str], ...] = (),
     ) -> RodRef:
         """A straight rod whose joints turn about ``normal``; see ``Rod`` for what it is made of.
 
@@ -122,10 +119,7 @@ class Draft:
     ) -> int:
         """A joint between two parts at a place; None stands for space.
 
-        Parameters
-        ----------
-        axes
-            Of the joint; those of the first of the parts that is a rod unless given.
+        Its ``axes`` are those of the first of the parts that is a rod unless given.
 
         Raises
         ------
@@ -143,21 +137,17 @@ class Draft:
 
     def slide(self, first: BodyRef, second: BodyRef, axes: Any) -> None:
         """Let two bodies slide along the x axis of ``axes``, each held at its own origin."""
-        frame = real_of(axes)
-        mounts = [
-            OnBody(ref.number, axes=self.bodies[ref.number].pose.axes.T @ frame)
-            for ref in (first, second)
-        ]
+        numbers, frame = (first.number, second.number), real_of(axes)
+        mounts = [OnBody(k, axes=self.bodies[k].pose.axes.T @ frame) for k in numbers]
         self.joints.append(Joint("prismatic", "", 0, *mounts))
 
     def opening(self, plane: int, joint: int, sense: float, lift: Any) -> None:
         """Let a revolute's angle be the opening angle of the plane's next section."""
-        opening = JointOpening(joint, sense, np.asarray(lift, dtype=float))
-        self.openings.setdefault(plane, []).append(opening)
+        self.openings[plane].append(JointOpening(joint, sense, np.asarray(lift, dtype=float)))
 
     def chord_opening(self, plane: int, body: BodyRef, centre: Any) -> None:
         """Let the line from a point in space to a body's origin be that angle."""
-        self.openings.setdefault(plane, []).append(ChordOpening(body.number, real_of(centre)))
+        self.openings[plane].append(ChordOpening(body.number, real_of(centre)))
 
     def on(self, body: BodyRef, at: Any) -> Mount:
         """A place on a body that carries it."""
@@ -165,19 +155,20 @@ class Draft:
 
     def finish(self) -> Layout:
         """The layout, with boom, net, loads and cables of the scene."""
-        boom = self._boom()
+        boom = self._boom()  # adds a lump and joints
+        openings = tuple(tuple(self.openings[plane]) for plane in sorted(self.openings))
         return Layout(
             bodies=tuple(self.bodies),
             rods=tuple(self.rods),
             joints=tuple(self.joints),
-            openings=tuple(tuple(self.openings[plane]) for plane in sorted(self.openings)),
+            openings=openings,
             corners=tuple(tuple(ref.number for ref in plane) for plane in self.corners),
             paths=self._paths(),
             springs=tuple(self.springs),
             contacts=tuple(self.contacts),
             net=self._net(),
             boom=boom,
-            forces=self._forces(),
+            forces=self._forces(openings),
         )
 
     def _mount(self, part: Part | None, at: Any, axes: Array, what: str) -> Mount:
@@ -217,10 +208,9 @@ class Draft:
             return None
         self._require_corners("boom", 2)
         top, low = (OnBody(plane[0].number) for plane in self.corners[:2])
-        body = self.bodies[top.body]
+        body, tube = self.bodies[top.body], boom.tube
         if boom.base == "fixed":
             self.joints.append(Joint("weld", "", 0, InSpace(body.pose.place, SPACE), top))
-        tube = boom.tube
         across = 0.125 * boom.mass * (tube.outer_diameter**2 + tube.inner_diameter**2)
         along = boom.mass * boom.length**2 / 3.0 + 0.5 * across
         centre = np.array([0.0, 0.0, -0.5 * boom.length])
@@ -240,16 +230,13 @@ class Draft:
         hub = FreeHub(net, len(held)).hub(np.array([self.bodies[k].pose.place for k in held]))
         return HubNet(net, hub, held)
 
-    def _forces(self) -> tuple[tuple[int, Array], ...]:
-        if self.scene.loads is None:
-            return ()
+    def _forces(self, openings: Sequence[Sequence[Opening]]) -> tuple[tuple[int, Array], ...]:
+        force = 0.0 if self.scene.loads is None else self.scene.loads.force
         return tuple(
-            (opening.joint, value * opening.lift)
-            for _, plane in sorted(self.openings.items())
-            for opening, value in zip(
-                plane, spread(self.scene.loads.force, len(plane)).tolist(), strict=True
-            )
-            if isinstance(opening, JointOpening) and value != 0.0
+            (one.joint, value * one.lift)
+            for plane in openings
+            for one, value in zip(plane, spread(force, len(plane)).tolist(), strict=True)
+            if isinstance(one, JointOpening) and value != 0.0
         )
 
     def _paths(self) -> tuple[tuple[Sheave, ...], ...]:

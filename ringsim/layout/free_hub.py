@@ -11,13 +11,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ringsim.layout.pose import Array
 from ringsim.parts.net import Net
 from ringsim.parts.persection import at_section, spread
 from ringsim.parts.springs import Reaction
-
-Array = NDArray[np.float64]
 
 _MOST = 60
 """Newton steps to the hub, each a tenth of the net's size long at most."""
@@ -34,21 +32,19 @@ class NetForces(NamedTuple):
 
 
 class FreeHub:
-    """Springs from so many corners to a free hub."""
+    """Springs from so many corners to a free hub; ``corners`` have the shape (corners, 3), m."""
 
     def __init__(self, net: Net, corners: int) -> None:
         self._net = at_section(net, np.arange(corners))
         self._stiffness = spread(net.stiffness, corners)
 
     def hub(self, corners: Array) -> Array:
-        """Where it lies under upper corners, shape (corners, 3), m: midway while all is slack."""
+        """Where it lies, shape (3,), m: midway while all is slack."""
         return self._balance(corners)[0]
 
     def forces(self, corners: Array, slopes: Array, rates: Array) -> NetForces:
-        """Generalised forces on coordinates with rates in rad/s.
-
-        ``slopes`` are the corners' derivatives after the coordinates, shape (corners, 3,
-        coordinates), m/rad.
+        """Generalised forces on coordinates with rates in rad/s, after which ``slopes`` are the
+        corners' derivatives, shape (corners, 3, coordinates), m/rad.
         """
         _, lengths, units, string = self._balance(corners)
         longer = np.einsum("ia,iaj->ij", units, slopes)

@@ -5,28 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ringsim.layout.bodies import Mount
-
-Array = NDArray[np.float64]
+from ringsim.layout.pose import Array
 
 
 @dataclass(frozen=True)
 class Joint:
     """A joint between two places that coincide; its axes are those of its mounts.
 
-    Attributes
-    ----------
-    kind
-        "revolute" turns about z, "prismatic" slides along x, "sleeve" slides along z and turns
-        freely, "weld" holds everything.
-    family
-        By which a scene gives joints their friction: "pivot", "hinge", "vjoint", ...; empty for
-        joints that cannot have any.
-    section
-        Counted from 0.
+    "revolute" turns about z, "prismatic" slides along x, "sleeve" slides along z and turns freely,
+    "weld" holds everything.  By its ``family`` a scene gives it friction: "pivot", "hinge",
+    "vjoint", ...; empty if it cannot have any.  ``section`` counts from 0.
     """
 
     kind: Literal["revolute", "prismatic", "sleeve", "weld"]
@@ -51,10 +40,7 @@ class JointOpening:
 
 @dataclass(frozen=True)
 class ChordOpening:
-    """The angle about z between the line from a point in space to a body's origin, and -y.
-
-    It has no lock.
-    """
+    """The angle about z of the line from a point in space to a body's origin, from -y; no lock."""
 
     body: int
     centre: Array

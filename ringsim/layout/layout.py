@@ -4,23 +4,66 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.sheaves import BlockSheave, Sheave
-from ringsim.layout.bodies import Body, InSpace, Mount, Rod, pose_of
+from ringsim.layout.bodies import Body, InSpace, Lump, Mount, OnBody, OnRod, Rod, pose_of
 from ringsim.layout.joints import Joint, JointOpening, Opening
-from ringsim.layout.pose import Pose, cross
-from ringsim.layout.springs import BoomBeam, Contact, HubNet, Spring
+from ringsim.layout.pose import STEP, Array, Pose, cross
+from ringsim.parts.net import Net
 
-Array = NDArray[np.float64]
+
+class Spring(NamedTuple):
+    """A linear spring with a damper between the origins of two bodies.
+
+    ``law`` has ``stiffness``, ``damping``, ``free_length``, and ``tension(length, rate)`` as a
+    ``ringsim.parts.springs.Reaction``.
+    """
+
+    first: int
+    second: int
+    law: Any
+
+
+class Contact(NamedTuple):
+    """A body's origin that may not come closer than ``room`` to the plane x_axis = 0.
+
+    ``law`` has ``push(depth, rate, xp)`` as a ``Reaction``.
+    """
+
+    body: int
+    axis: int
+    room: float
+    law: Any
+
+
+class HubNet(NamedTuple):
+    """Springs from the origins of bodies to a free ``hub``, where they balance, shape (3,), m."""
+
+    law: Net
+    hub: Array
+    bodies: tuple[int, ...]
+
+
+class BoomBeam(NamedTuple):
+    """A flexible boom: clamped at ``top``, while ``low`` slides along it.
+
+    ``lump`` is what it would be as a rigid part of the body at its top.
+    """
+
+    top: OnBody
+    low: OnBody
+    record: Any
+    lump: Lump
 
 
 class PointMasses(NamedTuple):
-    """Masses (kg) and numbers of their bodies, -1 for rods, shape (n,); where they are (m) and the
-    derivatives of that after the coordinate, shape (n, 3).
+    """Masses (kg) and numbers of their bodies, -1 for rods, shape (n,); places (m) and their
+    derivatives after the coordinate, shape (n, 3).
     """
 
     masses: Array
@@ -29,24 +72,22 @@ class PointMasses(NamedTuple):
     rates: Array
 
 
+class Half(NamedTuple):
+    """Elements ``first`` to ``last`` - 1 of a rod."""
+
+    rod: int
+    first: int
+    last: int
+
+
 @dataclass(frozen=True)
 class Layout:
     """Everything that a structure consists of, with its rates; SI units throughout.
 
-    Attributes
-    ----------
-    bodies, rods, joints
-        Numbered by their place here.
-    openings
-        Opening angles by plane and section.
-    corners
-        Hinge assemblies by plane and corner, as numbers of bodies.
-    paths
-        Sheaves of each cable of the scene in order, from its first winch to its far end.
-    springs, contacts, net, boom
-        What else acts between bodies.
-    forces
-        Constant forces: number of the joint whose first mount they act on, and vector, N.
+    ``openings`` are by plane and section, ``corners`` hinge assemblies by plane and corner, as
+    numbers of bodies; ``paths`` sheaves of each cable of the scene in order, from its first winch
+    to its far end; ``forces`` constant ones: number of the joint whose first mount they act on,
+    and vector, N.
     """
 
     bodies: tuple[Body, ...]
@@ -66,10 +107,10 @@ class Layout:
         return pose_of(mount, self.bodies, self.rods)
 
     def masses(self) -> dict[str, float]:
-        """Mass of each group of parts, kg."""
+        """Of each group of parts, kg."""
         parts = [(rod.group, rod.mass) for rod in self.rods]
         parts += [(lump.group, lump.mass) for body in self.bodies for lump in body.lumps]
-        parts += [("V-joints", mass) for rod in self.rods for _, mass in rod.masses]
+        parts += [(group, mass) for rod in self.rods for _, mass, group in rod.masses]
         if self.boom is not None:
             parts.append(("boom", self.boom.lump.mass))
         if self.net is not None:
@@ -103,13 +144,13 @@ class Layout:
             across = math.sqrt(3.0 * tube.second_moment / tube.area)
             arms = np.diag([0.5 * rod.length, across, across])
             found += [(rod.mass / 6.0, -1, *middle.at(r)) for r in (*arms, *-arms)]
-            for station, mass in rod.masses:
+            for station, mass, _ in rod.masses:
                 pose = rod.station(rod.stations[station])
                 found.append((mass, -1, pose.place, pose.rate))
         return PointMasses(*map(np.array, zip(*found, strict=True)))
 
     def sheave(self, sheave: Sheave) -> tuple[Array, Array]:
-        """Place of a sheave in space and its derivative after the coordinate, shape (3,), m."""
+        """Place of a sheave and its derivative after the coordinate, shape (3,), m."""
         if not isinstance(sheave, BlockSheave):
             return self.pose(sheave.node).at(sheave.arm)
         left, right = map(self.pose, sheave.nodes)
@@ -140,3 +181,49 @@ class Layout:
     def supports(self) -> tuple[Joint, ...]:
         """Joints to places in space."""
         return tuple(j for j in self.joints if isinstance(j.first, InSpace))
+
+    def halves(self) -> dict[str, list[Half]]:
+        """Rows of results by name, in the order of the layout, with a value a section: a rod with
+        a joint inside is two, left and right of it.
+        """
+        sides = (side for joint in self.joints for side in (joint.first, joint.second))
+        held = {(mount.rod, mount.station) for mount in sides if isinstance(mount, OnRod)}
+        rows: dict[str, list[Half]] = {}
+        for number, rod in enumerate(self.rods):
+            last = len(rod.stations) - 1
+            middle = [station for station in range(1, last) if (number, station) in held]
+            names = ("_left", "_right") if middle else ("",)
+            for name, ends in zip(names, pairwise((0, *middle[-1:], last)), strict=True):
+                rows.setdefault(rod.name + name, []).append(Half(number, *ends))
+        return rows
+
+
+def layout_of(scene: Any, coordinate: float | None = None) -> Layout:
+    """The layout of a scene's structure at a coordinate (rad), or as it starts.
+
+    >>> from ringsim.scene import load_scene
+    >>> layout = layout_of(load_scene("truss2"))
+    >>> len(layout.bodies), len(layout.rods), len(layout.joints)
+    (6, 12, 24)
+    """
+    q = scene.structure.coordinate if coordinate is None else coordinate
+    return cast(Layout, scene.structure.layout(scene, q + 1j * STEP))
+
+
+def layout_at_opening(scene: Any, opening: float) -> Layout:
+    """The layout at which the mean opening angle has a value (rad), by Newton's method.
+
+    Raises
+    ------
+    ValueError
+        If the structure never opens so far.
+    """
+    q = float(scene.structure.coordinate)
+    for _ in range(30):
+        layout = layout_of(scene, q)
+        angles, rates = layout.opening_angles()
+        missing = opening - float(angles.mean())
+        if abs(missing) < 1e-12:
+            return layout
+        q += missing / float(rates.mean())
+    raise ValueError(f"no state of the structure has a mean opening angle of {opening:.4g} rad")

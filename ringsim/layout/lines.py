@@ -2,39 +2,24 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.layout.bodies import OnBody, OnRod
-from ringsim.layout.halves import halves
 from ringsim.layout.joints import JointOpening
 from ringsim.layout.layout import Layout
-
-Array = NDArray[np.float64]
+from ringsim.layout.pose import Array
 
 
 def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> dict[str, Array]:
-    """Lines by what they are, centred on the vertical axis.
+    """End points of lines, shape (lines, 2, 3), m, by group: those of the rods, "hinge assemblies",
+    "boom", "net, taut" (springs longer than ``taut_beyond``, m) and "net, slack".
 
-    Everything stands as the layout says but for the joints that open: each stands at the depth of
-    its own opening angle, aside of the line between the far ends of its two rods.
-
-    Parameters
-    ----------
-    layout
-        At the mean opening angle.
-    openings
-        Opening angles, shape (planes, sections), rad.
-    taut_beyond
-        Length from which a spring of the net is drawn as taut, m.
-
-    Returns
-    -------
-    dict of str to Array
-        End points, shape (lines, 2, 3), m, by group: those of the rods, "hinge assemblies", "boom",
-        "net, taut" and "net, slack".
+    Everything stands as the layout, at the mean opening angle, says, centred on the vertical axis,
+    but for the joints that open: each stands at the depth of its own opening angle (``openings``,
+    shape (planes, sections), rad), aside of the line between the far ends of its two rods.
     """
     ends = {
         (number, station): rod.station(share).place
@@ -46,11 +31,10 @@ def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> di
             if isinstance(opening, JointOpening):
                 _open(layout, ends, opening, float(angle))
     found: dict[str, list[Any]] = {}
-    for half in (half for row in halves(layout).values() for half in row):
+    for half in chain.from_iterable(layout.halves().values()):
         line = ends[half.rod, half.first], ends[half.rod, half.last]
         found.setdefault(layout.rods[half.rod].group, []).append(line)
-    corners = {number for plane in layout.corners for number in plane}
-    pins = {}
+    corners, pins = {number for plane in layout.corners for number in plane}, {}
     for joint in layout.joints:
         for mount in (joint.first, joint.second):
             if isinstance(mount, OnBody) and mount.body in corners and joint.family:

@@ -1,18 +1,9 @@
-"""How many ways a structure of rigid parts can move, counted and computed.
+"""How many ways a structure of rigid parts can move: null space of the constraint Jacobian.
 
-The Kutzbach count 6 (bodies - 1) - constraints comes out far below zero for a ring (-7 N - 6 when
-closed): it takes all constraints for independent, which parallel axes and equal lengths are not.
-The true mobility at a fold state is the dimension of the null space of the constraint Jacobian.
-
-- A section of a pantograph ring has five internal freedoms: it folds, and each of its four hinge
-  assemblies tilts about the common axis of the two rods that it carries.
-- Where two sections meet, both share the upper and the lower hinge assembly.  Their normals
-  differ, so neither assembly can tilt about both: the tilt is gone, and what is left makes
-  both sections equally high.
-- An open arc therefore keeps five freedoms whatever its length (the fold, and the tilts of the
-  four assemblies at its ends; four if a boom joins two of them), and a closed ring has one.
-- At 180 deg exactly the state is singular: the bars lie straight, the sections' width is
-  stationary, and each of the 2 N V-joints can start to move by itself instead of with the fold.
+A section of a pantograph ring folds, and each of its four hinge assemblies tilts about the common
+axis of its two rods.  Where two sections meet, their normals differ: no tilt is left.  A closed
+ring has one freedom, an open arc five (four if a boom joins two end assemblies).  At 180 deg the
+bars lie straight, and each of the 2 N V-joints can start to move by itself.
 """
 
 from __future__ import annotations
@@ -20,13 +11,11 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.layout.bodies import InSpace, Mount, OnBody
 from ringsim.layout.joints import Joint
 from ringsim.layout.layout import Layout
-
-Array = NDArray[np.float64]
+from ringsim.layout.pose import Array, skew
 
 RANK_TOLERANCE = 1e-9
 """Singular values below this fraction of the largest are zeros.  Round-off leaves 1e-15; the
@@ -43,18 +32,8 @@ _HELD = {
 def internal_mobility(layout: Layout) -> int:
     """Degrees of freedom of a structure of rigid parts beyond its six as one rigid body.
 
-    The motions of each section by itself are joined at the bodies that sections share.  A boom
-    counts as rigid; supports do not count.
-
-    Parameters
-    ----------
-    layout
-        At the state in question, whose joints say by ``section`` what belongs together.
-
-    Returns
-    -------
-    int
-        Of a pantograph ring 1, of an open arc 5; at 180 deg 2 N and 2 N + 4.
+    The motions of each section (of its joints) by itself are joined at the bodies that sections
+    share.  A boom counts as rigid; supports do not count.
     """
     joints = [joint for joint in layout.joints if not isinstance(joint.first, InSpace)]
     if layout.boom is not None:
@@ -71,16 +50,16 @@ def internal_mobility(layout: Layout) -> int:
         free = shapes[_rank(values) :].T.reshape(len(parts), 6, -1)
         for part, twist in zip(parts, free, strict=True):
             place = layout.bodies[part[1]].pose.place if part[0] else middle
-            arm = _cross_matrix((place - middle) / size)
+            arm = skew((place - middle) / size)
             at_part = np.concatenate([twist[:3] - arm @ twist[3:], twist[3:]])
             motions.setdefault(part, []).append((columns, at_part))
         columns += free.shape[-1]
     joined = [np.zeros((0, columns))]
     for shared in motions.values():
-        for pair in pairwise(shared):
+        for (start, twist), (other, same) in pairwise(shared):
             joined.append(np.zeros((6, columns)))
-            for sign, (start, twist) in zip((1.0, -1.0), pair, strict=True):
-                joined[-1][:, start : start + twist.shape[1]] += sign * twist
+            joined[-1][:, start : start + twist.shape[1]] += twist
+            joined[-1][:, other : other + same.shape[1]] -= same
     rank = _rank(np.linalg.svd(np.concatenate(joined), compute_uv=False))
     return columns - rank - 6
 
@@ -96,17 +75,13 @@ def _row(
 ) -> Array:
     """What a joint holds, (constraints, 6 parts): on velocity at a point, and angular velocity."""
     pose = layout.pose(joint.first)
-    turned = pose.axes.T @ _cross_matrix((pose.place - at) / size)
+    turned = pose.axes.T @ skew((pose.place - at) / size)
     whole = np.block([[pose.axes.T, -turned], [np.zeros((3, 3)), pose.axes.T]])
     held = whole[_HELD[joint.kind]]
     row = np.zeros((len(held), len(parts), 6))
     row[:, parts.index(_part(joint.first))] += held
     row[:, parts.index(_part(joint.second))] -= held
     return row.reshape(len(held), -1)
-
-
-def _cross_matrix(r: Array) -> Array:
-    return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
 
 
 def _rank(values: Array) -> int:

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 STEP = 1e-30
 """Imaginary part of the coordinate at which a layout is built: f(q + i h) = f(q) + i h f'(q), the
-complex step (Squire and Trapp, SIAM Review 40, 1998).  It subtracts nothing, so that h may be as
-small as it likes and the derivative is good to round-off."""
+complex step (Squire and Trapp, SIAM Review 40, 1998), good to round-off as it subtracts nothing."""
 
 
 def rate_of(values: Any) -> Array:
@@ -29,12 +28,8 @@ def real_of(values: Any) -> Array:
 class Pose:
     """A frame and its derivative after the coordinate q.
 
-    Attributes
-    ----------
-    place, axes
-        Origin, shape (3,), m, and axes as columns, shape (3, 3).
-    rate, turn
-        Derivative of the origin, m per unit of q, and rotation vector per unit of q, shape (3,).
+    Origin, shape (3,), m, and axes as columns, shape (3, 3); derivative of the origin, m, and
+    rotation vector per unit of q, shape (3,).
 
     Examples
     --------
@@ -66,13 +61,15 @@ class Pose:
 
 
 def cross(a: Any, b: Any) -> NDArray[Any]:
-    """Cross product of two vectors, shape (3,), real or complex.
-
-    numpy's own costs fifteen times as much.
-    """
-    return np.array(
+    """Cross product of two vectors, shape (3,), real or complex."""
+    return np.array(  # numpy's own costs fifteen times as much
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     )
+
+
+def skew(r: Array) -> Array:
+    """The matrix [r]x."""
+    return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
 
 
 def turned_about_z(angle: Any) -> NDArray[Any]:

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from ringsim.layout.layout import layout_at_opening, layout_of
 from ringsim.layout.lines import lines_of
-from ringsim.layout.of_scene import layout_at_opening, layout_of
 from ringsim.plots import style, wording
 from ringsim.scene import Scene, scene_from_toml
 

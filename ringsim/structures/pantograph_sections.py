@@ -39,7 +39,7 @@ def add_sections(
     rods = draft.scene.rods
     young = spread(rods.young_modulus, geometry.sections).tolist()
     whole, half = (np.arange(n + 1) / n for n in (2 * rods.elements, rods.elements))
-    middle = ((rods.elements, vjoint_mass),) if vjoint_mass > 0.0 else ()
+    middle = ((rods.elements, vjoint_mass, "V-joints"),) if vjoint_mass > 0.0 else ()
     tracks: tuple[list[Any], list[Any]] = ([], [])
     for section, normal in enumerate(geometry.normals):
         pins = fold.left[:, section], fold.right[:, section]

@@ -12,9 +12,8 @@ from pydantic import model_validator
 from ringsim.choice import kind_of
 from ringsim.layout.bodies import Lump
 from ringsim.layout.draft import Draft, Track
-from ringsim.layout.layout import Layout
+from ringsim.layout.layout import Contact, Layout, Spring
 from ringsim.layout.pose import axes_along
-from ringsim.layout.springs import Contact, Spring
 from ringsim.parts.springs import Reaction, one_sided, two_sided
 from ringsim.parts.tube import Tube
 from ringsim.structures.family import Structure

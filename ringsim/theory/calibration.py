@@ -22,10 +22,9 @@ _CLOSE = 1e-5
 
 
 def opening_angle_for(scene: Scene, time: float) -> float:
-    """Initial opening angle in deg from which the scene's ideal ring deploys in ``time``.
+    """Initial opening angle in deg from which the scene's ideal ring deploys in ``time`` (s).
 
-    Every angle that is tried is a run of the ideal fidelity with all parts of the scene:
-    loads, net, friction, cables, faults.
+    Every angle that is tried is a run of the ideal fidelity with all parts of the scene.
 
     Raises
     ------

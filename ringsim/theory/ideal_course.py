@@ -1,30 +1,29 @@
-"""Integrating an ideal ring from its release to its end.
+"""Integrating an ideal ring from its release to its end, by scipy's Radau IIA (order 5, stiff).
 
-Steps are those of scipy's Radau IIA (order 5, for stiff equations).  A stop is a kink of the
-equations: a step that meets or leaves one is repeated to end there.  Switching a winch, and
-every fault, restarts the integration.
+A stop is a kink of the equations: a step that meets or leaves one is repeated to end there.
+Switching a winch, and every fault, restarts the integration.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from ringsim.cable.ropes import Ropes
+from ringsim.layout.pose import Array
 from ringsim.scene import Scene
 from ringsim.theory.ideal_motion import IdealMotion
-from ringsim.theory.ideal_points import Array
 from ringsim.variables import Cause, Status
 
 RELATIVE = 3e-7
 """Local error of a step, relative to every part of the state."""
 BEYOND = 1e-10
-"""Angle in rad beyond a stop at which it counts as met, and before it as left: more than
-round-off, so that no step begins with the crossing that ended the one before it."""
+"""Angle in rad beyond a stop at which it counts as met, and before it as left: above round-off, so
+that no step begins with the crossing that ended the one before it."""
 MOST_EVALUATIONS = 400_000
 """Evaluations of the equations after which a run is given up."""
 MOST_CONTACTS = 1000
@@ -36,11 +35,11 @@ _ALIKE = 1e-13
 
 @dataclass
 class Piece:
-    """Steps between two events, with their latches and ropes.
+    """Steps between two events.
 
-    ``times``, ``states`` and ``rates`` are beginning and end of every step, the states there and
-    their derivatives; ``inner``, where cables are, times and states at the collocation points
-    within the steps: what is stiff is in balance there, and nowhere else between a step's ends.
+    ``times`` and ``states`` are those at the steps' ends, ``rates`` the states' derivatives;
+    ``inner``, where cables are, times and states at the collocation points within the steps: what
+    is stiff is in balance there, and nowhere else between a step's ends.
     """
 
     latched: bool
@@ -51,13 +50,12 @@ class Piece:
     inner: list[tuple[float, Array]] = field(default_factory=list)
 
 
+@dataclass
 class _Crossing:
     """An event of scipy: the first coordinate passes a level."""
 
-    terminal = True
-
-    def __init__(self, level: float) -> None:
-        self.level = level
+    level: float
+    terminal: ClassVar = True
 
     def __call__(self, time: float, state: Array) -> float:
         return float(state[0]) - self.level
@@ -66,8 +64,7 @@ class _Crossing:
 class Course:
     """One run of a scene's ideal ring.
 
-    ``lock_time`` is when the V-joints reached 180 deg, s, NaN if they never did; each of the
-    ``pieces`` begins in time where the one before it ends.
+    ``lock_time`` is when the V-joints reached 180 deg, s, NaN if they never did.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -101,11 +98,10 @@ class Course:
             self.cause = Cause.STEP_LIMIT if too_long else Cause.NEWTON
             self.reason = f"the ideal ring's solver gave up at {self._time:.6g} s: {error}"
         if self.status == Status.UNFINISHED:
-            joints = 2 * self._scene.structure.sections
             self.cause = Cause.END_TIME
             self.reason = (
                 f"solver.end_time = {self._scene.solver.end_time:g} s was reached with 0 of "
-                f"{joints} V-joints locked"
+                f"{2 * self._scene.structure.sections} V-joints locked"
             )
         return self
 
@@ -133,9 +129,8 @@ class Course:
     def _advance(self, target: float) -> None:
         """Take steps until ``target``, or until a stop is met or left."""
         phi = float(self._state[0])
-        levels = [self._stowed + math.copysign(BEYOND, self._stowed - phi)]
-        if not self.motion.latched:
-            levels.append(math.copysign(BEYOND, -phi))
+        stops = [self._stowed] if self.motion.latched else [self._stowed, 0.0]
+        levels = [stop + math.copysign(BEYOND, stop - phi) for stop in stops]
         found = self._solve(target, levels if self._contacts < MOST_CONTACTS else [])
         crossed = [k for k, times in enumerate(found.t_events or []) if len(times)]
         if crossed:
@@ -173,7 +168,6 @@ class Course:
         return self.motion.jacobian(time, state)
 
     def _judge(self) -> None:
-        """Locks and ends."""
         phi, rate = float(self._state[0]), float(self._state[self.motion.mechanism.freedom])
         stop = self._scene.stop
         if math.isnan(self.lock_time) and phi <= 0.0 and rate < 0.0:

@@ -1,27 +1,26 @@
 """The ideal fidelity: a scene run with a ring of rigid rods.
 
-A closed ring of rigid rods has one coordinate, an open arc up to five.  What they cannot represent
-is refused; what they can is integrated to tolerances far below those of the full model
-(``ringsim.theory.ideal_course``), so that the difference of the two is what the rods' elasticity
-does.
+What rigid rods cannot represent is refused; the rest is integrated to tolerances far below those of
+the full model (``ringsim.theory.ideal_course``): the two differ by what the rods' elasticity does.
 """
 
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
+from ringsim.cable import regularisation
 from ringsim.choice import kind_of
 from ringsim.layout.free_hub import FreeHub
-from ringsim.layout.of_scene import layout_of
+from ringsim.layout.layout import layout_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.theory.faded_friction import with_remark
 from ringsim.theory.ideal_course import Course
 from ringsim.theory.ideal_outcome import to_outcome
-from ringsim.variables import Cause, Outcome, Status
+from ringsim.variables import PLANES, Cause, Outcome, Status
 
 _LIGHT_HUB = 1e-3
 """Largest mass of the net's hub over the ring's."""
@@ -76,13 +75,9 @@ def refuse_if_not_ideal(scene: Scene) -> None:
 
 
 def run_ideal(scene: Scene) -> Outcome:
-    """Integrate the ideal ring of a scene.
+    """Integrate the ideal ring of a scene; it always ends with a status.
 
-    Returns
-    -------
-    Outcome
-        The variables of the full model where they exist; all sections open alike.  It always ends
-        with a status.
+    The outcome has the variables of the full model where they exist; all sections open alike.
 
     Raises
     ------
@@ -100,3 +95,31 @@ def run_ideal(scene: Scene) -> Outcome:
     outcome.values["wall_time"] = np.array(time.perf_counter() - wall)
     outcome.values["cpu_time"] = np.array(time.process_time() - cpu)
     return with_remark(outcome, scene)
+
+
+def with_remark(outcome: Outcome, scene: Scene) -> Outcome:
+    """The outcome; its reason names every cable whose pulley friction is reduced.
+
+    A law with feedback finds its speed in the run, and a scene may set the slip speed, so this is
+    judged afterwards, by the length wound until deployed; see ``ringsim.cable.regularisation``.
+    """
+    values = outcome.values
+    if scene.cables is None or outcome.status.failed or "wound_length" not in values:
+        return outcome
+    times, reason = outcome.coordinates["time"], outcome.reason
+    before = ~(times > values.get("deployment_time", np.nan))
+    for plane, cable in scene.cables.present():
+        pulleys = scene.pulleys_of(cable)
+        slip = cable.slip_speed_over(pulleys)
+        speed = regularisation.usual_winding(times[before], values["wound_length"][plane, before])
+        right_angle = np.full(pulleys, 0.5 * np.pi)
+        decay = -cable.friction.log_decay(right_angle, cable.pulley_radius).min(initial=0.0)
+        excess = regularisation.excess(slip, speed, pulleys, float(decay))
+        if speed > 0.0 and excess > regularisation.TOLERATED:
+            reason += (
+                f"; cables.{PLANES[plane]}.slip_speed = {slip:.2g} m/s is too fast for rope wound "
+                f"at {speed:.2g} m/s: pulley friction fades, and the smallest tension is up to "
+                f"{100.0 * excess:.0f} % too high (set it to at most "
+                f"{regularisation.slip_speed(speed, pulleys):.2g} m/s)"
+            )
+    return replace(outcome, reason=reason)

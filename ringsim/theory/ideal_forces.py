@@ -1,30 +1,33 @@
-"""Forces on the ideal ring but for its cables: V-joint loads, net, joint friction, stops.
+"""What acts on the ideal ring: V-joint loads, net, joint friction, stops, and its cables.
 
 A joint turns at the rate of its second part less that of its first.  A part turns about the joint's
-axis z at z . (x x x'), with x a direction of its own square to z; x is linear in the functions of
-ringsim.theory.ideal_points.
+axis z at z . (x x x'), with x a direction of its own square to z.  The generalised force of a cable
+is its force on each sheave times how that point moves with the coordinates.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.layout.free_hub import FreeHub
-from ringsim.layout.pose import cross
+from ringsim.cable.chain import Chain
+from ringsim.cable.state import ChainState
+from ringsim.cable.winding.family import FeedbackWinding
+from ringsim.layout.pose import Array, cross
 from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.persection import at_section
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
-from ringsim.theory.ideal_points import Array, Points
+from ringsim.theory.ideal_points import Points
 
 
 class Acting(NamedTuple):
-    """What acts at one instant: generalised force on (q, psi) (N m); couple of the loads on the
-    structure as one body, shape (3,) (N m); energy in net and stops, and work function of the loads
-    (J); power lost in joints, net and stops (W).
+    """What acts at one instant: generalised force on (q, psi), and couple of the loads on the whole
+    structure, shape (3,) (N m); energy in net and stops, and work function of the loads (J); power
+    lost in joints, net and stops (W).
     """
 
     force: Array
@@ -34,38 +37,10 @@ class Acting(NamedTuple):
     loss: float
 
 
-class _FrictionJoints:
-    """Joints of one family and their law."""
-
-    def __init__(self, points: Points, family: str, law: JointFriction) -> None:
-        joints = [joint for joint in points.layout.joints if joint.family == family]
-        self._law = at_section(law, np.array([joint.section for joint in joints]))
-        axes = np.array([points.layout.pose(joint.first).axes[:, 2] for joint in joints])
-        self._sides = [
-            (np.cross(axes[:, :, None], along, axis=1), along)
-            for along in (
-                points.directions([joint.first for joint in joints]),
-                points.directions([joint.second for joint in joints]),
-            )
-        ]
-
-    def act(self, now: Configuration) -> tuple[Array, float]:
-        """Generalised force and power lost."""
-        first, second = (
-            np.einsum("ja,jap->jp", now.moved(ahead)[0], now.moved(along)[1])
-            for ahead, along in self._sides
-        )
-        slopes = second - first
-        speed = slopes @ now.rate
-        torque = self._law.torque(speed)
-        return -torque @ slopes, float(torque @ speed)
-
-
 class Forces:
-    """Everything that acts on the ideal ring of a scene, without its cables.
+    """Everything that acts on the ideal ring of a scene but its cables.
 
-    ``loaded`` is whether loads act, ``slowest`` the smallest characteristic rate of the joints'
-    friction, rad/s; infinite without one.
+    ``slowest`` is the least characteristic rate of the joints' friction, rad/s; infinite without.
     """
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
@@ -74,28 +49,30 @@ class Forces:
         loads, places = points.forces
         self.loaded = bool(loads.any())
         self._lift = np.tensordot(loads[:, 2], places, 1)
-        self._net = None if scene.net is None else FreeHub(scene.net, len(mechanism.upper_corners))
         laws = scene.joints.present()
-        self._joints = [_FrictionJoints(points, *item) for item in laws.items()]
+        self._joints = [_friction_joints(points, *item) for item in laws.items()]
         rates = [law.characteristic_rate() for law in laws.values()]
         self.slowest = min(rates, default=math.inf)
         self._stops = sum(map(len, points.layout.openings))
 
     def act(self, now: Configuration, up: Array, latched: bool) -> Acting:
-        """Forces, energies and powers.
+        """Forces, energies and powers, ``latched`` or not.
 
-        ``up`` is the unit vector that points up in space, in the structure's axes (the loads'
-        direction); ``latched`` is whether the latches hold.
+        The loads act along ``up``, the unit vector up in space, in the structure's axes.
         """
         lifted = self._lift @ now.values
-        force, loss, elastic = up @ self._lift @ now.by_place, 0.0, 0.0
-        for joints in self._joints:
-            torque, lost = joints.act(now)
-            force, loss = force + torque, loss + lost
-        if self._net is not None:
-            places, slopes, _ = now.moved(self._mechanism.upper_corners)
-            net = self._net.forces(places, slopes, now.rate)
-            force, elastic, loss = force + net.force, net.energy, loss + net.loss
+        force, loss = up @ self._lift @ now.by_place, 0.0
+        for law, sides in self._joints:
+            first, second = (
+                np.einsum("ja,jap->jp", now.moved(ahead)[0], now.moved(along)[1])
+                for ahead, along in sides
+            )
+            slopes = second - first
+            speed = slopes @ now.rate
+            torque = law.torque(speed)
+            force, loss = force - torque @ slopes, loss + float(torque @ speed)
+        net = self._mechanism.net(now, now.rate)
+        force, elastic, loss = force + net.force, net.energy, loss + net.loss
         stop, folded, rate = self._stop, 2.0 * float(now.place[0]), 2.0 * float(now.rate[0])
         if stop is not None and (latched or not 0.0 <= folded <= stop.most_folded):
             reaction = stop.torque(folded, rate, latched)
@@ -103,3 +80,130 @@ class Forces:
             elastic += self._stops * float(reaction.stored)
             loss += self._stops * float(reaction.damping) * rate
         return Acting(force, cross(lifted, up), elastic, float(up @ lifted), loss)
+
+
+def _friction_joints(
+    points: Points, family: str, law: JointFriction
+) -> tuple[JointFriction, list[tuple[Array, Array]]]:
+    """The law at the joints of a family; z x x and x of their first and second parts."""
+    joints = [joint for joint in points.layout.joints if joint.family == family]
+    axes = np.array([points.layout.pose(joint.first).axes[:, 2] for joint in joints])
+    sides = [joint.first for joint in joints], [joint.second for joint in joints]
+    alongs = map(points.directions, sides)
+    sections = np.array([joint.section for joint in joints])
+    aheads = [(np.cross(axes[:, :, None], along, axis=1), along) for along in alongs]
+    return at_section(law, sections), aheads
+
+
+class Pull(NamedTuple):
+    """The cables at one instant: their state; generalised force on (q, psi) (N m); speeds that laws
+    with feedback command (m/s); power lost, and put in by the winches less the energy wound up with
+    the rope (W); elastic energy (J).
+    """
+
+    chain: ChainState
+    force: Array
+    commands: Array
+    loss: float
+    power: float
+    elastic: float
+
+
+class IdealCables:
+    """The cables of a scene on its ideal ring.
+
+    ``planes`` are those of each cable, two where the cables of both planes are identical; ``paths``
+    the coefficients of all paths' points behind one another, shape (points, 3, functions), m;
+    ``ropes`` which spans form one rope, which faults change; ``answering`` cable and end (0 first,
+    1 far) of the winches with feedback, whose rope and speed are states of the motion.
+    """
+
+    def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
+        assert scene.cables is not None
+        present = scene.cables.present()
+        self.planes: list[tuple[int, ...]] = [(plane,) for plane, _ in present]
+        alike = scene.structure.closed and len(present) == 2 and not scene.faults
+        if alike and present[0][1] == present[1][1]:
+            present, self.planes = present[:1], [(0, 1)]
+        self._copies = np.array([float(len(planes)) for planes in self.planes])
+        self._structure, self._cables = scene.structure, [cable for _, cable in present]
+        paths = [mechanism.points.path(number) for number in range(len(present))]
+        self.paths = np.concatenate(paths)
+        self._chain = Chain(self._cables, [len(path) for path in paths])
+        released = np.eye(mechanism.freedom)[0] * scene.structure.coordinate
+        start = mechanism.configuration(released, 0.0 * released)
+        self.ropes = self._chain.start(self.paths @ start.values)
+        self._slip = min(cable.slip_speed_over(scene.pulleys_of(cable)) for cable in self._cables)
+        self._winches = {
+            (number, end): winch
+            for number, cable in enumerate(self._cables)
+            for end, winch in enumerate(cable.winches)
+        }
+        self.answering = [
+            place
+            for place, winch in self._winches.items()
+            if isinstance(winch.winding, FeedbackWinding)
+        ]
+
+    @property
+    def breaks(self) -> list[float]:
+        """Times at which a winch is switched on or off, s."""
+        switched = [(w.start_time, w.stop_time) for w in self._winches.values()]
+        return [time for times in switched for time in times if time is not None and time > 0.0]
+
+    @property
+    def nudges(self) -> tuple[float, float]:
+        """Increments of a length (m) and a rate (1/s) over which tensions are nearly linear."""
+        # A slack rope becomes taut within this strain; friction turns within the slip speed.
+        soft = min(cable.slack_width / cable.axial_stiffness for cable in self._cables)
+        return min(max(1e-2 * soft, 1e-9), 1e-6), 1e-2 * self._slip
+
+    def pull(self, time: float, now: Configuration, motors: Array) -> Pull:
+        """Evaluate the cables; ``time`` (s) is that of the winches' laws, ``motors`` the rope wound
+        by each winch with feedback and its speed, m and m/s, shape (2, winches).
+
+        Raises
+        ------
+        ValueError
+            If a span has no length, or a winch has wound up its whole rope.
+        """
+        points, slopes, velocities = now.moved(self.paths)
+        ropes, copies = self.ropes, self._copies
+        wound, speed = np.zeros((2, len(copies), 2))
+        for place, winch in self._winches.items():
+            wound[place], speed[place] = winch.at(time)
+        for place, *motor in zip(self.answering, *motors, strict=True):
+            wound[place], speed[place] = motor
+        state = self._chain.state(ropes, points, velocities, wound, speed)
+        on_rope, density = copies[ropes.cable], state.energy_density
+        of_points = np.repeat(copies, ropes.points_per_cable)[:, None] * state.point_forces
+        return Pull(
+            state,
+            np.tensordot(of_points, slopes, 2),
+            self._commands(time, now, state),
+            float(on_rope[ropes.of_pulley] @ state.friction_loss + on_rope @ state.damping_loss),
+            float(copies @ state.winch_power.sum(axis=1) - on_rope @ (density * state.wound_rates)),
+            float(on_rope @ (density * state.natural)),
+        )
+
+    def _commands(self, time: float, now: Configuration, state: ChainState) -> Array:
+        """Speeds commanded by the laws with feedback, m/s, shape (winches,)."""
+        if not self.answering:
+            return np.zeros(0)
+        opening = np.full(self._structure.sections, math.pi - 2.0 * float(now.place[0]))
+        on = [place for place in self.answering if self._winches[place].turns(time)]
+        running = [self.ropes.of_end[place] for place in on]
+        rest = state.path_rates + state.wound_rates
+        for place, rope in zip(on, running, strict=True):
+            rest[rope] -= state.wound_rate[place]
+        found = dict.fromkeys(self.answering, 0.0)
+        for place, rope in zip(on, running, strict=True):
+            law = self._winches[place].winding
+            assert isinstance(law, FeedbackWinding)
+            slope = self._structure.path_slope(self._cables[place[0]], opening)
+            # Winches on one rope share the length that the structure releases.
+            shared = float(rest[rope]) / running.count(rope)
+            reading = replace(state.reading(*place, slope), path_rate=shared)
+            command = law.command(float(state.winch_tensions[place]), reading)
+            found[place] = float(np.clip(command, *law.limits()))
+        return np.array(list(found.values()))

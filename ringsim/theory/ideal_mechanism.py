@@ -1,7 +1,7 @@
 """A structure with rigid rods as a mechanism: its coordinates, its mass, its equations of motion.
 
-A closed ring has one coordinate, the fold q.  An open arc has the swings psi of its four end
-assemblies besides (ringsim.theory.ideal_points): five, or four where a boom joins two of them.
+A closed ring has one coordinate, the fold q; an open arc the swings psi of its four end assemblies
+besides (ringsim.theory.ideal_points), three of them free where a boom joins two.
 
 The structure moves as one rigid body (velocity V, rotation W, along its own axes), folds and
 swings.  For masses m at r(p), p = (q, psi),
@@ -22,15 +22,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ringsim.layout.bodies import OnBody
+from ringsim.layout.free_hub import FreeHub, NetForces
+from ringsim.layout.pose import Array, skew
 from ringsim.scene import Scene
-from ringsim.theory.ideal_points import UP, Array, Points, body_of
+from ringsim.theory.ideal_points import UP, Points, body_of
 
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3))
-
-
-def skew(r: Array) -> Array:
-    """The matrix [r]x."""
-    return np.asarray(-_LEVI_CIVITA @ r)
 
 
 def _axial(w: Array) -> Array:
@@ -39,22 +37,13 @@ def _axial(w: Array) -> Array:
 
 
 class Configuration(NamedTuple):
-    """The mechanism at one instant, with n coordinates.
+    """The mechanism at one instant: its n coordinates p = (q, psi) and their rates, rad and rad/s.
 
-    Attributes
-    ----------
-    place, rate
-        p = (q, psi) and its rate, shape (n,), rad and rad/s.
-    slopes, bias
-        Derivatives of p after the free coordinates, shape (n, freedom), and p'' less slopes times
-        the free accelerations, rad/s^2.
-    functions
-        ``Points.functions`` there.
-    first, second
-        Sums of m P s_k and of m (P s_j) (P s_k)^T, where j and k count the columns of
-        ``functions``, j the first n + 1; shapes (3, n + 3) and (n + 1, n + 3, 3, 3).
-    matrix
-        Mass matrix of (V, W, p'), shape (6 + n, 6 + n).
+    ``slopes`` are derivatives of p after the free coordinates, shape (n, freedom), ``bias`` is p''
+    less slopes times the free accelerations, rad/s^2; ``first`` and ``second`` are the sums of
+    m P s_k and m (P s_j) (P s_k)^T over columns k of ``functions`` (those of ``Points``) and the
+    first n + 1 of them j, shapes (3, n + 3) and (n + 1, n + 3, 3, 3); ``matrix`` is the mass
+    matrix of (V, W, p'), shape (6 + n, 6 + n).
     """
 
     place: Array
@@ -90,15 +79,8 @@ class Configuration(NamedTuple):
 class Mechanism:
     """Coordinates, masses and equations of a scene's structure; ``at`` is as of ``Points``.
 
-    Attributes
-    ----------
-    points, upper_corners
-        Coefficients of its points, and those of the upper hinge assemblies, shape (corners, 3,
-        functions), m.
-    freedom
-        Number of free coordinates: 1, or 4 or 5 for an open arc; q is the first.
-    fixed
-        Whether a body is held: the first upper assembly by the base of a boom.
+    ``freedom`` is the number of free coordinates, q the first: 1, or 4 or 5 for an open arc;
+    ``fixed`` is whether a body is held: the first upper assembly by the base of a boom.
     """
 
     def __init__(self, scene: Scene, at: float | None = None) -> None:
@@ -108,7 +90,9 @@ class Mechanism:
         self._mass, self._first = float(masses.sum()), np.tensordot(masses, places, 1)
         second = ((flat.T * masses) @ flat).reshape(3, count, 3, count)
         self._second = second.transpose(1, 3, 0, 2).reshape(count, -1)
-        self.upper_corners = points.upper_corners()
+        corners = points.layout.corners
+        self._corners = points.places([OnBody(body) for body in corners[0]] if corners else [])
+        self._net = None if scene.net is None else FreeHub(scene.net, len(self._corners))
         held = [body_of(support.second) for support in points.layout.supports]
         self.fixed = bool(held)
         self._held = points.frame(held[0]) if held else np.zeros(0)
@@ -118,7 +102,7 @@ class Mechanism:
         if self._on_boom:
             pins = points.pins
             self._height = pins[0, 2] - pins[1, 2]
-            self._offset = float(np.linalg.norm(self.upper_corners[0, :, pins.shape[-1]]))
+            self._offset = float(np.linalg.norm(self._corners[0, :, pins.shape[-1]]))
 
     def configuration(self, free: Array, rates: Array) -> Configuration:
         """The mechanism at free coordinates (rad) and their rates (rad/s)."""
@@ -141,14 +125,19 @@ class Mechanism:
         matrix[6:, :6] = matrix[:6, 6:].T
         return Configuration(place, rate, slopes, bias, s, first, second, matrix)
 
+    def net(self, now: Configuration, rate: Array) -> NetForces:
+        """What the net does while p changes at a rate (rad/s)."""
+        if self._net is None:
+            return NetForces(np.zeros(len(rate)), 0.0, 0.0)
+        places, slopes, _ = now.moved(self._corners)
+        return self._net.forces(places, slopes, rate)
+
     def vertical(self, now: Configuration) -> Array:
         """Unit vector that points up in space, in the structure's axes, if it cannot pitch."""
         return np.asarray(self._held[3] @ now.values) if self.fixed else UP
 
     def rigid_rates(self, now: Configuration, spin: Array | None = None) -> Array:
-        """V and W, shape (6,).
-
-        Where a body is held those that hold it; else those without momentum, with the
+        """V and W, shape (6,), that hold the held body; else those without momentum, with the
         rotation ``spin`` (rad/s) or, if None, without angular momentum too.
         """
         matrix = now.matrix
@@ -164,8 +153,7 @@ class Mechanism:
     ) -> tuple[Array, Array]:
         """Accelerations of the free coordinates, and W' of a base that floats; rad/s^2.
 
-        ``spin`` is W (rad/s), ``torque`` acts on the structure as one body (N m, shape (3,)), and
-        ``forces`` are the generalised ones on p, N m.
+        ``spin`` is W (rad/s), ``torque`` that on the whole structure, ``forces`` those on p (N m).
         """
         first, second, matrix, turn = now.first, now.second, now.matrix, skew(spin)
         whirl, rigid = turn @ turn, 0 if self.fixed else 6
@@ -197,13 +185,11 @@ class Mechanism:
         """p, its derivatives after (q, b, psi_3, psi_4), and p'' at zero accelerations of these.
 
         A boom in the first end assembly, on which the second slides, leaves the angle b between
-        these two: with a the distance of the pins from the assembly's centre and h that of the
-        pins,
+        these two: with a the distance of a pin from its assembly's centre and h that of the pins,
 
-            sin(psi_1) = a (1 - cos b) / h,   psi_2 = psi_1 + b.
+            sin(psi_1) h = a (1 - cos b),   psi_2 = psi_1 + b,
 
-        The second derivatives come from sin(psi_1) h = a (1 - cos b), differentiated twice.  NaN
-        where the boom blocks the lower assembly.
+        of which bias is the second derivative.  NaN where the boom blocks the lower assembly.
         """
         h, h_slope, h_bend = self.points.basis(float(free[0])) @ self._height
         offset = self._offset

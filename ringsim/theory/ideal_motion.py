@@ -1,38 +1,38 @@
 """The ideal ring in motion: one system of ordinary differential equations.
 
-The state holds the free coordinates and their rates; the direction up in space along the core's
-axes and the core's rotation, where loads act on a base that floats (they stay vertical while the
-ring tilts; without them it has no angular momentum, which gives the rotation); the rope wound by
-each winch with feedback, and its speed, which follows the law's command within ``MOTOR_LAG``; and
-the energies lost and supplied so far.
+The state holds the free coordinates and their rates; the direction up along the core's axes and the
+core's rotation, where loads act on a base that floats (they stay vertical while the ring tilts;
+without them it has no angular momentum); the rope wound by each winch with feedback, and its speed;
+and the energies lost and supplied so far.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from ringsim.cable.faults.family import CableFault
+from ringsim.layout.pose import Array, skew
 from ringsim.parts.faults.family import Fault
 from ringsim.scene import Scene
-from ringsim.theory.ideal_cables import IdealCables, Pull
-from ringsim.theory.ideal_forces import Acting, Forces
-from ringsim.theory.ideal_mechanism import Mechanism, skew
-from ringsim.theory.ideal_points import UP, Array
+from ringsim.theory.ideal_forces import Acting, Forces, IdealCables, Pull
+from ringsim.theory.ideal_mechanism import Mechanism
+from ringsim.theory.ideal_points import UP
 
 MOTOR_LAG = 1e-6
-"""Time constant in s with which a motor follows the speed that its law commands: the law depends on
-the tension, which depends on the speed, and without this lag both would have to be solved together.
-Cables oscillate within milliseconds."""
+"""Time constant in s with which a motor follows its law's command: the law depends on the tension,
+which depends on the speed, and without this lag both would have to be solved together.  Cables
+oscillate within milliseconds."""
 _ANGLE, _RATE = 1e-6, 1e-4
 """Largest increments of angles (rad) and rates (rad/s) for derivatives of the equations."""
 
 
 class IdealState(NamedTuple):
     """Accelerations of the free coordinates and of the core's rotation (rad/s^2), that rotation
-    (rad/s), kinetic energy (J), and what acts, at one instant.
+    (rad/s), kinetic energy (J), and what acts.
     """
 
     acceleration: Array
@@ -51,9 +51,8 @@ class IdealState(NamedTuple):
 class IdealMotion:
     """The equations of a scene's ideal ring.
 
-    ``latched`` is whether the V-joints' latches hold; ``until`` the time (s) at which something is
-    switched on or off next, from before which laws of winches are taken; ``refusal`` why the
-    cables could last not be evaluated, empty if they always could.
+    ``latched`` is whether latches hold; ``until`` the time (s) of the next switching, from before
+    which laws of winches are taken; ``refusal`` why the cables could last not be evaluated.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -66,11 +65,10 @@ class IdealMotion:
         self._tilts = not self.mechanism.fixed and self.forces.loaded
         tilt = 3 if self._tilts else 0
         motors = 0 if self.cables is None else 2 * len(self.cables.answering)
-        ends = np.cumsum([n, n, tilt, tilt, motors])
-        self._place, self._rate = slice(0, n), slice(n, 2 * n)
-        self._up, self._spin = slice(2 * n, ends[2]), slice(ends[2], ends[3])
-        self._motors = slice(ends[3], ends[4])
-        self.size = int(ends[4]) + 2
+        ends = accumulate([0, n, n, tilt, tilt, motors])
+        parts = [slice(*pair) for pair in pairwise(ends)]
+        self._place, self._rate, self._up, self._spin, self._motors = parts
+        self.size = parts[-1].stop + 2
 
     def start(self) -> Array:
         """State of the ring released at rest."""
@@ -81,13 +79,7 @@ class IdealMotion:
         return state
 
     def instant(self, time: float, state: Array) -> IdealState:
-        """Evaluate everything at a state.
-
-        Raises
-        ------
-        ValueError
-            If the cables have no answer (ringsim.cable.chain).
-        """
+        """Evaluate everything; ValueError if the cables have no answer (ringsim.cable.chain)."""
         mechanism = self.mechanism
         now = mechanism.configuration(state[self._place], state[self._rate])
         rigid = mechanism.rigid_rates(now, state[self._spin] if self._tilts else None)
@@ -98,11 +90,10 @@ class IdealMotion:
             earlier = min(time, self.until * (1.0 - 1e-12))
             pull = self.cables.pull(earlier, now, state[self._motors].reshape(2, -1))
             force = force + pull.force
-        spin = rigid[3:]
-        moving, turning = mechanism.accelerations(now, spin, acting.couple, force)
+        moving, turning = mechanism.accelerations(now, rigid[3:], acting.couple, force)
         rates = np.concatenate([rigid, now.rate])
         kinetic = 0.5 * float(rates @ now.matrix @ rates)
-        return IdealState(moving, turning, spin, kinetic, acting, pull)
+        return IdealState(moving, turning, rigid[3:], kinetic, acting, pull)
 
     def rates(self, time: float, state: Array) -> Array:
         """Derivative of the state; NaN where the cables have no answer."""

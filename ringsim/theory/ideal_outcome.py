@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import BPoly, CubicHermiteSpline
 
 from ringsim.cable.state import ChainState
+from ringsim.layout.pose import Array
 from ringsim.outputs.cable_tension import CableTension
 from ringsim.outputs.family import Output, Values, axes
 from ringsim.outputs.recorder import outputs_of, reduced, spanned
@@ -17,7 +18,6 @@ from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
 from ringsim.theory.ideal_course import Course, Piece
-from ringsim.theory.ideal_points import Array
 from ringsim.variables import COUNTS, Fidelity, Outcome
 
 _Reader = Callable[[Reading], Array | float | None]
@@ -99,10 +99,9 @@ class _IdealRun:
         return {"peak_tension": peak, "peak_tension_time": moment, "slack_duration": slack}
 
     def _series(self, read: _Reader) -> Series:
+        times, known = _readings(read, self._steps)
         return _Evaluated(
-            *_readings(read, self._steps),
-            self._grid,
-            lambda where: _readings(read, self._instants(where))[1],
+            times, known, self._grid, lambda where: _readings(read, self._instants(where))[1]
         )
 
     def _instants(self, where: Array) -> list[Reading]:

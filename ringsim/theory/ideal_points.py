@@ -4,9 +4,8 @@ Where a structure has a basis s(q) (``Structure.basis``), every point is r = P s
 found from places and derivatives of the layout at three coordinates; then r' = P s' and
 r'' = P s''.  Elsewhere P = (r, r') and s = (1, 0), s' = (0, 1), good at one coordinate alone.
 
-The hinge assemblies at the ends of an open arc hang on the pins of one section each, and swing on
-them by angles psi.  A point of theirs at the arm a from the pin, a = b + c with b along the pin's
-axis n, stands at
+The hinge assemblies at the ends of an open arc swing on the pins of one section each by angles psi:
+a point of theirs at the arm a from the pin, a = b + c with b along the pin's axis n, stands at
 
     pin + b + cos(psi) c + sin(psi) n x a,
 
@@ -19,15 +18,13 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.cable.sheaves import FixedSheave
 from ringsim.layout.bodies import Mount, OnBody
-from ringsim.layout.layout import Layout
-from ringsim.layout.of_scene import layout_of
+from ringsim.layout.layout import Layout, layout_of
+from ringsim.layout.pose import Array
 from ringsim.scene import Scene
 
-Array = NDArray[np.float64]
 Pairs = tuple[Array, Array]
 """Places, or axes, and their derivatives after the coordinate, shape (..., 3) each."""
 
@@ -41,11 +38,10 @@ _CLOSE = 1e-10
 class Points:
     """Coefficients P of the points of a scene.
 
-    ``basis`` are the functions s of the structure and their derivatives, see ``Structure.basis``;
-    ``layout`` is one of those that P was found from: what is connected with what.  The bodies
-    ``swinging`` are left upper, left lower, right upper, right lower, or none unless the structure
-    is an open arc with a basis; ``pins`` are their pins' coefficients, shape (swinging, 3,
-    functions of the structure), and ``normals`` these pins' axes, shape (swinging, 3).
+    ``basis`` is that of the structure; ``layout`` one of those that P was found from.  The bodies
+    ``swinging`` are left upper, left lower, right upper, right lower of an open arc with a basis;
+    ``pins`` are their pins' coefficients, shape (swinging, 3, functions of the structure), and
+    ``normals`` these pins' axes, shape (swinging, 3).
     """
 
     def __init__(self, scene: Scene, at: float | None = None) -> None:
@@ -89,10 +85,8 @@ class Points:
         return np.moveaxis(found.reshape(len(found), *values.shape[1:]), 0, -1)
 
     def swung(self, read: Callable[[Layout], Pairs], bodies: Iterable[int]) -> Array:
-        """Coefficients of points that are read, with the swings of their bodies.
-
-        ``read`` gives shapes (points, 3), ``bodies`` the number of each point's body, -1 for any
-        part that cannot swing; what is returned has the shape (points, 3, functions), m.
+        """Coefficients of points that are read, with the swings of their ``bodies`` (-1 for any
+        part that cannot swing); shape (points, 3, functions), m.
         """
         rigid, bodies = self.fit(read), np.array(list(bodies), dtype=int)
         more = np.zeros((*rigid.shape[:-1], 2 * len(self.swinging)))
@@ -105,10 +99,9 @@ class Points:
         return np.concatenate([rigid, more], axis=-1)
 
     def functions(self, p: Array, w: Array) -> Array:
-        """The functions s at p = (q, psi) with its rates w, both of shape (n,), rad and rad/s.
+        """The functions s at p = (q, psi), rad, with constant rates w, rad/s, shape (n,) each.
 
-        The columns are s, its n derivatives after p, ds/dt, and d^2s/dt^2 with these rates
-        constant; shape (functions, n + 3).
+        The columns are s, its n derivatives after p, ds/dt and d^2s/dt^2; shape (functions, n + 3).
         """
         s = self.basis(float(p[0]))
         first, swings = s.shape[1], np.arange(len(self.swinging))
@@ -127,20 +120,14 @@ class Points:
         known = self.layout.point_masses()
         return known.masses, self.swung(lambda layout: layout.point_masses()[2:], known.bodies)
 
-    def upper_corners(self) -> Array:
-        """Coefficients of the upper hinge assemblies' centres, shape (corners, 3, functions), m."""
-        bodies = self.layout.corners[0] if self.layout.corners else ()
-        return self.places([OnBody(body, np.zeros(3), np.eye(3)) for body in bodies])
-
     def frame(self, body: int) -> Array:
         """Coefficients of a body's origin, m, and of its axes; shape (4, 3, functions)."""
-        axes = [OnBody(body, np.zeros(3), np.roll(np.eye(3), -k, axis=1)) for k in range(3)]
+        axes = [OnBody(body, axes=np.roll(np.eye(3), -k, axis=1)) for k in range(3)]
         return np.concatenate([self.places(axes[:1]), self.directions(axes)])
 
     def places(self, mounts: Sequence[Mount], *, ahead: float = 0.0) -> Array:
-        """Coefficients of mounts, or of points ahead of them along their x axes (m).
-
-        The mounts are those of ``layout``; shape (mounts, 3, functions), m.
+        """Coefficients of mounts of ``layout``, or of points ahead of them along their x axes (m);
+        shape (mounts, 3, functions), m.
         """
         arm = np.array([ahead, 0.0, 0.0])
         return self.swung(
@@ -158,11 +145,6 @@ class Points:
         mounts = [self.layout.joints[joint].first for joint, _ in self.layout.forces]
         vectors = np.array([force for _, force in self.layout.forces]).reshape(-1, 3)
         return vectors, self.places(mounts)
-
-    @cached_property
-    def load_work(self) -> Array:
-        """Coefficients of the work of loads that turn with the structure, shape (functions,), J."""
-        return np.tensordot(*self.forces, 2)
 
     def path(self, number: int) -> Array:
         """Coefficients of a cable's sheaves, shape (sheaves, 3, functions), m."""

@@ -7,15 +7,11 @@ With rigid rods every point is a function of q, so
 I = sum m |dr/dq|^2 over all masses with the rigid-body motion taken out, W the work of the loads
 less the energy of the net.  A free structure keeps momentum and angular momentum at zero (its loads
 turn with it here; ringsim.theory.ideal_motion keeps them vertical); a support holds its body.  The
-end assemblies of an open arc are held upright, as they are at rest.
-
-From rest at q_0 the time until q_1 follows without time integration from a quadrature of the
-energy,
+end assemblies of an open arc are held upright.  From rest at q_0 the time until q_1 is
 
     T = integral from q_1 to q_0 of sqrt(I / (2 (W - W(q_0)))) dq.
 
-The substitution q = q_0 - (q_0 - q_1) u^2 removes the singularity at the start; Gauss-Legendre
-panels do the rest.
+The substitution q = q_0 - (q_0 - q_1) u^2 removes the singularity at the start.
 """
 
 from __future__ import annotations
@@ -25,17 +21,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.layout.free_hub import FreeHub, NetForces
+from ringsim.layout.pose import Array
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
-from ringsim.theory.ideal_points import Array
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 class Motion(NamedTuple):
-    """Inertia I(q), kg m^2, and the rigid motion to be subtracted from the layout's rates: a point
-    at r moves with r' - velocity - rotation x r, shapes (3,), m/rad and rad/rad.
+    """Inertia I(q), kg m^2, and the rigid motion in the layout's rates: a point at r moves with
+    r' - velocity - rotation x r, shapes (3,), m/rad and rad/rad.
     """
 
     inertia: float
@@ -47,7 +42,6 @@ class OneCoordinate:
     """Masses, loads and net of a scene; joint friction, stops, springs and cables are left out."""
 
     def __init__(self, scene: Scene) -> None:
-        self._scene = scene
         known = scene.structure.basis(scene.structure.coordinate).size
         everywhere = Mechanism(scene) if known else None
         self._mechanism = lru_cache(maxsize=4)(lambda q: everywhere or Mechanism(scene, q))
@@ -62,28 +56,20 @@ class OneCoordinate:
     def work(self, q: float) -> float:
         """Work function W(q) in J, up to a constant."""
         mechanism, now = self._at(q)
-        return float(mechanism.points.load_work @ now.values) - self._net(q).energy
+        done = np.tensordot(*mechanism.points.forces, 2) @ now.values
+        return float(done) - mechanism.net(now, 0.0 * now.rate).energy
 
     def work_rate(self, q: float) -> float:
         """Generalised force dW/dq, J/rad."""
         mechanism, now = self._at(q)
-        done = mechanism.points.load_work @ now.by_place[:, 0]
-        return float(done + self._net(q).force[0])
+        done = np.tensordot(*mechanism.points.forces, 2) @ now.by_place[:, 0]
+        return float(done + mechanism.net(now, 0.0 * now.rate).force[0])
 
     def _at(self, q: float) -> tuple[Mechanism, Configuration]:
         """The mechanism, folding at rate 1 without swings."""
         mechanism = self._mechanism(q)
         folding = np.eye(mechanism.freedom)[0]
         return mechanism, mechanism.configuration(q * folding, folding)
-
-    def _net(self, q: float) -> NetForces:
-        """What the net does, nothing where there is none."""
-        if self._scene.net is None:
-            return NetForces(np.zeros(1), 0.0, 0.0)
-        mechanism, now = self._at(q)
-        places, slopes, _ = now.moved(mechanism.upper_corners)
-        net = FreeHub(self._scene.net, len(places))
-        return net.forces(places, slopes, 0.0 * now.rate)
 
 
 class OpeningTime(NamedTuple):
@@ -96,14 +82,12 @@ class OpeningTime(NamedTuple):
 def opening_time(
     ring: OneCoordinate, phi_start: float, phi_end: float = 0.0, *, panels: int = 24
 ) -> OpeningTime:
-    """Time from rest at the bar angle ``phi_start`` to ``phi_end`` (rad), the deployed ring's.
-
-    ``panels`` of 8 Gauss-Legendre nodes each are used.
+    """Time from rest at ``phi_start`` to ``phi_end`` (rad), by panels of 8 Gauss-Legendre nodes.
 
     Raises
     ------
     ValueError
-        If the ring does not reach ``phi_end`` because the work done turns negative before.
+        If the work done turns negative before the ring reaches ``phi_end``.
     """
     fine, coarse = (_integrate(ring, phi_start, phi_end, n) for n in (panels, panels // 2))
     return OpeningTime(fine, abs(fine - coarse))

@@ -12,7 +12,7 @@ from ringsim.engine.build import build
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.simulation import run_ideal
-from ringsim.theory.ideal_cables import IdealCables
+from ringsim.theory.ideal_forces import IdealCables
 from ringsim.theory.ideal_mechanism import Mechanism
 from ringsim.variables import Status
 

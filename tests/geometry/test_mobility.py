@@ -7,8 +7,8 @@ import pytest
 from fold_rates import fold_rate
 from numpy.typing import NDArray
 
+from ringsim.layout.layout import layout_of
 from ringsim.layout.mobility import internal_mobility
-from ringsim.layout.of_scene import layout_of
 from ringsim.scene import Scene, load_scene
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.structures.ring_geometry import RingGeometry

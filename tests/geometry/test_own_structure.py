@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import ringsim
+from ringsim.layout.layout import layout_of
 from ringsim.layout.mobility import internal_mobility
-from ringsim.layout.of_scene import layout_of
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.theory.one_coordinate import OneCoordinate, opening_time
 

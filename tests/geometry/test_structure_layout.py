@@ -12,8 +12,7 @@ from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.engine.build import build
 from ringsim.layout.bodies import Lump
 from ringsim.layout.draft import Draft
-from ringsim.layout.layout import Layout
-from ringsim.layout.of_scene import layout_at_opening, layout_of
+from ringsim.layout.layout import Layout, layout_at_opening, layout_of
 from ringsim.layout.pose import Pose
 from ringsim.scene import Scene, builtin_scenes, load_scene
 from ringsim.structures.family import Structure

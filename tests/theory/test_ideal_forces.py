@@ -10,8 +10,7 @@ from ideal_cases import pulled, six
 from ringsim.cable.chain import Chain
 from ringsim.layout.free_hub import FreeHub
 from ringsim.parts.persection import at_section
-from ringsim.theory.ideal_cables import IdealCables
-from ringsim.theory.ideal_forces import Forces
+from ringsim.theory.ideal_forces import Forces, IdealCables
 from ringsim.theory.ideal_mechanism import Mechanism
 from ringsim.theory.ideal_points import UP
 
