@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.choice import kind_of
-from ringsim.outputs.series import Array, Reading, Run, Series, output_times
+from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
+from ringsim.stepping.instant import Array
 from ringsim.variables import ErrorBar, Variable
 
 __all__ = ["Array", "ErrorBar", "Output", "Reading", "Run", "Series", "Values", "Variable"]

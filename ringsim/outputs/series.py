@@ -14,28 +14,19 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ringsim.cable.state import ChainState
 from ringsim.scene import Scene
-from ringsim.stepping.instant import Energies
+from ringsim.stepping.instant import Array, Instant
 from ringsim.variables import Cause, Status
 
-Array = NDArray[np.float64]
 _SAME = 1.0 + 1e-12
 """Times that differ by round-off alone are the same."""
 
 
 @dataclass(frozen=True)
-class Reading:
-    """The state of a run at the end of a step."""
+class Reading(Instant):
+    """An instant with all that outputs read; to them its energies tell ``work`` with what the
+    winches put in, and ``lost``, since the start.
+    """
 
-    time: float
-    """Since the start of the run, s."""
-    angles: Array
-    """Opening angles, shape (planes, sections), rad."""
-    rates: Array
-    """Their rates, rad/s."""
-    energies: Energies
-    """Outputs read ``work`` with what the winches put in, and ``lost``, since the start."""
-    gap: float = 0.0
-    """Largest distance of points that a joint holds together, m."""
     chain: ChainState | None = None
     """All cables; None if the scene has none."""
     planes: tuple[tuple[int, ...], ...] = ()

@@ -146,7 +146,7 @@ class DeviationSteps:
 
     def limit(self, now: Instant) -> float:
         """Largest next step, s; infinite until three readings far enough apart are known."""
-        time, angles, rates = now[:3]
+        time, angles, rates = now.time, now.angles, now.rates
         self._largest = max(self._largest, float(np.max(np.abs(angles - angles.mean()))))
         if self._past and time - self._past[-1][0] < 0.9 * self._shortest:
             return self._limit

@@ -47,6 +47,7 @@ class RunControl:
         their mean angle.
         """
         self.now, self._solver, self._locks = start, solver, locks
+        self._roped = scales.slack_tension is not None
         self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, locks is None)
         self._indicators: list[Indicator] = []
         self._deviations: DeviationSteps | None = None
@@ -153,8 +154,9 @@ class RunControl:
         # Settling counts from the last lock within this step: what happens after it must not
         # depend on where steps end.
         time, settling = self.now.time, self._solver.settling_time if locks.stops else 0.0
-        two = (np.array(part) for part in zip(before[:3], self.now[:3], strict=True))
-        last = float(np.fmax.reduce(lock_times(*two), axis=None))
+        ends = [(one.time, one.angles, one.rates) for one in (before, self.now)]
+        times = lock_times(*map(np.array, zip(*ends, strict=True)))
+        last = float(np.fmax.reduce(times, axis=None))
         end = (last if math.isfinite(last) else time) + settling
         self._settled_at = end if end > time * (1.0 + _ROUND_OFF) else time
         # What tensions do from here on is in no result but the series.
@@ -169,7 +171,8 @@ class RunControl:
             self.goes_on = False
             if locks is None:
                 self.status = Status.OK
-                words = f"the cable was wound until solver.end_time = {solver.end_time:g} s"
+                words = "the cable was wound" if self._roped else "the run lasted"
+                words += f" until solver.end_time = {solver.end_time:g} s"
                 self.reason = Reason(Cause.NONE, words)
             elif self.status == Status.UNFINISHED:
                 self.reason = Reason(
