@@ -27,8 +27,7 @@ class RunControl:
     """Steps, care and guard of one run.
 
     ``now`` is the last accepted state, ``goes_on`` whether there is a step from there, ``status``
-    and ``reason`` how the run has ended or must end, and ``repeats`` the number of steps that were
-    repeated with a smaller one.
+    and ``reason`` how the run has ended, ``repeats`` how many steps were repeated.
     """
 
     def __init__(
@@ -40,11 +39,9 @@ class RunControl:
         *,
         follow_deviations: bool = False,
     ) -> None:
-        """Begin a run at ``start``.
-
-        It ends when the V-joints of ``locks`` have all reached the same stop, without them at
-        ``solver.end_time``.  With ``follow_deviations`` steps resolve how the joints deviate from
-        their mean angle.
+        """Begin a run, which ends when the V-joints of ``locks`` have all reached the same stop,
+        without them at ``solver.end_time``; with ``follow_deviations`` steps resolve how the joints
+        deviate from their mean angle.
         """
         self.now, self._solver, self._locks = start, solver, locks
         self._roped = scales.slack_tension is not None

@@ -180,7 +180,7 @@ class PlanarTruss(Structure):
 
     @property
     def reach(self) -> float:
-        """See ``Structure``: a beam."""
+        """See ``Structure``."""
         return self.beam_length
 
     @property
@@ -195,16 +195,12 @@ class PlanarTruss(Structure):
 
     def describe(self) -> dict[str, str]:
         """See ``Structure``."""
-        geometry, ends = self.geometry(), [self.coordinate, self.stowed_angle]
-        found = {"structure": f"{kind_of(self)}, two beams of {self.beam_length} m"}
-        for label, angle, cable, strut in zip(
-            ("initial", "at its rest"), ends, geometry.cable(ends), geometry.strut(ends),
-            strict=True,
-        ):  # fmt: skip
-            found[label] = (
-                f"{math.degrees(angle):.4g} deg, {cable:.4g} m of cable, strut {strut:.4g} m"
-            )
-        return found
+        geometry, found = self.geometry(), f"{kind_of(self)}, two beams of {self.beam_length} m"
+        return {"structure": found} | {
+            label: f"{math.degrees(angle):.4g} deg, {geometry.cable(angle):.4g} m of cable, "
+            f"strut {geometry.strut(angle):.4g} m"
+            for label, angle in (("initial", self.coordinate), ("at its rest", self.stowed_angle))
+        }
 
     def path_slope(self, cable: Any, angles: Any) -> float:
         """See ``Structure``."""

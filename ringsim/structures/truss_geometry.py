@@ -24,11 +24,7 @@ Array = NDArray[np.float64]
 
 
 class TrussPoints(NamedTuple):
-    """Points of the truss at one or many angles, shape (..., 3) each, in metre.
-
-    Joints of the fixed axis (``lower``, ``upper``) and of the outer ends of the beams
-    (``lower_end``, ``upper_end``); ``foot`` and ``head`` of the strut.
-    """
+    """Joints on the axis, outer ends of the beams, ends of the strut; shape (..., 3), metre."""
 
     lower: Array
     upper: Array
