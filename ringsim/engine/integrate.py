@@ -5,6 +5,7 @@ steps and on the end.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import exudyn as exu
@@ -163,12 +164,12 @@ class Integration:
             # What a fault lets go is lost; nothing moves while it strikes.
             lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
             energies = after.energies._replace(lost=lost, driven=now.energies.driven)
-            now = after._replace(energies=energies)
+            now = replace(after, energies=energies)
         self._energy.keep()
         cables = self._built.cables
         self.history.note(
             Reading(
-                *now[:5],
+                **vars(now),
                 chain=self._chain,
                 planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
                 stress=None if self._stress is None else self._stress.read(),

@@ -44,17 +44,11 @@ class Asynchrony(Output):
 
 
 def largest_spread(times: Array, angles: Array, rates: Array, until: float) -> float:
-    """Largest difference between the joints' angles up to a time, rad.
+    """Largest difference between the joints' angles up to the time ``until``, rad.
 
     Looked for at ``_POINTS`` points in each step, on the cubics that fit angles and rates at its
     ends, and at ``until`` itself: a few long steps step over the moment of the largest one.
-
-    Parameters
-    ----------
-    times, angles, rates
-        Shapes (n,), (n, joints) and the same; s, rad, rad/s.
-    until
-        s; infinite for the whole run.
+    ``angles`` and ``rates`` have shape (n, joints), rad and rad/s.
     """
     largest = float(np.ptp(angles[0]))
     begun = int(np.searchsorted(times[:-1], until))

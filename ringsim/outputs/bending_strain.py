@@ -1,8 +1,6 @@
 """Bending strain of the rod that carries a structure's gauge."""
 
-import numpy as np
-
-from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.family import Array, Output, Reading, Variable
 
 
 class BendingStrain(Output):
@@ -26,7 +24,3 @@ class BendingStrain(Output):
     def read(self, now: Reading) -> Array | None:
         """Shape (stations,)."""
         return now.strain
-
-    def reduce(self, run: Run, series: Series) -> Values:
-        """Interpolated, and the largest reading of either sign."""
-        return super().reduce(run, series) | {"peak_bending_strain": np.abs(series.values).max()}

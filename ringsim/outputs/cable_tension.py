@@ -46,11 +46,11 @@ class CableTension(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Interpolated, and the largest reading or value at the deployment time."""
-        times, largest = series.times, np.nanmax(series.values, axis=(1, 2))
+        times, values = series.times, series.values
         if math.isfinite(run.until):
-            before = times <= run.until
-            times = np.append(times[before], run.until)
-            last = series.at(np.array([run.until]))
-            largest = np.append(largest[before], np.nanmax(last))
+            before, last = times <= run.until, np.array([run.until])
+            times = np.append(times[before], last)
+            values = np.append(values[before], series.at(last), axis=0)
+        largest = np.nanmax(values, axis=(1, 2))
         peak = {"peak_tension": largest.max(), "peak_tension_time": times[np.argmax(largest)]}
         return super().reduce(run, series) | peak

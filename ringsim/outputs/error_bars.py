@@ -1,20 +1,8 @@
-"""Numerical error of a run, estimated from a second run with steps twice as long.
+"""Numerical error of a run, estimated from a second run with steps twice or half as long.
 
-The integrator is of second order, so that doubling the steps multiplies an error by four and the
-two runs differ by three times the error of the finer one.  That holds on average; a single number
-(the largest of an oscillating quantity, the time of one event) may agree by chance.  The bars
-therefore take about the whole difference, and of times and angles the largest of all joints.
-The asynchrony as a function of time oscillates with the ring's own vibrations, which long steps do
-not resolve: its bar at any time follows from the largest difference up to then; an asynchrony
-below its bar is not significant.  The error of few elements, independent of the steps, is added:
-the rods' own inertia between two nodes, as a share that falls with the square of their number.
-So is the part of a peak tension that may lie between two readings, as the step control allows it.
-
-Where the run with longer steps does not end as ok, one with steps of half the length takes
-its place; it differs by three quarters of the error, so that its differences count four times.
-
-Each output states its factors (``ErrorBar``), the smallest that cover about 9 of 10 errors over
-random scenes: benchmarks/error_bars.py, docs/accuracy.md.
+The integrator is of second order: runs with steps twice as long are apart by (4 - 1) of the error,
+with steps half as long by (1 - 1/4) of it, so that this difference counts four times.  Each output
+states the factors of its bar (``ErrorBar``); docs/accuracy.md tells what they cover.
 """
 
 from __future__ import annotations
@@ -32,16 +20,12 @@ def error_bars(
 
     Parameters
     ----------
-    run
-        The run that counts.
-    other
-        The same scene with steps twice as long, or of half the length.
-    elements
-        Elements per rod half.
-    tolerance
-        ``solver.tolerance`` of the run that counts.
+    run, other
+        The run that counts, and the same scene with other steps.
+    elements, tolerance
+        Elements per rod half and ``solver.tolerance`` of the run that counts.
     scale
-        Factor on the differences: 1 for longer steps, 4 for shorter ones.
+        Factor on the differences: 1 if the other run has longer steps, 4 for shorter ones.
 
     Returns
     -------
@@ -51,11 +35,11 @@ def error_bars(
     """
     if run.status != Status.OK or other.status != Status.OK:
         return {}
-    apart = differences(run, other)
-    values = {name: largest(name, run.values[name]) for name in apart}
     return {
-        f"{name}_error": bar(name, scale * apart[name], values[name], elements, tolerance)
-        for name in apart
+        f"{name}_error": bar(
+            name, scale * apart, largest(name, run.values[name]), elements, tolerance
+        )
+        for name, apart in differences(run, other).items()
     }
 
 
@@ -82,9 +66,8 @@ def differences(one: Outcome, other: Outcome) -> dict[str, Array]:
 
 def largest(name: str, values: Array) -> Array:
     """Value of a result, or the largest of its series; of one over time up to each time."""
-    if VARIABLES[name].dims == ("time",):
-        return np.asarray(np.fmax.accumulate(values))
-    return np.asarray(np.fmax.reduce(values, axis=None))
+    over_time = VARIABLES[name].dims == ("time",)
+    return np.asarray(np.fmax.accumulate(values) if over_time else np.fmax.reduce(values, None))
 
 
 def bar(

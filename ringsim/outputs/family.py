@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.choice import kind_of
-from ringsim.outputs.series import Array, Reading, Run, Series, output_times
+from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
+from ringsim.stepping.instant import Array
 from ringsim.variables import ErrorBar, Variable
 
 __all__ = ["Array", "ErrorBar", "Output", "Reading", "Run", "Series", "Values", "Variable"]
@@ -75,37 +76,41 @@ class Output:
     def reduce(self, run: Run, series: Series) -> Values:
         """Values of its variables, from what ``read`` gave at all instants of a run.
 
-        Unless said otherwise the first variable is the reading, interpolated in time.
+        Unless said otherwise the first variable is the reading, interpolated in time, and the
+        second of two the largest magnitude of a reading.
         """
-        return {self.variables[0].name: series.on_grid()}
+        values: Values = {self.variables[0].name: series.on_grid()}
+        if len(self.variables) == 2:
+            values[self.variables[1].name] = np.abs(series.values).max()
+        return values
 
 
 def _declared(output: type[Output]) -> dict[str, Variable]:
-    """Variables of an output and their error bars ``NAME_error``, with what these need.
+    """Variables of an output and their error bars ``NAME_error``.
 
     The bar of a function of time alone is one, too; any other is a number.
     """
     found = {v.name: replace(v, needs=output.needs) for v in output.variables}
-    for name, variable in list(found.items()):
-        if variable.error_bar is not None:
-            words = f"numerical error bar of the {variable.error_bar.words}"
-            dims = variable.dims if variable.dims == ("time",) else ()
+    for one in output.variables:
+        if one.error_bar is not None:
+            name, words = f"{one.name}_error", f"numerical error bar of the {one.error_bar.words}"
+            dims = one.dims if one.dims == ("time",) else ()
             words += " at any time up to then" if dims else ""
             needs = ("error bars", *output.needs)
-            name += "_error"
-            found[name] = Variable(name, dims, variable.units, words, needs=needs)
+            found[name] = Variable(name, dims, one.units, words, needs=needs)
     return found
 
 
 def holds(scene: Scene) -> set[str]:
     """Everything that a variable may need and the scene has."""
-    parts = {name for name in type(scene).parts() if getattr(scene, name) is not None}
-    asked = {
+    held = {name: getattr(scene, name) is not None for name in type(scene).parts()}
+    held |= {
+        kind_of(scene.structure): True,
         "stress": scene.record.stress,
         "error bars": scene.solver.error_bars,
         "gauge": bool(scene.structure.gauge),
     }
-    return parts | {kind_of(scene.structure)} | {name for name, wanted in asked.items() if wanted}
+    return {name for name, present in held.items() if present}
 
 
 def axes(scene: Scene) -> dict[str, NDArray[Any]]:

@@ -1,6 +1,6 @@
 """How well the joints hold together."""
 
-from ringsim.outputs.family import Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.family import Output, Reading, Variable
 
 
 class JointGaps(Output):
@@ -18,7 +18,3 @@ class JointGaps(Output):
     def read(self, now: Reading) -> float:
         """The gap, m."""
         return now.gap
-
-    def reduce(self, run: Run, series: Series) -> Values:
-        """Interpolated, and the largest reading."""
-        return super().reduce(run, series) | {"constraint_error": series.values.max()}

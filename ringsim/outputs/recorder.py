@@ -18,16 +18,9 @@ from ringsim.variables import Outcome, Reason, Status
 
 
 class Recorder:
-    """A run of a scene, step by step.
+    """A run of a scene: ``times``, ``angles``, ... of all accepted steps (see ``Instant``).
 
-    Attributes
-    ----------
-    times, angles, rates, energies, gaps
-        Of all accepted steps; see ``ringsim.stepping.instant``.
-    status, reason
-        How the run has ended and why.
-    repeats, newton_iterations, jacobians
-        What the solver took.
+    An engine sets ``status`` and ``reason``, how and why it has ended, and what its solver took.
     """
 
     def __init__(self, scene: Scene, coordinates: Mapping[str, NDArray[Any]] | None = None) -> None:
@@ -44,7 +37,7 @@ class Recorder:
         self.repeats = self.newton_iterations = self.jacobians = 0
 
     def note(self, now: Reading) -> None:
-        """Keep an accepted step; its energies lost and driven are those since the step before."""
+        """Keep an accepted step."""
         energies = now.energies
         self.times.append(now.time)
         self.angles.append(now.angles)
@@ -70,7 +63,7 @@ class Recorder:
         }
         run = Run(
             self._scene, Series(times, angles, grid), Series(times, rates, grid),
-            lock_times(times, angles, rates), counts, self.status, self.reason.cause,
+            lock_times(times, angles, rates), counts,
         )  # fmt: skip
 
         def series_of(output: Output) -> Series | None:

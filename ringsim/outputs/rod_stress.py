@@ -1,6 +1,6 @@
 """Stress of the rods."""
 
-from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Variable
 
 
 class RodStress(Output):
@@ -24,7 +24,3 @@ class RodStress(Output):
     def read(self, now: Reading) -> Array | None:
         """Shape (rod halves, sections), Pa."""
         return now.stress
-
-    def reduce(self, run: Run, series: Series) -> Values:
-        """Interpolated, and the largest reading."""
-        return super().reduce(run, series) | {"peak_rod_stress": series.values.max()}

@@ -14,28 +14,18 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ringsim.cable.state import ChainState
 from ringsim.scene import Scene
-from ringsim.stepping.instant import Energies
-from ringsim.variables import Cause, Status
+from ringsim.stepping.instant import Array, Instant
 
-Array = NDArray[np.float64]
 _SAME = 1.0 + 1e-12
 """Times that differ by round-off alone are the same."""
 
 
 @dataclass(frozen=True)
-class Reading:
-    """The state of a run at the end of a step."""
+class Reading(Instant):
+    """An instant with all that outputs read; to them its energies tell ``work`` with what the
+    winches put in, and ``lost``, since the start.
+    """
 
-    time: float
-    """Since the start of the run, s."""
-    angles: Array
-    """Opening angles, shape (planes, sections), rad."""
-    rates: Array
-    """Their rates, rad/s."""
-    energies: Energies
-    """Outputs read ``work`` with what the winches put in, and ``lost``, since the start."""
-    gap: float = 0.0
-    """Largest distance of points that a joint holds together, m."""
     chain: ChainState | None = None
     """All cables; None if the scene has none."""
     planes: tuple[tuple[int, ...], ...] = ()
@@ -55,29 +45,24 @@ class Reading:
 
 @dataclass(frozen=True)
 class Series:
-    """Readings of one thing at all instants of a run.
-
-    Attributes
-    ----------
-    times, values
-        Shapes (n,) and (n, ...); s, and the reading's unit.
-    grid
-        The scene's output times, s.
-    """
+    """Readings of one thing at all instants of a run."""
 
     times: Array
+    """Shape (n,), s."""
     values: Array
+    """Shape (n, ...), in the reading's unit."""
     grid: Array
+    """The scene's output times, s."""
 
     def on_grid(self, rates: Array | None = None) -> Array:
         """Values at the output times, which are the last axis; see :meth:`at`."""
         return np.moveaxis(self.at(self.grid, rates), 0, -1)
 
     def at(self, where: Array, rates: Array | None = None) -> Array:
-        """Values at increasing times (s), which are the first axis; NaN after the end of the run.
+        """Values at increasing times (s), which are the first axis; NaN after the end of the run,
+        and where they are not known throughout, as of a plane without a cable.
 
-        What is not known throughout, as a plane without a cable, is NaN.  With ``rates``, the
-        values' derivatives, it is the cubic Hermite interpolation, else the shape-preserving one.
+        Cubic Hermite interpolation with ``rates``, the values' derivatives, else PCHIP.
         """
         found = np.full((len(where), *self.values.shape[1:]), np.nan)
         inside = where <= self.times[-1] * _SAME
@@ -105,27 +90,17 @@ class Series:
 
 @dataclass(frozen=True)
 class Run:
-    """A run that has ended.
-
-    Attributes
-    ----------
-    angles, rates
-        Opening angles and their rates, shape (n, planes, sections) each, rad and rad/s.
-    locks
-        When each V-joint reached 180 deg, shape (planes, sections), s; NaN if it did not.
-    counts
-        What the solver has counted, by variable.
-    status, cause
-        How it ended and why.
-    """
+    """A run that has ended."""
 
     scene: Scene
     angles: Series
+    """Opening angles, shape (n, planes, sections), rad."""
     rates: Series
+    """Their rates, rad/s."""
     locks: Array
+    """When each V-joint reached 180 deg, shape (planes, sections), s; NaN if it did not."""
     counts: Mapping[str, int]
-    status: Status
-    cause: Cause
+    """What the solver has counted, by variable."""
 
     @property
     def until(self) -> float:

@@ -45,17 +45,11 @@ class ConstantSteps:
 
 
 def unresolved(run: list[Instant], slack_tension: float | None) -> Reason:
-    """Why constant steps have not resolved a run; empty if they have.  Bends below the slack
-    tension (N; None without cables) do not matter.
+    """Why constant steps have not resolved a run; empty if they have.
 
-    Too long for a rope that swings on its load, they swallow the swing, which holds too little
-    energy for the balance to miss.  What is left of it shows: from one step to the next the tension
-    bends by
-
-        |T(n-1) - 2 T(n) + T(n+1)| = 2 (1 - cos(w h)) |T - mean|,
-
-    with the swing's angular frequency w: by two to four times the deviation from the mean where
-    less than four steps make a period.
+    A swing of the tension T with the angular frequency w bends it from one step to the next by
+    |T(n-1) - 2 T(n) + T(n+1)| = 2 (1 - cos(w h)) |T - mean|.  Bends below the slack tension (N;
+    None without cables) do not matter.
     """
     times, angles = np.array([(one.time, one.angles.max()) for one in run]).T
     first = int(np.argmax(angles >= math.pi))

@@ -1,13 +1,9 @@
 """Guards of a run: blow-up, energy growth and loss, joints that come apart, stops passed.
 
-They judge every accepted step and stop the run at the first that cannot be sound.  What they
-compare is the balance
-
-    B = kinetic + elastic - both at the start + lost - work of loads and winches
-
-with the energy X exchanged so far, the largest of |work| and of the changes of kinetic and
-elastic energy.  Generalised-alpha takes energy out of what it does not resolve (B < 0) and puts
-in none, so that growth (B > 0) means more than loss.
+They compare the balance B = kinetic + elastic - both at the start + lost - work of loads and
+winches with the energy X exchanged so far, the largest of |work| and of the changes of kinetic and
+elastic energy.  Generalised-alpha takes energy out of what it does not resolve (B < 0) and puts in
+none, so that growth (B > 0) means more than loss.
 """
 
 from __future__ import annotations

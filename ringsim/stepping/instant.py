@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -24,17 +25,21 @@ class Energies(NamedTuple):
     driven: float = 0.0
 
 
-class Instant(NamedTuple):
-    """Time (s), opening angles (rad) and their rates (rad/s), shape (planes, sections); energies;
-    largest gap of a joint (m); tensions of all spans (N), None without cables.
-    """
+@dataclass(frozen=True)
+class Instant:
+    """A state that a run has reached."""
 
     time: float
+    """Since the start of the run, s."""
     angles: Array
+    """Opening angles, shape (planes, sections), rad."""
     rates: Array
+    """Their rates, rad/s."""
     energies: Energies
     gap: float = 0.0
+    """Largest distance of points that a joint holds together, m."""
     tensions: Array | None = None
+    """Of all spans, N; None without cables."""
 
 
 class Scales(NamedTuple):

@@ -31,9 +31,8 @@ class Locks:
     """The V-joints' memory of their stops.
 
     ``deployed`` and ``stowed`` are whether each V-joint has reached 180 deg, and the stowed stop,
-    shape (planes, sections).  A joint that bounces has still reached its stop: all joints need not
-    lie in it at the same instant.  One that starts on the stowed stop has to leave it before it can
-    come back.
+    shape (planes, sections), even if it has bounced since.  One that starts on the stowed stop has
+    to leave it before it can come back.
     """
 
     def __init__(self, angles: Array, stowed_angle: float | None) -> None:
@@ -80,12 +79,11 @@ def lock_times(times: Array, angles: Array, rates: Array) -> Array:
     found = np.full(angles.shape[1:], np.nan)
     for place in np.ndindex(*found.shape):
         past = angles[(slice(None), *place)] - math.pi
-        crossing = np.flatnonzero(past >= 0.0)
-        if len(crossing) == 0 or crossing[0] == 0:
+        first = int(np.argmax(past >= 0.0))
+        if first == 0:
             continue
-        ends = slice(crossing[0] - 1, crossing[0] + 1)
+        ends = slice(first - 1, first + 1)
         cubic = CubicHermiteSpline(times[ends], past[ends], rates[(ends, *place)])
-        roots = cubic.roots(extrapolate=False)
-        inside = roots[(roots >= times[ends][0]) & (roots <= times[ends][1])]
-        found[place] = inside.min() if len(inside) else times[crossing[0]]
+        # Round-off may put a crossing at the very end of the step outside it.
+        found[place] = cubic.roots(extrapolate=False).min(initial=times[first])
     return found

@@ -45,16 +45,11 @@ _FADING = 20.0
 
 
 class MotionSteps:
-    """Steps that keep the relative error in time of the mean opening angle near a tolerance.
+    """Steps that keep the relative error in time of the mean opening angle a near a tolerance,
 
-    A local error C h^3 |a'''| in the angle a shifts the motion by C h^3 |a'''| / |a'| in time;
-    spread evenly over the run that gives h = sqrt(tolerance |a'| / (C |a'''|)).  The third
-    derivative comes from divided differences of three rates, far enough apart not to see the rods
-    vibrate; a rate below the reference rate counts as that much, or the tremor of a ring that
-    hardly moves yet would ask for tiny steps.  The ratio |a'''| / |a'| fades over its own time
-    scale, so that a passage of a''' through zero does not open the step.  Towards the end of the
-    travel the step shrinks so that a V-joint meets its stop with a small one, the smaller the
-    faster it comes, and so it stays until it rests.  ``step`` is the one wanted next, s.
+        h = sqrt(tolerance |a'| / (C |a'''|)),
+
+    and that meet stops with small ones.  ``step`` is the one wanted next, s.
     """
 
     def __init__(self, solver: Solver, scales: Scales) -> None:
@@ -119,26 +114,15 @@ class MotionSteps:
 
 
 class DeviationSteps:
-    """Steps that resolve how a ring vibrates about its mean motion.
+    """Steps that resolve how a ring vibrates about its mean motion over a run of duration T,
 
-    The loads set off vibrations of the ring itself (ovalisation, tilting of hinge assemblies), with
-    periods of the order of a second for 18 sections.  They hardly touch the mean opening angle,
-    which chooses the other steps, but as long as the ring opens slowly they are a large part of the
-    joints' deviations from it and of the rods' stresses.  A local error C h^3 d''' in the
-    deviations d adds up to C h^2 d''' T over a run of duration T; held to a share e of the largest
-    deviation so far,
+        h = sqrt(e |d| / (C T |d'''|)),
 
-        h = sqrt(e |d| / (C T |d'''|)).
-
-    |d| and |d'''| are the largest of all V-joints.  Vibrations too fast to be followed in ``MOST``
-    steps are left alone: neither are their derivatives looked at, nor are steps shorter than
-    T / MOST asked for.  From the first lock on the stops choose the steps.
+    at least T / MOST, with the largest deviation d from the mean angle of all V-joints.
     """
 
     def __init__(self, tolerance: float, duration: float) -> None:
-        """Start at rest; an error of so much of the largest deviation may add up over the run,
-        which takes about ``duration`` (s).
-        """
+        """Let errors add up to so much of the largest deviation over the ``duration`` (s)."""
         self._share = tolerance / (_GLOBAL_ERROR * duration)
         self._shortest = duration / MOST
         self._past: list[tuple[float, Array]] = []
@@ -146,7 +130,7 @@ class DeviationSteps:
 
     def limit(self, now: Instant) -> float:
         """Largest next step, s; infinite until three readings far enough apart are known."""
-        time, angles, rates = now[:3]
+        time, angles, rates = now.time, now.angles, now.rates
         self._largest = max(self._largest, float(np.max(np.abs(angles - angles.mean()))))
         if self._past and time - self._past[-1][0] < 0.9 * self._shortest:
             return self._limit

@@ -1,20 +1,19 @@
 """Steps across which an indicator exceeds its allowance are repeated with a smaller one.
 
-An indicator falls with the p-th power of the step where the step resolves the motion, so that a
-refused step is repeated with h (allowed / found)^(1/p), and the next one may be no larger than
-that: the standard controller of step sizes (Hairer, Norsett, Wanner, Solving Ordinary Differential
-Equations I, section II.4, where such a safety factor and bounds of the ratio stand, too).
+The standard controller of step sizes: Hairer, Norsett, Wanner, Solving Ordinary Differential
+Equations I, section II.4, where such a safety factor and bounds of the ratio stand, too.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from typing import ClassVar
 
 import numpy as np
 
 from ringsim.parts.solver import TENSION_BEND, Solver
-from ringsim.stepping.instant import Array, Instant, Scales
+from ringsim.stepping.instant import Array, Energies, Instant, Scales
 
 GROWTH, FALL = 1.5, 0.2
 """Largest and smallest ratio of successive steps: a step behind a much shorter one would see that
@@ -41,6 +40,9 @@ class Indicator(ABC):
     step in s, infinite before the first.
     """
 
+    order: ClassVar[float]
+    """Power p of a step that it falls with."""
+
     def __init__(self, solver: Solver) -> None:
         self.limit = math.inf
         self._least = SHORTEST * solver.step
@@ -49,47 +51,38 @@ class Indicator(ABC):
     def ratio(self, before: Instant, after: Instant) -> float:
         """Indicator of a step over its allowance; NaN where it is unknown."""
 
-    @abstractmethod
-    def share(self, ratio: float) -> float:
-        """The safety factor times ratio^(-1/p)."""
-
     def shorter(self, before: Instant, after: Instant) -> float | None:
         """A smaller step in s to repeat this one with, or None if it is good enough."""
         step, ratio = after.time - before.time, self.ratio(before, after)
         # A step comes back as a difference of times: a little more than what was asked for.
         if not ratio > _REFUSED or step <= self._least * (1.0 + 1e-6):
             return None
-        return max(step * max(FALL, self.share(ratio)), self._least)
+        return max(step * max(FALL, self._share(ratio)), self._least)
 
     def accept(self, before: Instant, after: Instant) -> None:
         """Learn from a step that is taken."""
         step, ratio = after.time - before.time, self.ratio(before, after)
         # 1e-3 stands for 0: from 0.2 on down ``GROWTH`` bounds the step, whatever the ratio is.
-        growth = min(max(self.share(max(ratio, 1e-3)), FALL), GROWTH)
+        growth = min(max(self._share(max(ratio, 1e-3)), FALL), GROWTH)
         self.limit = max(step * growth, self._least) if math.isfinite(ratio) else math.inf
 
     def note(self) -> str:
         """What a run's reason must add about this; empty if every step was judged."""
         return ""
 
+    def _share(self, ratio: float) -> float:
+        return _SAFETY * math.pow(ratio, -1.0 / self.order)
+
 
 class EnergyImbalance(Indicator):
-    """Steps that add or lose energy.
+    """Steps that add or lose energy: the imbalance
 
-    A rope becomes taut within a small part of the step that the motion asks for, and throws what it
-    pulls.  A step across that balances neither the work of the winch nor the energy of the rope:
-    the integrator swallows what it cannot resolve.  The imbalance of a step,
+        change of kinetic and elastic energy + lost - work of loads and winches.
 
-        change of kinetic and elastic energy + lost - work of loads and winches,
-
-    is known from its two ends and falls with the third power of the step.
-
-    What is allowed goes with the tolerance where an impact or two are all that matters.  Ropes
-    catch all the time: N ~ 1/h steps with an imbalance of h^3 each add up to h^2, which is to go
-    with the tolerance, so that a step may lack tolerance^(3/2).  Ropes need any number of repeated
-    steps.  A structure without them that vibrates on and on, faster than anybody wants to resolve,
-    would be followed forever; after ``PATIENCE`` steps its energy error tells instead.
+    Without ropes at most ``PATIENCE`` steps are repeated.
     """
+
+    order = 3.0
 
     def __init__(self, solver: Solver, scales: Scales) -> None:
         super().__init__(solver)
@@ -100,32 +93,30 @@ class EnergyImbalance(Indicator):
             self._allowed, self._exchanged = _ENERGY * solver.tolerance, scales.energy
         else:
             self._patience, self._exchanged = math.inf, scales.slack_energy
+            # N ~ 1/h steps that lack h^3 each add up to h^2, which is to go with the tolerance.
             self._allowed = _ENERGY * solver.tolerance * math.sqrt(solver.tolerance / _ALIKE)
 
     def ratio(self, before: Instant, after: Instant) -> float:
-        """Imbalance of a step over what is allowed; NaN where the balance is unknown."""
+        """See ``Indicator``."""
         first, last = before.energies, after.energies
         stored = last.kinetic - first.kinetic + last.elastic - first.elastic
         imbalance = abs(stored + last.lost - (last.work - first.work + last.driven))
-        return imbalance / (self._allowed * self._exchange(before, after))
-
-    def share(self, ratio: float) -> float:
-        """Of third order."""
-        return _SAFETY * math.pow(ratio, -1.0 / 3.0)
+        return imbalance / (self._allowed * self._exchange(first, last))
 
     def shorter(self, before: Instant, after: Instant) -> float | None:
-        """As of ``Indicator``; None once patience has ended."""
+        """See ``Indicator``; None once patience has ended."""
         found = super().shorter(before, after) if self._refused < self._patience else None
         self._refused += found is not None
         return found
 
     def accept(self, before: Instant, after: Instant) -> None:
-        """As of ``Indicator``; adds to the energy exchanged."""
+        """See ``Indicator``; adds to the energy exchanged."""
         super().accept(before, after)
         if self._refused >= self._patience:
             self.limit = math.inf
-        self._exchanged = self._exchange(before, after)
-        self._work += after.energies.work - before.energies.work + after.energies.driven
+        first, last = before.energies, after.energies
+        self._exchanged = self._exchange(first, last)
+        self._work += last.work - first.work + last.driven
 
     def note(self) -> str:
         """See ``Indicator``."""
@@ -136,9 +127,8 @@ class EnergyImbalance(Indicator):
             "energy_error"
         )
 
-    def _exchange(self, before: Instant, after: Instant) -> float:
+    def _exchange(self, first: Energies, last: Energies) -> float:
         """Largest energy exchanged up to the end of a step, J."""
-        first, last = before.energies, after.energies
         work = self._work + last.work - first.work + last.driven
         if math.isnan(self._stored):
             self._stored = first.elastic
@@ -146,19 +136,13 @@ class EnergyImbalance(Indicator):
 
 
 class TensionBend(Indicator):
-    """Steps across which a tension bends too far.
+    """Steps across which a tension T bends too far.
 
-    Within a step only the tensions T at its ends are known.  Against the straight line through the
-    step before, a tension bends over a step of length h2 behind one of length h1 by
-
-        b = |T2 - T1 - (T1 - T0) h2 / h1|.
-
-    A largest tension between two readings may be missed by b / 8, and where T kinks, because a
-    V-joint locks or a rope becomes taut, the step across the kink is wrong by up to b.  In the
-    energy balance that does not show where the joints' friction takes most of what the winch gives:
-    a slow ring came to its last lock with steps in which the tension doubled.  b falls with the
-    square of the step where T is smooth.
+    Against the straight line through the step before, of length h1, it bends over one of length h2
+    by |T2 - T1 - (T1 - T0) h2 / h1|.
     """
+
+    order = 2.0
 
     def __init__(self, solver: Solver, slack_tension: float) -> None:
         super().__init__(solver)
@@ -167,7 +151,7 @@ class TensionBend(Indicator):
         self._past: tuple[float, Array] | None = None
 
     def ratio(self, before: Instant, after: Instant) -> float:
-        """Bend over the allowed one; 0 where it is not known yet."""
+        """See ``Indicator``; 0 where the bend is not known yet."""
         first, last = before.tensions, after.tensions
         if self._past is None or first is None or last is None:
             return 0.0
@@ -176,12 +160,8 @@ class TensionBend(Indicator):
         bend = np.abs(last - first - (first - past) * (step / earlier)).max()
         return float(bend) / (self._allowed * max(self._largest, float(last.max())))
 
-    def share(self, ratio: float) -> float:
-        """Of second order."""
-        return _SAFETY / math.sqrt(ratio)
-
     def accept(self, before: Instant, after: Instant) -> None:
-        """As of ``Indicator``; remembers the tensions."""
+        """See ``Indicator``; remembers the tensions."""
         super().accept(before, after)
         if before.tensions is not None and after.tensions is not None:
             self._largest = max(self._largest, float(after.tensions.max()))

@@ -15,8 +15,7 @@ from ringsim.variables import COUNTS, TIMINGS, Cause, Outcome, Status
 Solve = Callable[[Solver], Outcome]
 """Runs a scene with these settings; it never raises."""
 ErrorBars = Callable[..., dict[str, Array]]
-"""As ``ringsim.outputs.error_bars``: of a run and another with steps half or twice as long, its
-``tolerance`` and the ``scale`` of their differences; empty if one did not reach its goal."""
+"""As ``ringsim.outputs.error_bars.error_bars``."""
 
 
 def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Outcome:
@@ -57,8 +56,7 @@ def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Ou
 def _with_bars(outcome: Outcome, solve: Solve, used: Solver, error_bars: ErrorBars) -> Outcome:
     """The outcome of a run at these settings with its error bars, or why it has none."""
     reasons = []
-    # Runs of second order with steps twice as long are apart by (4 - 1) of the error, with steps
-    # half as long by (1 - 1/4) of it: a difference that counts four times.
+    # See ``ringsim.outputs.error_bars`` for the factors of the differences.
     for words, factor, scale in (("twice as long", 2.0, 1.0), ("half as long", 0.5, 4.0)):
         found = solve(used.scaled(factor))
         # Times count from the beginning: those of the last run hold for all.

@@ -27,8 +27,7 @@ class RunControl:
     """Steps, care and guard of one run.
 
     ``now`` is the last accepted state, ``goes_on`` whether there is a step from there, ``status``
-    and ``reason`` how the run has ended or must end, and ``repeats`` the number of steps that were
-    repeated with a smaller one.
+    and ``reason`` how the run has ended, ``repeats`` how many steps were repeated.
     """
 
     def __init__(
@@ -40,13 +39,12 @@ class RunControl:
         *,
         follow_deviations: bool = False,
     ) -> None:
-        """Begin a run at ``start``.
-
-        It ends when the V-joints of ``locks`` have all reached the same stop, without them at
-        ``solver.end_time``.  With ``follow_deviations`` steps resolve how the joints deviate from
-        their mean angle.
+        """Begin a run, which ends when the V-joints of ``locks`` have all reached the same stop,
+        without them at ``solver.end_time``; with ``follow_deviations`` steps resolve how the joints
+        deviate from their mean angle.
         """
         self.now, self._solver, self._locks = start, solver, locks
+        self._roped = scales.slack_tension is not None
         self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, locks is None)
         self._indicators: list[Indicator] = []
         self._deviations: DeviationSteps | None = None
@@ -153,8 +151,9 @@ class RunControl:
         # Settling counts from the last lock within this step: what happens after it must not
         # depend on where steps end.
         time, settling = self.now.time, self._solver.settling_time if locks.stops else 0.0
-        two = (np.array(part) for part in zip(before[:3], self.now[:3], strict=True))
-        last = float(np.fmax.reduce(lock_times(*two), axis=None))
+        ends = [(one.time, one.angles, one.rates) for one in (before, self.now)]
+        times = lock_times(*map(np.array, zip(*ends, strict=True)))
+        last = float(np.fmax.reduce(times, axis=None))
         end = (last if math.isfinite(last) else time) + settling
         self._settled_at = end if end > time * (1.0 + _ROUND_OFF) else time
         # What tensions do from here on is in no result but the series.
@@ -169,7 +168,8 @@ class RunControl:
             self.goes_on = False
             if locks is None:
                 self.status = Status.OK
-                words = f"the cable was wound until solver.end_time = {solver.end_time:g} s"
+                words = "the cable was wound" if self._roped else "the run lasted"
+                words += f" until solver.end_time = {solver.end_time:g} s"
                 self.reason = Reason(Cause.NONE, words)
             elif self.status == Status.UNFINISHED:
                 self.reason = Reason(

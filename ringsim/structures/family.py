@@ -15,7 +15,7 @@ class Structure(Model):
     """Any deployable structure that a scene can hold: one file, found by its ``kind``.
 
     Its parts follow from one coordinate (a fold angle, rad).  The properties below are fields,
-    constants or properties of a kind; lists of a scene have as many values as they say.
+    constants or properties of a kind.
     """
 
     if TYPE_CHECKING:
@@ -58,8 +58,7 @@ class Structure(Model):
         return 0.0
 
     def layout(self, scene: Any, coordinate: Any) -> Layout:
-        """What it consists of at a value of the coordinate, with a scene's rods, boom, net, loads
-        and cables.
+        """What it consists of at a value of the coordinate, with all parts of a scene.
 
         The imaginary part ``ringsim.layout.pose.STEP`` of the coordinate carries the derivatives:
         compute places with functions that take complex numbers, without ``float`` and ``abs``.
@@ -67,11 +66,10 @@ class Structure(Model):
         raise NotImplementedError
 
     def basis(self, coordinate: float) -> NDArray[np.float64]:
-        """Functions s of the coordinate in which all places are linear, if a kind has some.
+        """Functions s of the coordinate in which all places are linear, if a kind has some, so
+        that theory need not build a layout at each coordinate: every place is P s with constant P.
 
-        Every place of the layout is then P s with constant P, so that theory need not build a
-        layout at each coordinate.  The first of them is 1; below them come their first and second
-        derivatives, shape (3, functions).
+        Shape (3, functions): s, of which the first is 1, its first and its second derivative.
         """
         del coordinate
         return np.zeros((3, 0))
@@ -81,9 +79,8 @@ class Structure(Model):
         return {"structure": str(type(self).model_fields["kind"].default)}
 
     def path_slope(self, cable: Any, angles: Any) -> float:
-        """Derivative of the ideal path of a cable after the opening angle, m/rad.
-
-        ``angles`` are the opening angles along its path, shape (sections,), rad.
+        """Derivative of the ideal path of a cable after the opening angle, m/rad, at the opening
+        angles along it, shape (sections,), rad.
         """
         raise NotImplementedError
 

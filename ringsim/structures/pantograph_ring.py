@@ -79,9 +79,7 @@ class PantographRing(Structure):
         return self
 
     def check(self, scene: Any) -> None:
-        """See ``Structure``: rods longer than thick, a boom to slide on, stops out of the way, V
-        pulleys that open the bars, and spans of cables that have a length and a direction.
-        """
+        """See ``Structure``."""
         for rod in ("diagonal", "bar"):
             tube, longest = f"rods.{rod}.outer_diameter", f"structure.half_{rod}"
             scene.require_below(tube, longest, "a rod is longer than thick")
@@ -117,36 +115,28 @@ class PantographRing(Structure):
         return pulleys_of(self.sections)
 
     @property
-    def polygon(self) -> int:
-        """Sides of the full polygon."""
-        return self.sections if self.closed else self.polygon_sections
-
-    @property
     def coordinate(self) -> float:
         """Initial angle phi of the bar halves from the horizontal, rad."""
         return 0.5 * (math.pi - math.radians(self.opening_angle))
 
     @property
     def reach(self) -> float:
-        """See ``Structure``: a bar half."""
+        """See ``Structure``."""
         return self.half_bar
 
     def geometry(self) -> RingGeometry:
         """The ideal ring."""
         return RingGeometry.of_polygon(
-            self.sections,
-            closed=self.closed,
-            polygon_sections=self.polygon,
-            aspect_ratio=self.aspect_ratio,
-            half_bar=self.half_bar,
-            half_diagonal=self.half_diagonal,
-            hinge_offset=self.hinge_offset,
-        )
+            self.sections, closed=self.closed, polygon_sections=self.polygon_sections,
+            aspect_ratio=self.aspect_ratio, half_bar=self.half_bar,
+            half_diagonal=self.half_diagonal, hinge_offset=self.hinge_offset,
+        )  # fmt: skip
 
     def describe(self) -> dict[str, str]:
         """See ``Structure``."""
         geometry = self.geometry()
-        shape = "closed ring" if self.closed else f"open arc of a polygon with {self.polygon} sides"
+        arc = f"open arc of a polygon with {self.polygon_sections} sides"
+        shape = "closed ring" if self.closed else arc
         # The first corner lies on the major axis of the ellipse.
         chord = 2.0 * (self.half_bar + self.hinge_offset)
         major, (x, y) = geometry.plan[0, 0], geometry.plan[1, :2]

@@ -63,25 +63,8 @@ class PlanarTruss(Structure):
     beam, ``rods.diagonal`` the outer tube of the strut, ``rods.elements`` half the elements of
     the upper beam.
 
-    Paper 001 gives the parts and their sections (its fig. 4 and table 1), not where the strut
-    and the cable are attached, nor the spring.  They are chosen so that the ideal truss
-    (tests/physics_planar/truss_statics.py) shows what its figs 8 and 9 show:
-
-    1. The cable has the published lengths, 0.9 m deployed and 0.1 m folded: if it ends at the outer
-       joint of the upper beam, for H from 0.646 m to 0.727 m.  H = 0.72 m puts 0.1 m at 3.1 deg,
-       where the outer joint is 34 mm off the axis: half the axis' tube (15 mm), half the
-       synchronising beam (7.5 mm) and a buffer.  There the contraction ends on a rest, so winding
-       further only stretches the cable.
-    2. The gauge sits where the beam bends most, at its centre: so does the strut's head, q = b / 2.
-       Strain then follows from tension alone, M = T H sin(g) b / (2 c), 4e-4 from 4.7 N (0.48 kgf).
-       At q = 0.45 m it takes 13.6 N, at 0.54 m 57 N, above the published 2 kgf; at q = 0.2 m the
-       head is strained more than the gauge.
-    3. The strain is largest near 500 mm of cable, as published, with p = 0.05 m (0.48 m, the
-       spring pushing 106 N): at 0.40 m with the strut's foot at the lower joint, at 0.50 m with
-       p = 0.03 m, which needs 180 N for 5 N of tension.
-    4. 2030 N/m and 0.316 m give 4e-4; 0.12 of that is left at 0.1 m and 0.14 at 0.9 m, where the
-       spring leaves the cable 0.8 N.  The tension is 1.4 N where the rest is met; the published
-       2 kgf is the rise at the end of contraction.
+    Source: paper 001, fig. 4 and table 1, for parts and sections; where strut and cable are
+    attached, and the spring, are inferred from its figs 8 and 9 (docs/planar_truss.md).
     """
 
     planes: ClassVar[tuple[str, ...]] = ("upper",)
@@ -196,7 +179,7 @@ class PlanarTruss(Structure):
 
     @property
     def reach(self) -> float:
-        """See ``Structure``: a beam."""
+        """See ``Structure``."""
         return self.beam_length
 
     @property
@@ -211,16 +194,12 @@ class PlanarTruss(Structure):
 
     def describe(self) -> dict[str, str]:
         """See ``Structure``."""
-        geometry, ends = self.geometry(), [self.coordinate, self.stowed_angle]
-        found = {"structure": f"{kind_of(self)}, two beams of {self.beam_length} m"}
-        for label, angle, cable, strut in zip(
-            ("initial", "at its rest"), ends, geometry.cable(ends), geometry.strut(ends),
-            strict=True,
-        ):  # fmt: skip
-            found[label] = (
-                f"{math.degrees(angle):.4g} deg, {cable:.4g} m of cable, strut {strut:.4g} m"
-            )
-        return found
+        geometry, found = self.geometry(), f"{kind_of(self)}, two beams of {self.beam_length} m"
+        return {"structure": found} | {
+            label: f"{math.degrees(angle):.4g} deg, {geometry.cable(angle):.4g} m of cable, "
+            f"strut {geometry.strut(angle):.4g} m"
+            for label, angle in (("initial", self.coordinate), ("at its rest", self.stowed_angle))
+        }
 
     def path_slope(self, cable: Any, angles: Any) -> float:
         """See ``Structure``."""

@@ -24,25 +24,18 @@ _SIGNED = np.array([_UP, -_UP])[:, None]
 
 @dataclass(frozen=True)
 class Fold:
-    """Point positions of one fold state, in metre.
-
-    Attributes
-    ----------
-    corners
-        Centres of the hinge assemblies, shape (2, corners, 3).
-    left, right
-        Pins of a section at its first and second corner, shape (2, sections, 3).
-    pivots
-        Crossing points of the diagonals, shape (sections, 3).
-    vjoints
-        Middle joints of the folding bars, shape (2, sections, 3).
-    """
+    """Point positions of one fold state, in metre."""
 
     corners: Array
+    """Centres of the hinge assemblies, shape (2, corners, 3)."""
     left: Array
+    """Pins of a section at its first corner, shape (2, sections, 3)."""
     right: Array
+    """Pins of a section at its second corner, shape (2, sections, 3)."""
     pivots: Array
+    """Crossing points of the diagonals, shape (sections, 3)."""
     vjoints: Array
+    """Middle joints of the folding bars, shape (2, sections, 3)."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +57,14 @@ class RingGeometry:
         closed: bool,
         polygon_sections: int,
         aspect_ratio: float,
-        half_bar: float,
-        half_diagonal: float,
-        hinge_offset: float,
+        **lengths: float,
     ) -> RingGeometry:
-        """A closed ring, or the first ``sections`` sides of a polygon left open."""
-        ring = polygon_corners(polygon_sections, aspect_ratio)
-        plan = ring if closed else ring[np.arange(sections + 1) % polygon_sections]
-        return cls(plan, closed, half_bar, half_diagonal, hinge_offset)
+        """A closed ring, or the first ``sections`` sides of a polygon left open; with its
+        ``lengths`` half_bar, half_diagonal and hinge_offset.
+        """
+        sides = sections if closed else polygon_sections
+        corners = np.arange(sections if closed else sections + 1) % sides
+        return cls(polygon_corners(sides, aspect_ratio)[corners], closed, **lengths)
 
     @property
     def sections(self) -> int:
@@ -119,14 +112,10 @@ class RingGeometry:
 def polygon_corners(sides: int, aspect_ratio: float) -> Array:
     """Corners of the closed polygon with equal chords of length 1, inscribed in an ellipse.
 
-    The first corner lies on the major axis (+x), the polygon runs anticlockwise and is
-    centred on the origin.  The unknowns are the ellipse parameters of the other corners and
-    the chord; Newton's method starts from the regular polygon and converges quadratically.
-
-    Returns
-    -------
-    Array
-        Read-only, shape (sides, 3), in units of the chord, z = 0.
+    The first corner lies on the major axis (+x), the polygon runs anticlockwise and is centred on
+    the origin.  Read-only, shape (sides, 3), in units of the chord, z = 0.  The unknowns are the
+    ellipse parameters of the other corners and the chord; Newton's method starts from the regular
+    polygon.
 
     Raises
     ------

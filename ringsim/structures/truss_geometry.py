@@ -9,8 +9,7 @@ above.  Both beams, of length b, make the angle g with it: g = 0 folded down alo
     strut, from a foot on the axis p below the upper joint to a head on the upper beam q from it
                                    s^2 = q^2 + p^2 - 2 q p cos g,      ds/dg = q p sin g / s
 
-The ratio (ds/dg) / (dc/dg) = q p c / (b H s) has no singularity at g = 0: the cable keeps its hold
-on the folded truss although neither length changes there.  Source: paper 001, figs 4 and 7.
+Source: paper 001, figs 4 and 7.
 """
 
 from __future__ import annotations
@@ -25,11 +24,7 @@ Array = NDArray[np.float64]
 
 
 class TrussPoints(NamedTuple):
-    """Points of the truss at one or many angles, shape (..., 3) each, in metre.
-
-    Joints of the fixed axis (``lower``, ``upper``) and of the outer ends of the beams
-    (``lower_end``, ``upper_end``); ``foot`` and ``head`` of the strut.
-    """
+    """Joints on the axis, outer ends of the beams, ends of the strut; shape (..., 3), metre."""
 
     lower: Array
     upper: Array
@@ -59,11 +54,6 @@ class TrussGeometry:
     def strut(self, angle: ArrayLike) -> Array:
         """Length s of the strut between its joints."""
         return _third_side(self.head, self.foot, angle)
-
-    def strut_over_cable(self, angle: ArrayLike) -> Array:
-        """Ratio (ds/dg) / (dc/dg) = q p c / (b H s), finite at every angle."""
-        sides = self.head * self.foot / (self.beam * self.axis)
-        return np.asarray(sides * self.cable(angle) / self.strut(angle))
 
     def angle(self, cable: ArrayLike) -> Array:
         """Angle g in [0, pi] at which the cable has a length; NaN out of reach."""

@@ -78,7 +78,7 @@ class _IdealRun:
         }
         angles, rates = self._series(lambda now: now.angles), self._series(lambda now: now.rates)
         locks = np.full(self._shape, course.lock_time)
-        self.run = Run(scene, angles, rates, locks, counts, course.status, course.cause)
+        self.run = Run(scene, angles, rates, locks, counts)
 
     def series_of(self, output: Output) -> Series | None:
         """Readings at the ends of steps; of tensions at all points that are in balance."""

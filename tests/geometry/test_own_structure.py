@@ -14,6 +14,7 @@ from ringsim.layout.layout import layout_of
 from ringsim.layout.mobility import internal_mobility
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.variables import Status
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,7 @@ def test_it_can_only_fold_and_weighs_twice_its_rods(example: dict[str, Any]) -> 
 
 def test_its_run_balances_energy_and_keeps_its_joints(example: dict[str, Any]) -> None:
     run = example["run"]
-    assert int(run.status) == 0
+    assert int(run.status) == Status.OK
     assert run.opening_angle.sizes == {"plane": 4, "section": 6, "time": run.sizes["time"]}
     assert list(run.plane.values) == ["upper", "lower", "inner upper", "inner lower"]
     # The bar of ring18 at its own tolerance: 3e-4 of deployment, 2e-3 with its impact.
@@ -66,9 +67,11 @@ def test_cables_stress_faults_and_its_own_text_work_as_with_any_other(
     )  # fmt: skip
     assert scene_from_toml(scene.to_toml(), source="text") == scene
     run = ringsim.simulate(scene)
-    assert not run.attrs["reason"].startswith("Error")
+    assert int(run.status) == Status.UNFINISHED, run.attrs["reason"]
     assert {"inner_bar_upper_left", "diagonal_rising_right"} <= set(run.rod.values)
     assert run.rod_stress.sizes["rod"] == 16
     assert float(run.cable_tension.sel(plane="upper").max()) > 0.0
     assert run.cable_tension.sel(plane="inner upper").isnull().all()
-    assert float(run.energy_error) < 0.05
+    # 9.1e-6 at the default tolerance, 2.7e-6 at a thirtieth of it.
+    assert float(run.energy_error) < 2e-5
+    assert float(run.constraint_error) < 1e-9

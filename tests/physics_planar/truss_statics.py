@@ -37,6 +37,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ringsim.scene import Scene
 from ringsim.structures.planar_truss import PlanarTruss
+from ringsim.structures.truss_geometry import TrussGeometry
 
 Array = NDArray[np.float64]
 _REPETITIONS = 12
@@ -76,7 +77,15 @@ def spring_force(truss: PlanarTruss, cable: ArrayLike) -> Array:
 def tension(truss: PlanarTruss, cable: ArrayLike) -> Array:
     """Tension that holds a truss with rigid beams at cable lengths (m) above the stowed one, N."""
     geometry = truss.geometry()
-    return spring_force(truss, cable) * geometry.strut_over_cable(geometry.angle(cable))
+    return spring_force(truss, cable) * strut_over_cable(geometry, geometry.angle(cable))
+
+
+def strut_over_cable(geometry: TrussGeometry, angle: ArrayLike) -> Array:
+    """Ratio (ds/dg) / (dc/dg) = q p c / (b H s), finite even where the truss is folded flat: the
+    cable keeps its hold there, although neither length changes.
+    """
+    sides = geometry.head * geometry.foot / (geometry.beam * geometry.axis)
+    return np.asarray(sides * geometry.cable(angle) / geometry.strut(angle))
 
 
 def statics(scene: Scene, cable: ArrayLike) -> TrussStatics:

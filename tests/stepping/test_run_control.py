@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -34,15 +35,17 @@ def lifted(time: float) -> tuple[float, float]:
 class Motion:
     """What an engine would read of six joints that move alike by a law, without any loss."""
 
-    def __init__(self, law: Law = falling) -> None:
-        self.law = law
+    def __init__(self, law: Law = falling, tensions: np.ndarray | None = None) -> None:
+        self.law, self.tensions = law, tensions
+        self.begun = 6.0 * 0.5 * INERTIA * law(0.0)[1] ** 2
         self.swallowed = 0.0
 
     def at(self, time: float) -> Instant:
         angle, rate = self.law(time)
         kinetic = 6.0 * 0.5 * INERTIA * rate**2
-        energies = Energies(kinetic - self.swallowed, 0.0, kinetic, 0.0)
-        return Instant(time, np.full((2, 3), angle), np.full((2, 3), rate), energies)
+        energies = Energies(kinetic - self.swallowed, 0.0, kinetic - self.begun, 0.0)
+        angles, rates = np.full((2, 3), angle), np.full((2, 3), rate)
+        return Instant(time, angles, rates, energies, tensions=self.tensions)
 
 
 def control_of(motion: Motion, solver: Solver, *, locking: bool = True, **more) -> RunControl:
@@ -163,14 +166,37 @@ def test_the_guard_ends_a_run_whose_energy_gets_lost() -> None:
     assert "solver.energy_tolerance" in control.reason
 
 
-def test_constant_steps_without_locks_run_to_the_end_time() -> None:
+@pytest.mark.parametrize(
+    ("slack_tension", "words"), [(None, "the run lasted"), (0.01, "the cable was wound")]
+)
+def test_constant_steps_without_locks_run_to_the_end_time(slack_tension, words) -> None:
     """A structure whose joints do not lock; the last step is what is left."""
     solver = Solver(step_control="constant", step=0.3, end_time=4.0)
-    control = control_of(motion := Motion(), solver, locking=False)
+    motion = Motion(tensions=None if slack_tension is None else np.ones(1))
+    control = RunControl(solver, SCALES._replace(slack_tension=slack_tension), motion.at(0.0))
     times = follow(motion, control)
     assert times == pytest.approx([*(0.3 * np.arange(14)), 4.0])
     assert control.status is Status.OK
-    assert control.reason == "the cable was wound until solver.end_time = 4 s"
+    assert control.reason == f"{words} until solver.end_time = 4 s"
+
+
+@pytest.mark.parametrize(("time_to_stop", "repeated"), [(0.15, True), (0.6, False)])
+def test_a_first_step_that_leads_too_close_to_a_stop_is_repeated(time_to_stop, repeated) -> None:
+    """It takes 2 % of the time to the first stop at most, which its end is the first to tell."""
+    rate = 0.1
+    motion = Motion(lambda time: (math.pi - rate * (time_to_stop - time), rate))
+    control = control_of(motion, Solver(step=0.2))
+    step = control.next_step()
+    assert step == pytest.approx(0.2 / 20.0)
+    assert (step > 0.02 * time_to_stop) is repeated
+    shorter = control.shorter(motion.at(step))
+    assert shorter == (pytest.approx(0.2 * step) if repeated else None)
+    step = control.retry(math.nan) if repeated else step
+    assert step <= 0.02 * time_to_stop
+    assert control.shorter(motion.at(step)) is None
+    # From the second step on the last one's rates have told how far away the stop is.
+    assert control.accept(motion.at(step))
+    assert control.shorter(motion.at(0.5 * time_to_stop)) is None
 
 
 @pytest.mark.parametrize(("locking", "grown"), [(False, [0.2, 0.4]), (True, [0.1, 0.1])])
@@ -190,11 +216,11 @@ def test_the_next_step_starts_from_what_a_fault_has_left() -> None:
     motion = Motion()
     control = control_of(motion, Solver())
     found = motion.at(control.next_step())
-    struck = found._replace(energies=found.energies._replace(elastic=-0.5, lost=0.5))
+    struck = replace(found, energies=found.energies._replace(elastic=-0.5, lost=0.5))
     control.accept(found, struck)
     assert control.now is struck
     later = motion.at(found.time + control.next_step())
-    balanced = later._replace(energies=later.energies._replace(elastic=-0.5))
+    balanced = replace(later, energies=later.energies._replace(elastic=-0.5))
     assert control.shorter(balanced) is None
     assert control.shorter(later) is not None
 
@@ -205,13 +231,13 @@ def test_tensions_are_judged_until_the_last_lock() -> None:
     solver = Solver(settling_time=1.0)
     for locked in (False, True):
         motion = Motion()
-        start = motion.at(0.0)._replace(tensions=np.zeros(2))
+        start = replace(motion.at(0.0), tensions=np.zeros(2))
         control = RunControl(solver, roped, start, Locks(start.angles, 0.1))
         exact = math.sqrt(2.0 * (math.pi - BEGIN) * INERTIA / TORQUE)
         until = exact if locked else 0.5 * exact
         while control.now.time < until:
             found = motion.at(control.now.time + control.next_step())
-            control.accept(found._replace(tensions=np.ones(2)))
+            control.accept(replace(found, tensions=np.ones(2)))
         found = motion.at(control.now.time + control.next_step())
-        jumped = found._replace(tensions=np.full(2, 11.0))
+        jumped = replace(found, tensions=np.full(2, 11.0))
         assert (control.shorter(jumped) is None) is locked
