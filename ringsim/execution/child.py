@@ -22,7 +22,11 @@ _MOST_LOG_BYTES = 1 << 28
 def main() -> None:
     """Serve the pipe whose file descriptor is the first argument."""
     pipe = Connection(int(sys.argv[1]))
-    _die_with_parent(int(sys.argv[2]))
+    # The kernel ends this process when its parent ends, however that happens.
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != int(sys.argv[2]):
+        os._exit(0)
     faulthandler.enable()
     faulthandler.register(signal.SIGUSR2)
     for ignored in (signal.SIGINT, signal.SIGUSR1):
@@ -50,13 +54,13 @@ def _serve(pipe: Connection, setup: dict[str, Any]) -> None:
             stream.reconfigure(line_buffering=True)  # a crash would take buffered lines with it
     pipe.send("")
     while True:
-        task = pipe.recv()
+        sample, values = pipe.recv()
         os.ftruncate(1, 0)
         _flush()  # what did not fit into the log before
         os.ftruncate(1, 0)
         # Ends this process, should its parent be unable to look at it.
         signal.setitimer(signal.ITIMER_REAL, 2.0 * setup["limits"].timeout + 60.0)
-        result = solve(solver, base, task)
+        result = solve(solver, base, sample, values)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         _flush()
         pipe.send(result)
@@ -75,14 +79,6 @@ def _limit(what: int, most: int) -> None:
     if hard != resource.RLIM_INFINITY:
         most = min(most, hard)
     resource.setrlimit(what, (most, hard))
-
-
-def _die_with_parent(parent: int) -> None:
-    """Let the kernel end this process when its parent ends, however that happens."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(0)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ class Local(Scheduler):
         self.workers, self.description = workers, f"{workers} local workers"
 
     def run(self, samples: Sequence[int], work: Work) -> str:
-        """Run samples; see :class:`Scheduler`."""
+        """See :meth:`Scheduler.run`."""
         queue = deque(samples)
         count = min(self.workers, len(queue))
         slots = [Slot(work.solver, work.scene, work.limits) for _ in range(count)]
@@ -39,7 +39,7 @@ class Local(Scheduler):
 
 
 class Serial(Scheduler):
-    """One sample after the other in this process, for debugging: a crash takes everything with it.
+    """One sample after the other in this process, for debugging: a crash ends everything.
 
     Limits do not hold.
     """
@@ -47,13 +47,13 @@ class Serial(Scheduler):
     description = "in one process"
 
     def run(self, samples: Sequence[int], work: Work) -> str:
-        """Run samples; see :class:`Scheduler`."""
+        """See :meth:`Scheduler.run`."""
         solver, base = load_solver(work.solver), Scene.model_validate(work.scene)
         for sample in samples:
             if reason := work.stop():
                 return reason
             work.started(sample)
-            result = solve(solver, base, work.task(sample))
+            result = solve(solver, base, sample, work.values_of(sample))
             work.keep(result)
             work.finished(result)
         return work.stop()

@@ -1,4 +1,4 @@
-"""Running samples on all ranks of an MPI world, which only schedules.
+"""Running samples on all ranks of an MPI world: finding, using and leaving it.
 
 Every rank supervises one solver process; rank 0 also hands out the samples.  Nobody spins: a
 rank with nothing to do sleeps on its solver's pipe, a little longer each time.
@@ -6,13 +6,18 @@ rank with nothing to do sleeps on its solver's pipe, a little longer each time.
 
 from __future__ import annotations
 
+import contextlib
+import os
+import subprocess
+import sys
 import time
+import traceback
 from collections import deque
-from collections.abc import Sequence
-from contextlib import closing
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar, cast
 
+from ringsim.execution.process import without_mpi
 from ringsim.execution.slot import Slot
 from ringsim.execution.work import Scheduler, Work
 from ringsim.refusal import InputError
@@ -22,6 +27,69 @@ _SHORTEST, _LONGEST = 1e-4, 2e-2
 _AHEAD_SECONDS, _MOST_AHEAD = 0.02, 32
 _POLITE = 5e-3
 _T = TypeVar("_T")
+
+_SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
+_LIBRARY = """
+import mpi4py
+mpi4py.rc.initialize = False
+from mpi4py import MPI
+print(MPI.Get_library_version())
+"""
+"""Tells the version of the MPI library without starting it; nothing if it cannot be loaded."""
+
+
+def launched_size() -> int:
+    """Number of processes that a launcher says it has started; 1 without a launcher."""
+    sizes = (os.environ.get(name, "") for name in _SIZES)
+    return next((int(size) for size in sizes if size.isdigit()), 1)
+
+
+def mpi_world() -> Any:
+    """The communicator of all processes that the launcher has started.
+
+    InputError if there is no MPI library, or if it does not belong to the launcher.
+    """
+    expected = launched_size()
+    if "OMPI_COMM_WORLD_SIZE" in os.environ:
+        # Other libraries do not even start under this launcher: they end the process.
+        library = subprocess.run(
+            [sys.executable, "-c", _LIBRARY], env=without_mpi(), capture_output=True, text=True,
+            check=False,
+        ).stdout.strip()  # fmt: skip
+        if library and not library.startswith("Open MPI"):
+            raise _stranger(expected, library)
+    try:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:
+        raise InputError(
+            f"started {expected} times by a launcher, but MPI cannot be loaded ({error}): install "
+            "an MPI library (pip install 'ringsim[mpich]'), or use --workers instead"
+        ) from None
+    world = MPI.COMM_WORLD
+    if world.Get_size() != expected:
+        raise _stranger(expected, MPI.Get_library_version())
+    return world
+
+
+def _stranger(expected: int, library: str) -> InputError:
+    name = library.splitlines()[0].strip(" \0")
+    return InputError(
+        f"the launcher has started {expected} processes, but each is alone in its MPI world: the "
+        f"launcher belongs to another MPI than the one loaded ({name}); use that one's mpiexec "
+        "(under Slurm: srun --mpi=pmi2)"
+    )
+
+
+@contextlib.contextmanager
+def aborting(communicator: Any) -> Iterator[None]:
+    """End the whole MPI job if an error leaves the block: the other ranks would wait for ever."""
+    try:
+        yield
+    except Exception:
+        traceback.print_exc()
+        sys.stderr.flush()
+        communicator.Abort(1)
+        raise
 
 
 class Mpi(Scheduler):
@@ -37,7 +105,7 @@ class Mpi(Scheduler):
         self.description = f"MPI, {self.workers} ranks, {library}"
 
     def from_first(self, value: _T) -> _T:
-        """See :meth:`Scheduler.from_first`."""
+        """:meth:`Scheduler.from_first`."""
         return cast(_T, self.communicator.bcast(value))
 
     def from_all(self, value: _T) -> list[_T]:
@@ -53,7 +121,7 @@ class Mpi(Scheduler):
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """See :meth:`Scheduler.run`."""
-        with closing(Slot(work.solver, work.scene, work.limits)) as slot:
+        with contextlib.closing(Slot(work.solver, work.scene, work.limits)) as slot:
             if self.rank == 0:
                 return self._schedule(deque(samples), slot, work)
             return self._serve(slot, work)

@@ -16,15 +16,22 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from ringsim.execution.launch import OF_MPI
 from ringsim.execution.solve import LOG_CHARACTERS
 from ringsim.refusal import InputError
 from ringsim.storage.result import plain
+
+_OF_MPI = ("PMI", "PMIX", "OMPI", "OPAL", "PRTE", "HYDRA", "HYDI", "MPI", "I_MPI", "MPIR")
+"""How names of variables begin by which launchers and libraries speak to each other."""
 
 _ADDRESS = re.compile(r"0x[0-9a-fA-F]+")
 _END_SECONDS = 10.0
 _PRINTING_SECONDS = 0.05
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def without_mpi() -> dict[str, str]:
+    """The environment of a process that is to know nothing of an MPI launcher."""
+    return {k: v for k, v in os.environ.items() if not k.startswith(_OF_MPI)}
 
 
 class SolverProcess:
@@ -34,12 +41,10 @@ class SolverProcess:
     """
 
     def __init__(self, setup: dict[str, Any]) -> None:
-        self.ready = False
-        self.runs = 0
+        self.ready, self.runs = False, 0
         mine, other = socket.socketpair()
         self.pipe = Connection(mine.detach())
-        environment = {k: v for k, v in os.environ.items() if not k.startswith(OF_MPI)}
-        environment |= dict.fromkeys(_ONE_THREAD, "1")
+        environment = without_mpi() | dict.fromkeys(_ONE_THREAD, "1")
         environment["PYTHONPATH"] = os.pathsep.join(os.path.abspath(path) for path in sys.path)
         command = [sys.executable, "-P", "-m", "ringsim.execution.child"]
         scratch = ""

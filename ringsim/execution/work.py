@@ -26,14 +26,6 @@ class Limits(Model):
 
 
 @dataclass(frozen=True)
-class Task:
-    """One run that is asked for."""
-
-    sample: int
-    values: dict[str, Any]
-
-
-@dataclass(frozen=True)
 class Work:
     """The samples' content, and where results go."""
 
@@ -50,10 +42,6 @@ class Work:
     started: Callable[[int], None] = lambda sample: None
     finished: Callable[[Result], None] = lambda result: None
     """Tell rank 0 what goes on; results of other ranks come without their arrays."""
-
-    def task(self, sample: int) -> Task:
-        """The run of a sample."""
-        return Task(sample, self.values_of(sample))
 
 
 class Scheduler:
