@@ -12,7 +12,7 @@ import xarray as xr
 
 from ringsim.analysis.accuracy import NEEDED, Truth, judge
 from ringsim.analysis.ladder import PATHS, Rung, ladder, references, standing
-from ringsim.campaign.cases import Cases, run_cases
+from ringsim.campaign.cases import run_cases
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
@@ -35,14 +35,8 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
     cheapest run of the reference goes first, then the whole reference, then the rest, so that a
     scene which cannot be studied costs little.  The ideal fidelity is a setting too, where it can
     represent the scene.  ``folder`` holds the campaigns, and a study that was interrupted goes on;
-    ``timeout`` is the longest time of one rung, s.
-
-    Raises
-    ------
-    InputError
-        If the scene is refused.
-    ReferenceRunError
-        If a reference run does not end well.
+    ``timeout`` is the longest time of one rung, s.  InputError if the scene is refused,
+    ReferenceRunError if a reference run does not end well.
     """
     scene = scene.with_values(
         {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
@@ -53,8 +47,7 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
         scene.with_values(dict(rung.values))  # refused before anything has run
     in_time, in_space = references(rungs)
     for stage, places in (("first", in_time[:1]), ("reference", in_time + in_space)):
-        own = [rungs[k] for k in places]
-        _require_ok(own, study.run(stage, own))
+        _require_ok(own := [rungs[k] for k in places], study.run(stage, own))
     results = study.run("settings", rungs)
     truths = _quadrature(scene)
     if (ideal := study.ideal()) is not None:
@@ -89,11 +82,10 @@ class _Study:
                 missing.setdefault(self._campaign(stage, rung), {})[key] = rung
         for (name, stress), own in missing.items():
             given = {path: next(iter(own.values())).values[path] for path in shared}
-            found = self._needed(
-                name, f"Settings of {self.scene.name} against each other ({name})",
-                self.scene.with_values(given | {"record.stress": stress}),
-                [{path: rung.values[path] for path in paths} for rung in own.values()],
-            )  # fmt: skip
+            scene = self.scene.with_values(given | {"record.stress": stress})
+            cases = [{path: rung.values[path] for path in paths} for rung in own.values()]
+            title = f"Settings of {scene.name} against each other ({name})"
+            found = self._needed(name, scene, cases, title=title)
             self.known |= {key: found.isel(rung=[k]) for k, key in enumerate(own)}
         return xr.concat([self.known[key] for key in keys], "rung")
 
@@ -112,15 +104,18 @@ class _Study:
         except InputError:
             return None
         case, title = {"solver.tolerance": plain.solver.tolerance}, f"{plain.name} with rigid rods"
-        return self._needed("ideal", title, plain, [case], "ideal")
+        return self._needed("ideal", plain, [case], title=title, fidelity="ideal")
 
     def _needed(
-        self, name: str, title: str, scene: Scene, cases: list[dict[str, Any]],
+        self, name: str, scene: Scene, cases: list[dict[str, Any]], *, title: str,
         fidelity: str = "full",
     ) -> xr.Dataset:  # fmt: skip
         """What is compared of a campaign's results, missing variables as NaN."""
-        cases_of = Cases(name, title, scene, cases, self.timeout, fidelity)
-        with xr.open_dataset(run_cases(self.folder, cases_of, self.workers)) as dataset:
+        file = run_cases(
+            self.folder, name, scene, cases, workers=self.workers, title=title,
+            timeout=self.timeout, fidelity=fidelity,
+        )  # fmt: skip
+        with xr.open_dataset(file) as dataset:
             found = dataset.rename(sample="rung").drop_vars("rung")
             kept = found[[name for name in (*NEEDED, "reason") if name in found]].load()
         nothing = ("rung", np.full(kept.sizes["rung"], np.nan))

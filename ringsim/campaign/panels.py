@@ -77,10 +77,7 @@ class Panel:
 def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
     """Panels for axes ``PATH=LOW..HIGH``, two to a panel; default ones if there are none.
 
-    Raises
-    ------
-    InputError
-        If a text, a path, a bound or any pair of values is refused.
+    InputError if a text, a path, a bound or any pair of values is refused.
     """
     if len(over) % 2:
         raise InputError(
@@ -119,10 +116,7 @@ def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
 def sweep_of(scene: Scene, text: str, points: int) -> Sweep:
     """The axis ``PATH=LOW..HIGH``: geometric from a decade on, else linear; whole numbers stay so.
 
-    Raises
-    ------
-    InputError
-        If the text, the path or one of the bounds is refused.
+    InputError if the text, the path or one of the bounds is refused.
     """
     path, _, extent = (part.strip() for part in text.partition("="))
     try:

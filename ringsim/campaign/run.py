@@ -30,15 +30,10 @@ class Share:
 
     @classmethod
     def parse(cls, text: str) -> Share:
-        """The share that ``i/n`` names.
+        """The share that ``i/n`` names; InputError if there is none.
 
         >>> Share.parse("2/8")
         Share(number=2, count=8)
-
-        Raises
-        ------
-        InputError
-            If there is no such share.
         """
         number, _, count = text.partition("/")
         if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
@@ -75,16 +70,8 @@ class Choices:
 def run_campaign(folder: Path, choices: Choices) -> int:
     """Run the missing samples of a prepared folder, on every rank that takes part.
 
-    Returns
-    -------
-    int
-        Exit code: 0 all samples have run, 3 too many (or all) of them failed, 130 stopped by a
-        signal, or samples are left.
-
-    Raises
-    ------
-    InputError
-        If the folder is in use or cannot be written.
+    Returns the exit code: 0 all samples have run, 3 too many (or all) of them failed, 130 stopped
+    by a signal, or samples are left.  InputError if the folder is in use or cannot be written.
     """
     scheduler, share = choices.scheduler, choices.share
     with contextlib.ExitStack() as held:
@@ -94,8 +81,7 @@ def run_campaign(folder: Path, choices: Choices) -> int:
                 held.enter_context(reserved(folder, share.writer, alone=share.whole))
             except InputError as error:
                 fault = str(error)
-        fault = scheduler.from_first(fault)
-        if fault:
+        if fault := scheduler.from_first(fault):
             raise InputError(fault)
         campaign = open_folder(folder)
         _run_missing(campaign, choices, stop)
@@ -159,8 +145,7 @@ def _watched(
         progress.refresh()
         failed = progress.failed + failed_elsewhere
         if most is not None and failed > most:
-            why = f"{failed} samples failed, more than max_failed = {most}"
-            stop.note(why, signalled=False)
+            stop.note(f"{failed} samples failed, more than max_failed = {most}", signalled=False)
         return stop.reason
 
     samples = longest_first(missing, relative_cost(campaign.table, campaign.scene))

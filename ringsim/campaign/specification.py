@@ -74,13 +74,7 @@ class Campaign:
     scene: Scene
 
     def draw(self) -> Table:
-        """All inputs of all samples.
-
-        Raises
-        ------
-        InputError
-            If the scene refuses an input.
-        """
+        """All inputs of all samples; InputError if the scene refuses one."""
         wanted = self.specification
         try:
             return draw(
@@ -92,13 +86,7 @@ class Campaign:
 
 
 def load_campaign(path: Path) -> Campaign:
-    """Read a campaign file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or if its content or its scene is refused.
-    """
+    """Read a campaign file; InputError if it, its content or its scene is refused."""
     text = read_text(path)
     try:
         specification = Specification.model_validate(parse_toml(text, path.name))

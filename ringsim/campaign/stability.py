@@ -10,7 +10,7 @@ from pathlib import Path
 import xarray as xr
 
 from ringsim.analysis.stability import cells_of, checked, chosen_for_check, joined
-from ringsim.campaign.cases import Cases, run_cases
+from ringsim.campaign.cases import run_cases
 from ringsim.campaign.panels import Panel
 from ringsim.parts.solver import MOST_STEPS
 from ringsim.scene import Scene
@@ -34,23 +34,15 @@ class _Piece:
 def run_map(folder: Path, panels: Sequence[Panel], workers: int) -> xr.Dataset:
     """Run all cells that are still missing, each panel in a folder of its own.
 
-    Returns
-    -------
-    xr.Dataset
-        The judged map (``ringsim.analysis.stability.joined``).
-
-    Raises
-    ------
-    InputError
-        If a scene refuses a value.
-    KeyboardInterrupt
-        If a signal stopped it; the same call goes on.
+    Returns the judged map (``ringsim.analysis.stability.joined``).  InputError if a scene refuses a
+    value, KeyboardInterrupt if a signal stopped it: the same call goes on.
     """
     found = []
     for panel in panels:
-        words = {"name": panel.name, "title": panel.title}
-        for axis, sweep in (("x", panel.x), ("y", panel.y)):
-            words |= {f"{axis}_label": sweep.label, f"{axis}_units": sweep.units}
+        words = {
+            "name": panel.name, "title": panel.title, "x_label": panel.x.label,
+            "x_units": panel.x.units, "y_label": panel.y.label, "y_units": panel.y.units,
+        }  # fmt: skip
         parts = [_run(folder, piece, workers) for piece in _pieces(panel)]
         found.append((words, xr.concat(parts, dim="cell")))
     return joined(found)
@@ -124,7 +116,10 @@ def _run(
                 changes["solver.deviation_tolerance"] = fine.deviation_tolerance
         rows.append(row | changes or {"solver.step": solver.step})  # a campaign varies something
     title, timeout = f"Stability map: {piece.panel.title}", TIMEOUT * (_PATIENCE if finer else 1.0)
-    cases = Cases(piece.name, title, piece.scene, rows, timeout)
+    file = run_cases(
+        folder / piece.panel.name, piece.name, piece.scene, rows, workers=workers, title=title,
+        timeout=timeout,
+    )  # fmt: skip
     x, y, _ = zip(*piece.cells, strict=True)
-    with xr.open_dataset(run_cases(folder / piece.panel.name, cases, workers)) as campaign:
+    with xr.open_dataset(file) as campaign:
         return cells_of(campaign, x, y)

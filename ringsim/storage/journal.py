@@ -1,7 +1,4 @@
-"""Journals: every finished sample is in a file at once, one file for each process.
-
-A :class:`Survey` says what all journals of a campaign hold.
-"""
+"""Journals: every finished sample is in a file at once, one file for each process."""
 
 from __future__ import annotations
 
@@ -38,17 +35,14 @@ class Journal:
     """An append-only file with one writer.
 
     A record is complete or, if the writer was killed within it, recognised as torn and ignored.
-    Its checksum is right for this campaign only.  The writer is named after its share of the
-    samples, and its number among the processes that run it.
+    Its checksum is right for this campaign only.  ``writer`` names the share and the rank.
     """
 
     def __init__(self, folder: Path, campaign: str, writer: str) -> None:
         # No two processes share a journal, even where the file system has no locks.
         self.path = folder / FOLDER / f"{writer}-{secrets.token_hex(4)}.journal"
         self._campaign = campaign
-        self._descriptor = -1
-        self._size = 0
-        self._synced = -_SYNC_SECONDS
+        self._descriptor, self._size, self._synced = -1, 0, -_SYNC_SECONDS
 
     def append(self, result: Result) -> None:
         """Add one result; the first one creates the file.
@@ -58,7 +52,7 @@ class Journal:
         header, body = result.header(), result.body
         check = _checksum(header, body, self._campaign)
         frame = _FRAME.pack(_MAGIC, len(header), len(body), check)
-        record = memoryview(b"".join((frame, header, body)))
+        record = memoryview(frame + header + body)
         with writing(self.path, GO_ON):
             if self._descriptor < 0:
                 flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND
@@ -144,9 +138,7 @@ class Survey:
     seconds: NDArray[np.float64]
     """Elapsed time of each sample, NaN where there is no result."""
     form: NDArray[np.int64]
-    """Form of each sample's result, an index of ``forms``; -1 where there is no result."""
-    forms: list[str]
-    """See :class:`Result`."""
+    """Number of the form of each sample's result; -1 where there is no result."""
     owner: NDArray[np.int64]
     """Journal with the result that counts of each sample, -1 where there is none."""
     place: NDArray[np.int64]
@@ -180,8 +172,7 @@ def survey(folder: Path, campaign: str, samples: int) -> Survey:
     Of several results of one sample, one that went well counts before one that failed, whatever
     the clocks said; otherwise the later one does.
 
-    Records that are damaged, or of a campaign with another identity than ``campaign``, are told in
-    a warning of the log.
+    A warning in the log tells of records that are damaged, or of another ``campaign``.
     """
     journals = sorted((folder / FOLDER).glob("*.journal"))
     status = np.full(samples, NOT_RUN, dtype=np.int8)
@@ -203,7 +194,6 @@ def survey(folder: Path, campaign: str, samples: int) -> Survey:
         if damaged:
             _log.warning(
                 "%s is damaged: %d of its records cannot be used, their samples run again",
-                path.name,
-                damaged,
-            )
-    return Survey(campaign, journals, status, seconds, form, list(forms), owner, place)
+                path.name, damaged,
+            )  # fmt: skip
+    return Survey(campaign, journals, status, seconds, form, owner, place)

@@ -30,11 +30,11 @@ def provenance(*, name: str, title: str, action: str) -> dict[str, Any]:
         "python_version": platform.python_version(),
         "platform": platform.platform(),
         "host": platform.node(),
-        "git_commit": git_commit(),
+        "git_commit": _git_commit(),
     } | {f"{package}_version": version(package) for package in _PACKAGES}
 
 
-def git_commit() -> str:
+def _git_commit() -> str:
     """Commit of the source tree that runs, with "+changes" if files differ; or "unknown"."""
     tree = Path(__file__).resolve().parents[2]
     if not (tree / ".git").exists():
