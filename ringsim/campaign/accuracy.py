@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -41,7 +41,7 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
     scene = scene.with_values(
         {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
     )
-    study = _Study(folder, scene, workers, timeout)
+    study = _Study(scene, partial(run_cases, folder, workers=workers, timeout=timeout))
     rungs = ladder(scene)
     for rung in rungs:
         scene.with_values(dict(rung.values))  # refused before anything has run
@@ -65,10 +65,9 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
 class _Study:
     """Runs settings in stages, each setting once."""
 
-    folder: Path
     scene: Scene
-    workers: int
-    timeout: float
+    cases: Callable[..., Path]
+    """``run_cases`` for all but name, scene, cases, title and fidelity."""
     known: dict[tuple[object, ...], xr.Dataset] = field(default_factory=dict)
 
     def run(self, stage: str, rungs: Sequence[Rung]) -> xr.Dataset:
@@ -85,7 +84,7 @@ class _Study:
             scene = self.scene.with_values(given | {"record.stress": stress})
             cases = [{path: rung.values[path] for path in paths} for rung in own.values()]
             title = f"Settings of {scene.name} against each other ({name})"
-            found = self._needed(name, scene, cases, title=title)
+            found = _needed(self.cases(name, scene, cases, title=title))
             self.known |= {key: found.isel(rung=[k]) for k, key in enumerate(own)}
         return xr.concat([self.known[key] for key in keys], "rung")
 
@@ -104,22 +103,16 @@ class _Study:
         except InputError:
             return None
         case, title = {"solver.tolerance": plain.solver.tolerance}, f"{plain.name} with rigid rods"
-        return self._needed("ideal", plain, [case], title=title, fidelity="ideal")
+        return _needed(self.cases("ideal", plain, [case], title=title, fidelity="ideal"))
 
-    def _needed(
-        self, name: str, scene: Scene, cases: list[dict[str, Any]], *, title: str,
-        fidelity: str = "full",
-    ) -> xr.Dataset:  # fmt: skip
-        """What is compared of a campaign's results, missing variables as NaN."""
-        file = run_cases(
-            self.folder, name, scene, cases, workers=self.workers, title=title,
-            timeout=self.timeout, fidelity=fidelity,
-        )  # fmt: skip
-        with xr.open_dataset(file) as dataset:
-            found = dataset.rename(sample="rung").drop_vars("rung")
-            kept = found[[name for name in (*NEEDED, "reason") if name in found]].load()
-        nothing = ("rung", np.full(kept.sizes["rung"], np.nan))
-        return kept.assign({name: nothing for name in NEEDED if name not in kept})
+
+def _needed(file: Path) -> xr.Dataset:
+    """What is compared of a campaign's results, missing variables as NaN."""
+    with xr.open_dataset(file) as dataset:
+        found = dataset.rename(sample="rung").drop_vars("rung")
+        kept = found[[name for name in (*NEEDED, "reason") if name in found]].load()
+    nothing = ("rung", np.full(kept.sizes["rung"], np.nan))
+    return kept.assign({name: nothing for name in NEEDED if name not in kept})
 
 
 def _require_ok(rungs: Sequence[Rung], results: xr.Dataset) -> None:

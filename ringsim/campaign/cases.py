@@ -50,13 +50,9 @@ def run_cases(
         writer.writerow({k: str(v).lower() if isinstance(v, bool) else v for k, v in case.items()})
     base, rows, file = (folder / f"{name}{end}" for end in ("-scene.toml", ".csv", ".toml"))
     table = {
-        "name": name,
-        "title": title,
-        "scene": base.name,
-        "fidelity": fidelity,
-        "design": {"kind": "list", "file": rows.name},
-        "limits": {"timeout": timeout},
-    }
+        "name": name, "title": title, "scene": base.name, "fidelity": fidelity,
+        "design": {"kind": "list", "file": rows.name}, "limits": {"timeout": timeout},
+    }  # fmt: skip
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     write_text(base, scene.to_toml())

@@ -38,7 +38,6 @@ class Folder:
     solver: str
     """``module:function`` that runs one sample."""
     attributes: dict[str, Any]
-    """Global attributes of the design."""
 
     def survey(self) -> Survey:
         """What it holds of every sample."""

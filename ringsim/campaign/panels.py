@@ -18,7 +18,7 @@ from ringsim.sampling.paths import field_at, refuse_fixed, unit_at
 from ringsim.scene import Scene
 from ringsim.variables import PLANES
 
-DECADE = 10.0
+_DECADE = 10.0
 """HIGH over LOW from which on values are spaced geometrically."""
 _DEFAULTS = (
     (("cables.*.axial_stiffness", "net.stiffness"),
@@ -139,7 +139,7 @@ def sweep_of(scene: Scene, text: str, points: int) -> Sweep:
 
 def _sweep(scene: Scene, path: str, low: float, high: float, points: int) -> Sweep:
     paths = _expanded(scene, path)
-    spaced = np.geomspace if low > 0.0 and high >= DECADE * low else np.linspace
+    spaced = np.geomspace if low > 0.0 and high >= _DECADE * low else np.linspace
     values = spaced(low, high, points)
     values[1:-1] = [float(f"{value:.6g}") for value in values[1:-1]]
     if type(_own_value(scene, paths[0])) is int:

@@ -24,10 +24,8 @@ SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_id
 
 def _flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
     """Join nested tables to dotted paths, down to tables that have the key ``whole``."""
-    if prefix and (not isinstance(table, dict) or whole in table):
-        return {prefix: table}
-    if not isinstance(table, dict):
-        return table
+    if not isinstance(table, dict) or (prefix and whole in table):
+        return {prefix: table} if prefix else table
     found: dict[str, Any] = {}
     for name, inner in table.items():
         found |= _flat(inner, whole, f"{prefix}.{name}" if prefix else name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -52,23 +53,19 @@ def run_check(
     folder: Path, panels: Sequence[Panel], whole: xr.Dataset, *, share: float, seed: int,
     workers: int,
 ) -> xr.Dataset:  # fmt: skip
-    """Run a random share of the ok cells again with smaller steps, compare, and judge again.
+    """Run a random ``share`` of the ok cells of a map again, compare, and judge again.
 
     The largest step is a quarter, the tolerance a sixteenth of those of the last attempt;
-    constant steps are a quarter of those that Newton let the cell take.  ``whole`` is what
-    :func:`run_map` gave; ``share`` and ``seed`` choose the cells.
+    constant steps are a quarter of those that Newton let the cell take.
     """
     which = chosen_for_check(whole, share, seed)
-    starts = 1 + whole["restarts"].values[which].astype(int)
-    taken = (whole["final_time"] / whole["steps"]).values[which]
-    refinements = zip(starts.tolist(), taken.tolist(), strict=True)
-    chosen = dict(zip(which.tolist(), refinements, strict=True))
-    finer, begin = [], 0
+    restarts, taken = whole["restarts"].values, (whole["final_time"] / whole["steps"]).values
+    finer, numbers = [], itertools.count()
     for piece in (piece for panel in panels for piece in _pieces(panel)):
-        mine = {k: chosen[begin + k] for k in range(len(piece.cells)) if begin + k in chosen}
-        begin += len(piece.cells)
-        if mine:
-            own, how = [piece.cells[k] for k in mine], list(mine.values())
+        numbered = dict(zip(itertools.islice(numbers, len(piece.cells)), piece.cells, strict=True))
+        if mine := [k for k in numbered if k in which]:
+            own = [numbered[k] for k in mine]
+            how = [(1 + int(restarts[k]), float(taken[k])) for k in mine]
             # Another choice of cells is another campaign.
             mark = hashlib.sha256(repr(([cell[:2] for cell in own], how)).encode()).hexdigest()[:6]
             again = replace(piece, name=f"{piece.name}-check-{mark}", cells=own)
@@ -94,11 +91,7 @@ def _pieces(panel: Panel) -> list[_Piece]:
 def _run(
     folder: Path, piece: _Piece, workers: int, finer: Sequence[tuple[int, float]] = ()
 ) -> xr.Dataset:
-    """The cells of a piece; in a check with smaller steps and with more time.
-
-    ``finer`` says how often each cell is refined, and the mean step in s that it took: constant
-    ones are no longer than a quarter of that.
-    """
+    """The cells of a piece; in a check refined so often, from a mean step in s, and more time."""
     rows = []
     for number, (_, _, row) in enumerate(piece.cells):
         solver = piece.scene.with_values(row).solver

@@ -16,7 +16,7 @@ from ringsim.choice import kind_of
 from ringsim.execution.cost import relative_cost
 from ringsim.execution.local import Local
 from ringsim.execution.work import Work
-from ringsim.sampling.columns import Table
+from ringsim.sampling.columns import Column
 from ringsim.storage.journal import survey
 from ringsim.storage.locks import in_use
 from ringsim.storage.netcdf import NOT_RUN
@@ -76,8 +76,8 @@ def status_lines(campaign: Folder) -> list[str]:
         listed = ", ".join(f"{sample} ({seconds:.0f} s)" for sample, seconds in longest)
         lines.append(f"  running        {len(unfinished)}: {listed}")
     if rate > 0.0:
-        lines += [f"  rate           {rate:.3g} samples/s"]
-        lines += [f"  time left      about {in_words(left / rate)}"]
+        lines.append(f"  rate           {rate:.3g} samples/s")
+        lines.append(f"  time left      about {in_words(left / rate)}")
     return lines
 
 
@@ -98,7 +98,7 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver
         f"({kind} design), {len(todo)} to run here",
         f"  folder         {folder}",
         f"  workers        {workers}",
-        *(f"  {line}" for line in _inputs(table)),
+        *map(_extent, table.columns),
     ]
     if len(todo) == 0:
         return [*lines, "  nothing is left to run"]
@@ -127,15 +127,12 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver
     ]
 
 
-def _inputs(table: Table) -> list[str]:
-    lines = []
-    for column in table.columns:
-        values = column.values
-        if values.dtype.kind in "iuf":
-            unit = "" if column.units == "1" else f" {column.units}"
-            extent = f"{values.min():.6g} to {values.max():.6g}{unit}"
-        else:
-            extent = ", ".join(sorted({str(value) for value in values.ravel()}))
-        each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
-        lines.append(f"{column.path}: {extent}{each}")
-    return lines
+def _extent(column: Column) -> str:
+    values = column.values
+    if values.dtype.kind in "iuf":
+        unit = "" if column.units == "1" else f" {column.units}"
+        extent = f"{values.min():.6g} to {values.max():.6g}{unit}"
+    else:
+        extent = ", ".join(sorted({str(value) for value in values.ravel()}))
+    each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
+    return f"  {column.path}: {extent}{each}"

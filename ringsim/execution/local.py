@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from contextlib import ExitStack, closing
 from multiprocessing.connection import wait
 
 from ringsim.execution.slot import TICK, Slot
@@ -21,21 +22,19 @@ class Local(Scheduler):
     def run(self, samples: Sequence[int], work: Work) -> str:
         """See :meth:`Scheduler.run`."""
         queue = deque(samples)
-        count = min(self.workers, len(queue))
-        slots = [Slot(work.solver, work.scene, work.limits) for _ in range(count)]
-        try:
-            while True:
-                if reason := work.stop():
-                    return reason
+        with ExitStack() as open_slots:
+            slots = [
+                open_slots.enter_context(closing(Slot(work.solver, work.scene, work.limits)))
+                for _ in range(min(self.workers, len(queue)))
+            ]
+            while not work.stop():
                 for slot in slots:
                     slot.serve(queue, work)
                 busy = [slot.pipe for slot in slots if slot.busy]
                 if not busy:
-                    return work.stop()
+                    break
                 wait(busy, timeout=TICK)
-        finally:
-            for slot in slots:
-                slot.close()
+            return work.stop()
 
 
 class Serial(Scheduler):
@@ -50,8 +49,8 @@ class Serial(Scheduler):
         """See :meth:`Scheduler.run`."""
         solver, base = load_solver(work.solver), Scene.model_validate(work.scene)
         for sample in samples:
-            if reason := work.stop():
-                return reason
+            if work.stop():
+                break
             work.started(sample)
             result = solve(solver, base, sample, work.values_of(sample))
             work.keep(result)

@@ -17,8 +17,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar, cast
 
-from ringsim.execution.process import without_mpi
-from ringsim.execution.slot import Slot
+from ringsim.execution.slot import Slot, without_mpi
 from ringsim.execution.work import Scheduler, Work
 from ringsim.refusal import InputError
 
@@ -105,7 +104,7 @@ class Mpi(Scheduler):
         self.description = f"MPI, {self.workers} ranks, {library}"
 
     def from_first(self, value: _T) -> _T:
-        """:meth:`Scheduler.from_first`."""
+        """See :meth:`Scheduler.from_first`."""
         return cast(_T, self.communicator.bcast(value))
 
     def from_all(self, value: _T) -> list[_T]:
@@ -127,28 +126,28 @@ class Mpi(Scheduler):
             return self._serve(slot, work)
 
     def _schedule(self, queue: deque[int], slot: Slot, work: Work) -> str:
-        held: dict[int, deque[int]] = {rank: deque() for rank in range(1, self.workers)}
-        silent, mean, reason, fault, delay = set(held), 0.0, "", "", _SHORTEST
+        held: dict[int, deque[int]] = {}  # by rank, once it has said hello
+        left, mean, reason, fault, delay = self.workers - 1, 0.0, "", "", _SHORTEST
 
         def receive() -> bool:
             """Take one message, if there is one."""
-            nonlocal mean, reason, fault
+            nonlocal left, mean, reason, fault
             if not self.communicator.iprobe(tag=_TO_RANK_0):
                 return False
             rank, kind, content = self.communicator.recv(tag=_TO_RANK_0)
-            silent.discard(rank)
+            mine = held.setdefault(rank, deque())
             if kind == "result":
                 mean += 0.1 * (content.seconds - mean)
                 work.finished(content)
-                held[rank].popleft()
-                if held[rank]:
-                    work.started(held[rank][0])
+                mine.popleft()
+                if mine:
+                    work.started(mine[0])
             elif kind == "fault":
                 fault = fault or content
             elif kind == "stop":
                 reason = reason or content
             elif kind == "left":
-                del held[rank]
+                left -= 1
             return True
 
         while True:
@@ -156,8 +155,7 @@ class Mpi(Scheduler):
             if reason or not (queue or slot.busy or any(held.values())):
                 break
             ahead = self._ahead(mean, len(queue))
-            for rank in held.keys() - silent if queue else ():
-                mine = held[rank]
+            for rank, mine in held.items():
                 if queue and len(mine) <= ahead // 2:
                     batch = [queue.popleft() for _ in range(min(ahead - len(mine), len(queue)))]
                     self.communicator.send(batch, dest=rank, tag=_TO_WORKER)
@@ -171,13 +169,11 @@ class Mpi(Scheduler):
                 moved = slot.serve(queue, work) is not None or moved
             except InputError as error:
                 fault = str(error)
-            delay = _SHORTEST if moved else min(1.5 * delay, _LONGEST)
-            if not moved:
-                _rest(slot, delay)
+            delay = _SHORTEST if moved else _rest(slot, delay)
         slot.close()
-        for rank in held:
+        for rank in range(1, self.workers):
             self.communicator.send(None, dest=rank, tag=_TO_WORKER)
-        while held:  # what they sent before they heard of the end
+        while left:  # what they sent before they heard of the end
             if not receive():
                 time.sleep(_LONGEST)
         if fault:
@@ -202,26 +198,25 @@ class Mpi(Scheduler):
                 queue.extend(batch)
                 delay = _SHORTEST
             try:
-                result = slot.serve(queue, work) if not fault else None
-                if result is not None:
+                if not fault and (result := slot.serve(queue, work)) is not None:
                     self._tell("result", replace(result, body=b""))
                     delay = _SHORTEST
             except InputError as error:
                 fault = str(error)
                 slot.close()
                 self._tell("fault", fault)
-            if work.stop() and not told:
-                told = work.stop()
+            if not told and (told := work.stop()):
                 self._tell("stop", told)
-            _rest(slot, delay)
-            delay = min(1.5 * delay, _LONGEST)
+            delay = _rest(slot, delay)
 
     def _tell(self, kind: str, content: Any) -> None:
         self.communicator.send((self.rank, kind, content), dest=0, tag=_TO_RANK_0)
 
 
-def _rest(slot: Slot, seconds: float) -> None:
+def _rest(slot: Slot, seconds: float) -> float:
+    """Sleep until the solver says something, not longer than so; how long to sleep next."""
     if slot.busy:
         slot.pipe.poll(seconds)
     else:
         time.sleep(seconds)
+    return min(1.5 * seconds, _LONGEST)

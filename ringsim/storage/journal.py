@@ -83,29 +83,26 @@ class Journal:
 
 
 def read_journal(path: Path, campaign: str) -> Iterator[tuple[int, Result | None]]:
-    """The records of a journal in the order in which they were written, with their places.
+    """The records of a journal in their order, each with its place.
 
-    None stands for bytes between two records that are no record of this campaign: one that is
-    damaged does not hide those behind it.  What a writer left unfinished at the end is left out:
-    the file may still be growing.
+    None stands for bytes between two records that are no record of this campaign.  What a writer
+    left unfinished at the end is left out: the file may still be growing.
     """
     with path.open("rb") as file:
         place, size = 0, os.fstat(file.fileno()).st_size
         while place < size:
-            result = read_record(file, place, campaign)
-            if result is not None:
+            if (result := _read_record(file, place, campaign)) is not None:
                 yield place, result
                 place = file.tell()
                 continue
             file.seek(place + 1)
-            gap = file.read().find(_MAGIC)
-            if gap < 0:
+            if (gap := file.read().find(_MAGIC)) < 0:
                 return
             yield place, None
             place += 1 + gap
 
 
-def read_record(file: BinaryIO, place: int, campaign: str) -> Result | None:
+def _read_record(file: BinaryIO, place: int, campaign: str) -> Result | None:
     """The record that begins at a place of a journal; None if there is no whole one."""
     file.seek(place)
     frame = file.read(_FRAME.size)
@@ -142,7 +139,6 @@ class Survey:
     owner: NDArray[np.int64]
     """Journal with the result that counts of each sample, -1 where there is none."""
     place: NDArray[np.int64]
-    """Where it begins there."""
 
     @property
     def missing(self) -> NDArray[np.int64]:
@@ -160,8 +156,7 @@ class Survey:
         for number in np.unique(owner[owner >= 0]):
             with self.journals[number].open("rb") as file:
                 for place in np.sort(self.place[samples][owner == number]):
-                    result = read_record(file, int(place), self.campaign)
-                    if result is None:
+                    if (result := _read_record(file, int(place), self.campaign)) is None:
                         raise OSError(f"{self.journals[number]} has been damaged meanwhile")
                     yield result
 
@@ -170,9 +165,8 @@ def survey(folder: Path, campaign: str, samples: int) -> Survey:
     """Look through the journals of a campaign's folder.
 
     Of several results of one sample, one that went well counts before one that failed, whatever
-    the clocks said; otherwise the later one does.
-
-    A warning in the log tells of records that are damaged, or of another ``campaign``.
+    the clocks said; otherwise the later one does.  A warning in the log tells of records that are
+    damaged, or of another ``campaign``.
     """
     journals = sorted((folder / FOLDER).glob("*.journal"))
     status = np.full(samples, NOT_RUN, dtype=np.int8)

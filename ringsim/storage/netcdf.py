@@ -122,10 +122,7 @@ def blank(definition: Variable, shape: tuple[int, ...]) -> NDArray[Any]:
 
 
 def write_design(folder: Path, table: Table, attributes: Mapping[str, Any]) -> None:
-    """Write all inputs of all samples; the attributes are identity, texts and provenance.
-
-    OSError or RuntimeError if the disk is full.
-    """
+    """Write all inputs of all samples; OSError or RuntimeError if the disk is full."""
     with whole(folder / DESIGN) as draft, netCDF4.Dataset(draft, "w") as file:
         file.setncatts(dict(attributes))
         add_coordinate(file, "sample", np.arange(table.samples))
@@ -133,10 +130,7 @@ def write_design(folder: Path, table: Table, attributes: Mapping[str, Any]) -> N
 
 
 def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
-    """The samples of a campaign, and the global attributes of its design.
-
-    InputError if the folder holds no campaign.
-    """
+    """The samples of a campaign, and the attributes of its design; InputError if there is none."""
     path = folder / DESIGN
     if not path.is_file():
         raise InputError(f"{folder}: no campaign in this folder: {DESIGN} is not there")
@@ -148,10 +142,9 @@ def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
         raise InputError(
             f"{path}: cannot be read: {error}; choose another folder, or delete this one"
         ) from None
-    for name in ("identity", "scene", "solver"):
-        if name not in attributes:
-            raise InputError(
-                f"{path}: this is not the design of a campaign, it has no attribute {name}: choose "
-                "another folder"
-            )
+    if absent := [name for name in ("identity", "scene", "solver") if name not in attributes]:
+        raise InputError(
+            f"{path}: this is not the design of a campaign, it has no attribute {absent[0]}: "
+            "choose another folder"
+        )
     return table, attributes

@@ -24,14 +24,10 @@ def provenance(*, name: str, title: str, action: str) -> dict[str, Any]:
         "history": f"{now} {action} by {software}",
         "date_created": now,
         "source": f"{software}: multibody simulation with exudyn",
-        "creator_name": "ringsim",
-        "creator_type": "institution",
-        "creator_software": software,
-        "python_version": platform.python_version(),
-        "platform": platform.platform(),
-        "host": platform.node(),
-        "git_commit": _git_commit(),
-    } | {f"{package}_version": version(package) for package in _PACKAGES}
+        "creator_name": "ringsim", "creator_type": "institution", "creator_software": software,
+        "python_version": platform.python_version(), "platform": platform.platform(),
+        "host": platform.node(), "git_commit": _git_commit(),
+    } | {f"{package}_version": version(package) for package in _PACKAGES}  # fmt: skip
 
 
 def _git_commit() -> str:
