@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from ringsim.analysis.accuracy import NEEDED, Truth, judge
 from ringsim.analysis.ladder import PATHS, Rung, ladder, references, standing
-from ringsim.campaign.cases import Cases, run_cases
+from ringsim.campaign.cases import run_cases
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
@@ -35,26 +35,19 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
     cheapest run of the reference goes first, then the whole reference, then the rest, so that a
     scene which cannot be studied costs little.  The ideal fidelity is a setting too, where it can
     represent the scene.  ``folder`` holds the campaigns, and a study that was interrupted goes on;
-    ``timeout`` is the longest time of one rung, s.
-
-    Raises
-    ------
-    InputError
-        If the scene is refused.
-    ReferenceRunError
-        If a reference run does not end well.
+    ``timeout`` is the longest time of one rung, s.  InputError if the scene is refused,
+    ReferenceRunError if a reference run does not end well.
     """
     scene = scene.with_values(
         {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
     )
-    study = _Study(folder, scene, workers, timeout)
+    study = _Study(scene, partial(run_cases, folder, workers=workers, timeout=timeout))
     rungs = ladder(scene)
     for rung in rungs:
         scene.with_values(dict(rung.values))  # refused before anything has run
     in_time, in_space = references(rungs)
     for stage, places in (("first", in_time[:1]), ("reference", in_time + in_space)):
-        own = [rungs[k] for k in places]
-        _require_ok(own, study.run(stage, own))
+        _require_ok(own := [rungs[k] for k in places], study.run(stage, own))
     results = study.run("settings", rungs)
     truths = _quadrature(scene)
     if (ideal := study.ideal()) is not None:
@@ -72,10 +65,9 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
 class _Study:
     """Runs settings in stages, each setting once."""
 
-    folder: Path
     scene: Scene
-    workers: int
-    timeout: float
+    cases: Callable[..., Path]
+    """``run_cases`` for all but name, scene, cases, title and fidelity."""
     known: dict[tuple[object, ...], xr.Dataset] = field(default_factory=dict)
 
     def run(self, stage: str, rungs: Sequence[Rung]) -> xr.Dataset:
@@ -89,11 +81,10 @@ class _Study:
                 missing.setdefault(self._campaign(stage, rung), {})[key] = rung
         for (name, stress), own in missing.items():
             given = {path: next(iter(own.values())).values[path] for path in shared}
-            found = self._needed(
-                name, f"Settings of {self.scene.name} against each other ({name})",
-                self.scene.with_values(given | {"record.stress": stress}),
-                [{path: rung.values[path] for path in paths} for rung in own.values()],
-            )  # fmt: skip
+            scene = self.scene.with_values(given | {"record.stress": stress})
+            cases = [{path: rung.values[path] for path in paths} for rung in own.values()]
+            title = f"Settings of {scene.name} against each other ({name})"
+            found = _needed(self.cases(name, scene, cases, title=title))
             self.known |= {key: found.isel(rung=[k]) for k, key in enumerate(own)}
         return xr.concat([self.known[key] for key in keys], "rung")
 
@@ -112,19 +103,16 @@ class _Study:
         except InputError:
             return None
         case, title = {"solver.tolerance": plain.solver.tolerance}, f"{plain.name} with rigid rods"
-        return self._needed("ideal", title, plain, [case], "ideal")
+        return _needed(self.cases("ideal", plain, [case], title=title, fidelity="ideal"))
 
-    def _needed(
-        self, name: str, title: str, scene: Scene, cases: list[dict[str, Any]],
-        fidelity: str = "full",
-    ) -> xr.Dataset:  # fmt: skip
-        """What is compared of a campaign's results, missing variables as NaN."""
-        cases_of = Cases(name, title, scene, cases, self.timeout, fidelity)
-        with xr.open_dataset(run_cases(self.folder, cases_of, self.workers)) as dataset:
-            found = dataset.rename(sample="rung").drop_vars("rung")
-            kept = found[[name for name in (*NEEDED, "reason") if name in found]].load()
-        nothing = ("rung", np.full(kept.sizes["rung"], np.nan))
-        return kept.assign({name: nothing for name in NEEDED if name not in kept})
+
+def _needed(file: Path) -> xr.Dataset:
+    """What is compared of a campaign's results, missing variables as NaN."""
+    with xr.open_dataset(file) as dataset:
+        found = dataset.rename(sample="rung").drop_vars("rung")
+        kept = found[[name for name in (*NEEDED, "reason") if name in found]].load()
+    nothing = ("rung", np.full(kept.sizes["rung"], np.nan))
+    return kept.assign({name: nothing for name in NEEDED if name not in kept})
 
 
 def _require_ok(rungs: Sequence[Rung], results: xr.Dataset) -> None:

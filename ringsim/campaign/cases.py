@@ -1,7 +1,7 @@
 """Campaigns of listed cases, written and run by the program itself.
 
 What they leave behind is an ordinary campaign: ``NAME.toml`` and ``NAME.csv`` can be read, changed
-and run with ``ringsim campaign``, and an interrupted one goes on when it is asked for again.
+and run with ``ringsim campaign``.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,73 +25,42 @@ from ringsim.scene import Scene
 from ringsim.storage.merge import NAME as MERGED
 
 
-@dataclass(frozen=True)
-class Cases:
-    """Variations of one scene that are to be run."""
+def run_cases(
+    folder: Path, name: str, scene: Scene, cases: Sequence[Mapping[str, Any]], *, workers: int,
+    title: str = "", timeout: float = 3600.0, fidelity: str = "full",
+) -> Path:  # fmt: skip
+    """Run the cases of a scene that are still missing; returns the merged file: sample k is case k.
 
-    name: str
-    title: str
-    scene: Scene
-    """What all cases vary."""
-    cases: Sequence[Mapping[str, Any]]
-    """Values by scene path, the same paths in each, one value (no lists) to a path."""
-    timeout: float = 3600.0
-    """Longest time of one run, s."""
-    fidelity: str = "full"
-    """``"full"`` or ``"ideal"``."""
+    Files and the campaign's folder, both called ``name``, go into ``folder``, which is created.
+    ``cases`` are values by scene path, the same paths in each, one value (no lists) to a path;
+    ``timeout`` is the longest time of one run, s; ``fidelity`` is "full" or "ideal".
 
-
-def run_cases(folder: Path, cases: Cases, workers: int) -> Path:
-    """Run the cases that are still missing, and merge them.
-
-    Files and the campaign's folder go into ``folder``, which is created.
-
-    Returns
-    -------
-    Path
-        The merged file: sample k is case k.
-
-    Raises
-    ------
-    InputError
-        If a case is refused, or the folder cannot be written or holds another campaign.
-    KeyboardInterrupt
-        If a signal stopped it; the same call goes on.
+    InputError if a case is refused, or the folder cannot be written or holds another campaign;
+    KeyboardInterrupt if a signal stopped it: the same call goes on.
     """
-    file = write_cases(folder, cases)
-    campaign = load_campaign(file)
-    home = folder / cases.name
-    prepare_folder(campaign, home, solver=SOLVERS[cases.fidelity])
-    choices = Choices(Local(workers), campaign.specification.limits)
-    if run_campaign(home, choices) == EXIT_INTERRUPTED:
-        raise KeyboardInterrupt
-    return home / MERGED
-
-
-def write_cases(folder: Path, cases: Cases) -> Path:
-    """Write scene, campaign file and list of cases; returns the campaign file."""
-    scene, rows, file = (folder / f"{cases.name}{end}" for end in ("-scene.toml", ".csv", ".toml"))
-    table = {
-        "name": cases.name,
-        "title": cases.title,
-        "scene": scene.name,
-        "fidelity": cases.fidelity,
-        "design": {"kind": "list", "file": rows.name},
-        "limits": {"timeout": cases.timeout},
-    }
-    listed = io.StringIO()
-    writer = csv.DictWriter(listed, list(cases.cases[0]), lineterminator="\n")
+    paths, listed = list(cases[0]), io.StringIO()
+    writer = csv.DictWriter(listed, paths, lineterminator="\n")
     writer.writeheader()
-    for number, case in enumerate(cases.cases):
-        if case.keys() != cases.cases[0].keys():
+    for number, case in enumerate(cases):
+        if case.keys() != cases[0].keys():
             raise InputError(
                 f"case {number} has values for {', '.join(case)}, and must have them for "
-                f"{', '.join(cases.cases[0])}"
+                f"{', '.join(paths)}"
             )
         writer.writerow({k: str(v).lower() if isinstance(v, bool) else v for k, v in case.items()})
+    base, rows, file = (folder / f"{name}{end}" for end in ("-scene.toml", ".csv", ".toml"))
+    table = {
+        "name": name, "title": title, "scene": base.name, "fidelity": fidelity,
+        "design": {"kind": "list", "file": rows.name}, "limits": {"timeout": timeout},
+    }  # fmt: skip
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    write_text(scene, cases.scene.to_toml())
+    write_text(base, scene.to_toml())
     write_text(rows, listed.getvalue())
     write_text(file, tomli_w.dumps(table))
-    return file
+    campaign = load_campaign(file)
+    prepare_folder(campaign, folder / name, solver=SOLVERS[fidelity])
+    choices = Choices(Local(workers), campaign.specification.limits)
+    if run_campaign(folder / name, choices) == EXIT_INTERRUPTED:
+        raise KeyboardInterrupt
+    return folder / name / MERGED

@@ -15,12 +15,11 @@ from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Table
 from ringsim.scene import Scene, scene_from_toml
-from ringsim.storage.design_file import NAME, read_design, write_design
 from ringsim.storage.journal import FOLDER, Survey, survey
 from ringsim.storage.locks import GO_ON, locked, tries
 from ringsim.storage.merge import NAME as MERGED
 from ringsim.storage.merge import write_merged
-from ringsim.storage.netcdf import OutputTable
+from ringsim.storage.netcdf import DESIGN, OutputTable, read_design, write_design
 from ringsim.storage.provenance import provenance
 
 _KEPT = ("identity", "seed", "solver", "campaign", "campaign_name", "scene", "output")
@@ -39,7 +38,6 @@ class Folder:
     solver: str
     """``module:function`` that runs one sample."""
     attributes: dict[str, Any]
-    """Global attributes of the design."""
 
     def survey(self) -> Survey:
         """What it holds of every sample."""
@@ -47,15 +45,9 @@ class Folder:
 
 
 def open_folder(path: Path) -> Folder:
-    """The campaign in a folder.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """The campaign in a folder; InputError if there is none."""
     table, attributes = read_design(path)
-    scene = scene_from_toml(attributes["scene"], source=f"{path / NAME}: scene")
+    scene = scene_from_toml(attributes["scene"], source=f"{path / DESIGN}: scene")
     return Folder(path, attributes["identity"], table, scene, attributes["solver"], attributes)
 
 
@@ -63,12 +55,8 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> None:
     """Create a campaign's folder, or check that it is this campaign's.
 
     A design may have grown since: if its first samples are those of the folder, the new ones
-    are added.  The solver is the ``module:function`` that runs one sample.
-
-    Raises
-    ------
-    InputError
-        If the folder belongs to another campaign, is in use, or cannot be written.
+    are added.  InputError if the folder belongs to another campaign, is in use, or cannot be
+    written.
     """
     try:
         os.fspath(path).encode("utf-8")
@@ -77,7 +65,7 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> None:
             f"{path}: its name is not UTF-8: choose another folder with --out"
         ) from None
     table = campaign.draw()
-    with writing(path / NAME, GO_ON):
+    with writing(path / DESIGN, GO_ON):
         for _ in tries(path):
             if _is_ready(campaign, path, table, solver):
                 return
@@ -91,9 +79,7 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> None:
 
 def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool:
     """Whether there is nothing to write to the folder: it is neither new nor does it grow."""
-    if (path / NAME).exists():
-        old = open_folder(path)
-        refuse_another(campaign, old, table, solver)
+    if (old := opened_as(campaign, path, table, solver)) is not None:
         return old.table.samples == table.samples and old.attributes["campaign"] == campaign.text
     try:
         names = sorted(entry.name for entry in path.iterdir()) if path.exists() else []
@@ -107,8 +93,8 @@ def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool
         )
     if any((path / FOLDER).glob("*.journal")):
         raise InputError(
-            f"{path}: this folder holds results in {FOLDER}, but its {NAME} is gone, so nobody "
-            f"knows which campaign they belong to: bring {NAME} back, or choose a new folder "
+            f"{path}: this folder holds results in {FOLDER}, but its {DESIGN} is gone, so nobody "
+            f"knows which campaign they belong to: bring {DESIGN} back, or choose a new folder "
             "with --out"
         )
     return False
@@ -116,9 +102,7 @@ def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool
 
 def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> None:
     wanted = campaign.specification
-    content = json.dumps(_decisive(campaign, table, solver), sort_keys=True)
     attributes = provenance(name=wanted.name, title=wanted.title, action="designed") | {
-        "identity": hashlib.sha256(content.encode()).hexdigest()[:32],
         "seed": wanted.seed,
         "solver": solver,
         "campaign": campaign.text,
@@ -126,38 +110,38 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> None:
         "scene": campaign.scene.to_toml(),
         "output": wanted.output.model_dump_json(),
     }
-    for draft in path.glob(f".{NAME}.*{DRAFT}"):
+    content = json.dumps(_decisive(table, attributes), sort_keys=True)
+    attributes["identity"] = hashlib.sha256(content.encode()).hexdigest()[:32]
+    for draft in path.glob(f".{DESIGN}.*{DRAFT}"):
         draft.unlink(missing_ok=True)
     write_design(path, table, attributes)
 
 
-def _decisive(campaign: Campaign, table: Table, solver: str) -> dict[str, Any]:
+def _decisive(table: Table, attributes: dict[str, Any]) -> dict[str, Any]:
     """Everything that decides about the results; the keys say what differs if it does."""
     return {
-        "its scene": campaign.scene.to_toml(),
-        "its seed": campaign.specification.seed,
-        "the version of ringsim": version("ringsim"),
+        "its scene": attributes["scene"],
+        "its seed": int(attributes["seed"]),
+        "the version of ringsim": attributes["ringsim_version"],
         "its inputs": [column.path for column in table.columns],
-        "its solver": solver,
+        "its solver": attributes["solver"],
     }
 
 
-def refuse_another(campaign: Campaign, old: Folder, table: Table, solver: str) -> None:
-    """Make sure that a folder holds this campaign, or fewer samples of it.
+def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder | None:
+    """The folder of this campaign, which may have fewer samples; None if it is not there yet.
 
-    Raises
-    ------
-    InputError
-        If it holds another one; the text says what differs.
+    InputError if it holds another campaign; the text says what differs.
     """
-    held = {
-        "its scene": old.attributes["scene"],
-        "its seed": int(old.attributes["seed"]),
-        "the version of ringsim": old.attributes["ringsim_version"],
-        "its inputs": [column.path for column in old.table.columns],
-        "its solver": old.solver,
-    }
-    wanted = _decisive(campaign, table, solver)
+    if not (path / DESIGN).exists():
+        return None
+    old = open_folder(path)
+    held = _decisive(old.table, old.attributes)
+    mine = {
+        "scene": campaign.scene.to_toml(), "seed": campaign.specification.seed, "solver": solver,
+        "ringsim_version": version("ringsim"),
+    }  # fmt: skip
+    wanted = _decisive(table, mine)
     what = " and ".join(word for word in wanted if wanted[word] != held[word])
     if what:
         what = f"{what} differs"
@@ -171,27 +155,22 @@ def refuse_another(campaign: Campaign, old: Folder, table: Table, solver: str) -
             f"{old.path}: this folder holds another campaign ({what}): choose another folder with "
             "--out, or delete this one"
         )
+    return old
 
 
 class Merged(NamedTuple):
-    """What a folder held when it was to be merged."""
+    """Samples without a result and failed ones; the merged file, or None if it is not due yet."""
 
     left: int
-    """Samples that have no result; they are missing from a merged file."""
     failed: int
     path: Path | None
-    """The merged file, or None if it was not wanted yet."""
 
 
 def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
     """Write ``campaign.nc``, one process at a time, so that it never loses samples it had.
 
-    It says in words who computed it, and is written ``partly`` if samples are left.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written to.
+    ``execution`` says who computed it; if samples are left, it is written only if ``partly``.
+    InputError if the folder cannot be written to.
     """
     path = campaign.path / MERGED
     with writing(path, GO_ON), locked(campaign.path / "lock-merge", wait=True):

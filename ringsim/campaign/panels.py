@@ -18,7 +18,7 @@ from ringsim.sampling.paths import field_at, refuse_fixed, unit_at
 from ringsim.scene import Scene
 from ringsim.variables import PLANES
 
-DECADE = 10.0
+_DECADE = 10.0
 """HIGH over LOW from which on values are spaced geometrically."""
 _DEFAULTS = (
     (("cables.*.axial_stiffness", "net.stiffness"),
@@ -77,10 +77,7 @@ class Panel:
 def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
     """Panels for axes ``PATH=LOW..HIGH``, two to a panel; default ones if there are none.
 
-    Raises
-    ------
-    InputError
-        If a text, a path, a bound or any pair of values is refused.
+    InputError if a text, a path, a bound or any pair of values is refused.
     """
     if len(over) % 2:
         raise InputError(
@@ -119,10 +116,7 @@ def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
 def sweep_of(scene: Scene, text: str, points: int) -> Sweep:
     """The axis ``PATH=LOW..HIGH``: geometric from a decade on, else linear; whole numbers stay so.
 
-    Raises
-    ------
-    InputError
-        If the text, the path or one of the bounds is refused.
+    InputError if the text, the path or one of the bounds is refused.
     """
     path, _, extent = (part.strip() for part in text.partition("="))
     try:
@@ -145,7 +139,7 @@ def sweep_of(scene: Scene, text: str, points: int) -> Sweep:
 
 def _sweep(scene: Scene, path: str, low: float, high: float, points: int) -> Sweep:
     paths = _expanded(scene, path)
-    spaced = np.geomspace if low > 0.0 and high >= DECADE * low else np.linspace
+    spaced = np.geomspace if low > 0.0 and high >= _DECADE * low else np.linspace
     values = spaced(low, high, points)
     values[1:-1] = [float(f"{value:.6g}") for value in values[1:-1]]
     if type(_own_value(scene, paths[0])) is int:

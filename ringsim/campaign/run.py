@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from ringsim.analysis.campaign_notes import budget_lines, restart_lines
 from ringsim.campaign.folder import Folder, merge, open_folder
@@ -30,15 +31,10 @@ class Share:
 
     @classmethod
     def parse(cls, text: str) -> Share:
-        """The share that ``i/n`` names.
+        """The share that ``i/n`` names; InputError if there is none.
 
         >>> Share.parse("2/8")
         Share(number=2, count=8)
-
-        Raises
-        ------
-        InputError
-            If there is no such share.
         """
         number, _, count = text.partition("/")
         if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
@@ -46,14 +42,9 @@ class Share:
         return cls(int(number), int(count))
 
     @property
-    def whole(self) -> bool:
-        """Whether it is all samples."""
-        return self.count == 1
-
-    @property
     def writer(self) -> str:
         """Start of the names of files that belong to this share alone."""
-        return "all" if self.whole else f"part{self.number}of{self.count}"
+        return "all" if self.count == 1 else f"part{self.number}of{self.count}"
 
     def holds(self, samples: Any) -> Any:
         """Which of the samples belong to the share."""
@@ -75,27 +66,18 @@ class Choices:
 def run_campaign(folder: Path, choices: Choices) -> int:
     """Run the missing samples of a prepared folder, on every rank that takes part.
 
-    Returns
-    -------
-    int
-        Exit code: 0 all samples have run, 3 too many (or all) of them failed, 130 stopped by a
-        signal, or samples are left.
-
-    Raises
-    ------
-    InputError
-        If the folder is in use or cannot be written.
+    Returns the exit code: 0 all samples have run, 3 too many (or all) of them failed, 130 stopped
+    by a signal, or samples are left.  InputError if the folder is in use or cannot be written.
     """
     scheduler, share = choices.scheduler, choices.share
     with contextlib.ExitStack() as held:
         stop, fault = held.enter_context(stopping_on_signals()), ""
         if scheduler.rank == 0:
             try:
-                held.enter_context(reserved(folder, share.writer, alone=share.whole))
+                held.enter_context(reserved(folder, share.writer, alone=share.count == 1))
             except InputError as error:
                 fault = str(error)
-        fault = scheduler.from_first(fault)
-        if fault:
+        if fault := scheduler.from_first(fault):
             raise InputError(fault)
         campaign = open_folder(folder)
         _run_missing(campaign, choices, stop)
@@ -144,23 +126,21 @@ def _watched(
     share, most = choices.share, choices.max_failed
     before = campaign.survey()
     missing, failed = before.missing, before.failed
-    failed_elsewhere = int((~share.holds(failed)).sum())
     if choices.retry_failed:
-        missing, failed, failed_elsewhere = np.union1d(missing, failed), failed[:0], 0
-    missing = missing[share.holds(missing)]
+        missing, failed = np.union1d(missing, failed), failed[:0]
+    missing, mine = missing[share.holds(missing)], int(share.holds(failed).sum())
     total = int(share.holds(np.arange(campaign.table.samples)).sum())
     progress = Progress(
         campaign.path / f"progress-{share.writer}.json", campaign.attributes["campaign_name"],
-        total=total, done=total - len(missing), failed=int(share.holds(failed).sum()),
+        total=total, done=total - len(missing), failed=mine,
         workers=choices.scheduler.workers,
     )  # fmt: skip
 
     def asked() -> str:
         progress.refresh()
-        failed = progress.failed + failed_elsewhere
-        if most is not None and failed > most:
-            why = f"{failed} samples failed, more than max_failed = {most}"
-            stop.note(why, signalled=False)
+        count = progress.failed + len(failed) - mine
+        if most is not None and count > most:
+            stop.note(f"{count} samples failed, more than max_failed = {most}", signalled=False)
         return stop.reason
 
     samples = longest_first(missing, relative_cost(campaign.table, campaign.scene))
@@ -172,45 +152,37 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
     """Merge if nothing is left, say how it ended, and choose the exit code."""
     stop.at_once = True
     try:
-        merged = merge(campaign, execution=choices.scheduler.description, partly=False)
+        left, failed, path = merge(campaign, execution=choices.scheduler.description, partly=False)
     except KeyboardInterrupt:
         _tell(f"{stop.reason}; the samples are not merged yet: the same command goes on with that")
         return EXIT_INTERRUPTED
     finally:
         stop.at_once = False
-    left, failed = merged.left, merged.failed
-    over_budget = bool(stop.reason) and not stop.signalled
-    interrupted = left and (stop.signalled or choices.share.whole)
-    if merged.path is not None:
-        _tell(f"{merged.path}: {campaign.table.samples} samples, {failed} failed")
-        for line in _notes(campaign, merged.path):
+    if path is not None:
+        _tell(f"{path}: {campaign.table.samples} samples, {failed} failed")
+        listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
+        with xr.open_dataset(path) as dataset:
+            notes = restart_lines(dataset)
+            if listed or campaign.scene.solver.error_bars:
+                notes += budget_lines(dataset)
+        for line in notes:
             _tell(f"  {line}")
-    if over_budget:
+    if stop.reason and not stop.signalled:
         _tell(
             f"{stop.reason}; {left} samples are left: raise max_failed, or mend what fails and "
             "give the same command with --retry-failed"
         )
-    elif interrupted:
+        return EXIT_FAILED
+    interrupted = left and (stop.signalled or choices.share.count == 1)
+    if interrupted:
         why = stop.reason or "some results were lost"
         _tell(f"{why}; {left} samples are left: the same command goes on with them")
     elif left:
         _tell(f"this part is done; {left} samples of other parts are left")
-    if over_budget or failed == campaign.table.samples:
+    if failed == campaign.table.samples:
         return EXIT_FAILED
     return EXIT_INTERRUPTED if interrupted else EXIT_DONE
 
 
 def _tell(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
-
-
-def _notes(campaign: Folder, path: Path) -> list[str]:
-    """Samples that started anew, and numerical against sampling error where there are bars."""
-    import xarray as xr
-
-    listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
-    with xr.open_dataset(path) as dataset:
-        lines = restart_lines(dataset)
-        if listed or campaign.scene.solver.error_bars:
-            lines += budget_lines(dataset)
-    return lines

@@ -24,10 +24,8 @@ SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_id
 
 def _flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
     """Join nested tables to dotted paths, down to tables that have the key ``whole``."""
-    if prefix and (not isinstance(table, dict) or whole in table):
-        return {prefix: table}
-    if not isinstance(table, dict):
-        return table
+    if not isinstance(table, dict) or (prefix and whole in table):
+        return {prefix: table} if prefix else table
     found: dict[str, Any] = {}
     for name, inner in table.items():
         found |= _flat(inner, whole, f"{prefix}.{name}" if prefix else name)
@@ -74,13 +72,7 @@ class Campaign:
     scene: Scene
 
     def draw(self) -> Table:
-        """All inputs of all samples.
-
-        Raises
-        ------
-        InputError
-            If the scene refuses an input.
-        """
+        """All inputs of all samples; InputError if the scene refuses one."""
         wanted = self.specification
         try:
             return draw(
@@ -92,13 +84,7 @@ class Campaign:
 
 
 def load_campaign(path: Path) -> Campaign:
-    """Read a campaign file.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or if its content or its scene is refused.
-    """
+    """Read a campaign file; InputError if it, its content or its scene is refused."""
     text = read_text(path)
     try:
         specification = Specification.model_validate(parse_toml(text, path.name))

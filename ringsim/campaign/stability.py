@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 import xarray as xr
 
 from ringsim.analysis.stability import cells_of, checked, chosen_for_check, joined
-from ringsim.campaign.cases import Cases, run_cases
+from ringsim.campaign.cases import run_cases
 from ringsim.campaign.panels import Panel
 from ringsim.parts.solver import MOST_STEPS
 from ringsim.scene import Scene
@@ -34,23 +35,15 @@ class _Piece:
 def run_map(folder: Path, panels: Sequence[Panel], workers: int) -> xr.Dataset:
     """Run all cells that are still missing, each panel in a folder of its own.
 
-    Returns
-    -------
-    xr.Dataset
-        The judged map (``ringsim.analysis.stability.joined``).
-
-    Raises
-    ------
-    InputError
-        If a scene refuses a value.
-    KeyboardInterrupt
-        If a signal stopped it; the same call goes on.
+    Returns the judged map (``ringsim.analysis.stability.joined``).  InputError if a scene refuses a
+    value, KeyboardInterrupt if a signal stopped it: the same call goes on.
     """
     found = []
     for panel in panels:
-        words = {"name": panel.name, "title": panel.title}
-        for axis, sweep in (("x", panel.x), ("y", panel.y)):
-            words |= {f"{axis}_label": sweep.label, f"{axis}_units": sweep.units}
+        words = {
+            "name": panel.name, "title": panel.title, "x_label": panel.x.label,
+            "x_units": panel.x.units, "y_label": panel.y.label, "y_units": panel.y.units,
+        }  # fmt: skip
         parts = [_run(folder, piece, workers) for piece in _pieces(panel)]
         found.append((words, xr.concat(parts, dim="cell")))
     return joined(found)
@@ -60,23 +53,19 @@ def run_check(
     folder: Path, panels: Sequence[Panel], whole: xr.Dataset, *, share: float, seed: int,
     workers: int,
 ) -> xr.Dataset:  # fmt: skip
-    """Run a random share of the ok cells again with smaller steps, compare, and judge again.
+    """Run a random ``share`` of the ok cells of a map again, compare, and judge again.
 
     The largest step is a quarter, the tolerance a sixteenth of those of the last attempt;
-    constant steps are a quarter of those that Newton let the cell take.  ``whole`` is what
-    :func:`run_map` gave; ``share`` and ``seed`` choose the cells.
+    constant steps are a quarter of those that Newton let the cell take.
     """
     which = chosen_for_check(whole, share, seed)
-    starts = 1 + whole["restarts"].values[which].astype(int)
-    taken = (whole["final_time"] / whole["steps"]).values[which]
-    refinements = zip(starts.tolist(), taken.tolist(), strict=True)
-    chosen = dict(zip(which.tolist(), refinements, strict=True))
-    finer, begin = [], 0
+    restarts, taken = whole["restarts"].values, (whole["final_time"] / whole["steps"]).values
+    finer, numbers = [], itertools.count()
     for piece in (piece for panel in panels for piece in _pieces(panel)):
-        mine = {k: chosen[begin + k] for k in range(len(piece.cells)) if begin + k in chosen}
-        begin += len(piece.cells)
-        if mine:
-            own, how = [piece.cells[k] for k in mine], list(mine.values())
+        numbered = dict(zip(itertools.islice(numbers, len(piece.cells)), piece.cells, strict=True))
+        if mine := [k for k in numbered if k in which]:
+            own = [numbered[k] for k in mine]
+            how = [(1 + int(restarts[k]), float(taken[k])) for k in mine]
             # Another choice of cells is another campaign.
             mark = hashlib.sha256(repr(([cell[:2] for cell in own], how)).encode()).hexdigest()[:6]
             again = replace(piece, name=f"{piece.name}-check-{mark}", cells=own)
@@ -102,11 +91,7 @@ def _pieces(panel: Panel) -> list[_Piece]:
 def _run(
     folder: Path, piece: _Piece, workers: int, finer: Sequence[tuple[int, float]] = ()
 ) -> xr.Dataset:
-    """The cells of a piece; in a check with smaller steps and with more time.
-
-    ``finer`` says how often each cell is refined, and the mean step in s that it took: constant
-    ones are no longer than a quarter of that.
-    """
+    """The cells of a piece; in a check refined so often, from a mean step in s, and more time."""
     rows = []
     for number, (_, _, row) in enumerate(piece.cells):
         solver = piece.scene.with_values(row).solver
@@ -124,7 +109,10 @@ def _run(
                 changes["solver.deviation_tolerance"] = fine.deviation_tolerance
         rows.append(row | changes or {"solver.step": solver.step})  # a campaign varies something
     title, timeout = f"Stability map: {piece.panel.title}", TIMEOUT * (_PATIENCE if finer else 1.0)
-    cases = Cases(piece.name, title, piece.scene, rows, timeout)
+    file = run_cases(
+        folder / piece.panel.name, piece.name, piece.scene, rows, workers=workers, title=title,
+        timeout=timeout,
+    )  # fmt: skip
     x, y, _ = zip(*piece.cells, strict=True)
-    with xr.open_dataset(run_cases(folder / piece.panel.name, cases, workers)) as campaign:
+    with xr.open_dataset(file) as campaign:
         return cells_of(campaign, x, y)

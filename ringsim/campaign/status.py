@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ringsim.campaign.folder import Folder, open_folder, refuse_another
+from ringsim.campaign.folder import Folder, opened_as
 from ringsim.campaign.run import Share
 from ringsim.campaign.specification import Campaign
+from ringsim.choice import kind_of
 from ringsim.execution.cost import relative_cost
 from ringsim.execution.local import Local
 from ringsim.execution.work import Work
-from ringsim.sampling.columns import Table
-from ringsim.storage.design_file import NAME
+from ringsim.sampling.columns import Column
 from ringsim.storage.journal import survey
 from ringsim.storage.locks import in_use
 from ringsim.storage.netcdf import NOT_RUN
@@ -40,12 +40,7 @@ def in_words(seconds: float) -> str:
 
 
 def status_lines(campaign: Folder) -> list[str]:
-    """Where a campaign stands, from its results and its progress files, as text.
-
-    Samples by the word of their status, a line for every process that runs or ran samples, the
-    samples that run now with the seconds since they began, and the predicted time until all are
-    done.
-    """
+    """Where a campaign stands, from its results and its progress files, as text."""
     found, now = campaign.survey(), time.time()
     left = len(found.missing)
     counts = Counter(found.status.tolist())
@@ -55,8 +50,7 @@ def status_lines(campaign: Folder) -> list[str]:
         f"{campaign.table.samples} samples done, {left} left",
         *(f"  {words[code]:<14} {counts[code]}" for code in words if counts[code]),
     ]
-    running: dict[int, float] = {}
-    rate = 0.0
+    running, rate = dict[int, float](), 0.0
     for path in sorted(campaign.path.glob("progress-*.json")):
         try:
             told = json.loads(path.read_text(encoding="utf-8"))
@@ -76,13 +70,11 @@ def status_lines(campaign: Folder) -> list[str]:
             f"  {writer:<14} {state}, {told['workers']} workers, "
             f"process {told['pid']} on {told['host']}, {since:.0f} s ago"
         )
-    running = {
-        sample: lasts for sample, lasts in running.items() if found.status[sample] == NOT_RUN
-    }
-    if running:
-        longest = sorted(running.items(), key=lambda item: -item[1])[:_MOST_SHOWN]
+    unfinished = [item for item in running.items() if found.status[item[0]] == NOT_RUN]
+    if unfinished:
+        longest = sorted(unfinished, key=lambda item: -item[1])[:_MOST_SHOWN]
         listed = ", ".join(f"{sample} ({seconds:.0f} s)" for sample, seconds in longest)
-        lines.append(f"  running        {len(running)}: {listed}")
+        lines.append(f"  running        {len(unfinished)}: {listed}")
     if rate > 0.0:
         lines.append(f"  rate           {rate:.3g} samples/s")
         lines.append(f"  time left      about {in_words(left / rate)}")
@@ -90,32 +82,23 @@ def status_lines(campaign: Folder) -> list[str]:
 
 
 def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver: str) -> list[str]:
-    """The plan as text.
+    """The plan as text; InputError if the folder, which need not exist, is another campaign's.
 
     The cost is predicted from samples that are done; if there are none, one sample of middling
-    cost runs as a trial, and nothing of it is kept.  The folder need not exist.
-
-    Raises
-    ------
-    InputError
-        If the folder belongs to another campaign.
+    cost runs as a trial, and nothing of it is kept.
     """
     table = campaign.draw()
-    identity = ""
-    if (folder / NAME).exists():
-        old = open_folder(folder)
-        refuse_another(campaign, old, table, solver)
-        identity = old.identity
-    found = survey(folder, identity, table.samples)
+    old = opened_as(campaign, folder, table, solver)
+    found = survey(folder, old.identity if old is not None else "", table.samples)
     todo = found.missing[share.holds(found.missing)]
     cost = relative_cost(table, campaign.scene)
-    kind = campaign.specification.design.model_dump()["kind"]
+    kind = kind_of(campaign.specification.design)
     lines = [
         f"{campaign.specification.name}: {table.samples} samples "
         f"({kind} design), {len(todo)} to run here",
         f"  folder         {folder}",
         f"  workers        {workers}",
-        *(f"  {line}" for line in _inputs(table)),
+        *map(_extent, table.columns),
     ]
     if len(todo) == 0:
         return [*lines, "  nothing is left to run"]
@@ -144,15 +127,12 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver
     ]
 
 
-def _inputs(table: Table) -> list[str]:
-    lines = []
-    for column in table.columns:
-        values = column.values
-        if values.dtype.kind in "iuf":
-            unit = "" if column.units == "1" else f" {column.units}"
-            extent = f"{values.min():.6g} to {values.max():.6g}{unit}"
-        else:
-            extent = ", ".join(sorted({str(value) for value in values.ravel()}))
-        each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
-        lines.append(f"{column.path}: {extent}{each}")
-    return lines
+def _extent(column: Column) -> str:
+    values = column.values
+    if values.dtype.kind in "iuf":
+        unit = "" if column.units == "1" else f" {column.units}"
+        extent = f"{values.min():.6g} to {values.max():.6g}{unit}"
+    else:
+        extent = ", ".join(sorted({str(value) for value in values.ravel()}))
+    each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
+    return f"  {column.path}: {extent}{each}"

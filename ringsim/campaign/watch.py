@@ -35,14 +35,14 @@ class StopRequest:
     """Whether a signal interrupts what is being done, instead of waiting to be asked for."""
 
     def note(self, reason: str, *, signalled: bool) -> None:
-        """Wish for a stop; the first reason counts."""
+        """Ask for a stop; the first reason counts."""
         if not self.reason:
             self.reason, self.signalled = reason, signalled
 
 
 @contextlib.contextmanager
 def stopping_on_signals() -> Iterator[StopRequest]:
-    """Turn the first stop signal into a wish; a second one ends the process as usual."""
+    """Turn the first stop signal into a request; a second one ends the process as usual."""
     stop = StopRequest()
 
     def note(number: int, _frame: Any) -> None:
@@ -65,14 +65,12 @@ class Progress:
     """Counts samples, and tells the terminal and the progress file."""
 
     path: Path
-    """The progress file."""
     name: str
     total: int
     done: int
     failed: int
     """Samples of this process's share: all, finished, failed among the finished."""
     workers: int
-    """Samples that run at the same time."""
     running: dict[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -90,16 +88,14 @@ class Progress:
 
     def started(self, sample: int) -> None:
         """Note that a sample runs."""
-        self.running[sample] = time.monotonic()
-        self._news = True
+        self.running[sample], self._news = time.monotonic(), True
         self.refresh()
 
     def finished(self, result: Result) -> None:
         """Note that a sample has ended."""
         self.running.pop(result.sample, None)
-        self.done += 1
+        self.done, self._news = self.done + 1, True
         self.failed += result.status.failed
-        self._news = True
         self._bar.set_postfix(refresh=False, failed=self.failed)
         self._bar.update()
         if self._bar.disable and time.monotonic() - self._told > _PLAIN_SECONDS:
@@ -109,30 +105,23 @@ class Progress:
     def refresh(self) -> None:
         """Write the progress file if there are news, not more often than each second."""
         if self._news and time.monotonic() - self._written >= _FILE_SECONDS:
-            self._save(state="running")
+            self._save("running")
 
     def close(self, state: str) -> None:
         """Say how it ended."""
         self._bar.close()
         self.running.clear()
-        self._save(state=state)
+        self._save(state)
 
     def _save(self, state: str) -> None:
         """Write the progress file; never fail because of it."""
         now = self._written = time.monotonic()
         self._news = False
         content = {
-            "state": state,
-            "host": platform.node(),
-            "pid": os.getpid(),
-            "workers": self.workers,
-            "elapsed": now - self._begin,
-            "updated": time.time(),
-            "total": self.total,
-            "done": self.done,
-            "done_before": self._before,
-            "failed": self.failed,
+            "state": state, "host": platform.node(), "pid": os.getpid(), "workers": self.workers,
+            "elapsed": now - self._begin, "updated": time.time(), "total": self.total,
+            "done": self.done, "done_before": self._before, "failed": self.failed,
             "running": {sample: now - begin for sample, begin in self.running.items()},
-        }
+        }  # fmt: skip
         with contextlib.suppress(OSError), whole(self.path, lasting=False) as draft:
             draft.write_text(json.dumps(content), encoding="utf-8")

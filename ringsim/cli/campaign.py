@@ -13,9 +13,8 @@ from ringsim.campaign.run import Choices, Share, run_campaign
 from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
 from ringsim.campaign.status import plan
 from ringsim.cli.options import PATH
-from ringsim.execution.launch import aborting, launched_size, mpi_world
 from ringsim.execution.local import Local, Serial
-from ringsim.execution.mpi import Mpi
+from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.work import Scheduler
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.refusal import InputError

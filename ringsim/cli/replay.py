@@ -11,7 +11,6 @@ import numpy as np
 from ringsim.campaign.folder import open_folder
 from ringsim.cli.options import FOLDER, PATH
 from ringsim.execution.solve import load_solver, solve
-from ringsim.execution.work import Task
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.outputs import COORDINATES
 from ringsim.refusal import InputError
@@ -44,7 +43,7 @@ def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
     before = next(campaign.survey().results([sample]), None)
     for path, value in values.items():
         click.echo(f"{path} = {value}")
-    result = solve(load_solver(campaign.solver), campaign.scene, Task(sample, values))
+    result = solve(load_solver(campaign.solver), campaign.scene, sample, values)
     if result.log:
         click.echo(result.log)
     click.echo(f"sample {sample}: {result.status.word}: {result.reason} ({result.seconds:.2f} s)")

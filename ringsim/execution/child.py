@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import faulthandler
-import io
 import os
 import resource
 import signal
@@ -15,6 +13,7 @@ from typing import Any
 
 from ringsim.refusal import InputError
 
+_C = ctypes.CDLL(None)
 _PR_SET_PDEATHSIG = 1
 _MOST_LOG_BYTES = 1 << 28
 
@@ -22,7 +21,11 @@ _MOST_LOG_BYTES = 1 << 28
 def main() -> None:
     """Serve the pipe whose file descriptor is the first argument."""
     pipe = Connection(int(sys.argv[1]))
-    _die_with_parent(int(sys.argv[2]))
+    # The kernel ends this process when its parent ends, however that happens.
+    if sys.platform == "linux":
+        _C.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != int(sys.argv[2]):
+        os._exit(0)
     faulthandler.enable()
     faulthandler.register(signal.SIGUSR2)
     for ignored in (signal.SIGINT, signal.SIGUSR1):
@@ -45,44 +48,24 @@ def _serve(pipe: Connection, setup: dict[str, Any]) -> None:
     _limit(resource.RLIMIT_DATA, int(setup["limits"].memory))
     _limit(resource.RLIMIT_FSIZE, _MOST_LOG_BYTES)
     _limit(resource.RLIMIT_CORE, 0)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(line_buffering=True)  # a crash would take buffered lines with it
     pipe.send("")
     while True:
-        task = pipe.recv()
+        sample, values = pipe.recv()
         os.ftruncate(1, 0)
-        _flush()  # what did not fit into the log before
+        _C.fflush(None)  # what did not fit into the log before
         os.ftruncate(1, 0)
         # Ends this process, should its parent be unable to look at it.
         signal.setitimer(signal.ITIMER_REAL, 2.0 * setup["limits"].timeout + 60.0)
-        result = solve(solver, base, task)
+        result = solve(solver, base, sample, values)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        _flush()
+        _C.fflush(None)  # into the log of its own sample
         pipe.send(result)
-
-
-def _flush() -> None:
-    """Let what was printed appear in the log of its own sample, not in that of the next."""
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError, AttributeError):
-            stream.flush()
-    ctypes.CDLL(None).fflush(None)
 
 
 def _limit(what: int, most: int) -> None:
     hard = resource.getrlimit(what)[1]
-    if hard != resource.RLIM_INFINITY:
-        most = min(most, hard)
-    resource.setrlimit(what, (most, hard))
-
-
-def _die_with_parent(parent: int) -> None:
-    """Let the kernel end this process when its parent ends, however that happens."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(0)
+    soft = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(what, (soft, hard))
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from contextlib import ExitStack, closing
 from multiprocessing.connection import wait
 
 from ringsim.execution.slot import TICK, Slot
@@ -19,27 +20,25 @@ class Local(Scheduler):
         self.workers, self.description = workers, f"{workers} local workers"
 
     def run(self, samples: Sequence[int], work: Work) -> str:
-        """Run samples; see :class:`Scheduler`."""
+        """See :meth:`Scheduler.run`."""
         queue = deque(samples)
-        count = min(self.workers, len(queue))
-        slots = [Slot(work.solver, work.scene, work.limits) for _ in range(count)]
-        try:
-            while True:
-                if reason := work.stop():
-                    return reason
+        with ExitStack() as open_slots:
+            slots = [
+                open_slots.enter_context(closing(Slot(work.solver, work.scene, work.limits)))
+                for _ in range(min(self.workers, len(queue)))
+            ]
+            while not work.stop():
                 for slot in slots:
                     slot.serve(queue, work)
                 busy = [slot.pipe for slot in slots if slot.busy]
                 if not busy:
-                    return work.stop()
+                    break
                 wait(busy, timeout=TICK)
-        finally:
-            for slot in slots:
-                slot.close()
+            return work.stop()
 
 
 class Serial(Scheduler):
-    """One sample after the other in this process, for debugging: a crash takes everything with it.
+    """One sample after the other in this process, for debugging: a crash ends everything.
 
     Limits do not hold.
     """
@@ -47,13 +46,13 @@ class Serial(Scheduler):
     description = "in one process"
 
     def run(self, samples: Sequence[int], work: Work) -> str:
-        """Run samples; see :class:`Scheduler`."""
+        """See :meth:`Scheduler.run`."""
         solver, base = load_solver(work.solver), Scene.model_validate(work.scene)
         for sample in samples:
-            if reason := work.stop():
-                return reason
+            if work.stop():
+                break
             work.started(sample)
-            result = solve(solver, base, work.task(sample))
+            result = solve(solver, base, sample, work.values_of(sample))
             work.keep(result)
             work.finished(result)
         return work.stop()

@@ -1,4 +1,4 @@
-"""Running samples on all ranks of an MPI world, which only schedules.
+"""Running samples on all ranks of an MPI world: finding, using and leaving it.
 
 Every rank supervises one solver process; rank 0 also hands out the samples.  Nobody spins: a
 rank with nothing to do sleeps on its solver's pipe, a little longer each time.
@@ -6,14 +6,18 @@ rank with nothing to do sleeps on its solver's pipe, a little longer each time.
 
 from __future__ import annotations
 
+import contextlib
+import os
+import subprocess
+import sys
 import time
+import traceback
 from collections import deque
-from collections.abc import Sequence
-from contextlib import closing
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar, cast
 
-from ringsim.execution.slot import Slot
+from ringsim.execution.slot import Slot, without_mpi
 from ringsim.execution.work import Scheduler, Work
 from ringsim.refusal import InputError
 
@@ -22,6 +26,69 @@ _SHORTEST, _LONGEST = 1e-4, 2e-2
 _AHEAD_SECONDS, _MOST_AHEAD = 0.02, 32
 _POLITE = 5e-3
 _T = TypeVar("_T")
+
+_SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
+_LIBRARY = """
+import mpi4py
+mpi4py.rc.initialize = False
+from mpi4py import MPI
+print(MPI.Get_library_version())
+"""
+"""Tells the version of the MPI library without starting it; nothing if it cannot be loaded."""
+
+
+def launched_size() -> int:
+    """Number of processes that a launcher says it has started; 1 without a launcher."""
+    sizes = (os.environ.get(name, "") for name in _SIZES)
+    return next((int(size) for size in sizes if size.isdigit()), 1)
+
+
+def mpi_world() -> Any:
+    """The communicator of all processes that the launcher has started.
+
+    InputError if there is no MPI library, or if it does not belong to the launcher.
+    """
+    expected = launched_size()
+    if "OMPI_COMM_WORLD_SIZE" in os.environ:
+        # Other libraries do not even start under this launcher: they end the process.
+        library = subprocess.run(
+            [sys.executable, "-c", _LIBRARY], env=without_mpi(), capture_output=True, text=True,
+            check=False,
+        ).stdout.strip()  # fmt: skip
+        if library and not library.startswith("Open MPI"):
+            raise _stranger(expected, library)
+    try:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:
+        raise InputError(
+            f"started {expected} times by a launcher, but MPI cannot be loaded ({error}): install "
+            "an MPI library (pip install 'ringsim[mpich]'), or use --workers instead"
+        ) from None
+    world = MPI.COMM_WORLD
+    if world.Get_size() != expected:
+        raise _stranger(expected, MPI.Get_library_version())
+    return world
+
+
+def _stranger(expected: int, library: str) -> InputError:
+    name = library.splitlines()[0].strip(" \0")
+    return InputError(
+        f"the launcher has started {expected} processes, but each is alone in its MPI world: the "
+        f"launcher belongs to another MPI than the one loaded ({name}); use that one's mpiexec "
+        "(under Slurm: srun --mpi=pmi2)"
+    )
+
+
+@contextlib.contextmanager
+def aborting(communicator: Any) -> Iterator[None]:
+    """End the whole MPI job if an error leaves the block: the other ranks would wait for ever."""
+    try:
+        yield
+    except Exception:
+        traceback.print_exc()
+        sys.stderr.flush()
+        communicator.Abort(1)
+        raise
 
 
 class Mpi(Scheduler):
@@ -53,34 +120,34 @@ class Mpi(Scheduler):
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """See :meth:`Scheduler.run`."""
-        with closing(Slot(work.solver, work.scene, work.limits)) as slot:
+        with contextlib.closing(Slot(work.solver, work.scene, work.limits)) as slot:
             if self.rank == 0:
                 return self._schedule(deque(samples), slot, work)
             return self._serve(slot, work)
 
     def _schedule(self, queue: deque[int], slot: Slot, work: Work) -> str:
-        held: dict[int, deque[int]] = {rank: deque() for rank in range(1, self.workers)}
-        silent, mean, reason, fault, delay = set(held), 0.0, "", "", _SHORTEST
+        held: dict[int, deque[int]] = {}  # by rank, once it has said hello
+        left, mean, reason, fault, delay = self.workers - 1, 0.0, "", "", _SHORTEST
 
         def receive() -> bool:
             """Take one message, if there is one."""
-            nonlocal mean, reason, fault
+            nonlocal left, mean, reason, fault
             if not self.communicator.iprobe(tag=_TO_RANK_0):
                 return False
             rank, kind, content = self.communicator.recv(tag=_TO_RANK_0)
-            silent.discard(rank)
+            mine = held.setdefault(rank, deque())
             if kind == "result":
                 mean += 0.1 * (content.seconds - mean)
                 work.finished(content)
-                held[rank].popleft()
-                if held[rank]:
-                    work.started(held[rank][0])
+                mine.popleft()
+                if mine:
+                    work.started(mine[0])
             elif kind == "fault":
                 fault = fault or content
             elif kind == "stop":
                 reason = reason or content
             elif kind == "left":
-                del held[rank]
+                left -= 1
             return True
 
         while True:
@@ -88,8 +155,7 @@ class Mpi(Scheduler):
             if reason or not (queue or slot.busy or any(held.values())):
                 break
             ahead = self._ahead(mean, len(queue))
-            for rank in held.keys() - silent if queue else ():
-                mine = held[rank]
+            for rank, mine in held.items():
                 if queue and len(mine) <= ahead // 2:
                     batch = [queue.popleft() for _ in range(min(ahead - len(mine), len(queue)))]
                     self.communicator.send(batch, dest=rank, tag=_TO_WORKER)
@@ -103,13 +169,11 @@ class Mpi(Scheduler):
                 moved = slot.serve(queue, work) is not None or moved
             except InputError as error:
                 fault = str(error)
-            delay = _SHORTEST if moved else min(1.5 * delay, _LONGEST)
-            if not moved:
-                _rest(slot, delay)
+            delay = _SHORTEST if moved else _rest(slot, delay)
         slot.close()
-        for rank in held:
+        for rank in range(1, self.workers):
             self.communicator.send(None, dest=rank, tag=_TO_WORKER)
-        while held:  # what they sent before they heard of the end
+        while left:  # what they sent before they heard of the end
             if not receive():
                 time.sleep(_LONGEST)
         if fault:
@@ -134,26 +198,25 @@ class Mpi(Scheduler):
                 queue.extend(batch)
                 delay = _SHORTEST
             try:
-                result = slot.serve(queue, work) if not fault else None
-                if result is not None:
+                if not fault and (result := slot.serve(queue, work)) is not None:
                     self._tell("result", replace(result, body=b""))
                     delay = _SHORTEST
             except InputError as error:
                 fault = str(error)
                 slot.close()
                 self._tell("fault", fault)
-            if work.stop() and not told:
-                told = work.stop()
+            if not told and (told := work.stop()):
                 self._tell("stop", told)
-            _rest(slot, delay)
-            delay = min(1.5 * delay, _LONGEST)
+            delay = _rest(slot, delay)
 
     def _tell(self, kind: str, content: Any) -> None:
         self.communicator.send((self.rank, kind, content), dest=0, tag=_TO_RANK_0)
 
 
-def _rest(slot: Slot, seconds: float) -> None:
+def _rest(slot: Slot, seconds: float) -> float:
+    """Sleep until the solver says something, not longer than so; how long to sleep next."""
     if slot.busy:
         slot.pipe.poll(seconds)
     else:
         time.sleep(seconds)
+    return min(1.5 * seconds, _LONGEST)

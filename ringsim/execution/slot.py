@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import re
+import shutil
 import signal
+import socket
+import subprocess
+import sys
+import tempfile
 import time
 from collections import deque
 from dataclasses import replace
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
-from ringsim.execution.process import SolverProcess
 from ringsim.execution.solve import LOG_CHARACTERS
-from ringsim.execution.work import Limits, Task, Work
+from ringsim.execution.work import Limits, Work
 from ringsim.refusal import InputError
-from ringsim.storage.result import Result
+from ringsim.storage.result import Result, plain
 from ringsim.variables import Cause, Status
 
 TICK = 0.2
@@ -32,6 +40,92 @@ _FROM_OUTSIDE = (
 """Signals that others send: the kernel, batch systems, and the stop signals of a campaign, which
 a process that is just starting does not ignore yet."""
 
+_OF_MPI = ("PMI", "PMIX", "OMPI", "OPAL", "PRTE", "HYDRA", "HYDI", "MPI", "I_MPI", "MPIR")
+"""How names of variables begin by which launchers and libraries speak to each other."""
+
+_ADDRESS = re.compile(r"0x[0-9a-fA-F]+")
+_END_SECONDS = 10.0
+_PRINTING_SECONDS = 0.05
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def without_mpi() -> dict[str, str]:
+    """The environment of a process that is to know nothing of an MPI launcher."""
+    return {k: v for k, v in os.environ.items() if not k.startswith(_OF_MPI)}
+
+
+class SolverProcess:
+    """``ringsim.execution.child`` in a folder of its own; InputError if it cannot be started."""
+
+    def __init__(self, setup: dict[str, Any]) -> None:
+        self.ready, self.runs = False, 0
+        mine, other = socket.socketpair()
+        self.pipe = Connection(mine.detach())
+        environment = without_mpi() | dict.fromkeys(_ONE_THREAD, "1")
+        environment["PYTHONPATH"] = os.pathsep.join(os.path.abspath(path) for path in sys.path)
+        # Unbuffered: a crash would take with it what has not been written.
+        command = [sys.executable, "-P", "-u", "-m", "ringsim.execution.child"]
+        scratch = ""
+        try:
+            scratch = tempfile.mkdtemp(prefix="ringsim-")
+            with other, open(f"{scratch}/log", "ab") as log:
+                self._process = subprocess.Popen(
+                    [*command, str(other.fileno()), str(os.getpid())],
+                    stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=scratch, env=environment,
+                    pass_fds=[other.fileno()], start_new_session=True,
+                )  # fmt: skip
+        except OSError as error:
+            self.pipe.close()
+            other.close()
+            shutil.rmtree(scratch, ignore_errors=True)
+            raise InputError(
+                f"the solver process cannot be started: {error}; use fewer workers, or make "
+                f"room in {tempfile.gettempdir()} (TMPDIR)"
+            ) from error
+        self._scratch, self.pid = Path(scratch), self._process.pid
+        self.send(setup)
+
+    def send(self, message: Any) -> None:
+        """Say something to the process; one that is dead does not hear it."""
+        with contextlib.suppress(BrokenPipeError):
+            self.pipe.send(message)
+
+    def exit_code(self, seconds: float = 0.0) -> int | None:
+        """How it ended, negative numbers for signals; None if it still runs after so long."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return self._process.wait(seconds)
+        return None
+
+    def tell_where_it_is(self) -> None:
+        """Let it print where it is just now."""
+        with contextlib.suppress(ProcessLookupError):
+            self._process.send_signal(signal.SIGUSR2)
+        time.sleep(_PRINTING_SECONDS)
+
+    def memory(self) -> int:
+        """Bytes of memory that it holds; 0 where the system does not tell."""
+        with contextlib.suppress(OSError, IndexError):
+            pages = Path(f"/proc/{self.pid}/statm").read_text().split()[1]
+            return int(pages) * os.sysconf("SC_PAGE_SIZE")
+        return 0
+
+    def printed(self) -> str:
+        """The end of what it has printed since the sample began."""
+        try:
+            with (self._scratch / "log").open("rb") as log:
+                log.seek(max(0, log.seek(0, os.SEEK_END) - LOG_CHARACTERS))
+                return _ADDRESS.sub("0x", plain(log.read().decode("utf-8", "replace")))
+        except OSError:
+            return ""
+
+    def close(self) -> None:
+        """End it at once, whatever it does."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.pid, signal.SIGKILL)
+        self.exit_code(_END_SECONDS)  # the kernel may hold it, waiting for a disk
+        self.pipe.close()
+        shutil.rmtree(self._scratch, ignore_errors=True)
+
 
 class Slot:
     """Runs one sample at a time in a process of its own.
@@ -41,64 +135,69 @@ class Slot:
     those of :class:`Work`.
     """
 
+    pipe: Connection
+    """What to wait on while a sample is running."""
+
     def __init__(self, solver: str, scene: dict[str, Any], limits: Limits) -> None:
         self._setup = {"solver": solver, "scene": scene, "limits": limits}
-        self._limits = limits
+        self._limits, self._deaths = limits, 0
         self._process: SolverProcess | None = None
-        self._task: Task | None = None
-        self._deaths = 0
+        self.busy = False
         self._begin = self._deadline = self._look = 0.0
 
-    @property
-    def busy(self) -> bool:
-        """Whether a sample is running."""
-        return self._task is not None
-
-    @property
-    def pipe(self) -> Connection:
-        """The pipe to wait on while busy."""
-        return self._running()[0].pipe
-
-    def submit(self, task: Task) -> None:
+    def submit(self, sample: int, values: dict[str, Any]) -> None:
         """Start a sample, or refuse if that cannot be done; the slot must not be busy."""
         self._begin, self._deaths = time.monotonic(), 0
-        self._send(task)
+        self._run = sample, values
+        self._send()
 
     def poll(self) -> Result | None:
         """The result, once there is one; call it when the pipe is ready or after a tick."""
-        while self._task is not None and self.pipe.poll():
-            process, _ = self._running()
+        if self._process is None or not self.busy:
+            return None
+        process = self._process
+        while process.pipe.poll():
             try:
                 message = process.pipe.recv()
             except (EOFError, OSError):
-                return self._died()
+                return self._died(process)
             if isinstance(message, Result):
-                self._task = None
+                self.busy = False
                 return self._with_log(message, process.printed())
             if message:
                 raise InputError(str(message))
             process.ready = True
             self._deadline = time.monotonic() + self._limits.timeout
         now = time.monotonic()
-        if self._task is None or now < self._look:
+        if now < self._look:
             return None
         if now - self._look > _PAUSE_SECONDS:
             self._deadline += now - self._look  # this process has been asleep, and the run perhaps
         self._look = now + TICK
-        return self._check(now)
+        if process.exit_code() is not None and not process.pipe.poll():
+            return self._died(process)
+        if now > self._deadline:
+            _require_started(process)
+            process.tell_where_it_is()
+            limit = f"limits.timeout = {self._limits.timeout:g} s"
+            why = f"still running after {limit}: raise it, or raise solver.tolerance"
+            return self._give_up(process, Status.TIMEOUT, why)
+        if process.memory() > self._limits.memory:
+            return self._give_up(process, Status.MEMORY)
+        return None
 
     def serve(self, queue: deque[int], work: Work) -> Result | None:
         """Keep the result that is there, if there is one, and start the next sample if it is free.
 
         InputError if the solver process cannot be started, or the result not be written.
         """
-        result = self.poll() if self.busy else None
+        result = self.poll()
         if result is not None:
             work.keep(result)
             work.finished(result)
         if queue and not self.busy and not work.stop():
             sample = queue.popleft()
-            self.submit(work.task(sample))
+            self.submit(sample, work.values_of(sample))
             work.started(sample)
         return result
 
@@ -106,74 +205,53 @@ class Slot:
         """End the process at once, whatever it does."""
         if self._process is not None:
             self._process.close()
-        self._process = self._task = None
+        self._process, self.busy = None, False
 
-    def _running(self) -> tuple[SolverProcess, Task]:
-        if self._process is None or self._task is None:
-            raise RuntimeError("a slot has a process and a task only while it is busy")
-        return self._process, self._task
-
-    def _send(self, task: Task) -> None:
-        if self._process is None or self._process.runs >= self._limits.recycle:
+    def _send(self) -> None:
+        process = self._process
+        if process is None or process.runs >= self._limits.recycle:
             self.close()
-            self._process = SolverProcess(self._setup)
-        self._task = task
-        self._process.runs += 1
+            process = self._process = SolverProcess(self._setup)
+            self.pipe = process.pipe
+        self.busy = True
+        process.runs += 1
         now = time.monotonic()
         self._look = now + TICK
-        self._deadline = now + (self._limits.timeout if self._process.ready else _START_SECONDS)
-        self._process.send(task)
+        self._deadline = now + (self._limits.timeout if process.ready else _START_SECONDS)
+        process.send(self._run)
 
     def _with_log(self, result: Result, printed: str) -> Result:
         """The solver's own result, with what only this process knows."""
         if result.status is Status.MEMORY:
-            result = replace(result, reason=self._too_much())
+            memory = f"limits.memory = {self._limits.memory:g} B"
+            result = replace(result, reason=f"the run needed more than {memory}")
         if result.status.failed:
             result = replace(result, log=(printed + result.log)[-LOG_CHARACTERS:])
         return replace(result, seconds=time.monotonic() - self._begin)
 
-    def _check(self, now: float) -> Result | None:
-        process, _ = self._running()
-        if process.exit_code() is not None and not process.pipe.poll():
-            return self._died()
-        if now > self._deadline:
-            self._require_started(process)
-            process.tell_where_it_is()
-            return self._give_up(
-                Status.TIMEOUT,
-                f"still running after limits.timeout = {self._limits.timeout:g} s: raise it, or "
-                "raise solver.tolerance",
-            )
-        if process.memory() > self._limits.memory:
-            return self._give_up(Status.MEMORY, self._too_much())
-        return None
-
-    def _too_much(self) -> str:
-        return f"the run needed more than limits.memory = {self._limits.memory:g} B"
-
-    def _require_started(self, process: SolverProcess) -> None:
-        if not process.ready:
-            raise InputError(f"the solver process does not start: {process.printed()}")
-
-    def _died(self) -> Result | None:
-        process, task = self._running()
+    def _died(self, process: SolverProcess) -> Result | None:
         code = process.exit_code(5.0) or 0
         if code in _FROM_OUTSIDE and self._deaths < _MOST_DEATHS_FROM_OUTSIDE:
             self._deaths += 1
             self.close()
-            self._send(task)
+            self._send()
             return None
-        self._require_started(process)
+        _require_started(process)
         if "bad_alloc" in process.printed():
-            return self._give_up(Status.MEMORY, self._too_much())
+            return self._give_up(process, Status.MEMORY)
         if code == -signal.SIGALRM:
-            return self._give_up(Status.TIMEOUT, "still running long after limits.timeout")
+            why = "still running long after limits.timeout"
+            return self._give_up(process, Status.TIMEOUT, why)
         how = f"died of {signal.Signals(-code).name}" if code < 0 else f"left with exit code {code}"
-        return self._give_up(Status.CRASHED, f"the solver process {how}")
+        return self._give_up(process, Status.CRASHED, f"the solver process {how}")
 
-    def _give_up(self, status: Status, reason: str) -> Result:
-        process, task = self._running()
-        result = Result(task.sample, status, reason, _CAUSES[status], finished=time.time())
+    def _give_up(self, process: SolverProcess, status: Status, reason: str = "") -> Result:
+        result = Result(self._run[0], status, reason, _CAUSES[status], finished=time.time())
         result = self._with_log(result, process.printed())
         self.close()
         return result
+
+
+def _require_started(process: SolverProcess) -> None:
+    if not process.ready:
+        raise InputError(f"the solver process does not start: {process.printed()}")

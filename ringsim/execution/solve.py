@@ -6,10 +6,10 @@ import importlib
 import time
 import traceback
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from ringsim.execution.work import Task
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
@@ -34,15 +34,14 @@ def load_solver(name: str) -> Run:
     return solver
 
 
-def solve(solver: Run, base: Scene, task: Task) -> Result:
-    """Run one sample of the scene ``base``."""
+def solve(solver: Run, base: Scene, sample: int, values: dict[str, Any]) -> Result:
+    """Run one sample of the scene ``base``, with its values by scene path."""
     begin, log, form, body = time.monotonic(), "", "", b""
     try:
-        outcome = solver(base.with_values(task.values))
+        outcome = solver(base.with_values(values))
         form, body = pack(outcome.coordinates | outcome.values)
         status, reason, cause = Status(outcome.status), str(outcome.reason), outcome.cause
-        fault = not_finite(outcome) if not status.failed else ""
-        if fault:
+        if not status.failed and (fault := _not_finite(outcome)):
             status, reason, cause = Status.DIVERGED, fault, Cause.NOT_FINITE
     except MemoryError:
         status, reason = Status.MEMORY, "the run needed more memory than allowed"
@@ -51,20 +50,12 @@ def solve(solver: Run, base: Scene, task: Task) -> Result:
         status, log = Status.ERROR, traceback.format_exc()
         reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
         cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
-    return Result(
-        sample=task.sample,
-        status=status,
-        reason=plain(" ".join(reason.split())[:1000]),
-        cause=cause,
-        log=plain(log[-LOG_CHARACTERS:]),
-        seconds=time.monotonic() - begin,
-        finished=time.time(),
-        form=form,
-        body=body,
-    )
+    reason, log = plain(" ".join(reason.split())[:1000]), plain(log[-LOG_CHARACTERS:])
+    seconds = time.monotonic() - begin
+    return Result(sample, status, reason, cause, log, seconds, time.time(), form, body)
 
 
-def not_finite(outcome: Outcome) -> str:
+def _not_finite(outcome: Outcome) -> str:
     """What is wrong with the numbers of a run that says it went well; empty if nothing is.
 
     Missing values are right after the end of a run, for times that never came and in rows of

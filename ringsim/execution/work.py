@@ -26,14 +26,6 @@ class Limits(Model):
 
 
 @dataclass(frozen=True)
-class Task:
-    """One run that is asked for."""
-
-    sample: int
-    values: dict[str, Any]
-
-
-@dataclass(frozen=True)
 class Work:
     """The samples' content, and where results go."""
 
@@ -51,30 +43,22 @@ class Work:
     finished: Callable[[Result], None] = lambda result: None
     """Tell rank 0 what goes on; results of other ranks come without their arrays."""
 
-    def task(self, sample: int) -> Task:
-        """The run of a sample."""
-        return Task(sample, self.values_of(sample))
-
 
 class Scheduler:
     """The one seam between a campaign and the processes that compute it.
 
-    Every process that takes part has one and calls the same methods in the same order; what
-    stands here is for a process that is alone.
+    Every process that takes part calls the same methods in the same order; what stands here is
+    for one that is alone.
     """
 
     rank = 0
-    """Number of this process among those that run the campaign together."""
     workers = 1
     """Samples that run at the same time."""
     description = ""
     """Who computes, in words."""
 
     def run(self, samples: Sequence[int], work: Work) -> str:
-        """Run samples, first ones first; returns the reason if it stopped before the end.
-
-        Only the samples of rank 0 are looked at.
-        """
+        """Run rank 0's samples, first ones first; returns why it stopped before the end, if so."""
         raise NotImplementedError
 
     def from_first(self, value: _T) -> _T:

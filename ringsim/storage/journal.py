@@ -1,7 +1,4 @@
-"""Journals: every finished sample is in a file at once, one file for each process.
-
-A :class:`Survey` says what all journals of a campaign hold.
-"""
+"""Journals: every finished sample is in a file at once, one file for each process."""
 
 from __future__ import annotations
 
@@ -38,17 +35,14 @@ class Journal:
     """An append-only file with one writer.
 
     A record is complete or, if the writer was killed within it, recognised as torn and ignored.
-    Its checksum is right for this campaign only.  The writer is named after its share of the
-    samples, and its number among the processes that run it.
+    Its checksum is right for this campaign only.  ``writer`` names the share and the rank.
     """
 
     def __init__(self, folder: Path, campaign: str, writer: str) -> None:
         # No two processes share a journal, even where the file system has no locks.
         self.path = folder / FOLDER / f"{writer}-{secrets.token_hex(4)}.journal"
         self._campaign = campaign
-        self._descriptor = -1
-        self._size = 0
-        self._synced = -_SYNC_SECONDS
+        self._descriptor, self._size, self._synced = -1, 0, -_SYNC_SECONDS
 
     def append(self, result: Result) -> None:
         """Add one result; the first one creates the file.
@@ -58,7 +52,7 @@ class Journal:
         header, body = result.header(), result.body
         check = _checksum(header, body, self._campaign)
         frame = _FRAME.pack(_MAGIC, len(header), len(body), check)
-        record = memoryview(b"".join((frame, header, body)))
+        record = memoryview(frame + header + body)
         with writing(self.path, GO_ON):
             if self._descriptor < 0:
                 flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND
@@ -89,29 +83,26 @@ class Journal:
 
 
 def read_journal(path: Path, campaign: str) -> Iterator[tuple[int, Result | None]]:
-    """The records of a journal in the order in which they were written, with their places.
+    """The records of a journal in their order, each with its place.
 
-    None stands for bytes between two records that are no record of this campaign: one that is
-    damaged does not hide those behind it.  What a writer left unfinished at the end is left out:
-    the file may still be growing.
+    None stands for bytes between two records that are no record of this campaign.  What a writer
+    left unfinished at the end is left out: the file may still be growing.
     """
     with path.open("rb") as file:
         place, size = 0, os.fstat(file.fileno()).st_size
         while place < size:
-            result = read_record(file, place, campaign)
-            if result is not None:
+            if (result := _read_record(file, place, campaign)) is not None:
                 yield place, result
                 place = file.tell()
                 continue
             file.seek(place + 1)
-            gap = file.read().find(_MAGIC)
-            if gap < 0:
+            if (gap := file.read().find(_MAGIC)) < 0:
                 return
             yield place, None
             place += 1 + gap
 
 
-def read_record(file: BinaryIO, place: int, campaign: str) -> Result | None:
+def _read_record(file: BinaryIO, place: int, campaign: str) -> Result | None:
     """The record that begins at a place of a journal; None if there is no whole one."""
     file.seek(place)
     frame = file.read(_FRAME.size)
@@ -144,13 +135,10 @@ class Survey:
     seconds: NDArray[np.float64]
     """Elapsed time of each sample, NaN where there is no result."""
     form: NDArray[np.int64]
-    """Form of each sample's result, an index of ``forms``; -1 where there is no result."""
-    forms: list[str]
-    """See :class:`Result`."""
+    """Number of the form of each sample's result; -1 where there is no result."""
     owner: NDArray[np.int64]
     """Journal with the result that counts of each sample, -1 where there is none."""
     place: NDArray[np.int64]
-    """Where it begins there."""
 
     @property
     def missing(self) -> NDArray[np.int64]:
@@ -168,8 +156,7 @@ class Survey:
         for number in np.unique(owner[owner >= 0]):
             with self.journals[number].open("rb") as file:
                 for place in np.sort(self.place[samples][owner == number]):
-                    result = read_record(file, int(place), self.campaign)
-                    if result is None:
+                    if (result := _read_record(file, int(place), self.campaign)) is None:
                         raise OSError(f"{self.journals[number]} has been damaged meanwhile")
                     yield result
 
@@ -178,10 +165,8 @@ def survey(folder: Path, campaign: str, samples: int) -> Survey:
     """Look through the journals of a campaign's folder.
 
     Of several results of one sample, one that went well counts before one that failed, whatever
-    the clocks said; otherwise the later one does.
-
-    Records that are damaged, or of a campaign with another identity than ``campaign``, are told in
-    a warning of the log.
+    the clocks said; otherwise the later one does.  A warning in the log tells of records that are
+    damaged, or of another ``campaign``.
     """
     journals = sorted((folder / FOLDER).glob("*.journal"))
     status = np.full(samples, NOT_RUN, dtype=np.int8)
@@ -203,7 +188,6 @@ def survey(folder: Path, campaign: str, samples: int) -> Survey:
         if damaged:
             _log.warning(
                 "%s is damaged: %d of its records cannot be used, their samples run again",
-                path.name,
-                damaged,
-            )
-    return Survey(campaign, journals, status, seconds, form, list(forms), owner, place)
+                path.name, damaged,
+            )  # fmt: skip
+    return Survey(campaign, journals, status, seconds, form, owner, place)

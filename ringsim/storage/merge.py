@@ -21,7 +21,7 @@ from ringsim.storage.netcdf import (
     add_coordinate,
     add_variable,
     blank,
-)
+)  # fmt: skip
 from ringsim.variables import Cause, Status, Variable
 
 NAME = "campaign.nc"
@@ -39,8 +39,8 @@ def write_merged(
     """Write ``campaign.nc`` of what was found in a folder, whole or not at all.
 
     Samples that have not been run have the status "not_run" and missing values.  Returns how many
-    count as failed because their coordinates differ from the others'.  OSError or RuntimeError if
-    the disk is full; an older file stays.
+    count as failed because their coordinates differ.  OSError or RuntimeError if the disk is full;
+    an older file stays.
     """
     axes, names, fits = _common(found)
     scalars = {n for n, v in VARIABLES.items() if not v.dims and not v.needs}
@@ -66,7 +66,7 @@ def _common(found: Survey) -> tuple[dict[str, NDArray[Any]], set[str], NDArray[n
     """Coordinates of the first samples, the outputs that occur, and which forms fit."""
     axes: dict[str, NDArray[Any]] = {}
     names: set[str] = set()
-    fits = np.ones(len(found.forms), dtype=bool)
+    fits = np.ones(found.form.max(initial=-1) + 1, dtype=bool)
     forms, first = np.unique(found.form, return_index=True)
     for sample in np.sort(first[forms >= 0]):  # the lowest sample of each form
         (result,) = found.results([sample])

@@ -1,19 +1,26 @@
-"""How variables lie in netCDF files: types, attributes, chunks and compression."""
+"""How variables lie in netCDF files; ``design.nc``, what a campaign is going to run."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from ringsim.files import whole
 from ringsim.outputs import COORDINATES, VARIABLES
-from ringsim.refusal import known_or_nearest
+from ringsim.refusal import InputError, known_or_nearest
+from ringsim.sampling.columns import Table, add_inputs, read_inputs
 from ringsim.storage.result import MISSING_COUNT
 from ringsim.units import Model
 from ringsim.variables import Variable, flags_of
+
+DESIGN = "design.nc"
 
 NOT_RUN = -1
 """Value of ``status`` for samples that have not been run, and of codes that are missing."""
@@ -72,7 +79,7 @@ def add_variable(
 ) -> None:
     """Create a variable over ``sample`` and its own dimensions, which the file has.
 
-    Compression is a level of zlib, 0 for none; digits are the significant decimal ones to keep.
+    ``compression`` is a level of zlib, 0 for none; ``digits`` are the significant ones to keep.
     """
     dims = ("sample", *definition.dims)
     options: dict[str, Any] = {}
@@ -112,3 +119,32 @@ def blank(definition: Variable, shape: tuple[int, ...]) -> NDArray[Any]:
         return np.full(shape, "", dtype=object)
     kind = np.dtype(definition.dtype)
     return np.full(shape, np.nan if kind.kind == "f" else MISSING_COUNT, dtype=kind)
+
+
+def write_design(folder: Path, table: Table, attributes: Mapping[str, Any]) -> None:
+    """Write all inputs of all samples; OSError or RuntimeError if the disk is full."""
+    with whole(folder / DESIGN) as draft, netCDF4.Dataset(draft, "w") as file:
+        file.setncatts(dict(attributes))
+        add_coordinate(file, "sample", np.arange(table.samples))
+        add_inputs(file, table, compression=4)
+
+
+def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
+    """The samples of a campaign, and the attributes of its design; InputError if there is none."""
+    path = folder / DESIGN
+    if not path.is_file():
+        raise InputError(f"{folder}: no campaign in this folder: {DESIGN} is not there")
+    try:
+        with netCDF4.Dataset(path) as file:
+            attributes = {name: file.getncattr(name) for name in file.ncattrs()}
+            table = Table(read_inputs(file), file["sample_seed"][:])
+    except (OSError, RuntimeError, KeyError, IndexError, AttributeError) as error:
+        raise InputError(
+            f"{path}: cannot be read: {error}; choose another folder, or delete this one"
+        ) from None
+    if absent := [name for name in ("identity", "scene", "solver") if name not in attributes]:
+        raise InputError(
+            f"{path}: this is not the design of a campaign, it has no attribute {absent[0]}: "
+            "choose another folder"
+        )
+    return table, attributes

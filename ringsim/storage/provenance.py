@@ -24,17 +24,13 @@ def provenance(*, name: str, title: str, action: str) -> dict[str, Any]:
         "history": f"{now} {action} by {software}",
         "date_created": now,
         "source": f"{software}: multibody simulation with exudyn",
-        "creator_name": "ringsim",
-        "creator_type": "institution",
-        "creator_software": software,
-        "python_version": platform.python_version(),
-        "platform": platform.platform(),
-        "host": platform.node(),
-        "git_commit": git_commit(),
-    } | {f"{package}_version": version(package) for package in _PACKAGES}
+        "creator_name": "ringsim", "creator_type": "institution", "creator_software": software,
+        "python_version": platform.python_version(), "platform": platform.platform(),
+        "host": platform.node(), "git_commit": _git_commit(),
+    } | {f"{package}_version": version(package) for package in _PACKAGES}  # fmt: skip
 
 
-def git_commit() -> str:
+def _git_commit() -> str:
     """Commit of the source tree that runs, with "+changes" if files differ; or "unknown"."""
     tree = Path(__file__).resolve().parents[2]
     if not (tree / ".git").exists():

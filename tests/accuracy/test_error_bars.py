@@ -8,7 +8,7 @@ import xarray as xr
 
 from ringsim import simulation
 from ringsim.analysis.campaign_notes import budget_lines
-from ringsim.campaign.cases import Cases, run_cases
+from ringsim.campaign.cases import run_cases
 from ringsim.campaign.specification import load_campaign
 from ringsim.dataset import to_dataset
 from ringsim.outputs.error_bars import error_bars, rules
@@ -251,7 +251,7 @@ def test_cases_run_as_a_campaign_with_bars_and_steps_as_inputs(tmp_path, capfd) 
         for step, tolerance in ((0.2, 1e-3), (0.1, 3e-5))
     ]
     scene = ring(**{"solver.end_time": 4.0})
-    file = run_cases(tmp_path, Cases("steps", "two steps", scene, cases), workers=1)
+    file = run_cases(tmp_path, "steps", scene, cases, workers=1, title="two steps")
     with xr.open_dataset(file) as found:
         assert (found.status == 0).all()
         np.testing.assert_array_equal(found.solver_step, [0.2, 0.1])
@@ -259,4 +259,4 @@ def test_cases_run_as_a_campaign_with_bars_and_steps_as_inputs(tmp_path, capfd) 
     assert errors[1] < errors[0]
     assert "dominates the mean" in capfd.readouterr().err
     with pytest.raises(InputError, match="case 1"):
-        run_cases(tmp_path / "b", Cases("x", "", scene, [{"a": 1}, {"b": 2}]), workers=1)
+        run_cases(tmp_path / "b", "x", scene, [{"a": 1}, {"b": 2}], workers=1)

@@ -10,7 +10,6 @@ import xarray as xr
 from campaign_bench import START, assert_same, finished, journals, lose
 from ringsim.campaign.folder import open_folder
 from ringsim.execution.solve import load_solver, solve
-from ringsim.execution.work import Task
 from ringsim.refusal import InputError
 from ringsim.storage.journal import FOLDER, Journal, read_journal, survey
 from ringsim.storage.locks import reserved
@@ -24,7 +23,7 @@ def write_journal(bench, writer, samples):
     journal = Journal(folder.path, folder.identity, writer)
     solver = load_solver("fake_solver:run")
     for sample in samples:
-        journal.append(solve(solver, folder.scene, Task(sample, folder.table.values_of(sample))))
+        journal.append(solve(solver, folder.scene, sample, folder.table.values_of(sample)))
     assert len(list(read_journal(journal.path, folder.identity))) == len(samples)
     return journal.path
 

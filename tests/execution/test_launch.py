@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from ringsim.execution.launch import launched_size, mpi_world
+from ringsim.execution.mpi import launched_size, mpi_world
 from ringsim.refusal import InputError
 
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
@@ -30,7 +30,7 @@ def under_mpi(script, ranks=2):
 def test_error_on_one_rank_ends_the_others_too():
     done = under_mpi(
         """
-        from ringsim.execution.launch import aborting, mpi_world
+        from ringsim.execution.mpi import aborting, mpi_world
         world = mpi_world()
         with aborting(world):
             if world.Get_rank() == 1:
@@ -48,8 +48,7 @@ def test_nobody_passes_the_barrier_before_all_are_there(tmp_path):
         f"""
         import time
         from pathlib import Path
-        from ringsim.execution.launch import mpi_world
-        from ringsim.execution.mpi import Mpi
+        from ringsim.execution.mpi import Mpi, mpi_world
         world, sign = mpi_world(), Path({str(tmp_path / "sign")!r})
         if world.Get_rank() == 1:
             time.sleep(0.3)

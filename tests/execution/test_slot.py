@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from ringsim.execution.slot import Slot
-from ringsim.execution.work import Limits, Task
+from ringsim.execution.work import Limits
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 from ringsim.variables import Status
@@ -37,7 +37,7 @@ def slots(monkeypatch):
 
 
 def result_of(slot, sample=0, force=0.015):
-    slot.submit(Task(sample, {"loads.force": force}))
+    slot.submit(sample, {"loads.force": force})
     return awaited(slot)
 
 
@@ -71,7 +71,7 @@ def test_process_is_replaced_after_its_share_of_runs(slots):
 def test_process_killed_by_somebody_else_runs_its_sample_again(slots):
     slot = slots("slot_solver:sleep")
     first = process_of(result_of(slot))
-    slot.submit(Task(1, {}))
+    slot.submit(1, {})
     os.kill(first, signal.SIGKILL)
     result = awaited(slot)
     assert result.status is Status.OK
@@ -82,7 +82,7 @@ def test_run_that_was_suspended_with_its_supervisor_is_no_hang(slots):
     """As by a batch system: nobody ran, so the time does not count."""
     slot = slots("slot_solver:sleep", limits=Limits(timeout=1.0))
     process = process_of(result_of(slot))
-    slot.submit(Task(1, {}))
+    slot.submit(1, {})
     slot.poll()
     os.kill(process, signal.SIGSTOP)
     time.sleep(2.0)
@@ -95,13 +95,13 @@ def test_process_that_cannot_be_started_is_refused(slots, monkeypatch):
     slot = slots()
     monkeypatch.setattr(sys, "executable", "/no/python")
     with pytest.raises(InputError, match=r"cannot be started.*use fewer workers"):
-        slot.submit(Task(0, {}))
+        slot.submit(0, {})
     slot.close()
 
 
 def test_stop_signal_to_a_process_that_is_just_starting_is_not_its_fault(slots):
     slot = slots()
-    slot.submit(Task(0, {"loads.force": 0.015}))
+    slot.submit(0, {"loads.force": 0.015})
     os.kill(slot._process.pid, signal.SIGUSR1)
     assert awaited(slot).status is Status.OK
 
@@ -141,13 +141,13 @@ def test_solver_process_ends_with_its_parent():
         """
         import os, sys, time
         from ringsim.execution.slot import Slot
-        from ringsim.execution.work import Limits, Task
+        from ringsim.execution.work import Limits
         from ringsim.scene import load_scene
         slot = Slot("slot_solver:sleep", load_scene("ring18").to_table(), Limits())
-        slot.submit(Task(0, {}))
+        slot.submit(0, {})
         while slot.poll() is None:
             pass
-        slot.submit(Task(1, {"solver.end_time": 1000.0}))
+        slot.submit(1, {"solver.end_time": 1000.0})
         print(slot._process.pid, flush=True)
         os.kill(os.getpid(), 9)
         """

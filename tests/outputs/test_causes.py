@@ -9,7 +9,6 @@ import pytest
 
 from ringsim import simulation
 from ringsim.execution.solve import solve
-from ringsim.execution.work import Task
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.result import Result
@@ -73,7 +72,7 @@ def test_a_sample_that_raises_has_a_cause(error, cause) -> None:
     def solver(scene: Scene) -> Outcome:
         raise error
 
-    assert solve(solver, RING, Task(0, {})).cause is cause
+    assert solve(solver, RING, 0, {}).cause is cause
 
 
 def test_a_journal_keeps_the_cause_and_older_ones_have_none() -> None:

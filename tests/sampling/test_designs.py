@@ -113,7 +113,7 @@ def test_csv_list_is_taken_as_it_is(base, tmp_path):
 
 
 def test_design_file_of_a_campaign_can_be_listed(base, tmp_path):
-    from ringsim.storage.design_file import write_design
+    from ringsim.storage.netcdf import write_design
 
     inputs = THREE | {
         "rods.young_modulus": THREE["rods.young_modulus"] | {"each_section": True},

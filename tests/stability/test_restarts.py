@@ -148,14 +148,14 @@ def test_a_campaign_says_how_many_samples_started_anew() -> None:
 def test_a_rung_of_an_accuracy_study_never_starts_anew(monkeypatch, tmp_path) -> None:
     asked = []
 
-    def refuse(folder, cases, workers):
-        asked.append(cases)
+    def refuse(folder, name, scene, cases, **how):
+        asked.append((scene, cases))
         raise KeyboardInterrupt
 
     monkeypatch.setattr(accuracy, "run_cases", refuse)
     scene = SCENE.with_values({"solver.restarts": 5})
     with pytest.raises(KeyboardInterrupt):
         accuracy.run_ladder(tmp_path, scene, workers=1, timeout=60.0)
-    (cases,) = asked
-    assert cases.scene.solver.restarts == 0
-    assert not any("solver.restarts" in case for case in cases.cases)
+    ((varied, cases),) = asked
+    assert varied.solver.restarts == 0
+    assert not any("solver.restarts" in case for case in cases)
