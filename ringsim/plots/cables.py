@@ -26,12 +26,7 @@ def section_series(dataset: xr.Dataset, plane: str) -> xr.Dataset:
     Tensions are recorded; span lengths and angles are recomputed from the opening angles on the
     ideal geometry of one section (see ``ringsim.cable.bracket``).
 
-    Parameters
-    ----------
-    dataset
-        A run with ``cable_tension`` and ``opening_angle``.
-    plane
-        "upper" or "lower"; its cable must exist.
+    ``dataset`` has ``cable_tension`` and ``opening_angle``; ``plane`` is one with a cable.
 
     Returns
     -------
@@ -98,24 +93,19 @@ def cables(dataset: xr.Dataset) -> Figure:
     tension = dataset["cable_tension"]
     plane = next(str(p) for p in dataset["plane"].values if np.isfinite(tension.sel(plane=p)).any())
     series = section_series(dataset, plane)
-    sections = series.sizes["section"]
-    figure = style.new_figure(11.0, 8.4)
+    colours = style.section_colours(sections := series.sizes["section"])
+    figure = Figure(figsize=(11.0, 8.4))
     grid = figure.subplots(3, 2, sharex=True)
-    colours = style.section_colours(sections)
     for axes, (name, values) in zip(grid.ravel(), series.items(), strict=True):
         for number, row in enumerate(values.values):
-            axes.plot(
-                series["time"], row, color=colours(number), linewidth=1.2,
-                label=f"section {number + 1}",
-            )  # fmt: skip
+            look = {"color": colours(number), "label": f"section {number + 1}"}
+            axes.plot(series["time"], row, linewidth=1.2, **look)
         axes.set_ylabel(wording.label(values))
-        style.span_time(axes, dataset["opening_angle"])
         if name not in ("length", "decay"):
             style.span_sizes(axes, values.where(values > 1e-6).values)
-    style.mark_deployment(dataset, *grid.ravel(), named=False)
-    for axes in grid[-1]:
-        axes.set_xlabel(wording.label(dataset["time"]))
+    for column in grid.T:
+        style.time_axes(dataset, dataset["opening_angle"], *column, named=False)
     if 1 < sections <= 6:
         grid[0, 0].legend(loc="best")
-    wording.head(figure, grid[0, 0], dataset, f"{plane.capitalize()} cable")
+    style.head(figure, grid[0, 0], dataset, f"{plane.capitalize()} cable")
     return figure

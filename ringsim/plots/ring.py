@@ -68,7 +68,7 @@ def ring(dataset: xr.Dataset) -> Figure:
         Line2D([], [], **({"label": name} | look)) for name, look in _LOOKS.items() if name in drawn
     ]
     figure.legend(handles=entries, loc="lower center", ncols=len(entries))
-    wording.head(figure, axes, dataset, "Deployment", pad=72.0 * _BAR)
+    style.head(figure, axes, dataset, "Deployment", pad=72.0 * _BAR)
     return figure
 
 
@@ -90,17 +90,9 @@ def facing_azimuth(scene: Scene) -> float:
 def view(points: Array, azimuth: float, elevation: float) -> tuple[Array, Array]:
     """Orthographic projection for a far observer, true to scale.
 
-    Parameters
-    ----------
-    points
-        Positions, shape (..., 3), m, z up.
-    azimuth, elevation
-        Where the observer stands, degree: from +x towards +y, and above the horizon.
-
-    Returns
-    -------
-    tuple[Array, Array]
-        Right and up on the paper, shape (..., 2), and nearness to the observer, shape (...,), m.
+    ``points`` are positions, shape (..., 3), m, z up; the observer stands at ``azimuth`` (from +x
+    towards +y) and ``elevation`` (above the horizon), degree.  Returns right and up on the paper,
+    shape (..., 2), and nearness to the observer, shape (...,), m.
     """
     a, e = np.radians([azimuth, elevation])
     right = np.array([-np.sin(a), np.cos(a), 0.0])
@@ -118,7 +110,7 @@ def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
     """
     angle = dataset["opening_angle"].dropna("time", how="any")
     mean = angle.mean(("plane", "section")).values
-    deployed = style.deployment_time(dataset)
+    deployed = wording.deployment_time(dataset)
     done = math.isfinite(deployed)
     last = int(np.abs(angle["time"].values - deployed).argmin()) if done else len(mean) - 1
     middle = int(np.abs(mean[: last + 1] - 0.5 * (mean[0] + mean[last])).argmin())
@@ -150,7 +142,7 @@ def _sheet(scale: float, height: float) -> tuple[Figure, Axes]:
     """Axes in metre whose frame is the drawing, between room for words above and below."""
     sheet = height * scale
     wide, high = _WIDTH + 2 * _SIDE, _BELOW + sheet + _ABOVE
-    figure = style.new_figure(wide, high)
+    figure = Figure(figsize=(wide, high))
     figure.set_layout_engine("none")
     axes = figure.add_axes((_SIDE / wide, _BELOW / high, _WIDTH / wide, sheet / high))
     axes.set_axis_off()

@@ -1,4 +1,4 @@
-"""Labels, units and titles of the figures, from the dataset's attributes."""
+"""Words of the figures, from the dataset's attributes."""
 
 from __future__ import annotations
 
@@ -7,10 +7,7 @@ import textwrap
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from ringsim.plots import style
 from ringsim.variables import Status
 
 _PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
@@ -48,10 +45,15 @@ def largest_magnitude(variable: xr.DataArray) -> float:
     return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
+def deployment_time(dataset: xr.Dataset) -> float:
+    """Time at which the last V-joint locked (s), NaN if it did not."""
+    return float(dataset.get("deployment_time", math.nan))
+
+
 def ending(dataset: xr.Dataset) -> str:
     """How the run ended, in one sentence."""
     word = Status(int(dataset["status"])).word.replace("_", " ")
-    deployed = style.deployment_time(dataset)
+    deployed = deployment_time(dataset)
     final = float(dataset.get("final_time", math.nan))
     if word == "ok" and math.isfinite(deployed):
         return f"Deployed after {deployed:.2f} s"
@@ -61,16 +63,7 @@ def ending(dataset: xr.Dataset) -> str:
     return f"{start}: {reason}" if reason else start
 
 
-def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: float = 8.0) -> None:
-    """Subject and scene above the figure, how the run ended above its first axes."""
-    inches = figure.get_size_inches()[0]
-    title = f"{subject}: {dataset.attrs.get('title', '')}".rstrip(": ")
-    style.title(figure, _balanced(title, int(10.3 * inches)))
-    lines = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
-    axes.set_title("\n".join(lines), pad=pad)
-
-
-def _balanced(text: str, width: int) -> str:
+def balanced(text: str, width: int) -> str:
     """Break a text into as few lines as fit, all about equally long."""
     lines = len(textwrap.wrap(text, width))
     fitting = (w for w in range(1, width + 1) if len(textwrap.wrap(text, w)) <= lines)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 from ringsim.plots import style, wording
 
@@ -59,8 +60,8 @@ def test_ending_tells_success_failure_and_the_lack_of_an_end(deployed, failed, u
 
 def test_a_long_title_is_broken_into_even_lines(deployed):
     run = deployed.assign_attrs(title="word " * 30)
-    figure = style.new_figure(8.0, 3.0)
-    wording.head(figure, figure.subplots(), run, "Subject")
+    figure = Figure(figsize=(8.0, 3.0))
+    style.head(figure, figure.subplots(), run, "Subject")
     lines = figure.get_suptitle().splitlines()
     assert len(lines) == 2
     assert abs(len(lines[0]) - len(lines[1])) <= len("word ")
