@@ -232,10 +232,14 @@ def borders(whole: xr.Dataset) -> list[list[str]]:
             ranges = [
                 f"{values[r[0]]:g} .. {values[r[-1]]:g}" if r else "none" for r in (longest, some)
             ]
-            label, units = (str(group[f"{axis}_{word}"].values) for word in ("label", "units"))
-            label += "" if units == "1" else f" ({units})"
-            rows.append([str(group["title"].values), label, *ranges, *beyond])
+            rows.append([str(group["title"].values), axis_label(group, axis), *ranges, *beyond])
     return rows
+
+
+def axis_label(group: xr.Dataset, axis: str) -> str:
+    """What stands on an axis ("x" or "y") of one panel, with its unit."""
+    label, units = (str(group[f"{axis}_{word}"].values) for word in ("label", "units"))
+    return label if units == "1" else f"{label} ({units})"
 
 
 def _causes(whole: xr.Dataset) -> str:

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ringsim.plots import style, wording
+from ringsim.plots import style
 
 
 @style.styled
@@ -26,9 +26,9 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     axes.plot(values["time"], values, color=style.BLUE)
     stated = float(dataset.get("asynchrony_max", math.nan))
     style.span_sizes(axes, np.append(values.values, stated))
-    axes.set_ylabel(wording.label(values, width=40))
+    axes.set_ylabel(style.label(values, width=40))
     style.time_axes(dataset, values, axes)
-    moment = wording.deployment_time(dataset)
+    moment = style.deployment_time(dataset)
     moving = values if math.isnan(moment) else values.where(values["time"] <= moment, drop=True)
     if moving.size:
         _mark_largest(axes, moving, stated)

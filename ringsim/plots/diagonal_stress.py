@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ringsim.plots import style, wording
+from ringsim.plots import style
 
 _COLOURS = (style.INK, "#d00000", style.BLUE, style.GREEN, style.ORANGE, style.PURPLE)
 _HALVES: dict[str, Any] = {"left": "-", "right": (0, (4, 1.6))}
@@ -36,7 +36,7 @@ def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) 
         )
     stress = dataset["rod_stress"].sel(section=list(chosen))
     stress = stress.sel(rod=stress["rod"].str.startswith("diagonal_"))
-    factor, units = wording.readable_units(stress)
+    factor, units = style.readable_units(stress)
     diagonals = list(dict.fromkeys(rod.split("_")[1] for rod in stress["rod"].values.tolist()))
     figure = Figure(figsize=(8.6, 2.9 * len(diagonals) + 0.9))
     grid = figure.subplots(len(diagonals), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
@@ -51,7 +51,7 @@ def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) 
         style.name_panel(axes, f"{diagonal} diagonal")
     style.span_sizes(grid[0], factor * stress.values)
     style.time_axes(dataset, stress, *grid)
-    figure.supylabel(wording.label(stress, units), fontsize=10.5)
+    figure.supylabel(style.label(stress, units), fontsize=10.5)
     entries = [Line2D([], [], color=colour, label=f"section {n}") for n, colour in coloured]
     entries += [
         Line2D([], [], color=style.GREY, linestyle=dashes, linewidth=1.2, label=f"{half} half")

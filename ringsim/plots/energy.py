@@ -7,7 +7,7 @@ import math
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ringsim.plots import style, wording
+from ringsim.plots import style
 
 _LOOKS = {
     "work": (style.INK, "-"),
@@ -26,20 +26,20 @@ def energy(dataset: xr.Dataset) -> Figure:
     """
     figure = Figure(figsize=(8.0, 5.8))
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(5, 2))
-    factor, units = wording.readable_units(*(dataset[name] for name in _LOOKS))
+    factor, units = style.readable_units(*(dataset[name] for name in _LOOKS))
     for name, (colour, dashes) in _LOOKS.items():
-        look = {"color": colour, "linestyle": dashes, "label": dataset[name].attrs["long_name"]}
-        upper.plot(dataset["time"], factor * dataset[name], **look)
+        (line,) = upper.plot(dataset["time"], factor * dataset[name], color=colour)
+        line.set(linestyle=dashes, label=dataset[name].attrs["long_name"])
     upper.margins(y=0.08)
     upper.set_ylabel(f"Energy ({units})")
     upper.legend(loc="best")
     lack = imbalance(dataset)
-    factor, units = wording.readable_units(lack)
+    factor, units = style.readable_units(lack)
     lower.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1.2)
     lower.plot(lack["time"], factor * lack, color=style.PURPLE)
     lower.set_ylabel(f"Imbalance ({units})")
     if math.isfinite(error := float(dataset.get("energy_error", math.nan))):
-        lower.set_title(f"{wording.label(dataset['energy_error'])}: {error:.1e}")
+        lower.set_title(f"{style.label(dataset['energy_error'])}: {error:.1e}")
     style.time_axes(dataset, dataset["work"], upper, lower)
     style.head(figure, upper, dataset, "Energy")
     return figure

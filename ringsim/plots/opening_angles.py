@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-from ringsim.plots import style, wording
+from ringsim.plots import style
 
 _LEAST_SPAN = 0.01
 """Smallest range (degree) of the axis of deviations, so that round-off is not magnified."""
@@ -38,15 +38,13 @@ def opening_angles(dataset: xr.Dataset) -> Figure:
         _mark_locks(upper, dataset, plane)
         style.name_panel(upper, f"{plane} plane", height=0.91)
         style.time_axes(dataset, angle, upper, lower)
-    _limits(grid, angle, deviation, wording.deployment_time(dataset))
-    grid[0, 0].set_ylabel(wording.label(angle))
+    _limits(grid, angle, deviation, style.deployment_time(dataset))
+    grid[0, 0].set_ylabel(style.label(angle))
     grid[1, 0].set_ylabel(f"Deviation from\nthe mean ({angle.attrs.get('units', '')})")
     figure.align_ylabels(grid[:, 0])
     if sections.size > 1:
-        bar = figure.colorbar(lines, ax=grid, aspect=40, pad=0.015)
-        bar.set_label(wording.label(sections))
-        bar.set_ticks(_section_ticks(sections.values))
-        bar.ax.tick_params(length=0)
+        bar = figure.colorbar(lines, ax=grid, aspect=40, pad=0.015, label=style.label(sections))
+        bar.set_ticks(MaxNLocator(12, integer=True))
         bar.minorticks_off()
         bar.outline.set_visible(False)
     style.head(figure, grid[0, 0], dataset, "Opening angles")
@@ -85,12 +83,5 @@ def _limits(grid: np.ndarray, angle: xr.DataArray, deviation: xr.DataArray, mome
     for axes in grid[0]:
         axes.yaxis.set_major_locator(MultipleLocator(30.0))
     moving = deviation.where(deviation["time"] <= moment) if math.isfinite(moment) else deviation
-    span = max(1.15 * wording.largest_magnitude(moving), _LEAST_SPAN)
+    span = max(1.15 * style.largest_magnitude(moving), _LEAST_SPAN)
     grid[1, 0].set_ylim(-span, span)
-
-
-def _section_ticks(sections: np.ndarray) -> list[int]:
-    """At most about twelve, at multiples of a round number, and the first section."""
-    step = next((s for s in (1, 2, 3, 5, 6, 10, 12, 20, 30) if len(sections) <= 12 * s), 60)
-    inner = sections[sections % step == 0]
-    return sorted({int(sections[0]), *inner[inner > step // 2].tolist()})

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 from scipy.constants import kilogram_force
 
-from ringsim.plots import style, wording
+from ringsim.plots import style
 
 _PASSAGES = (("reeled in", style.BLUE, "-"), ("reeled out", style.ORANGE, (0, (5, 1.5))))
 _SHOWN = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -30,7 +30,7 @@ def tension_over_length(dataset: xr.Dataset) -> Figure:
         axes.plot(lengths, values, color=colour, linestyle=dashes, label=name)
     _length_axis(axes, dataset)
     axes.set_ylim(0.0, 1.12 * (peak := float(tension.max())))
-    axes.set_ylabel(wording.label(tension))
+    axes.set_ylabel(style.label(tension))
     both_ways = (lambda n: np.divide(n, kilogram_force), lambda w: np.multiply(w, kilogram_force))
     weight = axes.secondary_yaxis("right", functions=both_ways)
     weight.set_ylabel("Tension (kgf)")
@@ -69,7 +69,7 @@ def strain_over_length(dataset: xr.Dataset) -> Figure:
     for name, _, dashes in _PASSAGES:
         left.plot([], [], color=style.GREY, linestyle=dashes, label=name)
     _length_axis(left, dataset)
-    left.set_ylabel(wording.label(strain))
+    left.set_ylabel(style.label(strain))
     left.set_ylim(0.0, 1.35 * float(strain.max()))
     left.legend(loc="upper left", ncols=2)
     left.ticklabel_format(axis="y", scilimits=(0, 0), useMathText=True)
@@ -88,7 +88,7 @@ def _draw_along(axes: Axes, lengths: xr.DataArray, strain: xr.DataArray) -> None
             color=colours(number), label=f"{float(lengths[moment]):.0f} mm of cable",
         )  # fmt: skip
     axes.set_xlim(left=0.0)
-    axes.set_xlabel(wording.label(strain["station"], "mm", width=40))
+    axes.set_xlabel(style.label(strain["station"], "mm", width=40))
     axes.legend(loc="upper left")
 
 
@@ -102,4 +102,4 @@ def _split(dataset: xr.Dataset, values: xr.DataArray) -> list[tuple[xr.DataArray
 
 def _length_axis(axes: Axes, dataset: xr.Dataset) -> None:
     axes.set_xlim(0.0, 1100.0 * float(dataset["cable_length"].max()))
-    axes.set_xlabel(wording.label(dataset["cable_length"], "mm"))
+    axes.set_xlabel(style.label(dataset["cable_length"], "mm"))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ringsim.layout.lines import lines_of
 from ringsim.layout.of_scene import layout_at_opening, layout_of
-from ringsim.plots import style, wording
+from ringsim.plots import style
 from ringsim.scene import Scene, scene_from_toml
 
 Array = NDArray[np.float64]
@@ -53,7 +53,8 @@ def ring(dataset: xr.Dataset) -> Figure:
     height = float(sizes[:, 1].max())
     scale, cells = _fit(sizes[:, 0], height)
     wide, high = _WIDTH + 2 * _SIDE, _BELOW + height * scale + _ABOVE
-    figure = Figure(figsize=(wide, high), layout="none")
+    figure = Figure(figsize=(wide, high))
+    figure.set_layout_engine("none")
     # Axes in metre whose frame is the drawing, between room for words above and below.
     axes = figure.add_axes((_SIDE / wide, _BELOW / high, _WIDTH / wide, height * scale / high))
     axes.set_axis_off()
@@ -65,9 +66,8 @@ def ring(dataset: xr.Dataset) -> Figure:
         _caption(axes, middles[number], *moments[number])
     _scale_bar(axes, _WIDTH / scale, height)
     drawn = {name for names, _, _ in shots for name in names}
-    entries = [
-        Line2D([], [], **({"label": name} | look)) for name, look in _LOOKS.items() if name in drawn
-    ]
+    looks = [{"label": name} | look for name, look in _LOOKS.items() if name in drawn]
+    entries = [Line2D([], [], **look) for look in looks]
     figure.legend(handles=entries, loc="lower center", ncols=len(entries))
     style.head(figure, axes, dataset, "Deployment", pad=72.0 * _BAR)
     return figure
@@ -75,8 +75,7 @@ def ring(dataset: xr.Dataset) -> Figure:
 
 def lines_at(scene: Scene, openings: Array) -> dict[str, Array]:
     """Lines of a scene at opening angles in rad, shape (planes, sections): see ``lines_of``."""
-    net = scene.net
-    beyond = 0.0 if net is None or net.two_sided else net.neutral_length
+    beyond = 0.0 if scene.net is None or scene.net.two_sided else scene.net.neutral_length
     return lines_of(layout_at_opening(scene, float(openings.mean())), openings, taut_beyond=beyond)
 
 
@@ -105,13 +104,12 @@ def view(points: Array, azimuth: float, elevation: float) -> tuple[Array, Array]
 def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
     """Name and opening angles (plane, section) of the three recorded instants to draw.
 
-    The first time, the time at which the mean opening angle is nearest to the middle between
-    the ends, and the deployment, at which every V-joint stands at 180 deg by definition, or the
-    last recorded time if it was not reached.
+    The first, the one whose mean opening angle is nearest to the middle between the ends, and the
+    deployment, at which every V-joint stands at 180 deg by definition, or else the last.
     """
     angle = dataset["opening_angle"].dropna("time", how="any")
     mean = angle.mean(("plane", "section")).values
-    deployed = wording.deployment_time(dataset)
+    deployed = style.deployment_time(dataset)
     done = math.isfinite(deployed)
     last = int(np.abs(angle["time"].values - deployed).argmin()) if done else len(mean) - 1
     middle = int(np.abs(mean[: last + 1] - 0.5 * (mean[0] + mean[last])).argmin())

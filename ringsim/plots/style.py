@@ -1,4 +1,4 @@
-"""Style, axes and headings shared by all figures."""
+"""Style, words and axes shared by all figures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from ringsim.plots import wording
+from ringsim.variables import Status
 
 INK, GREY, PALE = "#222222", "#6e6e6e", "#e4e4e4"
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
@@ -28,6 +28,8 @@ PAPER: Any = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.
 """Background of text on a grid."""
 _FLAT = 0.05
 """Median over largest value below which the axis becomes logarithmic."""
+_PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
+_PREFIXED = ("J", "Pa", "N", "W")
 
 styled = matplotlib.style.context(Path(__file__).with_name("figures.mplstyle"))
 """Decorator: draw with the shared style, and leave matplotlib's global settings as they were."""
@@ -51,14 +53,65 @@ def title(figure: Figure, text: str) -> None:
     figure.suptitle(text, x=0.012, ha="left")
 
 
+def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> str:
+    """Meaning and unit of a variable, as on an axis: "Time since the start of the run (s)".
+
+    ``units`` replaces the variable's own where its values were scaled; lines longer than
+    ``width`` characters are broken.
+    """
+    words = str(variable.attrs.get("long_name", variable.name))
+    units = str(variable.attrs.get("units", "1")) if units is None else units
+    words = words[:1].upper() + words[1:]
+    return textwrap.fill(words if units == "1" else f"{words} ({units})", width)
+
+
+def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
+    """Factor and prefixed unit that scale the largest value to between 0.5 and 500.
+
+    The variables share one unit; only J, Pa, N and W get a prefix.
+    """
+    units = str(variables[0].attrs.get("units", "1"))
+    largest = max(largest_magnitude(v) for v in variables)
+    if units not in _PREFIXED or largest == 0.0:
+        return 1.0, units
+    power = min(max(math.floor(math.log10(2.0 * largest) / 3.0), -4), 3)
+    return 1000.0**-power, _PREFIXES[power] + units
+
+
+def largest_magnitude(variable: xr.DataArray) -> float:
+    """Largest finite absolute value, 0 if there is none."""
+    values = variable.values
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def deployment_time(dataset: xr.Dataset) -> float:
+    """Time at which the last V-joint locked (s), NaN if it did not."""
+    return float(dataset.get("deployment_time", math.nan))
+
+
+def ending(dataset: xr.Dataset) -> str:
+    """How the run ended, in one sentence."""
+    word = Status(int(dataset["status"])).word.replace("_", " ")
+    deployed = deployment_time(dataset)
+    final = float(dataset.get("final_time", math.nan))
+    if word == "ok" and math.isfinite(deployed):
+        return f"Deployed after {deployed:.2f} s"
+    reason = str(dataset.attrs.get("reason", "")).strip()
+    start = "Ended" if word == "ok" else word[:1].upper() + word[1:]
+    start += f" after {final:.4g} s" if math.isfinite(final) else ""
+    return f"{start}: {reason}" if reason else start
+
+
 def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: float = 8.0) -> None:
     """Subject and scene above the figure, how the run ended above its first axes."""
     inches = figure.get_size_inches()[0]
-    heading = f"{subject}: {dataset.attrs.get('title', '')}".rstrip(": ")
-    title(figure, wording.balanced(heading, int(10.3 * inches)))
-    ending = wording.ending(dataset)
-    lines = textwrap.wrap(ending, int(11.5 * inches), max_lines=2, placeholder=" ...")
-    axes.set_title("\n".join(lines), pad=pad)
+    words, width = f"{subject}: {dataset.attrs.get('title', '')}".rstrip(": "), int(10.3 * inches)
+    lines = len(textwrap.wrap(words, width))
+    # The narrowest text with as few lines: all are about equally long.
+    fitting = (w for w in range(1, width) if len(textwrap.wrap(words, w)) <= lines)
+    title(figure, textwrap.fill(words, next(fitting, width)))
+    end = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
+    axes.set_title("\n".join(end), pad=pad)
 
 
 def section_colours(sections: int) -> Colormap:
@@ -74,11 +127,11 @@ def time_axes(
     It spans the times at which something was ``recorded``.  A dashed line marks where the last
     V-joint locked, if it did, with its time above the first panel where that is ``named``.
     """
-    panels[-1].set_xlabel(wording.label(dataset["time"]))
+    panels[-1].set_xlabel(label(dataset["time"]))
     time = recorded.dropna("time", how="all")["time"].values
     if len(time) > 1:
         panels[0].set_xlim(float(time[0]), float(time[-1]))
-    moment = wording.deployment_time(dataset)
+    moment = deployment_time(dataset)
     if math.isnan(moment):
         return
     for axes in panels:
