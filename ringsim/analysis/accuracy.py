@@ -53,7 +53,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     """Errors, orders, cost and the efficient frontier of a ladder.
 
     ``results`` are ``NEEDED`` variables over ``rung``, one entry for each of the ``rungs``, those
-    of the reference among them; ``truths`` are independent values, if any.
+    of the reference among them.
 
     Returns
     -------
@@ -70,19 +70,21 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     """
     errors = Errors(results, rungs)
     outputs = list(errors.of)
-    error = np.array([errors.of[name] for name in outputs]).T
-    own = np.array([errors.uncertainty[name] for name in outputs])
+    error = np.array(list(errors.of.values())).T
+    own = np.array(list(errors.uncertainty.values()))
     good = bounds(error, rungs, own)
     counts = {name: results[name].to_numpy().astype(float) for name in _COUNTS}
     residuals = counts.pop("newton_iterations") + counts["steps"]
     work = np.column_stack([residuals, counts["jacobians"], counts["steps"]])
-    cost = typical_cost(counts["cpu_time"], work, rungs)
-    cost = np.where(errors.good, cost, counts["cpu_time"])
+    seconds = counts["cpu_time"]
+    cost = np.where(errors.good, typical_cost(seconds, work, rungs), seconds)
     ladders = [rung.ladder for rung in rungs]
     choice = np.array([ladder not in _OTHER_MODELS for ladder in ladders])
     ranked = np.where(choice[:, None], good, np.nan)
     graded, orders = errors.orders()
-    pick = cheapest(in_favour(cost, ladders), ranked, TARGETS)
+    within = ranked <= np.array(TARGETS)[:, None, None]
+    costs = np.where(within, in_favour(cost, ladders)[:, None], np.inf)
+    pick = np.where(within.any(axis=1), costs.argmin(axis=1), -1)
     best = [errors.best.get(name, np.nan) for name in outputs]
     both, one = ("rung", "output"), ("rung",)
     rows: list[tuple[str, tuple[str, ...], Any, str, str]] = [
@@ -111,10 +113,19 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         units = "s" if path == "solver.step" else ""
         values = [rung.values[path] for rung in rungs]
         rows.append((path.replace(".", "_"), one, values, f"setting {path}", units))
+    if truths:
+        apart = np.array([_distances(errors, truth) for truth in truths])
+        text, of_rungs = "distance from values of other origin, relative", apart[:, :-1]
+        rows += [
+            ("from_truth", ("rung", "truth"), np.where(errors.good, of_rungs, np.nan).T, text, "1"),
+            ("reference_from_truth", ("truth",), apart[:, -1], f"reference: {text}", "1"),
+        ]
     found = xr.Dataset(coords={"output": outputs, "target": list(TARGETS), "graded": graded})
     for name, dims, values, text, units in rows:
         found[name] = (dims, values, {"long_name": text} | ({"units": units} if units else {}))
-    return _add_truths(found, errors, truths)
+    if truths:
+        found["truth"] = [f"{truth.output}: {truth.source}" for truth in truths]
+    return found
 
 
 def settings_at(found: xr.Dataset, rung: int) -> dict[str, Any]:
@@ -122,29 +133,15 @@ def settings_at(found: xr.Dataset, rung: int) -> dict[str, Any]:
     return {path: found[path.replace(".", "_")].values.tolist()[rung] for path in PATHS}
 
 
-def _add_truths(found: xr.Dataset, errors: Errors, truths: Sequence[Truth]) -> xr.Dataset:
-    """How far every rung and the reference are from values of other origin, relative."""
-    distances = []
-    for name, _, value in truths:
-        values, best = errors.until_the_end(name), errors.best_of(name).value
-        both = xr.concat([values, best.expand_dims("rung")], "rung")
-        if name == "opening_angle":
-            expected = xr.DataArray(value, dims="time", coords={"time": errors.results.time})
-            apart = largest(both.mean(("plane", "section")) - expected) / errors.scale(name, best)
-        else:
-            apart = np.abs(both.to_numpy() / value - 1.0)
-        distances.append(apart)
-    if not truths:
-        return found
-    distance = np.array(distances)
-    words = {"long_name": "distance from values of other origin, relative", "units": "1"}
-    of_rungs = np.where(errors.good, distance[:, :-1], np.nan).T
-    return found.assign(
-        from_truth=(("rung", "truth"), of_rungs, words),
-        reference_from_truth=(
-            "truth", distance[:, -1], words | {"long_name": f"reference: {words['long_name']}"}
-        ),
-    ).assign_coords(truth=[f"{truth.output}: {truth.source}" for truth in truths])  # fmt: skip
+def _distances(errors: Errors, truth: Truth) -> Array:
+    """How far every rung, and last the reference, is from a value of other origin, relative."""
+    values, best = errors.until_the_end(truth.output), errors.best_of(truth.output).value
+    both = xr.concat([values, best.expand_dims("rung")], "rung")
+    if truth.output != "opening_angle":
+        return np.asarray(np.abs(both.to_numpy() / truth.value - 1.0))
+    expected = xr.DataArray(truth.value, dims="time", coords={"time": errors.results.time})
+    apart = largest(both.mean(("plane", "section")) - expected)
+    return apart / errors.scale(truth.output, best)
 
 
 def bounds(error: Array, rungs: Sequence[Rung], uncertainty: Array) -> Array:
@@ -152,10 +149,8 @@ def bounds(error: Array, rungs: Sequence[Rung], uncertainty: Array) -> Array:
 
     ``error`` has that shape, too, and ``uncertainty``, of the reference, shape (output,).
     """
-    worst = [
-        np.fmax.reduce(error[[k, *(j for j, other in enumerate(rungs) if _refines(other, rung))]])
-        for k, rung in enumerate(rungs)
-    ]
+    as_fine = [[a is b or _refines(a, b) for a in rungs] for b in rungs]
+    worst = [np.fmax.reduce(error[finer]) for finer in as_fine]
     return np.where(np.isfinite(error), worst, np.nan) + uncertainty
 
 
@@ -177,12 +172,12 @@ def typical_cost(seconds: Array, work: Array, rungs: Sequence[Rung]) -> Array:
     and elements: fitted to the measured ``seconds``, shape (rung,), and the counts of ``work``,
     shape (rung, kinds).  A fidelity keeps its own time.
     """
-    cost, measured = np.array(seconds, dtype=float), np.isfinite(seconds)
+    cost, measured = seconds.copy(), np.isfinite(seconds)
     sizes = [
         () if r.ladder == "fidelity" else (r.values["rods.kind"], r.values["rods.elements"])
         for r in rungs
     ]
-    commonest = max(set(sizes), key=sizes.count)
+    commonest = max(sizes, key=sizes.count)
     own = np.array([size == commonest for size in sizes]) & measured
     scale = 1.0 / np.maximum(seconds[own], 1e-9)  # relative errors count
     shares, _ = nnls(work[own] * scale[:, None], np.ones(own.sum()))
@@ -207,10 +202,3 @@ def frontier(cost: Array, error: Array) -> NDArray[np.bool_]:
 def in_favour(cost: Array, ladders: Sequence[str]) -> Array:
     """Cost by which settings are picked: the scene's own is kept unless another one pays."""
     return cost * np.where(np.array(ladders) == STANDING, WORTH_A_CHANGE, 1.0)
-
-
-def cheapest(cost: Array, error: Array, targets: Sequence[float]) -> NDArray[np.int64]:
-    """The cheapest setting within each target, shape (target, output); -1 if there is none."""
-    within = error <= np.array(targets)[:, None, None]
-    costs = np.where(within, cost[:, None], np.inf)
-    return np.where(within.any(axis=1), costs.argmin(axis=1), -1)

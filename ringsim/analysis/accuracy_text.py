@@ -12,7 +12,8 @@ from ringsim.tables import markdown_table
 from ringsim.variables import Status
 
 _NAMES = OUTPUTS | {group: f"all {group}" for group in GROUPS}
-_THEORY = {"steps": "2", "constant step": "2", "elements": "2", "formulation": "2"}
+_THEORY = 2
+"""Order of the integrator, and of the elements."""
 _ADVICE = (
     "The cheapest setting that is good for an error. What a setting is good for is the largest "
     "error among itself and all finer settings, plus the reference's uncertainty: a single error "
@@ -66,18 +67,15 @@ def in_words(found: xr.Dataset, rung: int) -> str:
 
 def _advice(found: xr.Dataset) -> str:
     ideal = np.flatnonzero(found.ladder.values == "fidelity")
-    targets, rows = found.target.values, []
-    for column, name in enumerate(_names(found)):
-        cells = [name]
-        for target, cheapest in zip(targets, found.cheapest.values[:, column], strict=True):
-            picked = [int(cheapest), *ideal[found.bound.values[ideal, column] <= target]]
-            words = [
-                f"{in_words(found, k)}, {found.cost.values[k]:.3g} s" for k in picked if k >= 0
-            ]
-            coarse = found.uncertainty.values[column] >= target
-            otherwise = "reference too coarse" if coarse else "none tried"
-            cells.append("; or ".join(words) or otherwise)
-        rows.append(cells)
+    targets, rows = found.target.values.tolist(), []
+    for name, column in zip(_names(found), found.output, strict=True):
+        of = found.sel(output=column)
+        rows.append([name])
+        for target, cheapest in zip(targets, of.cheapest.values, strict=True):
+            picked = [cheapest, *ideal[of.bound.values[ideal] <= target]]
+            words = [f"{in_words(of, k)}, {of.cost.values[k]:.3g} s" for k in picked if k >= 0]
+            otherwise = "reference too coarse" if of.uncertainty >= target else "none tried"
+            rows[-1].append("; or ".join(words) or otherwise)
     return markdown_table(["error of", *(f"{target:g}" for target in targets)], rows)
 
 
@@ -101,7 +99,7 @@ def _errors(found: xr.Dataset) -> str:
 
 def _orders(found: xr.Dataset) -> str:
     rows = [
-        [name, _THEORY.get(name, ""), *(f"{o:.1f}" if np.isfinite(o) else "-" for o in orders)]
+        [name, _THEORY, *(f"{o:.1f}" if np.isfinite(o) else "-" for o in orders)]
         for name, orders in zip(found.graded.values.tolist(), found.order.values, strict=True)
     ]
     return markdown_table(["ladder", "theory", *_names(found)], rows)
@@ -109,11 +107,10 @@ def _orders(found: xr.Dataset) -> str:
 
 def _truths(found: xr.Dataset) -> str:
     rows = []
-    standing = found.from_truth.values[_standing(found)]
-    gaps = zip(found.reference_from_truth.values, standing, strict=True)
-    for name, both in zip(found.truth.values.tolist(), gaps, strict=True):
-        output, _, source = name.partition(": ")
-        rows.append([f"{_NAMES.get(output, output)}, {source}", *(f"{gap:.1e}" for gap in both)])
+    for of in (found.sel(truth=name) for name in found.truth):
+        output, _, source = of.truth.item().partition(": ")
+        gaps = (of.reference_from_truth.item(), of.from_truth.values[_standing(found)])
+        rows.append([f"{_NAMES.get(output, output)}, {source}", *(f"{gap:.1e}" for gap in gaps)])
     return markdown_table(["value", "reference", STANDING], rows)
 
 

@@ -1,8 +1,4 @@
-"""Settings that were measured to be worth their cost, and picking one for a wanted accuracy.
-
-An accuracy study leaves a small table of the settings on its efficient frontiers; those of the
-built-in scenes come with the package.
-"""
+"""Settings that an accuracy study found worth their cost, and picking one for an accuracy."""
 
 from __future__ import annotations
 
@@ -44,13 +40,13 @@ class Setting(Model):
 class Evidence(Model):
     """The settings of one scene that are worth their cost, cheapest first.
 
-    The scene's own setting comes before others that are hardly cheaper.  ``kind`` is that of
-    :func:`kind_of_scene`.
+    The scene's own setting comes before others that are hardly cheaper.
     """
 
     model_config = ConfigDict(extra="ignore")
     scene: str
     kind: dict[str, Any]
+    """See :func:`kind_of_scene`."""
     settings: Annotated[tuple[Setting, ...], ListIn, Field(min_length=1)]
 
     def pick(self, accuracy: float, of: str = JUDGED_BY) -> Setting:
@@ -108,15 +104,14 @@ def evidence_of(found: xr.Dataset) -> Evidence:
     ``found`` is from :func:`ringsim.analysis.accuracy.judge`; its attribute ``scene`` is its scene.
     """
     scene = scene_from_toml(found.attrs["scene"], source="the study's scene")
-    outputs = [str(name) for name in found.output.values]
     usable = found.eligible.values & np.isfinite(found.bound.values).any(axis=1)
     cost = np.where(usable, in_favour(found.cost.values, found.ladder.values), np.inf)
     settings: list[Setting] = []
     best: dict[str, float] = {}
     for rung in np.argsort(cost, kind="stable")[: usable.sum()].tolist():
-        bounds = zip(outputs, found.bound.values[rung].tolist(), strict=True)
+        bounds = found.bound[rung].to_series().dropna().items()
         # Rounded up: a setting is good for no less.
-        errors = {name: float(f"{1.0049 * e:.2e}") for name, e in bounds if np.isfinite(e)}
+        errors = {str(name): float(f"{1.0049 * e:.2e}") for name, e in bounds}
         if better := {name: e for name, e in errors.items() if e < best.get(name, np.inf)}:
             best |= better
             values = settings_at(found, rung)

@@ -69,22 +69,21 @@ def ladder(scene: Scene) -> list[Rung]:
     for step in (_rounded(share * solver.step) for share in (0.1, 0.05, 0.025) if follows):
         constant = {"solver.step_control": "constant", "solver.step": step}
         add("constant step", f"{step:g} s", step, constant | tight)
-    for elements in (one, 2 * one, 4 * one):
-        changes = _scaled(scene, 1.0 / 8.0) | tight | {"rods.elements": elements}
-        add("elements", f"{elements}", 1.0 / elements, changes)
+    meshes = [("elements", "", _scaled(scene, 1.0 / 8.0))]
     if kind_of(scene.structure) == "pantograph-ring" and scene.cables is None:
         other = "ancf" if kind_of(scene.rods) != "ancf" else "geometrically-exact"
-        rods = _scaled(scene, 1.0 / 4.0) | tight | {"rods.kind": other}
+        rods = _scaled(scene, 1.0 / 4.0) | {"rods.kind": other}
+        meshes.append(("formulation", f"{other}, ", rods))
+    for name, rods_are, changes in meshes:
         for elements in (one, 2 * one, 4 * one):
-            changes = rods | {"rods.elements": elements}
-            add("formulation", f"{other}, {elements}", 1.0 / elements, changes)
+            own = changes | tight | {"rods.elements": elements}
+            add(name, f"{rods_are}{elements}", 1.0 / elements, own)
     for radius in (0.5, 0.8, 0.9, 0.95):
         add("dissipation", f"{radius:g}", 0.0, {"solver.spectral_radius": radius})
     for tolerance in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
         add("newton", f"{tolerance:g}", 0.0, {"solver.newton_tolerance": tolerance})
     for coarser, newtons, more in _SETTINGS:
-        newton = max(newtons * solver.newton_tolerance, tight["solver.newton_tolerance"])
-        changes = {"solver.newton_tolerance": _rounded(newton), "rods.elements": more * one}
+        newton = _rounded(max(newtons * solver.newton_tolerance, *tight.values()))
         scaled = _scaled(scene, coarser**0.5)
         if follows:
             del scaled["solver.step"]
@@ -93,13 +92,12 @@ def ladder(scene: Scene) -> list[Rung]:
                 continue  # the scene's own tolerance is the end of what is allowed
             label = f"tolerance {tolerance:g}"
         else:
-            step = scaled["solver.step"]
-            scaled["solver.step"] = solver.step if coarser == 1.0 else float(f"{step:.2g}")
-            label = f"step {scaled['solver.step']:g} s"
-        changed = changes["solver.newton_tolerance"]
-        label += f", newton {changed:g}" if changed != solver.newton_tolerance else ""
+            step = solver.step if coarser == 1.0 else float(f"{scaled['solver.step']:.2g}")
+            scaled["solver.step"], label = step, f"step {step:g} s"
+        label += f", newton {newton:g}" if newton != solver.newton_tolerance else ""
         label += f", {more * one} elements" if more > 1 else ""
-        add("setting", label, 0.0, changes | scaled)
+        scaled |= {"solver.newton_tolerance": newton, "rods.elements": more * one}
+        add("setting", label, 0.0, scaled)
     return found
 
 
@@ -111,10 +109,7 @@ def standing(scene: Scene) -> dict[str, Any]:
 
 
 def references(rungs: Sequence[Rung]) -> tuple[list[int], list[int]]:
-    """Places of the three rungs with ever finer steps, and of the three with ever more elements.
-
-    Steps halve and elements double from one to the next.
-    """
+    """Places of three rungs whose steps halve, and of three whose elements double."""
     in_time = [k for k, r in enumerate(rungs) if r.ladder == "steps" and r.size <= _IN_TIME]
     return in_time, [k for k, r in enumerate(rungs) if r.ladder == "elements"]
 

@@ -6,6 +6,8 @@ reason name a cause, and "wrong" if it says ok and is not, or fails without a ca
 
 from __future__ import annotations
 
+import itertools
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 from ringsim.analysis.errors import held
 from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
+from ringsim.tables import markdown_table
 from ringsim.variables import Cause, Status
 
 OK, ENDED, WRONG = "ok", "ended", "wrong"
@@ -31,6 +34,8 @@ MORE_STEPS = 1.5
 """Steps of a finer run over those of the cell, at least; Newton may have cut both to the same."""
 ENERGY_PROMISE = Solver().energy_tolerance
 """Largest energy error of an ok cell."""
+_LONGEST_REASON = 300
+"""Characters of an example's reason that are shown."""
 
 _SCALARS = (
     "energy_error", "constraint_error", "restarts", "steps", "cpu_time", "deployment_time",
@@ -61,22 +66,19 @@ def word_of(cause: Cause) -> str:
 def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr.Dataset:
     """The cells of a merged campaign, given the values of the two axes for each of its samples.
 
-    Returns
-    -------
-    xr.Dataset
-        Over ``cell``: ``x``, ``y``, ``status`` (code), ``reason``, ``cause``, ``final_angle`` (mean
-        opening angle at the last output time that was reached, degree) and the run's numbers.
+    Over ``cell``: ``x``, ``y``, ``status`` (code), ``reason``, ``cause``, ``final_angle`` (mean
+    opening angle at the last output time that was reached, degree) and the run's numbers.
     """
     unknown = np.full(campaign.sizes["sample"], np.nan)
     status = campaign["status"].values.astype(int)
-    reasons = campaign["reason"].values.astype(str)
     causes = [
         "" if code == Status.OK else word_of(Cause(cause)) or Status(code).word
         for code, cause in zip(status, campaign["cause"].values.astype(int), strict=True)
     ]
     found = {
-        "x": np.asarray(x, dtype=float), "y": np.asarray(y, dtype=float), "status": status,
-        "reason": reasons.astype(object), "cause": np.array(causes), "final_angle": unknown,
+        "x": np.array(x, dtype=float), "y": np.array(y, dtype=float), "status": status,
+        "reason": campaign["reason"].values.astype(str).astype(object),
+        "cause": np.array(causes), "final_angle": unknown,
     }  # fmt: skip
     if "opening_angle" in campaign:
         angle = campaign["opening_angle"]
@@ -120,20 +122,17 @@ def chosen_for_check(cells: xr.Dataset, share: float, seed: int) -> NDArray[np.i
 def checked(cells: xr.Dataset, which: NDArray[np.int64], finer: xr.Dataset) -> xr.Dataset:
     """Compare cells, those with the numbers ``which``, with what they gave with smaller steps.
 
-    Returns
-    -------
-    xr.Dataset
-        The map with the differences of those cells (see ``PROMISES``), and ``check``: "" (not
-        checked), "holds", "differs", or "unproven" where the finer run did not end or was hardly
-        finer.
+    Returns the map with the differences of those cells (see ``PROMISES``), and ``check``: "" (not
+    checked), "holds", "differs", or "unproven" where the finer run did not end or was hardly finer.
     """
     mine = cells.isel(cell=which)
-    numbers = ["deployment_time", "final_angle", "peak_tension"]
-    apart = abs(mine[numbers] - finer[numbers])
+    time, angle, tension = (
+        abs(mine[name] - finer[name]) for name in ("deployment_time", "final_angle", "peak_tension")
+    )
     differences = (
-        apart["deployment_time"] / abs(finer["deployment_time"]),
-        apart["final_angle"].where(finer["deployment_time"].isnull()),
-        apart["peak_tension"] / abs(finer["peak_tension"]),
+        time / abs(finer["deployment_time"]),
+        angle.where(finer["deployment_time"].isnull()),
+        tension / abs(finer["peak_tension"]),
     )
     found, over = cells.copy(), np.zeros(len(which), dtype=bool)
     for (name, promise), difference in zip(PROMISES.items(), differences, strict=True):
@@ -158,3 +157,112 @@ def joined(groups: Sequence[tuple[dict[str, str], xr.Dataset]]) -> xr.Dataset:
     for key in groups[0][0]:
         whole[key] = ("group", np.array([words[key] for words, _ in groups], dtype=object))
     return judged(whole)
+
+
+def to_markdown(whole: xr.Dataset) -> str:
+    """A judged map as a Markdown text."""
+    head = ["panel", "axis", "all cells ok", "any cell ok", "below", "above"]
+    parts = ["# Stability map", summary(whole), *(_checks(whole) if "check" in whole else ())]
+    parts += ["![How each cell ended](stability.png)"]
+    parts += ["## Borders", markdown_table(head, borders(whole))]
+    parts += ["## What lies beyond", _causes(whole)]
+    if suspects := np.flatnonzero(whole["verdict"] == WRONG).tolist():
+        parts += ["## Wrong cells", "\n".join(_cell(whole, k) for k in suspects)]
+    return "\n\n".join(parts) + "\n"
+
+
+def summary(whole: xr.Dataset) -> str:
+    """The counts in one line."""
+    verdict = whole["verdict"].values
+    words, counts = np.unique(verdict, return_counts=True)
+    ends = ", ".join(f"{count} {word}" for count, word in zip(counts, words, strict=True))
+    anew = int(np.sum((whole["restarts"].values > 0) & (verdict == OK)))
+    minutes = float(whole["cpu_time"].sum()) / 60.0
+    panels = f"{whole.sizes['group']} panel{'s' if whole.sizes['group'] > 1 else ''}"
+    return (
+        f"{len(verdict)} cells in {panels}: {ends}; {anew} of the ok ones after "
+        f"a new start with smaller steps; {minutes:.1f} minutes of processor time"
+    )
+
+
+def _checks(whole: xr.Dataset) -> list[str]:
+    check = whole["check"].values
+    holds, differs, unproven = (np.sum(check == w) for w in ("holds", "differs", "unproven"))
+    time, angle, tension = PROMISES.values()
+    text = (
+        f"{np.sum(check != '')} random ok cells were run again with a quarter of the step and a "
+        f"sixteenth of the tolerance: {holds} held what ok promises ({100 * time:g} % of the "
+        f"deployment time, {angle:g} deg of the mean angle of runs that end before, "
+        f"{100 * tension:g} % of the largest tension), {differs} did not, {unproven} stayed "
+        "unproven because the finer run did not end or was hardly finer."
+    )
+    labels = ("deployment time", "mean angle", "largest tension")
+    lines = []
+    for name, label, unit in zip(PROMISES, labels, ("%", "deg", "%"), strict=True):
+        values = whole[name].dropna("cell").values * (100.0 if unit == "%" else 1.0)
+        if len(values):
+            lines.append(
+                f"- {label}: {np.median(values):.2g} {unit} in the median, "
+                f"{values.max():.2g} {unit} at most ({len(values)} cells)"
+            )
+    return [text, "\n".join(lines)] if lines else [text]
+
+
+def borders(whole: xr.Dataset) -> list[list[str]]:
+    """Between which values of each axis runs are ok, as rows of words.
+
+    Title, axis, the longest range of values at which all cells are ok, the range of those at which
+    any cell is, and the commonest causes just below and above the first range.
+    """
+    rows = []
+    for number in range(whole.sizes["group"]):
+        group = whole.isel(group=number, cell=(whole["of_group"] == number).values)
+        good = (group["verdict"] == OK).values
+        for axis in ("x", "y"):
+            values = np.unique(group[axis].values)
+            columns = [group[axis].values == value for value in values]
+            runs = itertools.groupby(range(len(values)), key=lambda k: good[columns[k]].all())
+            longest = max((list(run) for all_ok, run in runs if all_ok), key=len, default=[])
+            beyond = ["-", "-"]
+            for side, k in enumerate((longest[0] - 1, longest[-1] + 1) if longest else ()):
+                if 0 <= k < len(values):
+                    causes = group["cause"].values[columns[k] & ~good].astype(str).tolist()
+                    beyond[side] = Counter(sorted(causes)).most_common(1)[0][0] or WRONG
+            some = [k for k, column in enumerate(columns) if good[column].any()]
+            ranges = [
+                f"{values[r[0]]:g} .. {values[r[-1]]:g}" if r else "none" for r in (longest, some)
+            ]
+            rows.append([str(group["title"].values), axis_label(group, axis), *ranges, *beyond])
+    return rows
+
+
+def axis_label(group: xr.Dataset, axis: str) -> str:
+    """What stands on an axis ("x" or "y") of one panel, with its unit."""
+    label, units = (str(group[f"{axis}_{word}"].values) for word in ("label", "units"))
+    return label if units == "1" else f"{label} ({units})"
+
+
+def _causes(whole: xr.Dataset) -> str:
+    """Each cause with its number of cells and one reason as it was given."""
+    others = whole.isel(cell=(whole["verdict"] != OK).values)
+    causes, reasons = (others[name].values.astype(str) for name in ("cause", "reason"))
+    words, first, counts = np.unique(causes, return_index=True, return_counts=True)
+    rows = [
+        [words[k] or WRONG, counts[k], reasons[first[k]][:_LONGEST_REASON]]
+        for k in np.argsort(-counts, kind="stable")
+    ]
+    return markdown_table(["cause", "cells", "for example"], rows)
+
+
+def _cell(whole: xr.Dataset, number: int) -> str:
+    cell = whole.isel(cell=number, group=int(whole["of_group"][number]))
+    differences = ", ".join(
+        f"{name.replace('_', ' ')} {float(cell[name]):.2g}"
+        for name in PROMISES
+        if name in cell and np.isfinite(float(cell[name]))
+    )
+    return (
+        f"- {cell['name'].values}: {cell['x_label'].values} = {float(cell['x']):g}, "
+        f"{cell['y_label'].values} = {float(cell['y']):g}: {cell['reason'].values} "
+        f"({differences or 'no cause named'})"
+    )

@@ -69,8 +69,7 @@ def command(
 
 def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float) -> int:
     """Run panels, check some percent of the ok cells, and write the map; returns the exit code."""
-    from ringsim.analysis.stability import WRONG
-    from ringsim.analysis.stability_text import summary, to_markdown
+    from ringsim.analysis.stability import WRONG, summary, to_markdown
     from ringsim.campaign.stability import run_check, run_map
     from ringsim.dataset import save
     from ringsim.plots import style

@@ -31,7 +31,7 @@ def accuracy(found: xr.Dataset) -> Figure:
     finer one.  The ideal ring is named in words: it is too cheap for the axis.  ``found`` is from
     ``ringsim.analysis.accuracy.judge``.
     """
-    titles = {**OUTPUTS, "energy": "energy balance"}
+    titles = OUTPUTS | {"energy": "energy balance"}
     outputs = [name for name in titles if name in found.output.values]
     figure, panels, columns = style.new_panels(len(outputs), 3.6, 3.0, 0.9, sharex=True)
     for k, (panel, name) in enumerate(zip(panels, outputs, strict=True)):
@@ -62,10 +62,9 @@ def _panel(axes: Axes, found: xr.Dataset) -> None:
                 cost[own], error[own], s=size, color=colour, marker=marker, label=name,
                 linewidths=0.0, alpha=0.9, zorder=order,
             )  # fmt: skip
-    best = np.flatnonzero(found.frontier.values & (error > 0.0))
-    best = best[np.argsort(cost[best])]
+    best = found.isel(rung=found.frontier.values & (error > 0.0)).sortby("cost")
     axes.step(
-        cost[best], found.bound.values[best], where="post", color=style.INK, linewidth=1.1,
+        best.cost, best.bound, where="post", color=style.INK, linewidth=1.1,
         label="frontier: good for", zorder=2,
     )  # fmt: skip
     floor, ideal = float(found.uncertainty), ladder == "fidelity"
@@ -74,8 +73,8 @@ def _panel(axes: Axes, found: xr.Dataset) -> None:
         lowest = min(known.min(initial=np.inf), 0.5 * floor or np.inf)
         axes.set_ylim(0.4 * lowest, 30.0 * max(known.max(initial=0.0), floor))
     axes.axhspan(
-        axes.get_ylim()[0], max(floor, axes.get_ylim()[0]), color=style.PALE, zorder=0.5,
-        linewidth=0.0, label="uncertainty of the reference",
+        (low := axes.get_ylim()[0]), max(floor, low), color=style.PALE, zorder=0.5, linewidth=0.0,
+        label="uncertainty of the reference",
     )  # fmt: skip
     for k in np.flatnonzero(ideal & np.isfinite(error)):
         axes.text(

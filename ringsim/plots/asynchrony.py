@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ringsim.plots import style, wording
+from ringsim.plots import style
 
 
 @style.styled
@@ -20,36 +20,34 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     where it is not among them.
     """
     values = dataset["asynchrony"].dropna("time")
-    figure = style.new_figure(8.0, 4.3)
+    figure = Figure(figsize=(8.0, 4.3))
     axes = figure.subplots()
     axes.fill_between(values["time"], values, color=style.SKY, alpha=0.25, linewidth=0.0)
     axes.plot(values["time"], values, color=style.BLUE)
-    style.span_time(axes, values)
     stated = float(dataset.get("asynchrony_max", math.nan))
     style.span_sizes(axes, np.append(values.values, stated))
-    axes.set_xlabel(wording.label(dataset["time"]))
-    axes.set_ylabel(wording.label(values, width=40))
-    style.mark_deployment(dataset, axes)
+    axes.set_ylabel(style.label(values, width=40))
+    style.time_axes(dataset, values, axes)
     moment = style.deployment_time(dataset)
     moving = values if math.isnan(moment) else values.where(values["time"] <= moment, drop=True)
     if moving.size:
         _mark_largest(axes, moving, stated)
-    wording.head(figure, axes, dataset, "Asynchrony")
+    style.head(figure, axes, dataset, "Asynchrony")
     return figure
 
 
 def _mark_largest(axes: Axes, values: xr.DataArray, stated: float) -> None:
-    at, largest = float(values["time"].values[values.values.argmax()]), float(values.max())
-    place, hint = (at, largest), ""
+    at, largest, hint = float(values.idxmax()), float(values.max()), ""
     if stated > 1.01 * largest:
         axes.axhline(stated, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (1, 2)))
-        place, hint = (at, stated), ", between two recorded times"
+        hint = ", between two recorded times"
     else:
-        axes.plot(*place, "o", color=style.VERMILLION, markersize=7, zorder=4, clip_on=False)
+        axes.plot(at, largest, "o", color=style.VERMILLION, markersize=7, zorder=4, clip_on=False)
     number = f"{stated if math.isfinite(stated) else largest:.3g}"
     left = at > 0.5 * axes.get_xlim()[1]
     axes.annotate(
-        f"largest: {number} {values.attrs.get('units', '')}{hint}", place,
+        f"largest: {number} {values.attrs.get('units', '')}{hint}",
+        (at, stated if hint else largest),
         xytext=(-9 if left else 9, 5), textcoords="offset points", va="bottom",
         ha="right" if left else "left", color=style.VERMILLION, bbox=style.PAPER,
     )  # fmt: skip

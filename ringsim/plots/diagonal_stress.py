@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ringsim.plots import style, wording
+from ringsim.plots import style
 
 _COLOURS = (style.INK, "#d00000", style.BLUE, style.GREEN, style.ORANGE, style.PURPLE)
 _HALVES: dict[str, Any] = {"left": "-", "right": (0, (4, 1.6))}
@@ -19,18 +19,8 @@ _HALVES: dict[str, Any] = {"left": "-", "right": (0, (4, 1.6))}
 def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) -> Figure:
     """``rod_stress`` (rod, section, time) of both diagonals, as in figs 11-13 of paper 002.
 
-    Parameters
-    ----------
-    dataset
-        A run with stress.
-    sections
-        Section numbers, at most six; by default the first one in black and the one half-way
-        around the structure in red (1 and 9 of 18).
-
-    Returns
-    -------
-    Figure
-        One axes a diagonal; full lines are the left halves, dashed ones the right halves.
+    One axes a diagonal; full lines are the left halves, dashed ones the right halves.
+    ``sections`` are at most six section numbers, by default :func:`default_sections`.
 
     Raises
     ------
@@ -46,9 +36,9 @@ def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) 
         )
     stress = dataset["rod_stress"].sel(section=list(chosen))
     stress = stress.sel(rod=stress["rod"].str.startswith("diagonal_"))
-    factor, units = wording.readable_units(stress)
+    factor, units = style.readable_units(stress)
     diagonals = list(dict.fromkeys(rod.split("_")[1] for rod in stress["rod"].values.tolist()))
-    figure = style.new_figure(8.6, 2.9 * len(diagonals) + 0.9)
+    figure = Figure(figsize=(8.6, 2.9 * len(diagonals) + 0.9))
     grid = figure.subplots(len(diagonals), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     coloured = list(zip(chosen, _COLOURS, strict=False))
     for axes, diagonal in zip(grid, diagonals, strict=True):
@@ -58,22 +48,20 @@ def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) 
                 axes.plot(
                     values["time"], factor * values, color=colour, linestyle=dashes, linewidth=1.2
                 )
-        style.span_time(axes, stress)
         style.name_panel(axes, f"{diagonal} diagonal")
     style.span_sizes(grid[0], factor * stress.values)
-    style.mark_deployment(dataset, *grid)
-    grid[-1].set_xlabel(wording.label(dataset["time"]))
-    figure.supylabel(wording.label(stress, units), fontsize=10.5)
+    style.time_axes(dataset, stress, *grid)
+    figure.supylabel(style.label(stress, units), fontsize=10.5)
     entries = [Line2D([], [], color=colour, label=f"section {n}") for n, colour in coloured]
     entries += [
         Line2D([], [], color=style.GREY, linestyle=dashes, linewidth=1.2, label=f"{half} half")
         for half, dashes in _HALVES.items()
     ]
     figure.legend(handles=entries, loc="outside lower center", ncols=len(entries))
-    wording.head(figure, grid[0], dataset, "Diagonal stress")
+    style.head(figure, grid[0], dataset, "Diagonal stress")
     return figure
 
 
 def default_sections(sections: int) -> tuple[int, ...]:
-    """The section at the boom and the one opposite: 1 and 9 of 18."""
+    """The section at the boom, in black, and the one opposite, in red: 1 and 9 of 18."""
     return tuple(dict.fromkeys((1, max(sections // 2, min(2, sections)))))

@@ -7,7 +7,7 @@ import math
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ringsim.plots import style, wording
+from ringsim.plots import style
 
 _LOOKS = {
     "work": (style.INK, "-"),
@@ -24,30 +24,24 @@ def energy(dataset: xr.Dataset) -> Figure:
     Below them is their imbalance, each in a unit of its own size; ``energy_error`` is stated where
     it is known.
     """
-    figure = style.new_figure(8.0, 5.8)
+    figure = Figure(figsize=(8.0, 5.8))
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(5, 2))
-    factor, units = wording.readable_units(*(dataset[name] for name in _LOOKS))
+    factor, units = style.readable_units(*(dataset[name] for name in _LOOKS))
     for name, (colour, dashes) in _LOOKS.items():
-        values = dataset[name]
-        upper.plot(
-            values["time"], factor * values, color=colour, linestyle=dashes,
-            label=values.attrs["long_name"],
-        )  # fmt: skip
-    style.span_time(upper, dataset["work"])
+        (line,) = upper.plot(dataset["time"], factor * dataset[name], color=colour)
+        line.set(linestyle=dashes, label=dataset[name].attrs["long_name"])
     upper.margins(y=0.08)
     upper.set_ylabel(f"Energy ({units})")
     upper.legend(loc="best")
     lack = imbalance(dataset)
-    factor, units = wording.readable_units(lack)
+    factor, units = style.readable_units(lack)
     lower.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1.2)
     lower.plot(lack["time"], factor * lack, color=style.PURPLE)
     lower.set_ylabel(f"Imbalance ({units})")
-    lower.set_xlabel(wording.label(dataset["time"]))
-    error = float(dataset.get("energy_error", math.nan))
-    if math.isfinite(error):
-        lower.set_title(f"{wording.label(dataset['energy_error'])}: {error:.1e}")
-    style.mark_deployment(dataset, upper, lower)
-    wording.head(figure, upper, dataset, "Energy")
+    if math.isfinite(error := float(dataset.get("energy_error", math.nan))):
+        lower.set_title(f"{style.label(dataset['energy_error'])}: {error:.1e}")
+    style.time_axes(dataset, dataset["work"], upper, lower)
+    style.head(figure, upper, dataset, "Energy")
     return figure
 
 
@@ -55,6 +49,5 @@ def imbalance(dataset: xr.Dataset) -> xr.DataArray:
     """Work - dissipation - kinetic - elastic energy since the start, (time,), J; ideally 0."""
     stored = dataset["kinetic_energy"] + dataset["elastic_energy"]
     lack = dataset["work"] - dataset["dissipation"] - stored
-    recorded = lack.dropna("time").values
-    first = float(recorded[0]) if recorded.size else math.nan
+    first = lack.dropna("time")[:1].sum()
     return (lack - first).assign_attrs(units=dataset["work"].attrs["units"])

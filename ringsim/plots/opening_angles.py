@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-from ringsim.plots import style, wording
+from ringsim.plots import style
 
 _LEAST_SPAN = 0.01
 """Smallest range (degree) of the axis of deviations, so that round-off is not magnified."""
@@ -27,8 +27,8 @@ def opening_angles(dataset: xr.Dataset) -> Figure:
     """
     angle = dataset["opening_angle"].dropna("time", how="all")
     deviation = angle - angle.mean(("plane", "section"), skipna=True)
-    planes = dataset["plane"].values.tolist()
-    figure = style.new_figure(5.2 * len(planes) + 0.6, 6.4)
+    planes, sections = dataset["plane"].values.tolist(), dataset["section"]
+    figure = Figure(figsize=(5.2 * len(planes) + 0.6, 6.4))
     grid = figure.subplots(
         2, len(planes), sharex=True, sharey="row", squeeze=False, height_ratios=(3, 2)
     )
@@ -37,29 +37,24 @@ def opening_angles(dataset: xr.Dataset) -> Figure:
         lines = _draw_lines(lower, deviation.sel(plane=plane))
         _mark_locks(upper, dataset, plane)
         style.name_panel(upper, f"{plane} plane", height=0.91)
-        lower.set_xlabel(wording.label(dataset["time"]))
-        style.span_time(upper, angle)
-        style.mark_deployment(dataset, upper, lower)
+        style.time_axes(dataset, angle, upper, lower)
     _limits(grid, angle, deviation, style.deployment_time(dataset))
-    grid[0, 0].set_ylabel(wording.label(angle))
+    grid[0, 0].set_ylabel(style.label(angle))
     grid[1, 0].set_ylabel(f"Deviation from\nthe mean ({angle.attrs.get('units', '')})")
     figure.align_ylabels(grid[:, 0])
-    if dataset.sizes["section"] > 1:
-        bar = figure.colorbar(lines, ax=grid, aspect=40, pad=0.015)
-        bar.set_label(wording.label(dataset["section"]))
-        bar.set_ticks(_section_ticks(dataset["section"].values))
-        bar.ax.tick_params(length=0)
+    if sections.size > 1:
+        bar = figure.colorbar(lines, ax=grid, aspect=40, pad=0.015, label=style.label(sections))
+        bar.set_ticks(MaxNLocator(12, integer=True))
         bar.minorticks_off()
         bar.outline.set_visible(False)
-    wording.head(figure, grid[0, 0], dataset, "Opening angles")
+    style.head(figure, grid[0, 0], dataset, "Opening angles")
     return figure
 
 
 def _draw_lines(axes: Axes, values: xr.DataArray) -> LineCollection:
-    sections = values["section"].values
-    time = values["time"].values
+    sections, rows = values["section"].values, values.transpose("section", "time").values
     lines = LineCollection(
-        [np.column_stack([time, row]) for row in values.transpose("section", "time").values],
+        [np.column_stack([values["time"], row]) for row in rows],
         array=sections,
         cmap=style.section_colours(len(sections)),
         norm=BoundaryNorm(np.arange(len(sections) + 1) + sections[0] - 0.5, len(sections)),
@@ -76,9 +71,8 @@ def _mark_locks(axes: Axes, dataset: xr.Dataset, plane: str) -> None:
     moments = dataset["lock_time"].sel(plane=plane).values
     locked = np.flatnonzero(np.isfinite(moments))
     axes.scatter(
-        moments[locked], np.full(len(locked), 180.0), s=22,
-        c=style.section_colours(len(moments))(locked), zorder=3, edgecolors="white",
-        linewidths=0.5, clip_on=False, label="locked",
+        moments[locked], np.full(len(locked), 180.0), s=22, zorder=3, edgecolors="white",
+        c=style.section_colours(len(moments))(locked), linewidths=0.5, clip_on=False,
     )  # fmt: skip
 
 
@@ -89,13 +83,5 @@ def _limits(grid: np.ndarray, angle: xr.DataArray, deviation: xr.DataArray, mome
     for axes in grid[0]:
         axes.yaxis.set_major_locator(MultipleLocator(30.0))
     moving = deviation.where(deviation["time"] <= moment) if math.isfinite(moment) else deviation
-    span = max(1.15 * wording.largest_magnitude(moving), _LEAST_SPAN)
+    span = max(1.15 * style.largest_magnitude(moving), _LEAST_SPAN)
     grid[1, 0].set_ylim(-span, span)
-
-
-def _section_ticks(sections: np.ndarray) -> list[int]:
-    """At most about twelve, at multiples of a round number, and the first section."""
-    step = next((s for s in (1, 2, 3, 5, 6, 10, 12, 20, 30) if len(sections) <= 12 * s), 60)
-    inner = sections[sections % step == 0]
-    ticks: list[int] = np.unique([*sections[:1], *inner[inner > step // 2]]).tolist()
-    return ticks

@@ -6,12 +6,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator, ScalarFormatter
+from matplotlib.ticker import MultipleLocator
+from scipy.constants import kilogram_force
 
-from ringsim.plots import style, wording
+from ringsim.plots import style
 
-KILOGRAM_FORCE = 9.80665
-"""N; paper 001 gives the tension in kgf."""
 _PASSAGES = (("reeled in", style.BLUE, "-"), ("reeled out", style.ORANGE, (0, (5, 1.5))))
 _SHOWN = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Shares of the cable's longest length at which the strain is drawn along the beam."""
@@ -24,21 +23,20 @@ def tension_over_length(dataset: xr.Dataset) -> Figure:
     As paper 001's fig. 8: in N and kgf, of the span whose length changes, while reeled in and out.
     """
     tension = dataset["cable_tension"].isel(plane=0, span=-1)
-    figure = style.new_figure(8.0, 4.8)
+    figure = Figure(figsize=(8.0, 4.8))
     axes = figure.subplots()
-    for (lengths, values), (name, colour, dashes) in zip(
-        _split(dataset, tension), _PASSAGES, strict=True
-    ):
+    parts = zip(_split(dataset, tension), _PASSAGES, strict=True)
+    for (lengths, values), (name, colour, dashes) in parts:
         axes.plot(lengths, values, color=colour, linestyle=dashes, label=name)
     _length_axis(axes, dataset)
-    axes.set_ylim(0.0, 1.12 * float(tension.max()))
-    axes.set_ylabel(wording.label(tension))
-    both_ways = (lambda n: np.divide(n, KILOGRAM_FORCE), lambda w: np.multiply(w, KILOGRAM_FORCE))
+    axes.set_ylim(0.0, 1.12 * (peak := float(tension.max())))
+    axes.set_ylabel(style.label(tension))
+    both_ways = (lambda n: np.divide(n, kilogram_force), lambda w: np.multiply(w, kilogram_force))
     weight = axes.secondary_yaxis("right", functions=both_ways)
     weight.set_ylabel("Tension (kgf)")
     weight.spines["right"].set_visible(True)
     weight.yaxis.set_major_locator(MultipleLocator(0.5))
-    length, peak = 1e3 * dataset["cable_length"].isel(plane=0), float(tension.max())
+    length = 1e3 * dataset["cable_length"].isel(plane=0)
     if float(tension.isel(time=int(np.nanargmin(length.values)))) >= 0.9 * peak:
         axes.annotate(
             "contraction ends:\nwinding only stretches\nthe cable",
@@ -46,7 +44,7 @@ def tension_over_length(dataset: xr.Dataset) -> Figure:
             va="center", color=style.GREY, bbox=style.PAPER,
         )  # fmt: skip
     axes.legend(loc="upper right")
-    wording.head(figure, axes, dataset, "Cable tension")
+    style.head(figure, axes, dataset, "Cable tension")
     return figure
 
 
@@ -58,7 +56,7 @@ def strain_over_length(dataset: xr.Dataset) -> Figure:
     middle of the beam; right along the beam at some lengths while reeled in.
     """
     strain = dataset["bending_strain"]
-    figure = style.new_figure(11.0, 4.8)
+    figure = Figure(figsize=(11.0, 4.8))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
     station = strain["station"].values
     middle = int(np.abs(station - 0.5 * (station[0] + station[-1])).argmin())
@@ -71,14 +69,12 @@ def strain_over_length(dataset: xr.Dataset) -> Figure:
     for name, _, dashes in _PASSAGES:
         left.plot([], [], color=style.GREY, linestyle=dashes, label=name)
     _length_axis(left, dataset)
-    left.set_ylabel(wording.label(strain))
+    left.set_ylabel(style.label(strain))
     left.set_ylim(0.0, 1.35 * float(strain.max()))
     left.legend(loc="upper left", ncols=2)
-    formatter = ScalarFormatter(useMathText=True)
-    formatter.set_powerlimits((0, 0))
-    left.yaxis.set_major_formatter(formatter)
+    left.ticklabel_format(axis="y", scilimits=(0, 0), useMathText=True)
     _draw_along(right, *_split(dataset, strain)[0])
-    wording.head(figure, left, dataset, "Bending of the upper beam", pad=18.0)
+    style.head(figure, left, dataset, "Bending of the upper beam", pad=18.0)
     return figure
 
 
@@ -92,19 +88,18 @@ def _draw_along(axes: Axes, lengths: xr.DataArray, strain: xr.DataArray) -> None
             color=colours(number), label=f"{float(lengths[moment]):.0f} mm of cable",
         )  # fmt: skip
     axes.set_xlim(left=0.0)
-    axes.set_xlabel(wording.label(strain["station"], "mm", width=40))
+    axes.set_xlabel(style.label(strain["station"], "mm", width=40))
     axes.legend(loc="upper left")
 
 
 def _split(dataset: xr.Dataset, values: xr.DataArray) -> list[tuple[xr.DataArray, xr.DataArray]]:
     """Cable lengths in mm and values until most rope was wound, and from then on."""
-    recorded = dataset["wound_length"].isel(plane=0).dropna("time")
-    turn = int(recorded.values.argmax())
-    lengths = 1e3 * dataset["cable_length"].isel(plane=0)
-    inwards, outwards = recorded["time"][: turn + 1], recorded["time"][turn:]
-    return [(lengths.sel(time=part), values.sel(time=part)) for part in (inwards, outwards)]
+    wound = dataset["wound_length"].isel(plane=0).dropna("time")
+    lengths, turn = 1e3 * dataset["cable_length"].isel(plane=0), wound.idxmax("time").item()
+    passages = (wound.time.sel(time=part) for part in (slice(None, turn), slice(turn, None)))
+    return [(lengths.sel(time=times), values.sel(time=times)) for times in passages]
 
 
 def _length_axis(axes: Axes, dataset: xr.Dataset) -> None:
     axes.set_xlim(0.0, 1100.0 * float(dataset["cable_length"].max()))
-    axes.set_xlabel(wording.label(dataset["cable_length"], "mm"))
+    axes.set_xlabel(style.label(dataset["cable_length"], "mm"))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ringsim.layout.layout import layout_at_opening, layout_of
 from ringsim.layout.lines import lines_of
-from ringsim.plots import style, wording
+from ringsim.plots import style
 from ringsim.scene import Scene, scene_from_toml
 
 Array = NDArray[np.float64]
@@ -47,35 +47,35 @@ def ring(dataset: xr.Dataset) -> Figure:
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
     azimuth = facing_azimuth(scene)
     moments = instants(dataset)
-    shots = []
-    for _, angles in moments:
-        lines = lines_at(scene, np.radians(angles.transpose("plane", "section").values))
-        shots.append({name: view(ends, azimuth, _ELEVATION) for name, ends in lines.items()})
-    points = [np.concatenate([xy.reshape(-1, 2) for xy, _ in shot.values()]) for shot in shots]
-    low = np.array([p.min(axis=0) for p in points])
-    sizes = np.array([p.max(axis=0) for p in points]) - low
+    shots = [_shot(scene, angles, azimuth) for _, angles in moments]
+    low = np.array([lines.min(axis=(0, 1)) for _, lines, _ in shots])
+    sizes = np.array([lines.max(axis=(0, 1)) for _, lines, _ in shots]) - low
     height = float(sizes[:, 1].max())
     scale, cells = _fit(sizes[:, 0], height)
-    figure, axes = _sheet(scale, height)
+    wide, high = _WIDTH + 2 * _SIDE, _BELOW + height * scale + _ABOVE
+    figure = Figure(figsize=(wide, high))
+    figure.set_layout_engine("none")
+    # Axes in metre whose frame is the drawing, between room for words above and below.
+    axes = figure.add_axes((_SIDE / wide, _BELOW / high, _WIDTH / wide, height * scale / high))
+    axes.set_axis_off()
+    axes.set(aspect="equal", xlim=(0.0, _WIDTH / scale), ylim=(0.0, height))
     middles = (np.cumsum(cells + _GAP) - 0.5 * cells - _GAP) / scale
     lefts = np.column_stack([middles - 0.5 * sizes[:, 0], np.zeros(len(shots))])
-    for moment, shot, shift, middle in zip(moments, shots, lefts - low, middles, strict=True):
-        _draw(axes, shot, shift, scale)
-        _caption(axes, middle, *moment)
+    for number, (names, lines, near) in enumerate(shots):
+        _draw(axes, names, lines + (lefts - low)[number], near, scale)
+        _caption(axes, middles[number], *moments[number])
     _scale_bar(axes, _WIDTH / scale, height)
-    drawn = {name for shot in shots for name, (xy, _) in shot.items() if len(xy)}
-    entries = [
-        Line2D([], [], **({"label": name} | look)) for name, look in _LOOKS.items() if name in drawn
-    ]
+    drawn = {name for names, _, _ in shots for name in names}
+    looks = [{"label": name} | look for name, look in _LOOKS.items() if name in drawn]
+    entries = [Line2D([], [], **look) for look in looks]
     figure.legend(handles=entries, loc="lower center", ncols=len(entries))
-    wording.head(figure, axes, dataset, "Deployment", pad=72.0 * _BAR)
+    style.head(figure, axes, dataset, "Deployment", pad=72.0 * _BAR)
     return figure
 
 
 def lines_at(scene: Scene, openings: Array) -> dict[str, Array]:
     """Lines of a scene at opening angles in rad, shape (planes, sections): see ``lines_of``."""
-    net = scene.net
-    beyond = 0.0 if net is None or net.two_sided else net.neutral_length
+    beyond = 0.0 if scene.net is None or scene.net.two_sided else scene.net.neutral_length
     return lines_of(layout_at_opening(scene, float(openings.mean())), openings, taut_beyond=beyond)
 
 
@@ -90,17 +90,9 @@ def facing_azimuth(scene: Scene) -> float:
 def view(points: Array, azimuth: float, elevation: float) -> tuple[Array, Array]:
     """Orthographic projection for a far observer, true to scale.
 
-    Parameters
-    ----------
-    points
-        Positions, shape (..., 3), m, z up.
-    azimuth, elevation
-        Where the observer stands, degree: from +x towards +y, and above the horizon.
-
-    Returns
-    -------
-    tuple[Array, Array]
-        Right and up on the paper, shape (..., 2), and nearness to the observer, shape (...,), m.
+    ``points`` are positions, shape (..., 3), m, z up; the observer stands at ``azimuth`` (from +x
+    towards +y) and ``elevation`` (above the horizon), degree.  Returns right and up on the paper,
+    shape (..., 2), and nearness to the observer, shape (...,), m.
     """
     a, e = np.radians([azimuth, elevation])
     right = np.array([-np.sin(a), np.cos(a), 0.0])
@@ -112,9 +104,8 @@ def view(points: Array, azimuth: float, elevation: float) -> tuple[Array, Array]
 def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
     """Name and opening angles (plane, section) of the three recorded instants to draw.
 
-    The first time, the time at which the mean opening angle is nearest to the middle between
-    the ends, and the deployment, at which every V-joint stands at 180 deg by definition, or the
-    last recorded time if it was not reached.
+    The first, the one whose mean opening angle is nearest to the middle between the ends, and the
+    deployment, at which every V-joint stands at 180 deg by definition, or else the last.
     """
     angle = dataset["opening_angle"].dropna("time", how="any")
     mean = angle.mean(("plane", "section")).values
@@ -146,18 +137,6 @@ def _fit(widths: Array, height: float) -> tuple[float, Array]:
     return scale, cells + (room - cells.sum()) / len(cells)
 
 
-def _sheet(scale: float, height: float) -> tuple[Figure, Axes]:
-    """Axes in metre whose frame is the drawing, between room for words above and below."""
-    sheet = height * scale
-    wide, high = _WIDTH + 2 * _SIDE, _BELOW + sheet + _ABOVE
-    figure = style.new_figure(wide, high)
-    figure.set_layout_engine("none")
-    axes = figure.add_axes((_SIDE / wide, _BELOW / high, _WIDTH / wide, sheet / high))
-    axes.set_axis_off()
-    axes.set(aspect="equal", xlim=(0.0, _WIDTH / scale), ylim=(0.0, height))
-    return figure, axes
-
-
 def _caption(axes: Axes, middle: float, name: str, angles: xr.DataArray) -> None:
     time = angles["time"]
     numbers = (
@@ -171,19 +150,25 @@ def _caption(axes: Axes, middle: float, name: str, angles: xr.DataArray) -> None
         )  # fmt: skip
 
 
-def _draw(axes: Axes, shot: dict[str, tuple[Array, Array]], shift: Array, scale: float) -> None:
-    """Lines from far to near, the far ones paler; thinner where a metre is short."""
-    thin = float(np.clip(scale / 1.3, 0.45, 1.0))
-    lines = np.concatenate([xy for xy, _ in shot.values()]) + shift
-    near = np.concatenate([depth.mean(axis=-1) for _, depth in shot.values()])
+def _shot(scene: Scene, angles: xr.DataArray, azimuth: float) -> tuple[list[str], Array, Array]:
+    """Parts, ends on the paper and nearness of all lines at one instant, the farthest first."""
+    parts = lines_at(scene, np.radians(angles.transpose("plane", "section").values))
+    names = [name for name, ends in parts.items() for _ in ends]
+    lines, depths = view(np.concatenate(list(parts.values())), azimuth, _ELEVATION)
+    near = depths.mean(axis=-1)
     order = np.argsort(near, kind="stable")
-    every = [_LOOKS[name] for name, (xy, _) in shot.items() for _ in xy]
-    looks = [every[k] for k in order]
+    return [names[k] for k in order], lines[order], near[order]
+
+
+def _draw(axes: Axes, names: list[str], lines: Array, near: Array, scale: float) -> None:
+    """Lines, the far ones paler; thinner where a metre is short."""
+    thin = float(np.clip(scale / 1.3, 0.45, 1.0))
+    looks = [_LOOKS[name] for name in names]
     depth = max(float(np.ptp(near)), 0.8 * float(np.ptp(lines[..., 0])))
-    fade = (_FADE * (near.max() - near) / depth)[order, None]
+    fade = (_FADE * (near.max() - near) / depth)[:, None]
     colours = np.array([to_rgb(look["color"]) for look in looks])
     drawn = LineCollection(
-        list(lines[order]), colors=colours + fade * (1.0 - colours), capstyle="round",
+        list(lines), colors=colours + fade * (1.0 - colours), capstyle="round",
         linewidths=[thin * look["linewidth"] for look in looks],
         linestyles=[look.get("linestyle", "solid") for look in looks], clip_on=False,
     )  # fmt: skip

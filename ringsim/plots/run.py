@@ -46,19 +46,9 @@ PICTURES = (
 def draw_run(dataset: xr.Dataset, folder: str | Path, prefix: str = "") -> list[Path]:
     """Write every figure for which the run recorded something, as PNG.
 
-    Parameters
-    ----------
-    dataset
-        One run, finished or not, as ``ringsim.dataset.to_dataset`` makes it.
-    folder
-        Where the files go; it is created if it does not exist.
-    prefix
-        What the files' names begin with, so that several runs share a folder.
-
-    Returns
-    -------
-    list[Path]
-        The files written; none if the run ended before its first record.
+    ``dataset`` is a run, finished or not, as ``ringsim.dataset.to_dataset`` makes it.  ``folder``
+    is created if it does not exist; all names begin with ``prefix``.  Returns the files written,
+    none if the run ended before its first record.
 
     Raises
     ------
@@ -74,8 +64,8 @@ def draw_run(dataset: xr.Dataset, folder: str | Path, prefix: str = "") -> list[
     for name, draw, needs, ring_only in PICTURES:
         recorded = all(n in dataset and bool(np.isfinite(dataset[n]).any()) for n in needs)
         if recorded and (is_ring or not ring_only):
-            figure = draw(dataset)
-            written.append(folder / f"{prefix}{name}.png")
+            figure, path = draw(dataset), folder / f"{prefix}{name}.png"
             with writing(folder):
-                style.write(figure, written[-1])
+                style.write(figure, path)
+            written.append(path)
     return written

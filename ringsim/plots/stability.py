@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from ringsim.analysis.stability import OK, WRONG
+from ringsim.analysis.stability import OK, WRONG, axis_label
 from ringsim.plots import style
 
 _AGAIN = "ok, after a new start"
@@ -48,11 +48,11 @@ def stability(whole: xr.Dataset) -> Figure:
         cells = whole.isel(cell=(whole["of_group"] == number).values, group=number)
         seen |= set(kinds := _kinds(cells))
         _panel(axes, cells, kinds)
-    words = [word for word in [*_LOOKS, *sorted(seen - set(_LOOKS))] if word in seen]
-    handles = [
-        Patch(facecolor=colour, edgecolor=style.GREY, label=f"{letter}  {word}".strip())
-        for word, (colour, letter) in ((word, _LOOKS.get(word, _OTHER)) for word in words)
-    ]
+    handles = []
+    for word in [*filter(seen.__contains__, _LOOKS), *sorted(seen - set(_LOOKS))]:
+        colour, letter = _LOOKS.get(word, _OTHER)
+        label = f"{letter}  {word}".strip()
+        handles.append(Patch(facecolor=colour, edgecolor=style.GREY, label=label))
     most = min(len(handles), 2 * columns + 1)
     figure.legend(handles=handles, loc="outside lower center", ncols=most)
     style.title(figure, f"Stability map: {whole.sizes['cell']} runs and how they ended")
@@ -86,10 +86,10 @@ def _kinds(cells: xr.Dataset) -> list[str]:
 
 
 def _label(group: xr.Dataset, axis: str, width: int) -> str:
-    label, units = (str(group[f"{axis}_{word}"].values) for word in ("label", "units"))
+    label = axis_label(group, axis)
     if "." not in label.split()[0]:  # a path stays as it is typed
         label = label[:1].upper() + label[1:]
-    return textwrap.fill(label if units == "1" else f"{label} ({units})", width)
+    return textwrap.fill(label, width)
 
 
 def _short(value: float) -> str:

@@ -1,20 +1,22 @@
-"""Style shared by all figures."""
+"""Style, words and axes shared by all figures."""
 
 from __future__ import annotations
 
 import math
+import textwrap
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
+import matplotlib.style
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from ringsim.variables import Status
 
 INK, GREY, PALE = "#222222", "#6e6e6e", "#e4e4e4"
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
@@ -24,48 +26,13 @@ BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
 
 PAPER: Any = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5}
 """Background of text on a grid."""
-
-DPI = 150
 _FLAT = 0.05
 """Median over largest value below which the axis becomes logarithmic."""
-_SETTINGS: Any = {
-    "axes.axisbelow": True,
-    "axes.edgecolor": GREY,
-    "axes.grid": True,
-    "axes.labelcolor": INK,
-    "axes.labelsize": 10.5,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlelocation": "left",
-    "axes.titlesize": 10,
-    "axes.titlecolor": GREY,
-    "figure.titlesize": 11,
-    "figure.titleweight": "bold",
-    "font.family": "DejaVu Sans",
-    "font.size": 10,
-    "grid.color": PALE,
-    "grid.linewidth": 0.7,
-    "legend.fontsize": 9.5,
-    "legend.frameon": False,
-    "lines.linewidth": 1.6,
-    "lines.solid_joinstyle": "round",
-    "text.color": INK,
-    "xtick.color": GREY,
-    "xtick.labelcolor": INK,
-    "xtick.labelsize": 9.5,
-    "ytick.color": GREY,
-    "ytick.labelcolor": INK,
-    "ytick.labelsize": 9.5,
-}
+_PREFIXES = {-4: "p", -3: "n", -2: "µ", -1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
+_PREFIXED = ("J", "Pa", "N", "W")
 
-styled = mpl.rc_context(_SETTINGS)
+styled = matplotlib.style.context(Path(__file__).with_name("figures.mplstyle"))
 """Decorator: draw with the shared style, and leave matplotlib's global settings as they were."""
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure (size in inch) with constrained layout; needs no display."""
-    layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08)
-    return Figure(figsize=(width, height), layout=layout, facecolor="white")
 
 
 def new_panels(
@@ -74,7 +41,7 @@ def new_panels(
     """A figure of ``count`` panels in rows of three, and its number of columns; sizes in inch."""
     columns = min(3, count)
     rows = -(-count // columns)
-    figure = new_figure(width * columns, height * rows + legend)
+    figure = Figure(figsize=(width * columns, height * rows + legend))
     panels = figure.subplots(rows, columns, sharex=sharex, squeeze=False).ravel().tolist()
     for panel in panels[count:]:
         panel.set_visible(False)
@@ -86,16 +53,96 @@ def title(figure: Figure, text: str) -> None:
     figure.suptitle(text, x=0.012, ha="left")
 
 
+def label(variable: xr.DataArray, units: str | None = None, width: int = 60) -> str:
+    """Meaning and unit of a variable, as on an axis: "Time since the start of the run (s)".
+
+    ``units`` replaces the variable's own where its values were scaled; lines longer than
+    ``width`` characters are broken.
+    """
+    words = str(variable.attrs.get("long_name", variable.name))
+    units = str(variable.attrs.get("units", "1")) if units is None else units
+    words = words[:1].upper() + words[1:]
+    return textwrap.fill(words if units == "1" else f"{words} ({units})", width)
+
+
+def readable_units(*variables: xr.DataArray) -> tuple[float, str]:
+    """Factor and prefixed unit that scale the largest value to between 0.5 and 500.
+
+    The variables share one unit; only J, Pa, N and W get a prefix.
+    """
+    units = str(variables[0].attrs.get("units", "1"))
+    largest = max(largest_magnitude(v) for v in variables)
+    if units not in _PREFIXED or largest == 0.0:
+        return 1.0, units
+    power = min(max(math.floor(math.log10(2.0 * largest) / 3.0), -4), 3)
+    return 1000.0**-power, _PREFIXES[power] + units
+
+
+def largest_magnitude(variable: xr.DataArray) -> float:
+    """Largest finite absolute value, 0 if there is none."""
+    values = variable.values
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def deployment_time(dataset: xr.Dataset) -> float:
+    """Time at which the last V-joint locked (s), NaN if it did not."""
+    return float(dataset.get("deployment_time", math.nan))
+
+
+def ending(dataset: xr.Dataset) -> str:
+    """How the run ended, in one sentence."""
+    word = Status(int(dataset["status"])).word.replace("_", " ")
+    deployed = deployment_time(dataset)
+    final = float(dataset.get("final_time", math.nan))
+    if word == "ok" and math.isfinite(deployed):
+        return f"Deployed after {deployed:.2f} s"
+    reason = str(dataset.attrs.get("reason", "")).strip()
+    start = "Ended" if word == "ok" else word[:1].upper() + word[1:]
+    start += f" after {final:.4g} s" if math.isfinite(final) else ""
+    return f"{start}: {reason}" if reason else start
+
+
+def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: float = 8.0) -> None:
+    """Subject and scene above the figure, how the run ended above its first axes."""
+    inches = figure.get_size_inches()[0]
+    words, width = f"{subject}: {dataset.attrs.get('title', '')}".rstrip(": "), int(10.3 * inches)
+    lines = len(textwrap.wrap(words, width))
+    # The narrowest text with as few lines: all are about equally long.
+    fitting = (w for w in range(1, width) if len(textwrap.wrap(words, w)) <= lines)
+    title(figure, textwrap.fill(words, next(fitting, width)))
+    end = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
+    axes.set_title("\n".join(end), pad=pad)
+
+
 def section_colours(sections: int) -> Colormap:
     """One colour a section, perceptually uniform, without the light yellow end."""
-    return ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.88, sections)))
+    return ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, 0.88, sections)))
 
 
-def span_time(axes: Axes, values: xr.DataArray) -> None:
-    """From the first to the last time (s) at which something was recorded, without margins."""
-    time = values.dropna("time", how="all")["time"].values
+def time_axes(
+    dataset: xr.Dataset, recorded: xr.DataArray, *panels: Axes, named: bool = True
+) -> None:
+    """Time axis of a run, shared by panels above each other, without margins.
+
+    It spans the times at which something was ``recorded``.  A dashed line marks where the last
+    V-joint locked, if it did, with its time above the first panel where that is ``named``.
+    """
+    panels[-1].set_xlabel(label(dataset["time"]))
+    time = recorded.dropna("time", how="all")["time"].values
     if len(time) > 1:
-        axes.set_xlim(float(time[0]), float(time[-1]))
+        panels[0].set_xlim(float(time[0]), float(time[-1]))
+    moment = deployment_time(dataset)
+    if math.isnan(moment):
+        return
+    for axes in panels:
+        axes.axvline(moment, color=INK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=1.5)
+    if named:
+        side = "right" if moment > 0.5 * sum(panels[0].get_xlim()) else "left"
+        panels[0].annotate(
+            f"all locked at {moment:.2f} s", (moment, 1.0),
+            xycoords=panels[0].get_xaxis_transform(), xytext=(0, 3),
+            textcoords="offset points", ha=side, va="bottom", fontsize=9.5,
+        )  # fmt: skip
 
 
 def span_sizes(axes: Axes, sizes: np.ndarray) -> None:
@@ -124,33 +171,11 @@ def plain_numbers(axis: Axis) -> None:
 def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
     """A bold name in the upper left corner of the frame."""
     axes.text(
-        0.02, height, text, transform=axes.transAxes, va="top", weight="bold", zorder=5,
-        bbox=PAPER,
-    )  # fmt: skip
-
-
-def deployment_time(dataset: xr.Dataset) -> float:
-    """Time at which the last V-joint locked (s), NaN if it did not."""
-    return float(dataset.get("deployment_time", math.nan))
-
-
-def mark_deployment(dataset: xr.Dataset, *panels: Axes, named: bool = True) -> None:
-    """A dashed line where the last V-joint locked, if it did; its time above the first panel."""
-    moment = deployment_time(dataset)
-    if math.isnan(moment):
-        return
-    for axes in panels:
-        axes.axvline(moment, color=INK, linewidth=1.0, linestyle=(0, (4, 3)), zorder=1.5)
-    if named:
-        side = "right" if moment > 0.5 * sum(panels[0].get_xlim()) else "left"
-        panels[0].annotate(
-            f"all locked at {moment:.2f} s", (moment, 1.0),
-            xycoords=panels[0].get_xaxis_transform(), xytext=(0, 3),
-            textcoords="offset points", ha=side, va="bottom", fontsize=9.5,
-        )  # fmt: skip
+        0.02, height, text, transform=axes.transAxes, va="top", weight="bold", zorder=5, bbox=PAPER
+    )
 
 
 @styled
 def write(figure: Figure, path: Path) -> None:
     """Write a PNG."""
-    figure.savefig(path, dpi=DPI, format="png")
+    figure.savefig(path, format="png")

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
-from ringsim.plots import style, wording
+from ringsim.plots import style
 
 
 def quantity(values, units: str) -> xr.DataArray:
@@ -30,37 +31,37 @@ def quantity(values, units: str) -> xr.DataArray:
     ],
 )
 def test_prefix_follows_the_largest_value(largest, units, wanted):
-    factor, found = wording.readable_units(quantity([0.0, -largest, np.nan], units))
+    factor, found = style.readable_units(quantity([0.0, -largest, np.nan], units))
     assert found == wanted
     if units in ("J", "Pa") and 1e-12 < largest < 1e12:
         assert 0.5 <= factor * largest < 500.0
 
 
 def test_prefixed_numbers_mean_the_same():
-    factor, units = wording.readable_units(quantity([0.06], "J"))
+    factor, units = style.readable_units(quantity([0.06], "J"))
     assert (factor * 0.06, units) == (pytest.approx(60.0, rel=1e-15), "mJ")
 
 
 def test_label_is_long_name_and_units():
-    assert wording.label(quantity([1.0], "N")) == "Some quantity (N)"
-    assert wording.label(quantity([1.0], "N"), "kN") == "Some quantity (kN)"
-    assert wording.label(quantity([1.0], "1")) == "Some quantity"
+    assert style.label(quantity([1.0], "N")) == "Some quantity (N)"
+    assert style.label(quantity([1.0], "N"), "kN") == "Some quantity (kN)"
+    assert style.label(quantity([1.0], "1")) == "Some quantity"
 
 
 def test_long_labels_are_broken_between_words():
-    assert wording.label(quantity([1.0], "N"), width=14) == "Some quantity\n(N)"
+    assert style.label(quantity([1.0], "N"), width=14) == "Some quantity\n(N)"
 
 
 def test_ending_tells_success_failure_and_the_lack_of_an_end(deployed, failed, unfinished):
-    assert wording.ending(deployed) == "Deployed after 17.58 s"
-    assert wording.ending(failed).startswith("Solver failed after 9.25 s: the step fell below")
-    assert wording.ending(unfinished).startswith("Unfinished after 12 s: ")
+    assert style.ending(deployed) == "Deployed after 17.58 s"
+    assert style.ending(failed).startswith("Solver failed after 9.25 s: the step fell below")
+    assert style.ending(unfinished).startswith("Unfinished after 12 s: ")
 
 
 def test_a_long_title_is_broken_into_even_lines(deployed):
     run = deployed.assign_attrs(title="word " * 30)
-    figure = style.new_figure(8.0, 3.0)
-    wording.head(figure, figure.subplots(), run, "Subject")
+    figure = Figure(figsize=(8.0, 3.0))
+    style.head(figure, figure.subplots(), run, "Subject")
     lines = figure.get_suptitle().splitlines()
     assert len(lines) == 2
     assert abs(len(lines[0]) - len(lines[1])) <= len("word ")
@@ -70,4 +71,4 @@ def test_success_without_locking_gives_the_reason(unfinished):
     run = unfinished.copy(deep=True)
     run["status"] = run["status"].copy(data=np.int8(0))
     run.attrs["reason"] = "the end time was reached"
-    assert wording.ending(run) == "Ended after 12 s: the end time was reached"
+    assert style.ending(run) == "Ended after 12 s: the end time was reached"

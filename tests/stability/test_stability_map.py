@@ -15,13 +15,15 @@ from ringsim.analysis.stability import (
     OK,
     PROMISES,
     WRONG,
+    borders,
     cells_of,
     checked,
     chosen_for_check,
     joined,
     judged,
+    summary,
+    to_markdown,
 )
-from ringsim.analysis.stability_text import borders, summary, to_markdown
 from ringsim.parts.solver import Solver
 from ringsim.plots.stability import stability
 from ringsim.variables import Cause, Status
