@@ -1,7 +1,5 @@
 """Families of choices: each kind is a model in its own file, picked by ``kind = "..."``."""
 
-from __future__ import annotations
-
 import functools
 import importlib
 import pkgutil

@@ -1,7 +1,5 @@
 """A run as an xarray dataset, and datasets as netCDF files."""
 
-from __future__ import annotations
-
 import platform
 from datetime import UTC, datetime
 from importlib.metadata import version

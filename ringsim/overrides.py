@@ -1,7 +1,5 @@
 """Values at dotted paths: ``rods.bar.outer_diameter``, ``rods.young_modulus[3]``."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from typing import Any

@@ -1,7 +1,5 @@
 """Refusing bad input: one clear line, naming field, value, bound and cure."""
 
-from __future__ import annotations
-
 import difflib
 import types
 import typing

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ringsim.refusal import InputError
-from ringsim.sampling.paths import field_at, refuse_fixed, unit_at
+from ringsim.sampling.paths import field_at, refuse_fixed
 from ringsim.scene import Scene
+from ringsim.units import unit_at
 from ringsim.variables import PLANES
 
 DECADE = 10.0

@@ -1,7 +1,5 @@
 """``ringsim campaign``: run a campaign, or finish an interrupted one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """``ringsim check``: validate a scene and say what it builds."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

@@ -1,7 +1,5 @@
 """``ringsim explain``: what the variables of a result mean."""
 
-from __future__ import annotations
-
 import click
 
 from ringsim.outputs import COORDINATES, VARIABLES

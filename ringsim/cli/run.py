@@ -1,7 +1,5 @@
 """``ringsim run SCENE``."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """``ringsim scenes``: what is built in, and its text as a starting point."""
 
-from __future__ import annotations
-
 import click
 
 from ringsim.refusal import InputError, known_or_nearest

@@ -5,8 +5,6 @@ A law takes the functions that it needs (``minimum``, ``maximum``, ``where``, ``
 own expressions.  Forces resist the growth of the law's coordinate.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,9 +1,7 @@
 """The inputs of all samples, and how they lie in netCDF files."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +43,7 @@ class Table:
         """Values by path of one sample, as :meth:`Scene.with_values` takes them."""
         return {column.path: column.values[sample].tolist() for column in self.columns}
 
-    def starts_with(self, other: Table) -> bool:
+    def starts_with(self, other: Self) -> bool:
         """Whether the first samples are those of ``other``, bit by bit."""
         count = other.samples
         return (

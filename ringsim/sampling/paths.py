@@ -1,15 +1,11 @@
-"""Scene paths as inputs: their unit, and which of them a campaign may vary."""
+"""Scene paths as inputs: their values, and which of them a campaign may vary."""
 
-from __future__ import annotations
-
+import operator
 from typing import Any
-
-from pydantic import BaseModel
 
 from ringsim.overrides import section_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.units import unit_of
 
 FIXED = (
     "name", "title", "structure.kind", "structure.sections", "structure.closed", "solver.end_time",
@@ -31,19 +27,8 @@ def refuse_fixed(scene: Scene, path: str) -> None:
 def field_at(scene: Scene, path: str) -> Any:
     """The value of a scene at a dotted path, one entry of a list at ``name[k]``."""
     inner, section = section_of(path)
-    value: Any = scene
-    for step in inner.split("."):
-        value = getattr(value, step)
+    value = operator.attrgetter(inner)(scene)
     return value[section - 1] if section is not None and isinstance(value, tuple) else value
-
-
-def unit_at(scene: Scene, path: str) -> str:
-    """Symbol of the SI unit of the field at a path, "1" if it has none."""
-    inner, _, last = section_of(path)[0].rpartition(".")
-    owner = field_at(scene, inner) if inner else scene
-    if not isinstance(owner, BaseModel) or last not in type(owner).model_fields:
-        return "1"
-    return unit_of(type(owner).model_fields[last])
 
 
 def each_of(scene: Scene, path: str, value: Any) -> int:

@@ -1,7 +1,5 @@
 """The design of a campaign: which values every sample has."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -16,8 +14,9 @@ from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Design
 from ringsim.sampling.distributions.family import Distribution, Values
-from ringsim.sampling.paths import each_of, field_at, refuse_fixed, unit_at
+from ringsim.sampling.paths import each_of, field_at, refuse_fixed
 from ringsim.scene import Scene, place_of
+from ringsim.units import unit_at
 
 AnyDistribution = Annotated[Distribution, OneOf()]
 AnyDesign = Annotated[Design, OneOf()]

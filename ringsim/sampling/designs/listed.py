@@ -1,7 +1,5 @@
 """Samples listed in a file."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The family of distributions: each one maps probabilities to values of an input."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import numpy as np
