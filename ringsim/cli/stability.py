@@ -20,7 +20,7 @@ _SEED = 1
 """Of the random choice of cells that are checked: the same at every resumption."""
 
 
-@click.command("stability")
+@click.command()
 @SCENE
 @SETTINGS
 @click.option(
