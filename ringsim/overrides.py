@@ -14,13 +14,8 @@ _SECTION = re.compile(r"(.*)\[([0-9]{1,6})\]", re.DOTALL)
 def parse_assignment(text: str) -> tuple[str, Any]:
     """Split ``PATH=VALUE``; the value is TOML, or a bare word taken as a string.
 
-    Raises
-    ------
-    InputError
-        If there is no ``=``, no path or no value.
+    InputError if there is no ``=``, no path or no value.
 
-    Examples
-    --------
     >>> parse_assignment("loads.force = 0.02")
     ('loads.force', 0.02)
     >>> parse_assignment("rods.kind=ancf")
@@ -50,19 +45,10 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
     """Write ``value`` at ``path`` into nested tables, in place.
 
     A step through a part that is not there creates it.  A last step ``name[k]`` is the value of
-    section k, counted from 1; a field that had one value for all becomes a list first.  The
-    value "none" (or None) removes a part, and puts the default back in any other field but
-    ``kind``, where "none" is a word like others.
-
-    Parameters
-    ----------
-    length
-        Number of values in a list at this path.
-
-    Raises
-    ------
-    InputError
-        If the path is malformed or leads through a value that is not a table.
+    section k, counted from 1; a field that had one value for all becomes a list of ``length``
+    first.  The value "none" (or None) removes a part, and puts the default back in any other field
+    but ``kind``, where "none" is a word like others.  InputError if the path is malformed or leads
+    through a value that is not a table.
     """
     inner, section = section_of(path)
     *steps, name = inner.split(".")

@@ -11,21 +11,14 @@ import numpy as np
 
 
 class Reaction(NamedTuple):
-    """What resists a coordinate; numbers, arrays or an engine's expressions.
-
-    Attributes
-    ----------
-    elastic
-        Derivative of ``stored`` after the coordinate, N (N m for an angle).
-    damping
-        The rest; times the rate it is the power lost, never negative, N (N m).
-    stored
-        Elastic energy, J.
-    """
+    """What resists a coordinate; numbers, arrays or an engine's expressions."""
 
     elastic: Any
+    """Derivative of ``stored`` after the coordinate, N (N m for an angle)."""
     damping: Any
+    """The rest; times the rate it is the power lost, never negative, N (N m)."""
     stored: Any
+    """Elastic energy, J."""
 
     @property
     def total(self) -> Any:

@@ -16,9 +16,8 @@ class Column:
     path: str
     """Scene path that the values are written to."""
     dim: str
-    """Second dimension of ``values``, or empty: what there is a value for, "section", "corner"
-    "pulley" or "pulley_of_two_winches" (one more), or "place_k" for lists of any other length
-    k."""
+    """Second dimension of ``values``, or empty: "section", "corner", "pulley",
+    "pulley_of_two_winches" (one more), or "place_k" for lists of any other length k."""
     units: str
     """SI unit of the field."""
     origin: str

@@ -34,17 +34,8 @@ def draw(
 ) -> Table:
     """Draw all samples of a campaign, which vary the scene ``base``.
 
-    Parameters
-    ----------
-    folder
-        Where files that the design names are looked up.
-    error_bars_every
-        One sample in so many states its error bars; 0 for none.
-
-    Raises
-    ------
-    InputError
-        If a path or its values are refused by the scene.
+    Files that the design names are looked up in ``folder``; one sample in ``error_bars_every``
+    states its error bars, none for 0.  InputError if the scene refuses a path or its values.
     """
     factors: dict[str, Distribution] = {}
     for path, distribution in inputs.items():
