@@ -1,5 +1,6 @@
 """Values at dotted paths: ``rods.bar.outer_diameter``, ``rods.young_modulus[3]``."""
 
+import operator
 import re
 import tomllib
 from typing import Any
@@ -39,6 +40,13 @@ def section_of(path: str) -> tuple[str, int | None]:
     """
     matched = _SECTION.fullmatch(path)
     return (matched[1], int(matched[2])) if matched else (path, None)
+
+
+def field_at(record: Any, path: str) -> Any:
+    """The value of a record at a dotted path, one entry of a list at ``name[k]``."""
+    inner, section = section_of(path)
+    value = operator.attrgetter(inner)(record)
+    return value[section - 1] if section is not None and isinstance(value, tuple) else value
 
 
 def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:

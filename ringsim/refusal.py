@@ -1,7 +1,6 @@
 """Refusing bad input: one clear line, naming field, value, bound and cure."""
 
 import difflib
-import types
 import typing
 from collections.abc import Iterable
 from typing import Any
@@ -11,7 +10,7 @@ from pydantic.fields import FieldInfo
 
 from ringsim.choice import leaves_of
 from ringsim.parts.persection import EACH, ONE
-from ringsim.units import Model, unit_of
+from ringsim.units import Model, nested_in, unit_of
 
 MOST_NAMED = 3
 """So many further faults are named beside the one that is described."""
@@ -42,7 +41,6 @@ _SAYS = {
     "string_pattern_mismatch": "{shown} must start with a letter or digit and hold only letters, "
     "digits, dots, dashes and underscores",
     "string_too_long": "{shown} must have at most {max_length} characters",
-    "string_too_short": "{shown} must have at least {min_length} characters",
     "literal_error": "{shown} must be {expected}",
     "model": "{shown} must be a table: write [{where}], and its keys on the lines below",
     "tuple": "{shown} must be one value, or a list with a value for each section",
@@ -156,15 +154,9 @@ def _tag(model: type[BaseModel]) -> Any:
     return model.model_fields["kind"].default if "kind" in model.model_fields else None
 
 
-_NESTING = (typing.Union, types.UnionType, typing.Annotated, tuple, list, dict)
-
-
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, Model):
-        return [*leaves_of(annotation)]
-    if typing.get_origin(annotation) in _NESTING:
-        return [m for part in typing.get_args(annotation) for m in _models_in(part)]
-    return []
+    types = (part for part in nested_in(annotation) if isinstance(part, type))
+    return [kind for each in types if issubclass(each, Model) for kind in leaves_of(each)]
 
 
 def _toml(value: Any) -> str:

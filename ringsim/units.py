@@ -3,7 +3,7 @@
 import functools
 import operator
 import typing
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -34,7 +34,8 @@ class Unit:
 
 def unit_of(field: FieldInfo) -> str:
     """Symbol of the SI unit of a model's field, also of one in a list; "1" if it has none."""
-    return next(_units_in((*field.metadata, field.annotation)), "1")
+    parts = (part for top in (*field.metadata, field.annotation) for part in nested_in(top))
+    return next((part.symbol for part in parts if isinstance(part, Unit)), "1")
 
 
 def unit_at(record: BaseModel, path: str) -> str:
@@ -45,12 +46,11 @@ def unit_at(record: BaseModel, path: str) -> str:
     return "1" if field is None else unit_of(field)
 
 
-def _units_in(parts: Iterable[Any]) -> Iterator[str]:
-    for part in parts:
-        if isinstance(part, Unit):
-            yield part.symbol
-        else:
-            yield from _units_in((*getattr(part, "__metadata__", ()), *typing.get_args(part)))
+def nested_in(annotation: Any) -> Iterator[Any]:
+    """An annotation, then all that it is made of: types, units and other marks."""
+    yield annotation
+    for part in typing.get_args(annotation):
+        yield from nested_in(part)
 
 
 class Model(BaseModel):

@@ -71,16 +71,15 @@ def command(
 
 def _run(scheduler: Scheduler, prepare: Callable[[], tuple[Path, tuple[Any, ...]]]) -> int:
     """Prepare on rank 0 and run on all ranks; what is refused is told once."""
-    prepared, fault = None, ""
+    prepared: Any = None
     if scheduler.rank == 0:
         try:
             prepared = prepare()
         except InputError as error:
-            fault = str(error)
-    prepared, fault = scheduler.from_first((prepared, fault))
+            prepared = error
     try:
-        if prepared is None:
-            raise InputError(fault)
+        if isinstance(prepared := scheduler.from_first(prepared), InputError):
+            raise prepared
         folder, choices = prepared
         return run_campaign(folder, Choices(scheduler, *choices))
     except InputError as error:

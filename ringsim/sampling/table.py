@@ -1,25 +1,31 @@
-"""The design of a campaign: which values every sample has."""
+"""The design of a campaign: which values every sample has, and which paths it may vary."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.choice import OneOf
 from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.overrides import field_at, section_of
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Design
 from ringsim.sampling.distributions.family import Distribution, Values
-from ringsim.sampling.paths import each_of, field_at, refuse_fixed
 from ringsim.scene import Scene, place_of
 from ringsim.units import unit_at
 
 AnyDistribution = Annotated[Distribution, OneOf()]
 AnyDesign = Annotated[Design, OneOf()]
+
+FIXED = (
+    "name", "title", "structure.kind", "structure.sections", "structure.closed", "solver.end_time",
+    "record",
+)  # fmt: skip
+"""Paths that give a result its shape or its name: all samples of a campaign share them."""
 
 
 def draw(
@@ -42,7 +48,7 @@ def draw(
         refuse_fixed(base, path)
         middle = distribution.quantile(np.array([0.5]))[0].item()
         if distribution.each_section:
-            own = [f"{path}[{k + 1}]" for k in range(each_of(base, path, middle))]
+            own = [f"{path}[{k + 1}]" for k in range(_each_of(base, path, middle))]
         else:
             base.with_values({path: middle})
             own = [path]
@@ -73,6 +79,29 @@ def draw(
     table = Table(tuple(columns), _seeds(seed, samples))
     _check_extremes(base, table)
     return table
+
+
+def refuse_fixed(scene: Scene, path: str) -> None:
+    """Refuse (InputError) a path whose value all samples of a campaign must share."""
+    for fixed in (*FIXED, *scene.structure.shaping):
+        if path == fixed or path.startswith((f"{fixed}.", f"{fixed}[")):
+            raise InputError(
+                f"inputs: {path} must be the same for all samples, because it shapes the result: "
+                "give it under [set], and run a campaign for each value"
+            )
+
+
+def _each_of(base: Scene, path: str, value: Any) -> int:
+    """How many values the list at a path has; InputError if it is one value for all sections."""
+    if section_of(path)[1] is not None:
+        raise InputError(f"inputs: {path} is one section already: leave out each_section")
+    scene = base.with_values({path: value})
+    try:
+        return len(field_at(scene.with_values({f"{path}[1]": value}), path))
+    except InputError:
+        raise InputError(
+            f"inputs: {path} is one value for all sections: leave out each_section"
+        ) from None
 
 
 def _column(base: Scene, path: str, values: Values, origin: Distribution | None) -> Column:

@@ -1,6 +1,6 @@
 """Uniform distribution."""
 
-from typing import ClassVar, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -15,8 +15,6 @@ class Uniform(Continuous):
     [1.0, 1.5, 3.0]
     """
 
-    bounded: ClassVar[bool] = True
-
     kind: Literal["uniform"] = "uniform"
     low: float
     high: float
@@ -30,6 +28,10 @@ class Uniform(Continuous):
     def quantile(self, probability: Array) -> Array:
         """Inverse of the cumulative distribution; its ends are low and high to the bit."""
         return self.low * (1.0 - probability) + self.high * probability
+
+    def levels(self, count: int) -> Array:
+        """From end to end: both are values that can occur."""
+        return np.linspace(0.0, 1.0, count) if count > 1 else super().levels(count)
 
     def probability(self, value: float) -> float:
         """Cumulative distribution."""
