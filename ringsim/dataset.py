@@ -15,8 +15,6 @@ from ringsim.outputs.family import axes, holds
 from ringsim.scene import Scene
 from ringsim.variables import Fidelity, Outcome, Variable, flags_of
 
-_MISSING_COUNT = -1
-
 
 def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
     """Give the arrays of a run of ``scene`` their dimensions, units, meaning and provenance.
@@ -100,9 +98,7 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
         "source": f"{software}: {model}{engine}",
         "fidelity": "ideal" if ideal else "full",
         "creator_name": "ringsim",
-        "ringsim_version": version("ringsim"),
-        "exudyn_version": version("exudyn"),
-        "numpy_version": version("numpy"),
+        **{f"{package}_version": version(package) for package in ("ringsim", "exudyn", "numpy")},
         "python_version": platform.python_version(),
         "scene": scene.to_toml(),
     }
@@ -116,7 +112,7 @@ def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
         if variable.dtype.kind == "f" and name not in dataset.coords:
             chosen["_FillValue"] = np.nan
             if declared is not None and declared.dtype.startswith("i"):
-                chosen = {"dtype": declared.dtype, "_FillValue": _MISSING_COUNT}
+                chosen = {"dtype": declared.dtype, "_FillValue": -1}
         if variable.ndim > 0 and variable.dtype.kind in "fiub":
             chosen |= {"zlib": True, "complevel": 4, "shuffle": True}
         encoding[str(name)] = chosen

@@ -9,7 +9,6 @@ from ringsim.refusal import InputError
 from ringsim.units import LEFT_OUT
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_SECTION = re.compile(r"(.*)\[([0-9]{1,6})\]", re.DOTALL)
 
 
 def parse_assignment(text: str) -> tuple[str, Any]:
@@ -38,7 +37,7 @@ def section_of(path: str) -> tuple[str, int | None]:
     >>> section_of("rods.young_modulus[3]"), section_of("loads.force")
     (('rods.young_modulus', 3), ('loads.force', None))
     """
-    matched = _SECTION.fullmatch(path)
+    matched = re.fullmatch(r"(.*)\[([0-9]{1,6})\]", path, re.DOTALL)
     return (matched[1], int(matched[2])) if matched else (path, None)
 
 

@@ -14,7 +14,6 @@ from ringsim.units import Model, nested_in, unit_of
 
 MOST_NAMED = 3
 """So many further faults are named beside the one that is described."""
-
 LONGEST_VALUE = 60
 """Characters of a refused value that are shown."""
 
@@ -49,18 +48,14 @@ _SAYS = {
 
 
 def explain(error: ValidationError, model: type[BaseModel], source: str) -> str:
-    """One line that begins with ``source``: the first fault in full, then where the others are.
-
-    ``model`` is what was validated; its fields give units and known names.
-    """
+    """One line that begins with ``source``: the first fault in full, then where the others are."""
     faults = error.errors(include_url=False)
     line = f"{source}: {_describe(faults[0], model)}"
     others = list(dict.fromkeys(_place(fault, model) for fault in faults[1:]))
-    if others:
-        left = len(others) - MOST_NAMED
-        more = f" and {left} more" if left > 0 else ""
-        line += f"; also at fault: {', '.join(others[:MOST_NAMED])}{more}"
-    return line
+    if not others:
+        return line
+    more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
+    return f"{line}; also at fault: {', '.join(others[:MOST_NAMED])}{more}"
 
 
 def known_or_nearest(key: str, known: Iterable[str]) -> str:
@@ -112,10 +107,8 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
         case "value_error":
             text = str(limits["error"])
             return f"{where}.{text}" if where and not text.startswith(where) else text
-    says = _SAYS.get(kind) or _SAYS.get(kind.split("_")[0])
-    if says is None:
-        message = fault["msg"]
-        return f"{shown}: {message[0].lower()}{message[1:]}"
+    if (says := _SAYS.get(kind) or _SAYS.get(kind.split("_")[0])) is None:
+        return f"{shown}: {fault['msg'][0].lower()}{fault['msg'][1:]}"
     in_unit = f" in{unit}" if unit else ""
     return says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
 

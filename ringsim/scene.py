@@ -31,8 +31,6 @@ from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import ListIn, Model
 
-AnyStructure = Annotated[Structure, OneOf(default="pantograph-ring")]
-
 MOST_RECORDS = 1_000_000
 """Output times of one run, at most."""
 
@@ -42,7 +40,7 @@ class Scene(Model):
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
     title: Annotated[str, Field(max_length=300)] = ""
-    structure: AnyStructure = PantographRing()
+    structure: Annotated[Structure, OneOf(default="pantograph-ring")] = PantographRing()
     rods: Annotated[Rods, OneOf()] = GeometricallyExactRods()
     joints: Joints = Joints()
     stop: Annotated[Stop, OneOf(default="spring-damper")] | None = SpringDamperStop()

@@ -8,10 +8,8 @@ from typing import Any, Self
 import numpy as np
 
 PLANES = ("upper", "lower")
-
 COUNTS = ("steps", "newton_iterations", "jacobians")
 """What a start of a run takes; "total_" before the name counts all starts."""
-
 TIMINGS = ("wall_time", "cpu_time")
 """The only variables that differ between repetitions of one run."""
 

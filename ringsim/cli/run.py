@@ -113,15 +113,13 @@ def _with_accuracy(
             f"--accuracy {accuracy:g}: the ideal fidelity keeps its own tolerances: leave out one "
             "of --accuracy and --fidelity"
         )
-    output = of or JUDGED_BY
-    if output not in CHOICES:
+    if (output := of or JUDGED_BY) not in CHOICES:
         raise InputError(f"--of {output}: must be one of {', '.join(CHOICES)}")
     changed = scene.with_values(given)
     known = read_evidence(file) if file is not None else evidence_for(changed)
     known.require_like(changed)
     picked = known.pick(accuracy, output)
-    clash = sorted(set(picked.values) & set(given))
-    if clash:
+    if clash := sorted(set(picked.values) & set(given)):
         raise InputError(f"--set {clash[0]}: --accuracy chooses it: leave out one of the two")
     values = known.values_for(picked, changed)
     words = ", ".join(f"{path} = {value}" for path, value in values.items())

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.choice import OneOf
 from ringsim.outputs import COORDINATES, VARIABLES
@@ -76,7 +75,10 @@ def draw(
             raise InputError(f"error_bars_every = {every}: {path} is an input, too: leave out one")
         chosen = np.arange(samples) % every == 0
         columns.append(Column("solver_error_bars", path, "", "1", f"one sample in {every}", chosen))
-    table = Table(tuple(columns), _seeds(seed, samples))
+    # From the campaign's seed and the sample's index alone, so that a design can grow.
+    sequences = (np.random.SeedSequence(seed, spawn_key=(k,)) for k in range(samples))
+    states = [int(each.generate_state(1, np.uint64)[0]) >> 1 for each in sequences]
+    table = Table(tuple(columns), np.array(states, dtype=np.int64))
     _check_extremes(base, table)
     return table
 
@@ -99,9 +101,8 @@ def _each_of(base: Scene, path: str, value: Any) -> int:
     try:
         return len(field_at(scene.with_values({f"{path}[1]": value}), path))
     except InputError:
-        raise InputError(
-            f"inputs: {path} is one value for all sections: leave out each_section"
-        ) from None
+        told = f"inputs: {path} is one value for all sections: leave out each_section"
+        raise InputError(told) from None
 
 
 def _column(base: Scene, path: str, values: Values, origin: Distribution | None) -> Column:
@@ -118,18 +119,8 @@ def _column(base: Scene, path: str, values: Values, origin: Distribution | None)
     return Column(name, path, dim, unit_at(scene, path), words, values)
 
 
-def _seeds(seed: int, samples: int) -> NDArray[np.int64]:
-    """One seed per sample, from the campaign's seed and the sample's index alone."""
-    sequences = (np.random.SeedSequence(seed, spawn_key=(k,)) for k in range(samples))
-    states = [int(each.generate_state(1, np.uint64)[0]) >> 1 for each in sequences]
-    return np.array(states, dtype=np.int64)
-
-
 def _check_extremes(base: Scene, table: Table) -> None:
-    """Build the scenes that hold the least and the greatest value of every input.
-
-    Every word among the inputs is in one of them, so that all numbers of spans are seen.
-    """
+    """Build scenes with the least and the greatest value, and each word, of every input."""
     spans: set[int] = set()
     suspects: set[int] = {0}
     for column in table.columns:
