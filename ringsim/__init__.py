@@ -1,7 +1,6 @@
 """ringsim: how large deployable ring antennas open.
 
-Public words: :class:`Scene`, :func:`load_scene` and :func:`simulate`.  Each is loaded when it is
-first used, so that importing ringsim costs nothing.
+Its public words are loaded when they are used, so that importing ringsim costs nothing.
 
 >>> import ringsim
 >>> ring = ringsim.load_scene("ring18").with_values({"structure.sections": 6})
@@ -30,9 +29,7 @@ def __getattr__(name: str) -> Any:
     """Load a public word on its first use."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = importlib.import_module(f"{__name__}.{_HOMES[name]}")
-    word = globals()[name] = getattr(home, name)
-    return word
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
 
 
 def __dir__() -> list[str]:

@@ -1,7 +1,5 @@
 """Families of choices: each kind is a model in its own file, picked by ``kind = "..."``."""
 
-from __future__ import annotations
-
 import functools
 import importlib
 import pkgutil
@@ -19,20 +17,14 @@ class OneOf:
     """Marks a field that holds any kind of its family: ``rods: Annotated[Rods, OneOf()]``.
 
     Kinds are looked up when a value is read: one that a script defines is a choice from then on.
-
-    Attributes
-    ----------
-    default
-        Kind of a table that does not name one; without it the table must.
     """
 
     default: str | None = None
+    """Kind of a table that does not name one; without it the table must."""
 
     def __get_pydantic_core_schema__(
         self, family: type[Model], handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        del handler
-
         def read(value: Any) -> Any:
             if self.default is not None and isinstance(value, dict):
                 value = {"kind": self.default, **value}

@@ -1,7 +1,5 @@
 """A run as an xarray dataset, and datasets as netCDF files."""
 
-from __future__ import annotations
-
 import platform
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -17,35 +15,18 @@ from ringsim.outputs.family import axes, holds
 from ringsim.scene import Scene
 from ringsim.variables import Fidelity, Outcome, Variable, flags_of
 
-CONVENTIONS = "CF-1.11, ACDD-1.3"
-_MISSING_COUNT = -1
-
 
 def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
-    """Give the arrays of a run their dimensions, units, meaning and provenance.
+    """Give the arrays of a run of ``scene`` their dimensions, units, meaning and provenance.
 
     Everything that does not depend on time is always there, NaN where the run did not get so
     far (stress only if the scene records it); what depends on time is there if it was recorded.
     So the samples of a campaign fit together, also when some of them failed.
 
-    Parameters
-    ----------
-    outcome
-        What the run gave.
-    scene
-        The scene that was run; its TOML text becomes the attribute ``scene``.
-
-    Returns
-    -------
-    xr.Dataset
-        Variables of ``ringsim.outputs`` with ``units`` and ``long_name``; ``status`` and ``cause``
-        are int8 with CF flags; the global attribute ``reason`` says in words how the run ended.
-
-    Raises
-    ------
-    ValueError
-        If the outcome holds a name that no output declares, or an array whose shape does not fit
-        its dimensions.
+    Variables of ``ringsim.outputs`` have ``units`` and ``long_name``; ``status`` and ``cause``
+    are int8 with CF flags.  Among the global attributes ``reason`` says in words how the run
+    ended, and ``scene`` is the scene's TOML text.  ValueError if the outcome holds a name that no
+    output declares, or an array whose shape does not fit its dimensions.
     """
     unknown = sorted(set(outcome.values) - set(VARIABLES))
     if unknown:
@@ -68,22 +49,10 @@ def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
 
 
 def save(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a netCDF-4 file, whole or not at all.
+    """Write a netCDF-4 file, whole or not at all; an older one of that name is replaced.
 
     Numeric arrays are compressed (zlib level 4, shuffle), missing values are NaN, missing
-    counts -1.  The file appears under its name only once it is complete on the disk.
-
-    Parameters
-    ----------
-    dataset
-        What to write.
-    path
-        The file; an older one of that name is replaced.
-
-    Raises
-    ------
-    InputError
-        If the folder does not exist, or if the file cannot be written there.
+    counts -1.  InputError if the folder does not exist, or the file cannot be written there.
     """
     path = Path(path)
     require_place(path)
@@ -99,8 +68,8 @@ def _array(variable: Variable, values: np.ndarray[Any, Any]) -> xr.DataArray:
     attributes: dict[str, Any] = {"long_name": variable.long_name}
     if variable.dtype != "str":
         attributes["units"] = variable.units
-        whole = np.issubdtype(np.dtype(variable.dtype), np.integer)
-        missing = whole and values.dtype.kind == "f" and not np.isfinite(values).all()
+        counts = variable.dtype.startswith("i")
+        missing = counts and values.dtype.kind == "f" and not np.isfinite(values).all()
         values = values.astype("f8" if missing else variable.dtype)
     if values.ndim != len(variable.dims):
         raise ValueError(
@@ -119,7 +88,7 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
     model = "ideal ring of rigid rods" if ideal else "multibody simulation with exudyn"
     engine = "" if ideal else f" {version('exudyn')}"
     return {
-        "Conventions": CONVENTIONS,
+        "Conventions": "CF-1.11, ACDD-1.3",
         "title": title,
         "summary": f"One simulated run of the scene {scene.name} ({title}), "
         f"status {outcome.status.word}.",
@@ -129,9 +98,7 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
         "source": f"{software}: {model}{engine}",
         "fidelity": "ideal" if ideal else "full",
         "creator_name": "ringsim",
-        "ringsim_version": version("ringsim"),
-        "exudyn_version": version("exudyn"),
-        "numpy_version": version("numpy"),
+        **{f"{package}_version": version(package) for package in ("ringsim", "exudyn", "numpy")},
         "python_version": platform.python_version(),
         "scene": scene.to_toml(),
     }
@@ -144,8 +111,8 @@ def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
         declared = VARIABLES.get(str(name))
         if variable.dtype.kind == "f" and name not in dataset.coords:
             chosen["_FillValue"] = np.nan
-            if declared is not None and np.dtype(declared.dtype).kind == "i":
-                chosen = {"dtype": declared.dtype, "_FillValue": _MISSING_COUNT}
+            if declared is not None and declared.dtype.startswith("i"):
+                chosen = {"dtype": declared.dtype, "_FillValue": -1}
         if variable.ndim > 0 and variable.dtype.kind in "fiub":
             chosen |= {"zlib": True, "complevel": 4, "shuffle": True}
         encoding[str(name)] = chosen

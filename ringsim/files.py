@@ -1,7 +1,5 @@
 """Files: texts and TOML with refusals of one line, and files that appear whole or not at all."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import secrets

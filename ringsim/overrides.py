@@ -1,7 +1,6 @@
 """Values at dotted paths: ``rods.bar.outer_diameter``, ``rods.young_modulus[3]``."""
 
-from __future__ import annotations
-
+import operator
 import re
 import tomllib
 from typing import Any
@@ -10,19 +9,13 @@ from ringsim.refusal import InputError
 from ringsim.units import LEFT_OUT
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_SECTION = re.compile(r"(.*)\[([0-9]{1,6})\]", re.DOTALL)
 
 
 def parse_assignment(text: str) -> tuple[str, Any]:
     """Split ``PATH=VALUE``; the value is TOML, or a bare word taken as a string.
 
-    Raises
-    ------
-    InputError
-        If there is no ``=``, no path or no value.
+    InputError if there is no ``=``, no path or no value.
 
-    Examples
-    --------
     >>> parse_assignment("loads.force = 0.02")
     ('loads.force', 0.02)
     >>> parse_assignment("rods.kind=ancf")
@@ -44,27 +37,25 @@ def section_of(path: str) -> tuple[str, int | None]:
     >>> section_of("rods.young_modulus[3]"), section_of("loads.force")
     (('rods.young_modulus', 3), ('loads.force', None))
     """
-    matched = _SECTION.fullmatch(path)
+    matched = re.fullmatch(r"(.*)\[([0-9]{1,6})\]", path, re.DOTALL)
     return (matched[1], int(matched[2])) if matched else (path, None)
+
+
+def field_at(record: Any, path: str) -> Any:
+    """The value of a record at a dotted path, one entry of a list at ``name[k]``."""
+    inner, section = section_of(path)
+    value = operator.attrgetter(inner)(record)
+    return value[section - 1] if section is not None and isinstance(value, tuple) else value
 
 
 def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
     """Write ``value`` at ``path`` into nested tables, in place.
 
     A step through a part that is not there creates it.  A last step ``name[k]`` is the value of
-    section k, counted from 1; a field that had one value for all becomes a list first.  The
-    value "none" (or None) removes a part, and puts the default back in any other field but
-    ``kind``, where "none" is a word like others.
-
-    Parameters
-    ----------
-    length
-        Number of values in a list at this path.
-
-    Raises
-    ------
-    InputError
-        If the path is malformed or leads through a value that is not a table.
+    section k, counted from 1; a field that had one value for all becomes a list of ``length``
+    first.  The value "none" (or None) removes a part, and puts the default back in any other field
+    but ``kind``, where "none" is a word like others.  InputError if the path is malformed or leads
+    through a value that is not a table.
     """
     inner, section = section_of(path)
     *steps, name = inner.split(".")

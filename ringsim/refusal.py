@@ -1,9 +1,6 @@
 """Refusing bad input: one clear line, naming field, value, bound and cure."""
 
-from __future__ import annotations
-
 import difflib
-import types
 import typing
 from collections.abc import Iterable
 from typing import Any
@@ -13,11 +10,10 @@ from pydantic.fields import FieldInfo
 
 from ringsim.choice import leaves_of
 from ringsim.parts.persection import EACH, ONE
-from ringsim.units import Model, unit_of
+from ringsim.units import Model, nested_in, unit_of
 
 MOST_NAMED = 3
 """So many further faults are named beside the one that is described."""
-
 LONGEST_VALUE = 60
 """Characters of a refused value that are shown."""
 
@@ -44,7 +40,6 @@ _SAYS = {
     "string_pattern_mismatch": "{shown} must start with a letter or digit and hold only letters, "
     "digits, dots, dashes and underscores",
     "string_too_long": "{shown} must have at most {max_length} characters",
-    "string_too_short": "{shown} must have at least {min_length} characters",
     "literal_error": "{shown} must be {expected}",
     "model": "{shown} must be a table: write [{where}], and its keys on the lines below",
     "tuple": "{shown} must be one value, or a list with a value for each section",
@@ -53,18 +48,14 @@ _SAYS = {
 
 
 def explain(error: ValidationError, model: type[BaseModel], source: str) -> str:
-    """One line that begins with ``source``: the first fault in full, then where the others are.
-
-    ``model`` is what was validated; its fields give units and known names.
-    """
+    """One line that begins with ``source``: the first fault in full, then where the others are."""
     faults = error.errors(include_url=False)
     line = f"{source}: {_describe(faults[0], model)}"
     others = list(dict.fromkeys(_place(fault, model) for fault in faults[1:]))
-    if others:
-        left = len(others) - MOST_NAMED
-        more = f" and {left} more" if left > 0 else ""
-        line += f"; also at fault: {', '.join(others[:MOST_NAMED])}{more}"
-    return line
+    if not others:
+        return line
+    more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
+    return f"{line}; also at fault: {', '.join(others[:MOST_NAMED])}{more}"
 
 
 def known_or_nearest(key: str, known: Iterable[str]) -> str:
@@ -116,10 +107,8 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
         case "value_error":
             text = str(limits["error"])
             return f"{where}.{text}" if where and not text.startswith(where) else text
-    says = _SAYS.get(kind) or _SAYS.get(kind.split("_")[0])
-    if says is None:
-        message = fault["msg"]
-        return f"{shown}: {message[0].lower()}{message[1:]}"
+    if (says := _SAYS.get(kind) or _SAYS.get(kind.split("_")[0])) is None:
+        return f"{shown}: {fault['msg'][0].lower()}{fault['msg'][1:]}"
     in_unit = f" in{unit}" if unit else ""
     return says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
 
@@ -158,15 +147,9 @@ def _tag(model: type[BaseModel]) -> Any:
     return model.model_fields["kind"].default if "kind" in model.model_fields else None
 
 
-_NESTING = (typing.Union, types.UnionType, typing.Annotated, tuple, list, dict)
-
-
 def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, Model):
-        return [*leaves_of(annotation)]
-    if typing.get_origin(annotation) in _NESTING:
-        return [m for part in typing.get_args(annotation) for m in _models_in(part)]
-    return []
+    types = (part for part in nested_in(annotation) if isinstance(part, type))
+    return [kind for each in types if issubclass(each, Model) for kind in leaves_of(each)]
 
 
 def _toml(value: Any) -> str:

@@ -1,13 +1,11 @@
 """The scene: everything that one simulation needs, strict in and exact out."""
 
-from __future__ import annotations
-
 import copy
 import os
 from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
@@ -33,8 +31,6 @@ from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import ListIn, Model
 
-AnyStructure = Annotated[Structure, OneOf(default="pantograph-ring")]
-
 MOST_RECORDS = 1_000_000
 """Output times of one run, at most."""
 
@@ -44,7 +40,7 @@ class Scene(Model):
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
     title: Annotated[str, Field(max_length=300)] = ""
-    structure: AnyStructure = PantographRing()
+    structure: Annotated[Structure, OneOf(default="pantograph-ring")] = PantographRing()
     rods: Annotated[Rods, OneOf()] = GeometricallyExactRods()
     joints: Joints = Joints()
     stop: Annotated[Stop, OneOf(default="spring-damper")] | None = SpringDamperStop()
@@ -57,10 +53,10 @@ class Scene(Model):
     record: Record = Record()
 
     @model_validator(mode="after")
-    def _consistent(self) -> Scene:
+    def _consistent(self) -> Self:
         for path, value in _lists(self):
             wanted = _length_at(self, path)
-            if wanted is not None and len(value) != wanted:
+            if wanted not in (None, len(value)):
                 raise ValueError(
                     f"{path} has {len(value)} values, but the structure needs {wanted}: give "
                     "one value for all, or a list of that length"
@@ -95,18 +91,12 @@ class Scene(Model):
         present = [] if self.cables is None else self.cables.present()
         return max((self.pulleys_of(cable) + 1 for _, cable in present), default=0)
 
-    def with_values(self, values: dict[str, Any]) -> Scene:
+    def with_values(self, values: dict[str, Any]) -> "Scene":
         """A copy with the fields at dotted paths replaced in their order, validated again.
 
-        See :func:`ringsim.overrides.set_path` for ``name[k]`` and ``none``.
+        See :func:`ringsim.overrides.set_path` for ``name[k]`` and ``none``.  InputError if a path
+        or a value is refused.
 
-        Raises
-        ------
-        InputError
-            If a path or a value is refused.
-
-        Examples
-        --------
         >>> scene = load_scene("ring18").with_values({"loads.force": 0.02, "boom": "none"})
         >>> scene.loads.force, scene.boom
         (0.02, None)
@@ -156,7 +146,6 @@ def _at(owner: Any, path: str) -> Any:
 
 
 def _check_faults(scene: Scene) -> None:
-    """Every fault names a place that the scene has."""
     cables = [] if scene.cables is None else scene.cables.present()
     places = {"section": scene.structure.sections, "cable": len(cables)}
     for number, fault in enumerate(scene.faults, 1):
@@ -185,13 +174,7 @@ def _lists(record: Model, prefix: str = "") -> Iterator[tuple[str, tuple[float, 
 
 
 def scene_from_table(table: dict[str, Any], *, source: str) -> Scene:
-    """Validate nested tables.
-
-    Raises
-    ------
-    InputError
-        One line naming ``source``, field, value, bound and cure.
-    """
+    """Validate nested tables; InputError names ``source``, field, value, bound and cure."""
     try:
         return Scene.model_validate(table)
     except ValidationError as error:
@@ -199,42 +182,31 @@ def scene_from_table(table: dict[str, Any], *, source: str) -> Scene:
 
 
 def scene_from_toml(text: str, *, source: str) -> Scene:
-    """Parse and validate TOML text.
-
-    Raises
-    ------
-    InputError
-        If the text is not TOML, or its content is refused.
-    """
+    """Parse and validate TOML text; InputError if it is no TOML, or its content is refused."""
     return scene_from_table(parse_toml(text, source), source=source)
 
 
 def builtin_scenes() -> dict[str, str]:
     """TOML text of the built-in scenes by name."""
     folder = resources.files("ringsim") / "scenes"
-    files = sorted((f for f in folder.iterdir() if f.name.endswith(".toml")), key=lambda f: f.name)
-    return {f.name.removesuffix(".toml"): f.read_text(encoding="utf-8") for f in files}
+    files = {file.name: file for file in folder.iterdir() if file.name.endswith(".toml")}
+    return {name[:-5]: files[name].read_text(encoding="utf-8") for name in sorted(files)}
 
 
 def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
-    """A built-in scene by name, or a scene file; paths may be relative to the folder of a file.
+    """A built-in scene by name, or a scene file; paths are relative to the folder of ``beside``.
 
-    Raises
-    ------
-    InputError
-        If there is no such scene or file, or if its content is refused.
+    InputError if there is no such scene or file, or if its content is refused.
 
-    Examples
-    --------
     >>> scene = load_scene("ring18")
     >>> scene.structure.sections, scene.loads.force
     (18, 0.015)
     """
-    builtin = builtin_scenes()
-    if str(name_or_path) in builtin:
-        return scene_from_toml(builtin[str(name_or_path)], source=f"scene {name_or_path}")
+    builtin, name = builtin_scenes(), str(name_or_path)
+    if name in builtin:
+        return scene_from_toml(builtin[name], source=f"scene {name}")
     path = beside.parent / name_or_path
     if not os.path.exists(path):  # Path.exists raises for names that are too long
-        hint = known_or_nearest(str(name_or_path), builtin)
+        hint = known_or_nearest(name, builtin)
         raise InputError(f"{path}: no such file, and no built-in scene of that name ({hint})")
     return scene_from_toml(read_text(path), source=path.name)

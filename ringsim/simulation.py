@@ -1,8 +1,4 @@
-"""One simulation: scene in, outcome or dataset out.  Failures are values, not exceptions.
-
-Two fidelities answer the same questions: the full multibody model (``run``), and the ideal ring
-of rigid rods (``run_ideal``), which knows neither asynchrony nor stress and costs a fraction.
-"""
+"""One simulation: scene in, outcome or dataset out.  Failures are values, not exceptions."""
 
 from __future__ import annotations
 
@@ -32,13 +28,10 @@ __all__ = ["FIDELITIES", "run", "run_ideal", "simulate"]
 def run(scene: Scene) -> Outcome:
     """Build and integrate a scene; one that fails or diverges starts anew with smaller steps.
 
-    Returns
-    -------
-    Outcome
-        Arrays on the scene's output grid, of the last start, and what
-        :func:`ringsim.stepping.restarts.run_with_restarts` adds on the starts; times are those of
-        all of them and of the second run for error bars.  A solve that fails or does not reach its
-        goal has a status other than OK and the reason; it never raises.
+    The outcome has arrays on the scene's output grid, of the last start, and what
+    :func:`ringsim.stepping.restarts.run_with_restarts` adds on the starts; times are those of all
+    of them and of the second run for error bars.  A solve that fails or does not reach its goal
+    has a status other than OK and the reason; it never raises.
     """
     begin = (time.perf_counter(), time.process_time())
 
@@ -66,19 +59,15 @@ def _attempt(scene: Scene, begin: tuple[float, float]) -> Outcome:
 
 
 FIDELITIES: dict[str, Callable[[Scene], Outcome]] = {"full": run, "ideal": run_ideal}
-"""What answers a scene, by the word that chooses it."""
+"""What answers a scene: the full multibody model, or the ideal ring of rigid rods, which knows
+neither asynchrony nor stress and costs a fraction."""
 
 
 def simulate(scene: Scene, fidelity: str = "full") -> xr.Dataset:
     """Run a scene and return its dataset (see ``ringsim.dataset.to_dataset``).
 
-    Raises
-    ------
-    InputError
-        If the ideal ring cannot represent the scene.
+    InputError if the ideal ring cannot represent the scene.
 
-    Examples
-    --------
     >>> from ringsim.scene import load_scene
     >>> scene = load_scene("truss2").with_values({"solver.end_time": 0.5})
     >>> run = simulate(scene)

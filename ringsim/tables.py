@@ -1,7 +1,5 @@
 """Tables in Markdown."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from tabulate import DataRow, TableFormat, tabulate
@@ -16,16 +14,6 @@ _NARROW = TableFormat(
 
 
 def markdown_table(head: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
-    """A table as GitHub reads it; cells are text or numbers, and written as they are.
-
-    Parameters
-    ----------
-    head
-        Names of the columns.
-    rows
-        One cell for each column; a ``|`` or a line break in a cell is masked.
-    """
+    """A table as GitHub reads it; cells are written as they are, but ``|`` and line breaks."""
     cells = [[" ".join(str(cell).split()).replace("|", "\\|") for cell in row] for row in rows]
-    names = [str(name) for name in head]
-    table: str = tabulate(cells, names, _NARROW, disable_numparse=True, stralign=None)
-    return table
+    return str(tabulate(cells, list(map(str, head)), _NARROW, disable_numparse=True, stralign=None))

@@ -1,12 +1,9 @@
 """Annotated field types: SI unit and bounds of every quantity that a scene may hold."""
 
-from __future__ import annotations
-
 import functools
 import operator
-import types
 import typing
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -37,15 +34,23 @@ class Unit:
 
 def unit_of(field: FieldInfo) -> str:
     """Symbol of the SI unit of a model's field, also of one in a list; "1" if it has none."""
-    return next(_units_in((*field.metadata, field.annotation)), "1")
+    parts = (part for top in (*field.metadata, field.annotation) for part in nested_in(top))
+    return next((part.symbol for part in parts if isinstance(part, Unit)), "1")
 
 
-def _units_in(parts: Iterable[Any]) -> Iterator[str]:
-    for part in parts:
-        if isinstance(part, Unit):
-            yield part.symbol
-        else:
-            yield from _units_in((*getattr(part, "__metadata__", ()), *typing.get_args(part)))
+def unit_at(record: BaseModel, path: str) -> str:
+    """Symbol of the SI unit of the field at a dotted path, ``name[k]`` included; "1" if none."""
+    inner, _, last = path.partition("[")[0].rpartition(".")
+    owner = operator.attrgetter(inner)(record) if inner else record
+    field = getattr(type(owner), "model_fields", {}).get(last)
+    return "1" if field is None else unit_of(field)
+
+
+def nested_in(annotation: Any) -> Iterator[Any]:
+    """An annotation, then all that it is made of: types, units and other marks."""
+    yield annotation
+    for part in typing.get_args(annotation):
+        yield from nested_in(part)
 
 
 class Model(BaseModel):
@@ -61,20 +66,16 @@ class Model(BaseModel):
         """Read the word "none" as nothing, where nothing is allowed."""
         if not isinstance(table, dict):
             return table
-        parts = cls.parts()
-        return {
-            key: None if isinstance(value, str) and value == LEFT_OUT and key in parts else value
-            for key, value in table.items()
+        left_out = {
+            k for k in cls.parts() if isinstance(table.get(k), str) and table[k] == LEFT_OUT
         }
+        return table | dict.fromkeys(left_out)
 
     def require_below(self, path: str, limit: str, why: str = "") -> None:
         """Refuse a field at a dotted path that is not below another one of the same unit."""
         value, most = operator.attrgetter(path, limit)(self)
         if value >= most:
-            inner, _, last = path.rpartition(".")
-            owner = operator.attrgetter(inner)(self) if inner else self
-            unit = unit_of(type(owner).model_fields[last])
-            because = f": {why}" if why else ""
+            unit, because = unit_at(self, path), f": {why}" if why else ""
             raise ValueError(
                 f"{path} = {value} {unit} must be below {limit} = {most} {unit}{because}"
             )
@@ -99,8 +100,7 @@ class Model(BaseModel):
         return frozenset(
             name
             for name, field in cls.model_fields.items()
-            if typing.get_origin(field.annotation) in (typing.Union, types.UnionType)
-            and type(None) in typing.get_args(field.annotation)
+            if type(None) in typing.get_args(field.annotation)
         )
 
 

@@ -1,19 +1,15 @@
 """What a result is made of: variables with their meaning, and how and why a run ended."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 PLANES = ("upper", "lower")
-
 COUNTS = ("steps", "newton_iterations", "jacobians")
 """What a start of a run takes; "total_" before the name counts all starts."""
-
 TIMINGS = ("wall_time", "cpu_time")
 """The only variables that differ between repetitions of one run."""
 
@@ -82,15 +78,15 @@ class Reason(str):
 
     cause: Cause
 
-    def __new__(cls, cause: Cause = Cause.NONE, text: str = "") -> Reason:
+    def __new__(cls, cause: Cause = Cause.NONE, text: str = "") -> Self:
         """Attach the code to the text."""
         made = super().__new__(cls, text)
         made.cause = cause
         return made
 
-    def __add__(self, more: str) -> Reason:
+    def __add__(self, more: str) -> Self:
         """The same cause with more words."""
-        return Reason(self.cause, f"{self}{more}")
+        return type(self)(self.cause, f"{self}{more}")
 
 
 class Fidelity(IntEnum):

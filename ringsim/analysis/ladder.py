@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ringsim.choice import kind_of
+from ringsim.overrides import field_at
 from ringsim.parts.solver import NO_DEVIATIONS
-from ringsim.sampling.paths import field_at
 from ringsim.scene import Scene
 
 PATHS = (

@@ -13,9 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ringsim.overrides import field_at
 from ringsim.refusal import InputError
-from ringsim.sampling.paths import field_at, refuse_fixed, unit_at
+from ringsim.sampling.table import refuse_fixed
 from ringsim.scene import Scene
+from ringsim.units import unit_at
 from ringsim.variables import PLANES
 
 _DECADE = 10.0

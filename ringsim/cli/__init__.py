@@ -1,7 +1,5 @@
 """The command line: verbs only, each in its own file and loaded only when it is called."""
 
-from __future__ import annotations
-
 import importlib
 import logging
 import os

@@ -1,7 +1,5 @@
 """``ringsim accuracy SCENE``."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any
@@ -15,7 +13,7 @@ from ringsim.files import write_text
 from ringsim.scene import load_scene
 
 
-@click.command("accuracy")
+@click.command()
 @SCENE
 @SETTINGS
 @click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/accuracy-SCENE).")

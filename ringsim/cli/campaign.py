@@ -1,7 +1,5 @@
 """``ringsim campaign``: run a campaign, or finish an interrupted one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,7 +8,7 @@ import click
 
 from ringsim.campaign.folder import prepare_folder
 from ringsim.campaign.run import Choices, Share, run_campaign
-from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
+from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.campaign.status import plan
 from ringsim.cli.options import PATH
 from ringsim.execution.local import Local, Serial
@@ -43,28 +41,25 @@ def command(
     """
     size = launched_size()
 
-    def asked_for() -> tuple[Campaign, Path, str, Share]:
-        campaign = load_campaign(file)
-        wanted = campaign.specification
-        folder = out or Path("runs") / wanted.name
-        return campaign, folder, solver or SOLVERS[wanted.fidelity], Share.parse(part)
-
     def prepare() -> tuple[Path, tuple[Any, ...]]:
-        if size > 1 and workers is not None:
+        if size > 1 and workers is not None and not dry_run:
             raise InputError(
                 f"--workers {workers}: under an MPI launcher every rank drives one solver "
                 "process: leave out --workers"
             )
-        campaign, folder, name, share = asked_for()
-        prepare_folder(campaign, folder, solver=name)
+        campaign, share = load_campaign(file), Share.parse(part)
         wanted = campaign.specification
+        folder, name = out or Path("runs") / wanted.name, solver or SOLVERS[wanted.fidelity]
+        if dry_run:
+            count = max(1, workers or size)
+            for line in plan(campaign, folder, workers=count, share=share, solver=name):
+                click.echo(line)
+        else:
+            prepare_folder(campaign, folder, solver=name)
         return folder, (wanted.limits, wanted.max_failed, share, retry_failed)
 
     if dry_run:
-        campaign, folder, name, share = asked_for()
-        count = max(1, workers or size)
-        for line in plan(campaign, folder, workers=count, share=share, solver=name):
-            click.echo(line)
+        prepare()
         return EXIT_DONE
     if size == 1:
         return _run(Serial() if workers == 0 else Local(workers or 1), prepare)
@@ -75,16 +70,15 @@ def command(
 
 def _run(scheduler: Scheduler, prepare: Callable[[], tuple[Path, tuple[Any, ...]]]) -> int:
     """Prepare on rank 0 and run on all ranks; what is refused is told once."""
-    prepared, fault = None, ""
+    prepared: Any = None
     if scheduler.rank == 0:
         try:
             prepared = prepare()
         except InputError as error:
-            fault = str(error)
-    prepared, fault = scheduler.from_first((prepared, fault))
+            prepared = error
     try:
-        if prepared is None:
-            raise InputError(fault)
+        if isinstance(prepared := scheduler.from_first(prepared), InputError):
+            raise prepared
         folder, choices = prepared
         return run_campaign(folder, Choices(scheduler, *choices))
     except InputError as error:

@@ -1,7 +1,5 @@
 """``ringsim check``: validate a scene and say what it builds."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 
@@ -19,7 +17,7 @@ MOST_SECTIONS_FOR_MOBILITY = 72
 """Larger rings take seconds, and their answer is the same."""
 
 
-@click.command("check", short_help="Check a scene file and say what it builds.")
+@click.command()
 @click.argument("scene", metavar="FILE")
 @SETTINGS
 @click.option(
@@ -31,9 +29,7 @@ def command(scene: str, settings: dict[str, Any], time: float | None) -> None:
 
     Bad input ends with exit code 2 and one line that names the field, its value and the cure.
     """
-    loaded = load_scene(scene)
-    if settings:
-        loaded = loaded.with_values(settings)
+    loaded = load_scene(scene).with_values(settings)
     if time is not None:
         from ringsim.theory.calibration import opening_angle_for
 
@@ -42,28 +38,29 @@ def command(scene: str, settings: dict[str, Any], time: float | None) -> None:
             f"structure.opening_angle = {angle:.6g} deg: the ideal ring deploys in {time:g} s"
         )
         return
-    for label, text in summary(loaded):
-        click.echo(f"{label:<12}{text}")
+    for label, text in _summary(loaded).items():
+        if text:
+            click.echo(f"{label:<12}{text}")
 
 
-def summary(scene: Scene) -> list[tuple[str, str]]:
-    """What a scene builds, as pairs of a label and a text."""
-    lines = [("scene", f"{scene.name}: {scene.title}" if scene.title else scene.name)]
-    lines += [*scene.structure.describe().items(), *_parts(scene)]
-    for name in sorted(type(scene).parts()):
-        part = getattr(scene, name)
-        if part is not None:
-            lines.append((name, _fields(part)))
+def _summary(scene: Scene) -> dict[str, str]:
+    """What a scene builds; an empty text has no line."""
     friction = scene.joints.model_dump()
-    if friction:
-        lines.append(("friction", ", ".join(friction)))
-    lines.append(("left out", ", ".join(_left_out(scene)) or "nothing"))
-    lines.append(("solver", _fields(scene.solver)))
-    return lines
+    parts = {name: getattr(scene, name) for name in sorted(type(scene).parts())}
+    absent = {name: part is None for name, part in parts.items()}
+    absent |= {"joint friction": not friction, "stress output": not scene.record.stress}
+    return {
+        "scene": f"{scene.name}: {scene.title}" if scene.title else scene.name,
+        **scene.structure.describe(),
+        **_layout(scene),
+        **{name: _fields(part) for name, part in parts.items() if part is not None},
+        "friction": ", ".join(friction),
+        "left out": ", ".join(name for name, out in absent.items() if out) or "nothing",
+        "solver": _fields(scene.solver),
+    }
 
 
-def _parts(scene: Scene) -> list[tuple[str, str]]:
-    """What the layout of a scene holds."""
+def _layout(scene: Scene) -> dict[str, str]:
     layout, rods = layout_of(scene), scene.rods
     counts = Counter(joint.kind for joint in layout.joints)
     families = Counter(joint.family for joint in layout.joints)
@@ -77,14 +74,13 @@ def _parts(scene: Scene) -> list[tuple[str, str]]:
         "hinge assemblies": sum(map(len, layout.corners)),
         "V-joints": families["vjoint"], "pivots": families["pivot"],
     }  # fmt: skip
-    lines = [
-        ("rods", f"{len(layout.rods)} {kind_of(rods)} ({elements})"),
-        ("points", ", ".join(f"{count} {name}" for name, count in points.items() if count)),
-        ("joints", ", ".join(_count(count, _JOINTS[kind]) for kind, count in counts.items())),
-        ("mobility", _mobility(layout)),
-        ("mass", f"{sum(masses.values()):.4g} kg: {parts}"),
-    ]
-    return [(label, text) for label, text in lines if text]
+    return {
+        "rods": f"{len(layout.rods)} {kind_of(rods)} ({elements})",
+        "points": ", ".join(f"{count} {name}" for name, count in points.items() if count),
+        "joints": ", ".join(_count(count, _JOINTS[kind]) for kind, count in counts.items()),
+        "mobility": _mobility(layout),
+        "mass": f"{sum(masses.values()):.4g} kg: {parts}",
+    }
 
 
 _JOINTS = {
@@ -107,14 +103,6 @@ def _mobility(layout: Layout) -> str:
 
 def _fields(part: Model) -> str:
     table = part.model_dump()
-    kind = [str(table.pop("kind"))] if "kind" in table else []
-    return ", ".join(kind + [f"{key} = {show(value)}" for key, value in table.items()])
-
-
-def _left_out(scene: Scene) -> list[str]:
-    missing = [name for name in sorted(type(scene).parts()) if getattr(scene, name) is None]
-    if not scene.joints.model_dump():
-        missing.append("joint friction")
-    if not scene.record.stress:
-        missing.append("stress output")
-    return missing
+    return ", ".join(
+        str(value) if key == "kind" else f"{key} = {show(value)}" for key, value in table.items()
+    )

@@ -1,7 +1,5 @@
 """``ringsim explain``: what the variables of a result mean."""
 
-from __future__ import annotations
-
 import click
 
 from ringsim.outputs import COORDINATES, VARIABLES
@@ -9,7 +7,7 @@ from ringsim.refusal import InputError, known_or_nearest
 from ringsim.variables import Variable
 
 
-@click.command("explain", short_help="Say what the variables of a result mean.")
+@click.command()
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 def command(names: tuple[str, ...]) -> None:
     """List the variables of a result, or those named, with dimensions, units and meaning."""

@@ -1,7 +1,5 @@
 """``ringsim merge``: put the results of a campaign into one file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

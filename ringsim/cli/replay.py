@@ -1,7 +1,5 @@
 """``ringsim replay``: run one sample of a campaign again, in the foreground."""
 
-from __future__ import annotations
-
 import faulthandler
 from pathlib import Path
 

@@ -1,8 +1,5 @@
 """``ringsim run SCENE``."""
 
-from __future__ import annotations
-
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +8,14 @@ import numpy as np
 
 from ringsim.choice import kind_of
 from ringsim.cli.options import PATH, SCENE, SETTINGS
-from ringsim.exit_codes import EXIT_FAILED
+from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.files import require_place
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 
 
-@click.command("run")
+@click.command()
 @SCENE
 @SETTINGS
 @click.option("--out", metavar="FILE", type=PATH, help="netCDF file to write.")
@@ -43,7 +40,7 @@ from ringsim.scene import Scene, load_scene
 def command(
     scene: str, settings: dict[str, Any], out: Path | None, fidelity: str,
     accuracy: float | None, of: str | None, evidence: Path | None, *, plot: bool,
-) -> None:  # fmt: skip
+) -> int:  # fmt: skip
     """Run SCENE (a built-in name or a TOML file) and write SCENE.nc."""
     chosen = load_scene(scene)
     if accuracy is not None:
@@ -51,26 +48,23 @@ def command(
     for name, value in (("--of", of), ("--evidence", evidence)):
         if value is not None and accuracy is None:
             raise InputError(f"{name} {value}: says nothing without --accuracy; give both")
-    if settings:
-        chosen = chosen.with_values(settings)
+    chosen = chosen.with_values(settings)
     if fidelity == "ideal" and chosen.record.stress:
         chosen = chosen.with_values({"record.stress": False})
         click.echo("stress is left out: the rods of the ideal ring are rigid")
     elif plot and fidelity == "full" and kind_of(chosen.rods) != "ancf":
         chosen = chosen.with_values({"record.stress": True})
-    target = out if out is not None else Path(f"{chosen.name}.nc")
+    target = out or Path(f"{chosen.name}.nc")
 
     from ringsim.dataset import save, to_dataset
     from ringsim.outputs import VARIABLES
     from ringsim.simulation import FIDELITIES
-    from ringsim.variables import Status
 
     require_place(target)
     outcome = FIDELITIES[fidelity](chosen)
     values = outcome.values
     click.echo(f"{chosen.name}: {outcome.status.word}: {outcome.reason}")
-    anew = restarted(values, chosen.solver)
-    if anew:
+    if anew := _restarted(values, chosen.solver):
         click.echo(f"  {anew}")
     for name, variable in VARIABLES.items():
         if variable.summary is None or (name == "total_steps" and not anew):
@@ -90,14 +84,12 @@ def command(
 
         for picture in draw_run(dataset, target.parent, prefix=f"{target.stem}-"):
             click.echo(f"wrote {picture}")
-    if outcome.status >= Status.SOLVER_FAILED:
-        sys.exit(EXIT_FAILED)
+    return EXIT_FAILED if outcome.status.failed else EXIT_DONE
 
 
-def restarted(values: dict[str, Any], asked: Solver) -> str:
+def _restarted(values: dict[str, Any], asked: Solver) -> str:
     """With which settings a run that started anew was computed; empty if it did not."""
-    times = int(values.get("restarts", 0))
-    if not times:
+    if not (times := int(values.get("restarts", 0))):
         return ""
     used = f"solver.step = {values['step_used'].item():.3g} s instead of {asked.step:.3g} s"
     if np.isfinite(values["tolerance_used"]):
@@ -121,15 +113,13 @@ def _with_accuracy(
             f"--accuracy {accuracy:g}: the ideal fidelity keeps its own tolerances: leave out one "
             "of --accuracy and --fidelity"
         )
-    output = of or JUDGED_BY
-    if output not in CHOICES:
+    if (output := of or JUDGED_BY) not in CHOICES:
         raise InputError(f"--of {output}: must be one of {', '.join(CHOICES)}")
-    changed = scene.with_values(given) if given else scene
+    changed = scene.with_values(given)
     known = read_evidence(file) if file is not None else evidence_for(changed)
     known.require_like(changed)
     picked = known.pick(accuracy, output)
-    clash = sorted(set(picked.values) & set(given))
-    if clash:
+    if clash := sorted(set(picked.values) & set(given)):
         raise InputError(f"--set {clash[0]}: --accuracy chooses it: leave out one of the two")
     values = known.values_for(picked, changed)
     words = ", ".join(f"{path} = {value}" for path, value in values.items())

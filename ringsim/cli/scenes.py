@@ -1,14 +1,12 @@
 """``ringsim scenes``: what is built in, and its text as a starting point."""
 
-from __future__ import annotations
-
 import click
 
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.scene import builtin_scenes, scene_from_toml
 
 
-@click.command("scenes", short_help="List the built-in scenes.")
+@click.command()
 @click.argument("name", required=False)
 def command(name: str | None) -> None:
     """List the built-in scenes, or print the TOML of one.
@@ -21,9 +19,9 @@ def command(name: str | None) -> None:
             raise InputError(f"{name}: no built-in scene ({known_or_nearest(name, texts)})")
         click.echo(texts[name], nl=False)
         return
-    scenes = [scene_from_toml(text, source=f"scene {key}") for key, text in texts.items()]
-    longest = max(len(scene.name) for scene in scenes)
-    for key, scene in zip(texts, scenes, strict=True):
+    longest = max(map(len, texts))
+    for key, text in texts.items():
+        scene = scene_from_toml(text, source=f"scene {key}")
         sections = scene.structure.sections
         count = f"{sections} section{'s' if sections > 1 else ''}"
         click.echo(f"{key:<{longest}}  {count:>12}  {scene.title}")

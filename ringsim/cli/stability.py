@@ -16,11 +16,8 @@ from ringsim.scene import load_scene
 if TYPE_CHECKING:
     from ringsim.campaign.panels import Panel
 
-_SEED = 1
-"""Of the random choice of cells that are checked: the same at every resumption."""
 
-
-@click.command("stability")
+@click.command()
 @SCENE
 @SETTINGS
 @click.option(
@@ -76,7 +73,8 @@ def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float
     from ringsim.plots.stability import stability
 
     whole = run_map(folder, panels, workers)
-    whole = run_check(folder, panels, whole, share=0.01 * percent, seed=_SEED, workers=workers)
+    # The same seed at every resumption, so that the same cells are checked.
+    whole = run_check(folder, panels, whole, share=0.01 * percent, seed=1, workers=workers)
     save(whole, folder / "stability.nc")
     style.write(stability(whole), folder / "stability.png")
     write_text(folder / "stability.md", to_markdown(whole))

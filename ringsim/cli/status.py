@@ -1,7 +1,5 @@
 """``ringsim status``: how far a campaign is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

@@ -1,7 +1,5 @@
 """Friction of the joint families."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from ringsim.choice import OneOf

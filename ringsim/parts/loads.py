@@ -1,7 +1,5 @@
 """Prescribed forces."""
 
-from __future__ import annotations
-
 from ringsim.parts.persection import PerSection
 from ringsim.units import Model, Newton
 

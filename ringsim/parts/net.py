@@ -1,7 +1,5 @@
 """The net, reduced to springs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

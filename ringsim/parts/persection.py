@@ -1,7 +1,5 @@
 """Quantities that are one value for all sections, or a list with one value for each."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, TypeVar, Union
 
 import numpy as np

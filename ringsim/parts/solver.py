@@ -1,8 +1,6 @@
 """Settings of the time integration."""
 
-from __future__ import annotations
-
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -58,7 +56,7 @@ class Solver(Model):
     be wrong by."""
 
     @model_validator(mode="after")
-    def _usable(self) -> Solver:
+    def _usable(self) -> Self:
         if self.step > self.end_time:
             raise ValueError(f"step = {self.step} s must not exceed end_time = {self.end_time} s")
         if self.spectral_radius == 1.0:
@@ -68,31 +66,28 @@ class Solver(Model):
             )
         return self
 
-    def refined(self, times: int) -> Solver:
+    def refined(self, times: int) -> Self:
         """The settings of a restart: a quarter of every step, ``times`` times over."""
         return self.scaled(_FINER**times)
 
-    def scaled(self, factor: float) -> Solver:
-        """Every step so many times as long.
+    def scaled(self, factor: float) -> Self:
+        """Every step so many times as long, within the fields' bounds and ``end_time``.
 
         The largest step is scaled, and with it the smallest, or a run at one of them would hardly
         differ; steps go with the square root of the tolerances, which take the factor's square.
-        Only where a run is a single step there is no longer one.
+        Deviations that are not followed stay so.
         """
-        tolerance = min(max(self.tolerance * factor**2, _LEAST_TOLERANCE), _LARGEST_TOLERANCE)
+        step, tolerance = self.step * factor, self.tolerance * factor**2
+        deviations = self.deviation_tolerance
+        if deviations < NO_DEVIATIONS:
+            deviations = max(deviations * factor**2, _LEAST_DEVIATION)
         return self.model_copy(
             update={
-                "step": min(max(self.step * factor, _LEAST_STEP), self.end_time),
-                "tolerance": tolerance,
-                "deviation_tolerance": self.deviations_scaled(factor**2),
+                "step": min(max(step, _LEAST_STEP), self.end_time),
+                "tolerance": min(max(tolerance, _LEAST_TOLERANCE), _LARGEST_TOLERANCE),
+                "deviation_tolerance": deviations,
             }
         )
-
-    def deviations_scaled(self, factor: float) -> float:
-        """``deviation_tolerance`` times a factor, within its bounds; not followed stays so."""
-        if self.deviation_tolerance >= NO_DEVIATIONS:
-            return NO_DEVIATIONS
-        return max(self.deviation_tolerance * factor, _LEAST_DEVIATION)
 
 
 class Record(Model):

@@ -5,29 +5,20 @@ A law takes the functions that it needs (``minimum``, ``maximum``, ``where``, ``
 own expressions.  Forces resist the growth of the law's coordinate.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
 
 
 class Reaction(NamedTuple):
-    """What resists a coordinate; numbers, arrays or an engine's expressions.
-
-    Attributes
-    ----------
-    elastic
-        Derivative of ``stored`` after the coordinate, N (N m for an angle).
-    damping
-        The rest; times the rate it is the power lost, never negative, N (N m).
-    stored
-        Elastic energy, J.
-    """
+    """What resists a coordinate; numbers, arrays or an engine's expressions."""
 
     elastic: Any
+    """Derivative of ``stored`` after the coordinate, N (N m for an angle)."""
     damping: Any
+    """The rest; times the rate it is the power lost, never negative, N (N m)."""
     stored: Any
+    """Elastic energy, J."""
 
     @property
     def total(self) -> Any:

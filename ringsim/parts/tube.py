@@ -1,8 +1,7 @@
 """Tubular cross-sections and their elastic and inertial constants."""
 
-from __future__ import annotations
-
 import math
+from typing import Self
 
 from pydantic import model_validator
 
@@ -16,7 +15,7 @@ class Tube(Model):
     inner_diameter: MetreOrZero
 
     @model_validator(mode="after")
-    def _inside(self) -> Tube:
+    def _inside(self) -> Self:
         self.require_below("inner_diameter", "outer_diameter")
         return self
 

@@ -1,9 +1,7 @@
 """The inputs of all samples, and how they lie in netCDF files."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +16,8 @@ class Column:
     path: str
     """Scene path that the values are written to."""
     dim: str
-    """Second dimension of ``values``, or empty: what there is a value for, "section", "corner"
-    "pulley" or "pulley_of_two_winches" (one more), or "place_k" for lists of any other length
-    k."""
+    """Second dimension of ``values``, or empty: "section", "corner", "pulley",
+    "pulley_of_two_winches" (one more), or "place_k" for lists of any other length k."""
     units: str
     """SI unit of the field."""
     origin: str
@@ -45,7 +42,7 @@ class Table:
         """Values by path of one sample, as :meth:`Scene.with_values` takes them."""
         return {column.path: column.values[sample].tolist() for column in self.columns}
 
-    def starts_with(self, other: Table) -> bool:
+    def starts_with(self, other: Self) -> bool:
         """Whether the first samples are those of ``other``, bit by bit."""
         count = other.samples
         return (
@@ -62,29 +59,22 @@ class Table:
 def add_inputs(file: Any, table: Table, *, compression: int) -> None:
     """Create a variable for every input, and the samples' seeds, in an open netCDF4 dataset."""
     for column in table.columns:
-        values, kind = column.values, cast(Any, column.values.dtype)
+        values, text = column.values, column.values.dtype.kind == "U"
+        kind: Any = {"U": str, "b": "i1"}.get(values.dtype.kind, values.dtype)
         if column.dim and column.dim not in file.dimensions:
             file.createDimension(column.dim, values.shape[1])
-        attributes = {
-            "long_name": f"input {column.path}",
-            "units": column.units,
-            "path": column.path,
-            "role": "input",
-            "distribution": column.origin,
-        }
-        options: dict[str, Any] = {}
-        if values.dtype.kind == "U":
-            kind, values = str, values.astype(object)
-            del attributes["units"]
-        elif compression:
-            options = {"compression": "zlib", "complevel": compression}
-        if values.dtype.kind == "b":
-            kind, values = "i1", values.astype("i1")
-            attributes["dtype"] = "bool"
         dims = ("sample", column.dim) if column.dim else ("sample",)
+        packed = compression and not text
+        options = {"compression": "zlib", "complevel": compression} if packed else {}
         variable = file.createVariable(column.name, kind, dims, **options)
-        variable.setncatts(attributes)
-        variable[:] = values
+        variable.long_name = f"input {column.path}"
+        if not text:
+            variable.units = column.units
+        variable.setncatts(
+            {"path": column.path, "role": "input", "distribution": column.origin}
+            | ({"dtype": "bool"} if values.dtype.kind == "b" else {})
+        )
+        variable[:] = values.astype(object if text else kind)
     seeds = file.createVariable("sample_seed", "i8", ("sample",))
     seeds.long_name = "seed of the sample, from the campaign's seed and the sample's index"
     seeds.units = "1"

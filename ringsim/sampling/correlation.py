@@ -1,7 +1,5 @@
 """Correlated inputs: a Gaussian copula over the axes of a design."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated
 

@@ -1,26 +1,30 @@
-"""The design of a campaign: which values every sample has."""
-
-from __future__ import annotations
+"""The design of a campaign: which values every sample has, and which paths it may vary."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.choice import OneOf
 from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.overrides import field_at, section_of
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Design
 from ringsim.sampling.distributions.family import Distribution, Values
-from ringsim.sampling.paths import each_of, field_at, refuse_fixed, unit_at
 from ringsim.scene import Scene, place_of
+from ringsim.units import unit_at
 
 AnyDistribution = Annotated[Distribution, OneOf()]
 AnyDesign = Annotated[Design, OneOf()]
+
+FIXED = (
+    "name", "title", "structure.kind", "structure.sections", "structure.closed", "solver.end_time",
+    "record",
+)  # fmt: skip
+"""Paths that give a result its shape or its name: all samples of a campaign share them."""
 
 
 def draw(
@@ -35,24 +39,15 @@ def draw(
 ) -> Table:
     """Draw all samples of a campaign, which vary the scene ``base``.
 
-    Parameters
-    ----------
-    folder
-        Where files that the design names are looked up.
-    error_bars_every
-        One sample in so many states its error bars; 0 for none.
-
-    Raises
-    ------
-    InputError
-        If a path or its values are refused by the scene.
+    Files that the design names are looked up in ``folder``; one sample in ``error_bars_every``
+    states its error bars, none for 0.  InputError if the scene refuses a path or its values.
     """
     factors: dict[str, Distribution] = {}
     for path, distribution in inputs.items():
         refuse_fixed(base, path)
         middle = distribution.quantile(np.array([0.5]))[0].item()
         if distribution.each_section:
-            own = [f"{path}[{k + 1}]" for k in range(each_of(base, path, middle))]
+            own = [f"{path}[{k + 1}]" for k in range(_each_of(base, path, middle))]
         else:
             base.with_values({path: middle})
             own = [path]
@@ -80,9 +75,34 @@ def draw(
             raise InputError(f"error_bars_every = {every}: {path} is an input, too: leave out one")
         chosen = np.arange(samples) % every == 0
         columns.append(Column("solver_error_bars", path, "", "1", f"one sample in {every}", chosen))
-    table = Table(tuple(columns), _seeds(seed, samples))
+    # From the campaign's seed and the sample's index alone, so that a design can grow.
+    sequences = (np.random.SeedSequence(seed, spawn_key=(k,)) for k in range(samples))
+    states = [int(each.generate_state(1, np.uint64)[0]) >> 1 for each in sequences]
+    table = Table(tuple(columns), np.array(states, dtype=np.int64))
     _check_extremes(base, table)
     return table
+
+
+def refuse_fixed(scene: Scene, path: str) -> None:
+    """Refuse (InputError) a path whose value all samples of a campaign must share."""
+    for fixed in (*FIXED, *scene.structure.shaping):
+        if path == fixed or path.startswith((f"{fixed}.", f"{fixed}[")):
+            raise InputError(
+                f"inputs: {path} must be the same for all samples, because it shapes the result: "
+                "give it under [set], and run a campaign for each value"
+            )
+
+
+def _each_of(base: Scene, path: str, value: Any) -> int:
+    """How many values the list at a path has; InputError if it is one value for all sections."""
+    if section_of(path)[1] is not None:
+        raise InputError(f"inputs: {path} is one section already: leave out each_section")
+    scene = base.with_values({path: value})
+    try:
+        return len(field_at(scene.with_values({f"{path}[1]": value}), path))
+    except InputError:
+        told = f"inputs: {path} is one value for all sections: leave out each_section"
+        raise InputError(told) from None
 
 
 def _column(base: Scene, path: str, values: Values, origin: Distribution | None) -> Column:
@@ -99,18 +119,8 @@ def _column(base: Scene, path: str, values: Values, origin: Distribution | None)
     return Column(name, path, dim, unit_at(scene, path), words, values)
 
 
-def _seeds(seed: int, samples: int) -> NDArray[np.int64]:
-    """One seed per sample, from the campaign's seed and the sample's index alone."""
-    sequences = (np.random.SeedSequence(seed, spawn_key=(k,)) for k in range(samples))
-    states = [int(each.generate_state(1, np.uint64)[0]) >> 1 for each in sequences]
-    return np.array(states, dtype=np.int64)
-
-
 def _check_extremes(base: Scene, table: Table) -> None:
-    """Build the scenes that hold the least and the greatest value of every input.
-
-    Every word among the inputs is in one of them, so that all numbers of spans are seen.
-    """
+    """Build scenes with the least and the greatest value, and each word, of every input."""
     spans: set[int] = set()
     suspects: set[int] = {0}
     for column in table.columns:

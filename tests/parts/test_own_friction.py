@@ -15,11 +15,10 @@ from ringsim.engine.integrate import Integration
 from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.persection import PerSection
 from ringsim.refusal import InputError
-from ringsim.sampling.paths import unit_at
 from ringsim.scene import Scene, load_scene, scene_from_toml
 from ringsim.stepping.locks import lock_times
 from ringsim.theory.ideal_fidelity import run_ideal
-from ringsim.units import AngularRate, Torque
+from ringsim.units import AngularRate, Torque, unit_at
 
 
 class StribeckFriction(JointFriction):

@@ -1,7 +1,5 @@
 """The family of booms."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from ringsim.parts.tube import Tube

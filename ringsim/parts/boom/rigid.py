@@ -1,7 +1,5 @@
 """A rigid boom."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from ringsim.parts.boom.family import Boom

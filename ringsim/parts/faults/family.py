@@ -1,7 +1,5 @@
 """The family of faults: things that break at a given time and place."""
 
-from __future__ import annotations
-
 from ringsim.units import Model, SecondOrZero
 
 

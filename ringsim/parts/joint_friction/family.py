@@ -1,7 +1,5 @@
 """The family of friction laws of joints."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Viscous and dry friction."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """Absolute nodal coordinate beams, as in the papers."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from ringsim.parts.rods.family import Rods

@@ -1,7 +1,5 @@
 """The family of rod formulations, with what they have in common."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Geometrically exact (Simo-Reissner) beams."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from ringsim.parts.rods.family import Rods

@@ -1,7 +1,5 @@
 """The family of stops."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A stop of a spring and a damper."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The family of designs: each one places samples in the space of the inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, ClassVar

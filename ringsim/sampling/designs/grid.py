@@ -1,7 +1,5 @@
 """Full grid over the inputs."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, ClassVar, Literal
 

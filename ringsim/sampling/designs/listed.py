@@ -1,7 +1,5 @@
 """Samples listed in a file."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from pathlib import Path
@@ -49,7 +47,7 @@ class Listed(Design):
 def _from_csv(path: Path) -> dict[str, Values]:
     lines = csv.reader(read_text(path).splitlines())
     rows = [[word.strip() for word in row] for row in lines if row]
-    if not rows:
+    if len(rows) < 2:
         return {}
     header, *rows = rows
     for name in header:
@@ -63,13 +61,12 @@ def _from_csv(path: Path) -> dict[str, Values]:
                 f"design.file = {path.name}: row {number} has {len(row)} values and must have "
                 f"{len(header)}, one per column"
             )
-    columns = zip(*rows, strict=True) if rows else [()] * len(header)
-    return {name: _typed(words) for name, words in zip(header, columns, strict=True)}
+    return {name: _typed(words) for name, *words in zip(header, *rows, strict=True)}
 
 
 def _typed(words: Sequence[str]) -> Values:
     """Whole numbers, numbers, true and false, or words: the narrowest that fits the column."""
-    if words and all(word in ("true", "false") for word in words):
+    if all(word in ("true", "false") for word in words):
         return np.array([word == "true" for word in words])
     for kind in (int, float):
         try:

@@ -1,8 +1,6 @@
 """A finite set of values."""
 
-from __future__ import annotations
-
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -26,7 +24,7 @@ class Discrete(Distribution):
     probabilities: Annotated[tuple[Annotated[float, Field(gt=0.0)], ...] | None, ListIn] = None
 
     @model_validator(mode="after")
-    def _fitting(self) -> Discrete:
+    def _fitting(self) -> Self:
         if not self.values:
             raise ValueError("values must hold at least one value")
         if len(set(self.values)) < len(self.values):

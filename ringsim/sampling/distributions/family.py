@@ -1,8 +1,6 @@
 """The family of distributions: each one maps probabilities to values of an input."""
 
-from __future__ import annotations
-
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +15,6 @@ Values = NDArray[Any]
 class Distribution(Model):
     """Distribution of one scene field, in the field's own unit."""
 
-    bounded: ClassVar[bool] = False
-    """Whether both ends are values that can occur."""
-
     each_section: bool = False
     """Draw one independent value for every section instead of one for all."""
 
@@ -28,9 +23,7 @@ class Distribution(Model):
         raise NotImplementedError
 
     def levels(self, count: int) -> Array:
-        """Probabilities of ``count`` grid points: from end to end, or centred if unbounded."""
-        if self.bounded and count > 1:
-            return np.linspace(0.0, 1.0, count)
+        """Probabilities of ``count`` grid points: middles of intervals of equal probability."""
         return (np.arange(count) + 0.5) / count
 
 

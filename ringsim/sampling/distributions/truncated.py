@@ -1,8 +1,6 @@
 """A continuous distribution cut off at one or both ends."""
 
-from __future__ import annotations
-
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -17,7 +15,7 @@ LEAST_MASS = 1e-6
 class Truncated(Distribution):
     """The distribution ``of``, given that its value lies between ``low`` and ``high``.
 
-    >>> from ringsim.sampling.distributions.continuous.normal import Normal
+    >>> from ringsim.sampling.distributions.normal import Normal
     >>> force = Truncated(of=Normal(mean=0.015, standard_deviation=0.002), low=0.015)
     >>> force.quantile(np.array([0.0])).tolist()
     [0.015]
@@ -29,7 +27,7 @@ class Truncated(Distribution):
     high: float | None = None
 
     @model_validator(mode="after")
-    def _some_mass(self) -> Truncated:
+    def _some_mass(self) -> Self:
         if self.low is None and self.high is None:
             raise ValueError("truncated needs low, high or both; without them use the kind in of")
         if self.of.each_section:

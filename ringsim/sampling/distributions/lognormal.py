@@ -1,15 +1,13 @@
 """Lognormal distribution."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from ringsim.sampling.distributions.continuous.normal import Normal
 from ringsim.sampling.distributions.family import Array, Continuous
+from ringsim.sampling.distributions.normal import Normal
 
 
 class Lognormal(Continuous):

@@ -1,8 +1,6 @@
 """Uniform distribution."""
 
-from __future__ import annotations
-
-from typing import ClassVar, Literal
+from typing import Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -17,14 +15,12 @@ class Uniform(Continuous):
     [1.0, 1.5, 3.0]
     """
 
-    bounded: ClassVar[bool] = True
-
     kind: Literal["uniform"] = "uniform"
     low: float
     high: float
 
     @model_validator(mode="after")
-    def _ordered(self) -> Uniform:
+    def _ordered(self) -> Self:
         if self.low >= self.high:
             raise ValueError(f"low = {self.low} must be below high = {self.high}")
         return self
@@ -32,6 +28,10 @@ class Uniform(Continuous):
     def quantile(self, probability: Array) -> Array:
         """Inverse of the cumulative distribution; its ends are low and high to the bit."""
         return self.low * (1.0 - probability) + self.high * probability
+
+    def levels(self, count: int) -> Array:
+        """From end to end: both are values that can occur."""
+        return np.linspace(0.0, 1.0, count) if count > 1 else super().levels(count)
 
     def probability(self, value: float) -> float:
         """Cumulative distribution."""

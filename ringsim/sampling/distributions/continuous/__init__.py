@@ -1,1 +1,0 @@
-"""Kinds of continuous distributions, one file each."""
