@@ -15,7 +15,7 @@ from ringsim.engine.connectors import Faults, Reacting, Stops, connect
 from ringsim.engine.model import Multibody
 from ringsim.engine.rods import Ancf
 from ringsim.layout.bodies import OnBody
-from ringsim.layout.springs import BoomBeam
+from ringsim.layout.layout import BoomBeam
 from ringsim.parts.boom.flexible import FlexibleBoom
 from ringsim.scene import Scene
 
