@@ -18,6 +18,7 @@ from ringsim.overrides import section_of, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.faults.family import Fault
 from ringsim.parts.joints import Joints
+from ringsim.parts.limits import Limits
 from ringsim.parts.loads import Loads
 from ringsim.parts.net import Net
 from ringsim.parts.rods.ancf import AncfRods
@@ -48,6 +49,7 @@ class Scene(Model):
     net: Net | None = None
     loads: Loads | None = None
     cables: Cables | None = None
+    limits: Limits = Limits()
     faults: Annotated[tuple[Annotated[Fault, OneOf()], ...], ListIn] = ()
     solver: Solver = Solver()
     record: Record = Record()
@@ -67,6 +69,16 @@ class Scene(Model):
             raise ValueError(
                 'record.stress = true is not possible with rods.kind = "ancf", whose elements '
                 'report no forces: choose "geometrically-exact", or leave record.stress out'
+            )
+        if self.limits.rod_stress is not None and not self.record.stress:
+            raise ValueError(
+                f"limits.rod_stress = {self.limits.rod_stress:g} Pa needs the stress of the rods: "
+                "set record.stress = true, or leave the limit out"
+            )
+        if self.limits.tension is not None and self.cables is None:
+            raise ValueError(
+                f"limits.tension = {self.limits.tension:g} N needs a cable: add [cables.upper], or "
+                "leave the limit out"
             )
         if self.record.interval > self.solver.end_time:
             raise ValueError(

@@ -33,10 +33,9 @@ def flags_of(codes: Iterable[Code]) -> dict[str, Any]:
 
 
 class Status(Code):
-    """How a run ended; negative codes never occur, 0 is the only success."""
+    """Whether the numbers of a run hold; what the antenna did says its ``Fate``."""
 
     OK = 0
-    UNFINISHED = 1
     SOLVER_FAILED = 2
     DIVERGED = 3
     ERROR = 4
@@ -51,15 +50,13 @@ class Status(Code):
 
 
 class Cause(Code):
-    """Why a run did not end well; ``reason`` says it in a sentence, with numbers and the cure."""
+    """Why the numbers of a run do not hold; ``reason`` tells it with values and the cure."""
 
     NONE = 0
-    END_TIME = 1
     BLOW_UP = 2
     ENERGY_GREW = 3
     ENERGY_LOST = 4
     JOINT_GAP = 5
-    STOP_PASSED = 6
     FEW_STEPS = 7
     TENSION_BENDS = 8
     NEWTON = 9
@@ -71,6 +68,27 @@ class Cause(Code):
     TIME_LIMIT = 15
     MEMORY = 16
     UNFIT = 17
+
+
+class Fate(Code):
+    """What the antenna did, as far as a run whose numbers hold tells."""
+
+    UNKNOWN = 0
+    """The numbers do not hold."""
+    DEPLOYED = 1
+    """Every V-joint has reached 180 deg, whatever it did afterwards."""
+    PARTLY_DEPLOYED = 2
+    """At rest, with some V-joints locked; nothing drives the others any more."""
+    STALLED = 3
+    """At rest, with no V-joint locked."""
+    FOLDED = 4
+    """Every V-joint has reached the stowed stop."""
+    OVERLOADED = 5
+    """A limit of the scene was passed; see ``ringsim.parts.limits``."""
+    CUT_OFF = 6
+    """Still moving or driven at ``solver.end_time``."""
+    FINISHED = 7
+    """A structure that does not lock, driven until ``solver.end_time``."""
 
 
 class Reason(str):

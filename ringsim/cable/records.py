@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -12,6 +12,7 @@ from ringsim.cable.bracket.family import Bracket
 from ringsim.cable.friction.family import PulleyFriction
 from ringsim.cable.friction.frictionless import Frictionless
 from ringsim.cable.winding.family import PrescribedWinding, Winding
+from ringsim.cable.winding.stall import StallWinding
 from ringsim.choice import OneOf
 from ringsim.units import (
     AxialStiffness,
@@ -28,6 +29,12 @@ AnyBracket = Annotated[Bracket, OneOf()]
 AnyFriction = Annotated[PulleyFriction, OneOf()]
 AnyWinding = Annotated[Winding, OneOf()]
 
+LEAST_HELD = 1e-3
+"""Tension that a winch keeps whose rope is slack when its plane locks, N: next to nothing."""
+RESTING = 1e-3
+"""A motor that answers to the tension stands still below this share of its usual speed: it comes to
+rest exponentially, never quite."""
+
 
 class Winch(Model):
     """A motor with a drum: a winding law between a start and a stop."""
@@ -37,6 +44,9 @@ class Winch(Model):
     """Start of the law's time; the drum stands still before."""
     stop_time: SecondOrZero | None = None
     """The drum stands still from here on."""
+    after_lock: Literal["stop", "hold", "pull"] = "stop"
+    """What the winch does once all V-joints of its plane have locked: stand still, keep the tension
+    that it has then, or go on with its law."""
 
     @model_validator(mode="after")
     def _in_order(self) -> Winch:
@@ -62,6 +72,24 @@ class Winch(Model):
         clock = max(last - self.start_time, 0.0)
         rate = self.winding.wound_rate(clock) if self.turns(time) else 0.0
         return self.winding.wound(clock), rate
+
+    def locked(self, time: float, tension: float) -> Self:
+        """The winch after its plane has locked at a time (s), when it had this tension (N)."""
+        speed = self.winding.usual_speed()
+        if self.after_lock == "pull" or not self.turns(time):
+            return self
+        if self.after_lock == "stop" or speed == 0.0:
+            return self.model_copy(update={"stop_time": time})
+        hold = StallWinding(speed=speed, max_tension=max(tension, LEAST_HELD), backdrivable=True)
+        return self.model_copy(update={"winding": hold, "after_lock": "pull"})
+
+    def drives(self, time: float, rate: float) -> bool:
+        """Whether the drum turns at a time (s), at a rate (m/s), or will turn."""
+        if time < self.start_time or not self.turns(time):
+            return time < self.start_time
+        if isinstance(self.winding, PrescribedWinding):
+            return time - self.start_time < self.winding.rests_from()
+        return abs(rate) > RESTING * self.winding.usual_speed()
 
 
 class Cable(Model):

@@ -120,6 +120,21 @@ class Winches:
                 wound[place] += found * elapsed
         return wound, speed
 
+    def lock(self, number: int, time: float, state: ChainState) -> None:
+        """The plane of a cable has locked at a time (s): its winches do what they do then."""
+        for place, winch in self._winches.items():
+            if place[0] == number and winch.after_lock != "pull":
+                tension = float(state.winch_tensions[place])
+                self._winches[place] = winch.locked(time, tension)
+
+    def driving(self, time: float, state: ChainState) -> bool:
+        """Whether any winch turns or will turn on a rope that is whole."""
+        whole = state.ropes.alive[state.ropes.of_end]
+        return any(
+            whole[place] and winch.drives(time, float(state.wound_rate[place]))
+            for place, winch in self._winches.items()
+        )
+
     def stiffness_left(self, time: float, ropes: Ropes, paths: Array, rates: Array) -> Array:
         """Share of a change of path that stretches the rope, not answered by its winches."""
         left = np.ones(len(ropes.starts))

@@ -11,6 +11,7 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
+from ringsim.cable.ropes import Flags
 from ringsim.cable.state import ChainState
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.build import Built, build
@@ -69,6 +70,7 @@ class Integration:
             scales_of(built),
             self._read(self._measure(0.0)),
             self._locks,
+            limits=scene.limits,
             follow_deviations=scene.record.stress,
         )
 
@@ -95,7 +97,8 @@ class Integration:
         if control.goes_on:
             control.fail(self._refusal() or cause)
         control.conclude()
-        history.status, history.reason = control.status, control.reason + self._energy.note()
+        history.status, history.fate = control.status, control.fate
+        history.reason = control.reason + self._energy.note()
         history.repeats = control.repeats
         history.newton_iterations = int(solver.it.newtonStepsCount)
         history.jacobians = int(solver.it.newtonJacobiCount)
@@ -150,9 +153,19 @@ class Integration:
             return False
         found = self._weighed or self._measure(time)
         goes_on = self._control.accept(found, self._read(found))
-        if self._locks is not None and self._built.stops is not None:
-            self._built.stops.latch(self._locks.deployed)
+        if self._locks is not None:
+            self._lock(self._locks.deployed, time)
         return goes_on
+
+    def _lock(self, deployed: Flags, time: float) -> None:
+        """Latch the V-joints that have locked, and let winches know whose plane has."""
+        if self._built.stops is not None:
+            self._built.stops.latch(deployed)
+        cables = self._built.cables
+        if cables is not None and self._chain is not None:
+            for number, (plane, _) in enumerate(cables.present):
+                if deployed[plane].all():
+                    cables.winches.lock(number, time, self._chain)
 
     def _read(self, now: Instant) -> Instant:
         """Note a state that the run goes on from; returns it as faults that strike there leave it.
@@ -186,8 +199,11 @@ class Integration:
             self._chain = cables.current(state.position, state.velocity, time)
         energies = self._energy.read(time, state, angles, rates, self._chain)
         gap = max(float(group.gaps(state).max()) for group in self._gaps)
-        tensions = None if self._chain is None else self._chain.tensions
-        return Instant(time, angles, rates, energies, gap, tensions)
+        tensions, driven = None, math.isfinite(self._built.faults.next_time)
+        if cables is not None and self._chain is not None:
+            tensions = self._chain.tensions
+            driven = driven or cables.winches.driving(time, self._chain)
+        return Instant(time, angles, rates, energies, gap, tensions, driven)
 
 
 class _Predictor:

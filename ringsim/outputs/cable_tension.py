@@ -17,6 +17,7 @@ class CableTension(Output):
 
     rank = 40
     needs = ("cables",)
+    limit = "tension"
     variables = (
         Variable("cable_tension", ("plane", "span", "time"), "N", "tension of a cable's span"),
         Variable(

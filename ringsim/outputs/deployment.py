@@ -1,5 +1,7 @@
 """When the V-joints reached 180 deg."""
 
+import numpy as np
+
 from ringsim.outputs.family import ErrorBar, Output, Run, Series, Values, Variable
 
 
@@ -16,10 +18,15 @@ class Deployment(Output):
         Variable(
             "lock_time", ("plane", "section"), "s", "time at which the V-joint reached 180 deg"
         ),
+        Variable("locked_joints", (), "1", "V-joints that have reached 180 deg", "i4"),
     )  # fmt: skip
 
     def reduce(self, run: Run, series: Series) -> Values:
         """As the run knows them; see ``ringsim.stepping.locks.lock_times``."""
         if not run.scene.structure.locks:
             return {}
-        return {"lock_time": run.locks, "deployment_time": run.locks.max()}
+        return {
+            "lock_time": run.locks,
+            "deployment_time": run.locks.max(),
+            "locked_joints": np.isfinite(run.locks).sum(),
+        }

@@ -48,6 +48,8 @@ class Output:
         Dimensions that no other output has; an engine gives their values to its ``Recorder``.
     needs
         What a scene must hold for it, see ``Variable``.
+    limit
+        Field of ``ringsim.parts.limits.Limits`` that its largest reading must not pass.
     rank
         Place among the outputs in files and summaries; the smaller the earlier.
     """
@@ -55,6 +57,7 @@ class Output:
     variables: ClassVar[tuple[Variable, ...]]
     coordinates: ClassVar[tuple[Variable, ...]] = ()
     needs: ClassVar[tuple[str, ...]] = ()
+    limit: ClassVar[str] = ""
     rank: ClassVar[int] = 50
 
     def __init_subclass__(cls) -> None:

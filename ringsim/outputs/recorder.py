@@ -14,13 +14,14 @@ from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
 from ringsim.stepping.locks import lock_times
-from ringsim.variables import Outcome, Reason, Status
+from ringsim.variables import Fate, Outcome, Reason, Status
 
 
 class Recorder:
     """A run of a scene: ``times``, ``angles``, ... of all accepted steps (see ``Instant``).
 
-    An engine sets ``status`` and ``reason``, how and why it has ended, and what its solver took.
+    An engine sets ``status``, ``fate`` and ``reason``, how and why it has ended, and what its
+    solver took.
     """
 
     def __init__(self, scene: Scene, coordinates: Mapping[str, NDArray[Any]] | None = None) -> None:
@@ -33,7 +34,7 @@ class Recorder:
         self.rates: list[Array] = []
         self.energies: list[Energies] = []
         self.gaps: list[float] = []
-        self.status, self.reason = Status.UNFINISHED, Reason()
+        self.status, self.fate, self.reason = Status.OK, Fate.UNKNOWN, Reason()
         self.repeats = self.newton_iterations = self.jacobians = 0
 
     def note(self, now: Reading) -> None:
@@ -73,12 +74,43 @@ class Recorder:
 
         values = reduced(run, self._readings, series_of)
         coordinates = spanned(values, axes(self._scene) | dict(self._coordinates))
-        return Outcome(self.status, str(self.reason), coordinates, values, self.reason.cause)
+        passed = overloads(self._scene, self._readings, series_of)
+        return ended(self.status, self.fate, self.reason, passed, coordinates, values)
 
 
 def outputs_of(scene: Scene) -> list[Output]:
     """The outputs that a scene holds everything for."""
     return [output() for output in OUTPUTS if set(output.needs) <= holds(scene)]
+
+
+def overloads(
+    scene: Scene, outputs: Iterable[Output], series_of: Callable[[Output], Series | None]
+) -> str:
+    """Which limits of the scene the readings of a run have passed, by what and when."""
+    found = ""
+    for output in outputs:
+        most = getattr(scene.limits, output.limit) if output.limit else None
+        series = None if most is None else series_of(output)
+        if series is None:
+            continue
+        largest = np.nanmax(series.values.reshape(len(series.times), -1), axis=1)
+        if largest.max() > most:
+            unit, time = output.variables[0].units, series.times[largest.argmax()]
+            found += (
+                f"; {largest.max():.4g} {unit} at {time:.6g} s, "
+                f"more than limits.{output.limit} = {most:g} {unit}"
+            )
+    return found
+
+
+def ended(
+    status: Status, fate: Fate, reason: Reason, passed: str,
+    coordinates: dict[str, NDArray[Any]], values: dict[str, NDArray[Any]],
+) -> Outcome:  # fmt: skip
+    """The outcome of a run that ended so; ``passed`` are the limits that it went over."""
+    fate = Fate.OVERLOADED if passed and not status.failed else fate
+    values["outcome"] = np.array(int(fate))
+    return Outcome(status, str(reason) + passed, coordinates, values, reason.cause)
 
 
 def reduced(

@@ -8,6 +8,7 @@ class RodStress(Output):
 
     rank = 30
     needs = ("stress",)
+    limit = "rod_stress"
     coordinates = (Variable("rod", ("rod",), "1", "rod half of a section", "str"),)
     variables = (
         Variable(

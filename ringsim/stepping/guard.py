@@ -1,4 +1,4 @@
-"""Guards of a run: blow-up, energy growth and loss, joints that come apart, stops passed.
+"""Guards of a run: blow-up, energy growth and loss, joints that come apart.
 
 They compare the balance B = kinetic + elastic - both at the start + lost - work of loads and
 winches with the energy X exchanged so far, the largest of |work| and of the changes of kinetic and
@@ -7,8 +7,6 @@ none, so that growth (B > 0) means more than loss.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -27,8 +25,6 @@ SLIGHT = 1e-3
 """Share of the reference energy below which a whole run has done nothing worth judging."""
 GAP = 1e-4
 """Largest gap of a joint over the length of a bar: joints that hold are closed to 1e-12 m."""
-OVERRUN = math.radians(30.0)
-"""Angle by which a V-joint may pass its stop: beyond it neither stop nor model mean anything."""
 _CURE = "reduce solver.step or solver.tolerance"
 
 
@@ -43,11 +39,8 @@ class Guard:
         self._low = self._high = np.zeros(3)
         self._worst = (0.0, 0.0)
 
-    def judge(self, now: Instant, overrun: float = 0.0) -> Reason:
-        """Why the run must stop here: cause, measured value, bound and cure; empty if it may go on.
-
-        ``overrun`` is the largest angle by which a V-joint has passed its stops, rad.
-        """
+    def judge(self, now: Instant) -> Reason:
+        """Why the run must stop here: cause, measured value, bound and cure; empty if not."""
         self._run.append(now)
         time, found, start = now.time, now.energies, self._run[0].energies
         self._lost += found.lost
@@ -73,13 +66,6 @@ class Guard:
                 Cause.JOINT_GAP,
                 f"the joints came apart by {now.gap:.2g} m at {time:.6g} s, more than "
                 f"{GAP * self._scales.length:.2g} m: {_CURE}",
-            )
-        if overrun > OVERRUN:
-            return Reason(
-                Cause.STOP_PASSED,
-                f"a V-joint swung {math.degrees(overrun):.3g} deg past its stop at {time:.6g} s, "
-                f"more than {math.degrees(OVERRUN):.0f} deg: raise stop.stiffness, or lower what "
-                "drives it",
             )
         factor = GAIN if balance > 0.0 else LOSS
         words = f"{factor:g} times solver.energy_tolerance"

@@ -40,6 +40,8 @@ class Instant:
     """Largest distance of points that a joint holds together, m."""
     tensions: Array | None = None
     """Of all spans, N; None without cables."""
+    driven: bool = False
+    """Whether a winch turns or will turn on its rope, or a fault is still to come."""
 
 
 class Scales(NamedTuple):

@@ -9,12 +9,24 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from ringsim.stepping.instant import Array, Instant
+from ringsim.variables import PLANES
 
 _NEAR = 0.1
 """A V-joint that has reached a stop counts as resting on it within this angle of it, rad."""
 _APART = 1e-3
 """A V-joint that starts closer to the stowed stop than this has not come to it, rad; the stop of
 ``ring18`` gives 4e-5 under its load."""
+
+_NAMED = 6
+"""V-joints that a sentence names at most."""
+
+
+class Overrun(NamedTuple):
+    """How far a V-joint is past its stop (rad), which one, and when (s)."""
+
+    angle: float = 0.0
+    joint: str = ""
+    time: float = 0.0
 
 
 class StopContact(NamedTuple):
@@ -25,6 +37,11 @@ class StopContact(NamedTuple):
     time_to_next: float = math.inf
     rate_of_next: float = 0.0
     resting_rate: float = 0.0
+
+
+def name_of(plane: int, section: int) -> str:
+    """A V-joint by its place, both from 0: "upper 3"."""
+    return f"{PLANES[plane]} {section + 1}"
 
 
 class Locks:
@@ -48,9 +65,20 @@ class Locks:
         self.stowed |= self._away & (angles <= self._stowed_angle)
         self._away |= angles > self._stowed_angle + _NEAR
 
-    def overrun(self, angles: Array) -> float:
-        """Largest angle by which a V-joint is past its stops, rad; 0 if none is."""
-        return max(float(angles.max()) - math.pi, self._stowed_angle - float(angles.min()), 0.0)
+    def overrun(self, now: Instant) -> Overrun:
+        """The V-joint that is farthest past its stop."""
+        past: Array = np.maximum(now.angles - math.pi, self._stowed_angle - now.angles)
+        plane, section = divmod(int(past.argmax()), past.shape[1])
+        return Overrun(float(past[plane, section]), name_of(plane, section), now.time)
+
+    def missing(self) -> str:
+        """How many V-joints have locked, and which have not."""
+        open_ = [name_of(*place) for place in np.argwhere(~self.deployed)]
+        count = f"{int(self.deployed.sum())} of {self.deployed.size} V-joints locked"
+        if not open_ or len(open_) == self.deployed.size:
+            return count
+        more = f" and {len(open_) - _NAMED} more" if len(open_) > _NAMED else ""
+        return f"{count}, not {', '.join(open_[:_NAMED])}{more}"
 
     def contact(self, now: Instant) -> StopContact:
         """V-joints that are about to meet a stop, and those that rest on one."""

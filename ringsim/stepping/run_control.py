@@ -10,14 +10,16 @@ import math
 
 import numpy as np
 
+from ringsim.parts.limits import Limits
 from ringsim.parts.solver import NO_DEVIATIONS, Solver
 from ringsim.stepping.constant_steps import ConstantSteps
 from ringsim.stepping.guard import Guard
 from ringsim.stepping.instant import Instant, Scales
-from ringsim.stepping.locks import Locks, StopContact, lock_times
+from ringsim.stepping.locks import Locks, Overrun, StopContact, lock_times
 from ringsim.stepping.motion_steps import DeviationSteps, MotionSteps
 from ringsim.stepping.repeats import EnergyImbalance, Indicator, TensionBend
-from ringsim.variables import Cause, Reason, Status
+from ringsim.stepping.rest import Rest
+from ringsim.variables import Cause, Fate, Reason, Status
 
 _ROUND_OFF = 1e-12
 """Relative difference of two times that are the same."""
@@ -26,8 +28,8 @@ _ROUND_OFF = 1e-12
 class RunControl:
     """Steps, care and guard of one run.
 
-    ``now`` is the last accepted state, ``goes_on`` whether there is a step from there, ``status``
-    and ``reason`` how the run has ended, ``repeats`` how many steps were repeated.
+    ``now`` is the last accepted state, ``goes_on`` whether there is a step from there, ``status``,
+    ``fate`` and ``reason`` how the run has ended, ``repeats`` how many steps were repeated.
     """
 
     def __init__(
@@ -37,13 +39,15 @@ class RunControl:
         start: Instant,
         locks: Locks | None = None,
         *,
+        limits: Limits = Limits(),  # noqa: B008  frozen
         follow_deviations: bool = False,
     ) -> None:
-        """Begin a run, which ends when the V-joints of ``locks`` have all reached the same stop,
-        without them at ``solver.end_time``; with ``follow_deviations`` steps resolve how the joints
-        deviate from their mean angle.
+        """Begin a run, which ends when the V-joints of ``locks`` have all reached the same stop, or
+        one is past it by more than ``limits``, or all are at rest, else at ``solver.end_time``;
+        with ``follow_deviations`` steps resolve how the joints deviate from their mean angle.
         """
-        self.now, self._solver, self._locks = start, solver, locks
+        self.now, self._solver, self._locks, self._limits = start, solver, locks, limits
+        self._rest, self._farthest = Rest(start, solver.end_time), Overrun()
         self._roped = scales.slack_tension is not None
         self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, locks is None)
         self._indicators: list[Indicator] = []
@@ -59,7 +63,8 @@ class RunControl:
         self._guard = Guard(solver, scales)
         self._shorter: float | None = None
         self._count, self.repeats, self._settled_at = 0, 0, math.inf
-        self.status, self.reason, self.goes_on = Status.UNFINISHED, Reason(), True
+        self.status, self.fate, self.reason = Status.OK, Fate.UNKNOWN, Reason()
+        self.goes_on = True
         self._watch()
 
     def next_step(self, next_event: float = math.inf) -> float:
@@ -102,6 +107,7 @@ class RunControl:
             self._locks.note(self.now.angles)
             if math.isinf(self._settled_at):
                 self._note_lock(self._locks, before)
+            self._note_overrun(self._locks)
         if self.goes_on:
             self._note_end(before.time)
         if self.goes_on:
@@ -122,12 +128,13 @@ class RunControl:
 
     def diverge(self, reason: Reason) -> None:
         """End a run that cannot be sound."""
-        self.status, self.reason, self.goes_on = Status.DIVERGED, reason, False
+        self.status, self.fate, self.reason = Status.DIVERGED, Fate.UNKNOWN, reason
+        self.goes_on = False
 
     def conclude(self) -> None:
         """Judge the run as a whole."""
         refused = self._guard.verdict()
-        if refused and self.status in (Status.OK, Status.UNFINISHED):
+        if refused and self.status == Status.OK:
             self.diverge(refused)
         self.reason += "".join(indicator.note() for indicator in self._indicators)
 
@@ -136,8 +143,7 @@ class RunControl:
 
     def _watch(self) -> None:
         """End the run where the guard must."""
-        overrun = 0.0 if self._locks is None else self._locks.overrun(self.now.angles)
-        refused = self._guard.judge(self.now, overrun)
+        refused = self._guard.judge(self.now)
         if refused:
             self.diverge(refused)
 
@@ -145,9 +151,9 @@ class RunControl:
         """Let the run settle once all V-joints have reached the same stop."""
         if not (locks.deployed.all() or locks.stowed.all()):
             return
+        self.fate = Fate.DEPLOYED if locks.deployed.all() else Fate.FOLDED
         where = "180 deg" if locks.deployed.all() else "the stowed stop"
-        reason = Reason(Cause.NONE, f"all V-joints have reached {where}")
-        self.status, self.reason = Status.OK, reason
+        self.reason = Reason(text=f"all V-joints have reached {where}")
         # Settling counts from the last lock within this step: what happens after it must not
         # depend on where steps end.
         time, settling = self.now.time, self._solver.settling_time if locks.stops else 0.0
@@ -162,27 +168,45 @@ class RunControl:
     def _note_end(self, before: float) -> None:
         """End a run that has settled, or reached the end time or the step limit."""
         solver, time, locks = self._solver, self.now.time, self._locks
+        end = f"solver.end_time = {solver.end_time:g} s"
         if time >= self._settled_at:
             self.goes_on = False
         elif time >= solver.end_time * (1.0 - _ROUND_OFF):
-            self.goes_on = False
             if locks is None:
-                self.status = Status.OK
                 words = "the cable was wound" if self._roped else "the run lasted"
-                words += f" until solver.end_time = {solver.end_time:g} s"
-                self.reason = Reason(Cause.NONE, words)
-            elif self.status == Status.UNFINISHED:
-                self.reason = Reason(
-                    Cause.END_TIME,
-                    f"solver.end_time = {solver.end_time:g} s was reached with "
-                    f"{int(locks.deployed.sum())} of {locks.deployed.size} V-joints locked",
-                )
+                self._end(Fate.FINISHED, f"{words} until {end}")
+            elif math.isinf(self._settled_at):
+                self._end(Fate.CUT_OFF, f"{end} was reached with {locks.missing()}")
+            self.goes_on = False
+        elif locks is not None and math.isinf(self._settled_at) and self._rest.reached(self.now):
+            some = locks.deployed.any()
+            self._end(
+                Fate.PARTLY_DEPLOYED if some else Fate.STALLED,
+                f"came to rest with {locks.missing()}: nothing drives it any more",
+            )
         elif self._count >= solver.step_limit:
             self._give_up(
                 Cause.STEP_LIMIT,
                 f"solver.step_limit = {solver.step_limit} steps took the run to {time:.6g} s only, "
                 f"the last of {time - before:.1e} s: raise solver.tolerance or solver.step_limit",
             )
+
+    def _note_overrun(self, locks: Locks) -> None:
+        """End the run where a V-joint is so far past its stop that the model means nothing."""
+        past = locks.overrun(self.now)
+        self._farthest = max(self._farthest, past)
+        if past.angle > self._limits.farthest:
+            stop = "its stop" if locks.stops else "180 deg, where the scene has no stop,"
+            self._end(
+                Fate.OVERLOADED,
+                f"V-joint {past.joint} was driven {math.degrees(past.angle):.3g} deg past {stop} "
+                f"at {past.time:.6g} s, more than limits.overrun = {self._limits.overrun:g} deg, "
+                f"with {locks.missing()}",
+            )
+
+    def _end(self, fate: Fate, words: str) -> None:
+        """End a run whose numbers hold."""
+        self.fate, self.reason, self.goes_on = fate, Reason(text=words), False
 
     def _give_up(self, cause: Cause, words: str) -> None:
         """End a run early; one that has reached its goal only settles less."""

@@ -17,7 +17,7 @@ from ringsim.cable.ropes import Ropes
 from ringsim.layout.pose import Array
 from ringsim.scene import Scene
 from ringsim.theory.ideal_motion import IdealMotion
-from ringsim.variables import Cause, Status
+from ringsim.variables import Cause, Fate, Reason, Status
 
 RELATIVE = 3e-7
 """Local error of a step, relative to every part of the state."""
@@ -69,7 +69,7 @@ class Course:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self.motion = scene, IdealMotion(scene)
-        self.status, self.cause, self.reason = Status.UNFINISHED, Cause.NONE, ""
+        self.status, self.fate, self.reason = Status.OK, Fate.UNKNOWN, Reason()
         self.lock_time = math.nan
         self.pieces: list[Piece] = []
         self.evaluations, self.jacobians = 0, 0
@@ -94,13 +94,13 @@ class Course:
                     self._state = self.motion.strike(fault, self._time, self._state)
         except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
             too_long = self.evaluations > MOST_EVALUATIONS
-            self.status = Status.SOLVER_FAILED
-            self.cause = Cause.STEP_LIMIT if too_long else Cause.NEWTON
-            self.reason = f"the ideal ring's solver gave up at {self._time:.6g} s: {error}"
-        if self.status == Status.UNFINISHED:
-            self.cause = Cause.END_TIME
-            self.reason = (
-                f"solver.end_time = {self._scene.solver.end_time:g} s was reached with 0 of "
+            self.status, self.fate = Status.SOLVER_FAILED, Fate.UNKNOWN
+            words = f"the ideal ring's solver gave up at {self._time:.6g} s: {error}"
+            self.reason = Reason(Cause.STEP_LIMIT if too_long else Cause.NEWTON, words)
+        if not self.reason:
+            self.fate = Fate.CUT_OFF
+            self.reason = Reason(
+                text=f"solver.end_time = {self._scene.solver.end_time:g} s was reached with 0 of "
                 f"{2 * self._scene.structure.sections} V-joints locked"
             )
         return self
@@ -172,13 +172,16 @@ class Course:
         stop = self._scene.stop
         if math.isnan(self.lock_time) and phi <= 0.0 and rate < 0.0:
             self.lock_time = self._time - phi / rate
-            self.status, self.reason = Status.OK, "all V-joints have reached 180 deg"
+            self.fate = Fate.DEPLOYED
+            self.reason = Reason(text="all V-joints have reached 180 deg")
             self._settle(self.lock_time)
-            if stop is not None and stop.latch:
-                self.motion.latched = True
-                self._begin()
-        elif self.status == Status.UNFINISHED and phi >= self._stowed:
-            self.status, self.reason = Status.OK, "all V-joints have reached the stowed stop"
+            self.motion.latched = stop is not None and stop.latch
+            if self.motion.cables is not None:
+                self.motion.cables.lock(self._time)
+            self._begin()
+        elif not self.reason and phi >= self._stowed:
+            self.fate = Fate.FOLDED
+            self.reason = Reason(text="all V-joints have reached the stowed stop")
             self._settle(self._time)
 
     def _settle(self, time: float) -> None:

@@ -158,6 +158,15 @@ class IdealCables:
         soft = min(cable.slack_width / cable.axial_stiffness for cable in self._cables)
         return min(max(1e-2 * soft, 1e-9), 1e-6), 1e-2 * self._slip
 
+    def lock(self, time: float) -> None:
+        """All V-joints have locked at a time (s): winches rest but for those that pull on.
+
+        Of rods that do not give, rope held at a tension and rope held as it is are the same.
+        """
+        for place, winch in self._winches.items():
+            if winch.after_lock != "pull" and winch.turns(time):
+                self._winches[place] = winch.model_copy(update={"stop_time": time})
+
     def pull(self, time: float, now: Configuration, motors: Array) -> Pull:
         """Evaluate the cables; ``time`` (s) is that of the winches' laws, ``motors`` the rope wound
         by each winch with feedback and its speed, m and m/s, shape (2, winches).

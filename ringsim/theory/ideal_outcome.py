@@ -13,7 +13,7 @@ from ringsim.cable.state import ChainState
 from ringsim.layout.pose import Array
 from ringsim.outputs.cable_tension import CableTension
 from ringsim.outputs.family import Output, Values, axes
-from ringsim.outputs.recorder import outputs_of, reduced, spanned
+from ringsim.outputs.recorder import ended, outputs_of, overloads, reduced, spanned
 from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
@@ -52,7 +52,8 @@ def to_outcome(course: Course, scene: Scene) -> Outcome:
         "tolerance_used": np.array(np.nan),
         **{f"total_{name}": np.array(ideal.run.counts[name]) for name in COUNTS},
     }
-    return Outcome(course.status, course.reason, coordinates, values, course.cause)
+    passed = overloads(scene, outputs_of(scene), ideal.series_of)
+    return ended(course.status, course.fate, course.reason, passed, coordinates, values)
 
 
 class _IdealRun:

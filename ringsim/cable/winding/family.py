@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -35,6 +36,10 @@ class Winding(Model):
 
 class PrescribedWinding(Winding):
     """A law of time alone."""
+
+    def rests_from(self) -> float:
+        """Time after which the drum never turns again, s; infinite if it always does."""
+        return 0.0 if self.usual_speed() == 0.0 else math.inf
 
     def wound(self, time: float) -> float:
         """Rope taken up since the start, in metre."""

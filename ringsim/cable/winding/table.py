@@ -59,6 +59,10 @@ class TableWinding(PrescribedWinding):
         elapsed = np.cumsum(step[order])
         return float(speed[order[np.searchsorted(elapsed, 0.5 * elapsed[-1])]])
 
+    def rests_from(self) -> float:
+        """The last time of the table, s."""
+        return self.times[-1]
+
     def wound(self, time: float) -> float:
         """Rope taken up, in metre."""
         return float(self._curve(min(max(time, self.times[0]), self.times[-1])))
