@@ -21,17 +21,7 @@ from ringsim.scene import Scene
 
 
 class Built(NamedTuple):
-    """A model with its optional parts.
-
-    Attributes
-    ----------
-    connectors
-        What pushes, pulls and brakes, for the energy balance.
-    stops, cables
-        Those of the scene, if it has any.
-    faults
-        What breaks during the run.
-    """
+    """A model with what pushes, pulls and brakes in it, and those parts that a scene may lack."""
 
     model: Multibody
     connectors: list[Reacting]

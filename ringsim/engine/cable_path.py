@@ -58,12 +58,10 @@ class CablePath:
 
     Attributes
     ----------
-    nodes
-        exudyn nodes whose coordinates the path depends on.
+    nodes, per_cable
+        exudyn nodes whose coordinates the path depends on; number of points of each cable.
     width, size
         Most coordinates of a node, and those of all nodes.
-    per_cable
-        Number of points of each cable.
     leg_point, leg_node, leg_share
         Every dependence of a point on a node, in the order of the nodes: the point, the node's
         place in ``nodes``, and the share of the turn of its Euler parameters that turns the

@@ -73,9 +73,7 @@ class Stops:
         return _torsion(model, markers, **law)
 
     def latch(self, deployed: NDArray[np.bool_]) -> None:
-        """Hold these V-joints, shape (planes, sections), from both sides from now on, if there are
-        latches.
-        """
+        """Hold these V-joints, (planes, sections), from both sides from now on, if it latches."""
         if self._law.latch:
             for plane, section in np.argwhere(deployed & ~self._latched):
                 # A stop has no use for the connector's offset; its law reads it as a switch.
@@ -117,10 +115,7 @@ class StuckJoint:
 class Faults:
     """The faults of a scene, in the order of their times, each struck between two steps.
 
-    Attributes
-    ----------
-    joints
-        V-joints that stick.
+    ``joints`` are the V-joints that will stick.
     """
 
     def __init__(self, model: Multibody, drive: CableDrive | None) -> None:
@@ -137,10 +132,8 @@ class Faults:
         return self._waiting[0][0].time if self._waiting else math.inf
 
     def strike(self, time: float, angles: Array, state: ChainState | None) -> bool:
-        """Strike all faults that are due; returns whether there was one.
-
-        ``angles`` are the opening angles, shape (planes, sections), rad, and ``state`` the cables
-        now, if the scene has any.
+        """Strike all faults that are due, at opening angles (rad) of shape (planes, sections) and
+        a state of the cables; returns whether there was one.
         """
         due = [one for one in self._waiting if one[0].time <= time + 1e-12]
         del self._waiting[: len(due)]

@@ -41,16 +41,8 @@ class BuiltJoint(NamedTuple):
 
 
 class Multibody:
-    """Bodies, rods, joints and loads of a scene's layout in its initial state.
-
-    Attributes
-    ----------
-    layout
-        What it is built from, at the start of the run.
-    bodies
-        Body and node of every rigid body.
-    rods, joints
-        In the order of the layout.
+    """Bodies (each with its node), rods, joints and loads of a scene's layout at the start, in the
+    layout's order.
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -108,14 +108,14 @@ class Openings:
         for plane, joints in zip(model.layout.openings, model.openings(), strict=True):
             if joints:
                 group = JointGroup(model, [joint for joint, _ in joints])
-                senses = np.array([sense for _, sense in joints])
-                self._planes.append(partial(_of_joints, group, senses))
+                self._planes.append(partial(_of_joints, group, np.array([s for _, s in joints])))
             else:
                 chords = [one for one in plane if isinstance(one, ChordOpening)]
                 nodes = [model.bodies[one.body][1] for one in chords]
                 where = np.array([model.assembly.coordinates_of(node)[:3] for node in nodes])
-                centres = np.array([one.centre for one in chords])
-                self._planes.append(partial(_of_chords, where, centres))
+                self._planes.append(
+                    partial(_of_chords, where, np.array([c.centre for c in chords]))
+                )
 
     def read(self, state: State) -> tuple[Array, Array]:
         """Opening angles and their rates, shape (planes, sections), rad and rad/s."""
