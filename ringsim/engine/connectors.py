@@ -93,9 +93,8 @@ class StuckJoint:
         self._place = model.scene.structure.planes.index(fault.plane), fault.section - 1
         planes = _opening_joints(model, 'faults of kind "stuck-vjoint"', "faults")
         joint, self._sense = planes[self._place[0]][self._place[1]]
-        linear = {"stiffness": fault.stiffness, "damping": fault.damping}
-        self._object = _torsion(model, joint.markers, activeConnector=False, **linear)
-        self._angle: float | None = None
+        linear = {"stiffness": fault.stiffness, "damping": fault.damping, "activeConnector": False}
+        self._object, self._angle = _torsion(model, joint.markers, **linear), math.nan
 
     def strike(self, angles: Array) -> None:
         """Hold the joint at the opening angle that it has now."""
@@ -107,7 +106,7 @@ class StuckJoint:
     def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
         """See ``Reacting``."""
         rate = rates[self._place]
-        if self._angle is None:
+        if math.isnan(self._angle):  # the fault has not struck
             return Reaction(0.0, 0.0, 0.0), rate
         return self._law.torque(float(angles[self._place]) - self._angle, rate), rate
 

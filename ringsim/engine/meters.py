@@ -53,7 +53,6 @@ class EnergyMeter:
         """
         kinetic = sum(self._output(body, _KIND.KineticEnergy) for body in self._assembly.bodies)
         elastic = sum(self._output(element, _KIND.PotentialEnergy) for element in self._elements)
-        moved = (state.position - state.reference)[self._loaded]
         forces, resisted = [np.zeros(0)], [np.zeros(0)]
         for connector in self._connectors:
             reaction, resisting = connector(state, angles, rates)
@@ -74,7 +73,7 @@ class EnergyMeter:
             if chain is not None and old_chain is not None:
                 driven, lost_in_cables = work_between(old_chain, chain)
                 lost += lost_in_cables
-        work = float(np.sum(self._forces * moved))
+        work = float(np.sum(self._forces * (state.position - state.reference)[self._loaded]))
         return Energies(float(kinetic), float(elastic), work, lost, driven)
 
     def keep(self) -> None:

@@ -49,7 +49,7 @@ class _Side:
         return self._read(state.position[self._where], state.velocity[self._where])
 
     def spin_about(self, state: State, axes: Array) -> Array:
-        """Angular rate about given axes, shape (n, 3), rad/s; of nodes with Euler parameters."""
+        """Angular rate about axes, shape (n, 3), rad/s; of nodes with Euler parameters."""
         place, rates = state.position[self._where], state.velocity[self._where]
         return np.asarray(np.sum(spin(place[:, 3:7], rates[:, 3:7]) * axes, axis=1))
 
@@ -113,9 +113,8 @@ class Openings:
                 chords = [one for one in plane if isinstance(one, ChordOpening)]
                 nodes = [model.bodies[one.body][1] for one in chords]
                 where = np.array([model.assembly.coordinates_of(node)[:3] for node in nodes])
-                self._planes.append(
-                    partial(_of_chords, where, np.array([c.centre for c in chords]))
-                )
+                centres = np.array([one.centre for one in chords])
+                self._planes.append(partial(_of_chords, where, centres))
 
     def read(self, state: State) -> tuple[Array, Array]:
         """Opening angles and their rates, shape (planes, sections), rad and rad/s."""

@@ -41,7 +41,6 @@ class GeometricallyExact:
     has_strains = True
     """Whether exudyn reports strains, forces and moments of the elements."""
     constant_curvature = True
-    """Whether the curvature is constant in an element."""
 
     def add_node(self, assembly: Assembly, pose: Pose) -> Any:
         """A node at a pose; as for ``Assembly.add_rigid_node``."""
@@ -80,10 +79,7 @@ class GeometricallyExact:
 
 
 class Ancf:
-    """The papers' beams: absolute nodal coordinates, 9 a node with two slope vectors.
-
-    Attributes and methods are those of ``GeometricallyExact``.
-    """
+    """The papers' beams: absolute nodal coordinates, 9 a node with two slope vectors."""
 
     has_strains = False
     constant_curvature = False

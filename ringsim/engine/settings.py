@@ -55,8 +55,7 @@ def scales_of(built: Built) -> Scales:
     inertia = folding / per_angle**2
     # The mean rate if the first acceleration lasted, at least that of the longest run.
     rate = max(math.sqrt(0.5 * abs(acceleration) * travel), travel / scene.solver.end_time)
-    # Springs of its own set their own scale: a thousandth of what they would do along a rod does
-    # not matter.
+    # Springs of its own set the scale: a thousandth of their force times a rod does not matter.
     pushed = 1e-3 * structure.push * structure.reach
     energy = pushed or 0.5 * inertia * rate**2
     found = Scales(rate, energy, travel, structure.reach, contact_step=_contact_step(model))
