@@ -19,9 +19,7 @@ from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 
 
 class BuiltRod(NamedTuple):
-    """A chain of beam elements; the nodes' frames have x along the rod and z along the section's
-    normal.
-    """
+    """A chain of beam elements; its nodes' frames have x along the rod, z along its joints' axis."""
 
     nodes: list[Any]
     elements: list[Any]
