@@ -19,7 +19,7 @@ from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 
 
 class BuiltRod(NamedTuple):
-    """A chain of beam elements; its nodes' frames have x along the rod, z along its joints' axis."""
+    """A chain of beam elements; its nodes' axes: x along the rod, z along the joints' axis."""
 
     nodes: list[Any]
     elements: list[Any]
