@@ -34,16 +34,12 @@ class Assembly:
 
     Attributes
     ----------
-    container, system
-        exudyn's SystemContainer and MainSystem.
     starts
         Accelerations (m/s^2, 1/s^2) at which coordinates start, by node, in the nodes' order.
     bodies
         Objects with kinetic energy and, where elastic, potential energy.
-    rigid_nodes
-        Nodes with Euler parameters.
-    dampers
-        Dampers of the rods.
+    rigid_nodes, dampers
+        Nodes with Euler parameters, and dampers of the rods.
     """
 
     def __init__(self) -> None:
@@ -109,14 +105,8 @@ class Assembly:
     def symbolic_law(
         self, kind: str, key: Hashable, law: Callable[[Any, Any, Any], Any]
     ) -> dict[str, Any]:
-        """The setting that gives a spring-damper connector its law; equal keys share one.
-
-        Parameters
-        ----------
-        kind
-            Type of the connector in exudyn.
-        law
-            Force or torque from displacement (angle), rate, and the connector's last parameter.
+        """The setting that gives a spring-damper connector (a type of exudyn's) its law, a force or
+        torque from displacement (angle), rate and last parameter; equal keys share one.
         """
 
         def function(

@@ -21,17 +21,7 @@ from ringsim.scene import Scene
 
 
 class Built(NamedTuple):
-    """A model with its optional parts.
-
-    Attributes
-    ----------
-    connectors
-        What pushes, pulls and brakes, for the energy balance.
-    stops, cables
-        Those of the scene, if it has any.
-    faults
-        What breaks during the run.
-    """
+    """A model with what pushes, pulls and brakes in it, and those parts that a scene may lack."""
 
     model: Multibody
     connectors: list[Reacting]
@@ -87,15 +77,12 @@ def _add_boom(model: Multibody, beam: BoomBeam) -> None:
     top, low = (model.layout.bodies[number].pose.place for number in ends)
     (top_body, top_node), (low_body, _) = (model.bodies[number] for number in ends)
     start = assembly.starts[int(top_node)]
-    spin = 2.0 * start[4:7]
-    nodes = []
+    spin, down, nodes = 2.0 * start[4:7], np.array([0.0, 0.0, -1.0]), []
     for drop in np.linspace(0.0, boom.length, boom.elements + 1):
-        arm = np.array([0.0, 0.0, -drop])
-        node = assembly.add_node(
-            item.NodePointSlope1(referenceCoordinates=[*(top + arm), 0.0, 0.0, -1.0]),
-            np.concatenate([start[:3] + np.cross(spin, arm), np.cross(spin, [0.0, 0.0, -1.0])]),
-        )
-        nodes.append(node)
+        arm = drop * down
+        point = item.NodePointSlope1(referenceCoordinates=[*(top + arm), *down])
+        start_of = [start[:3] + np.cross(spin, arm), np.cross(spin, down)]
+        nodes.append(assembly.add_node(point, np.concatenate(start_of)))
     length = boom.length / boom.elements
     cables = [
         assembly.system.AddObject(
@@ -114,8 +101,7 @@ def _add_boom(model: Multibody, beam: BoomBeam) -> None:
     # direction, and the boom is inextensible between the two.
     for drop in (0.0, 0.1 * length):
         place = item.MarkerBodyPosition(bodyNumber=cables[0], localPosition=[drop, 0.0, 0.0])
-        upper = assembly.body_marker(top_body, np.array([0.0, 0.0, -drop]))
-        clamp = [upper, assembly.system.AddMarker(place)]
+        clamp = [assembly.body_marker(top_body, drop * down), assembly.system.AddMarker(place)]
         assembly.system.AddObject(item.ObjectJointSpherical(markerNumbers=clamp))
     _slide(model, low_body, cables, length, float(top[2] - low[2]))
 

@@ -58,18 +58,14 @@ class CablePath:
 
     Attributes
     ----------
-    nodes
-        exudyn nodes whose coordinates the path depends on.
+    nodes, per_cable
+        exudyn nodes whose coordinates the path depends on; number of points of each cable.
     width, size
         Most coordinates of a node, and those of all nodes.
-    per_cable
-        Number of points of each cable.
-    leg_point, leg_node, leg_share
+    leg_point, leg_node, leg_share, leg_carries
         Every dependence of a point on a node, in the order of the nodes: the point, the node's
-        place in ``nodes``, and the share of the turn of its Euler parameters that turns the
-        point's arm.  That is 0 for slope vectors: all that follows then leaves their legs alone.
-    leg_carries
-        Share of the node's displacement that moves the point.
+        place in ``nodes``, the share of the turn of its Euler parameters that turns the point's
+        arm (0 for slope vectors, which leaves their legs alone), and that of its displacement.
     spots
         Place of each node's coordinates among those of all nodes behind one another, shape
         (nodes, width); -1 where a node has fewer.

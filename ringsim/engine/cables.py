@@ -6,7 +6,6 @@ Jacobian that of ringsim.engine.cable_jacobian.
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import exudyn as exu
@@ -20,7 +19,7 @@ from ringsim.cable.winches import Winches
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.cable_jacobian import JacobianPattern
 from ringsim.engine.cable_path import CablePath, Placed
-from ringsim.engine.rotations import Array, Indices
+from ringsim.engine.rotations import Array
 
 
 class CableDrive:
@@ -28,14 +27,10 @@ class CableDrive:
 
     Attributes
     ----------
-    present
-        The cables with their planes.
-    path
-        What they run over, on the model's nodes.
-    chain, ropes
+    present, path
+        The cables with their planes, and what they run over, on the model's nodes.
+    chain, ropes, winches
         See ringsim.cable; faults replace the ropes.
-    winches
-        What winds them.
     refusal
         Why the chain last had no answer to a state that Newton tried; empty if it always had.
     """
@@ -43,10 +38,11 @@ class CableDrive:
     def __init__(self, assembly: Assembly, cables: Cables, path: CablePath, faults: int) -> None:
         self.present = cables.present()
         present = [cable for _, cable in self.present]
-        self.path, self._assembly = path, assembly
-        parameter = assembly.system.GetNodeParameter
+        self.path, system = path, assembly.system
+        parameter = system.GetNodeParameter
         reference = [parameter(node, "referenceCoordinates") for node in path.nodes]
         self._reference = path.by_node(np.concatenate(reference))
+        self._columns = np.concatenate([assembly.coordinates_of(node) for node in path.nodes])
         self.chain = Chain(present, path.per_cable)
         start = path.place(self._reference, np.zeros_like(self._reference))
         self.ropes = self.chain.start(start.points)
@@ -55,7 +51,25 @@ class CableDrive:
         self.pattern = JacobianPattern(path, self.ropes, len(present) + faults)
         self._size = path.size + self.pattern.unknowns
         self.refusal = ""
-        self._add_object()
+        zeros = np.zeros(self.pattern.unknowns)
+        auxiliary = system.AddNode(
+            item.NodeGenericODE2(
+                referenceCoordinates=zeros,
+                initialCoordinates=zeros,
+                initialCoordinates_t=zeros,
+                numberOfODE2Coordinates=len(zeros),
+            )
+        )
+        mass = exu.MatrixContainer()
+        mass.SetWithSparseMatrix(np.zeros((1, 3)), self._size, self._size)
+        system.AddObject(
+            item.ObjectGenericODE2(
+                nodeNumbers=[*path.nodes, auxiliary],
+                massMatrix=mass,
+                forceUserFunction=self._force,
+                jacobianUserFunction=self._jacobian,
+            )
+        )
 
     def evaluate(self, coordinates: Array, rates: Array, time: float) -> tuple[ChainState, Placed]:
         """The chain from the nodes' total coordinates and rates, (nodes, width)."""
@@ -80,32 +94,6 @@ class CableDrive:
         """The chain at a state of the whole system (total coordinates)."""
         place, rates = (self.path.by_node(x[self._columns]) for x in (position, velocity))
         return self.evaluate(place, rates, time)[0]
-
-    @cached_property
-    def _columns(self) -> Indices:
-        """Where the nodes' coordinates stand in the vector of the system, once assembled."""
-        return np.concatenate([self._assembly.coordinates_of(node) for node in self.path.nodes])
-
-    def _add_object(self) -> None:
-        zeros = np.zeros(self.pattern.unknowns)
-        auxiliary = self._assembly.system.AddNode(
-            item.NodeGenericODE2(
-                referenceCoordinates=zeros,
-                initialCoordinates=zeros,
-                initialCoordinates_t=zeros,
-                numberOfODE2Coordinates=len(zeros),
-            )
-        )
-        mass = exu.MatrixContainer()
-        mass.SetWithSparseMatrix(np.zeros((1, 3)), self._size, self._size)
-        self._assembly.system.AddObject(
-            item.ObjectGenericODE2(
-                nodeNumbers=[*self.path.nodes, auxiliary],
-                massMatrix=mass,
-                forceUserFunction=self._force,
-                jacobianUserFunction=self._jacobian,
-            )
-        )
 
     def _answer(self, q: Any, q_t: Any, time: float) -> tuple[ChainState, Placed]:
         """The chain at a state of the object; Newton asks twice for force and Jacobian."""

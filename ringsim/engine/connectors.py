@@ -73,9 +73,7 @@ class Stops:
         return _torsion(model, markers, **law)
 
     def latch(self, deployed: NDArray[np.bool_]) -> None:
-        """Hold these V-joints, shape (planes, sections), from both sides from now on, if there are
-        latches.
-        """
+        """Hold these V-joints, (planes, sections), from both sides from now on, if it latches."""
         if self._law.latch:
             for plane, section in np.argwhere(deployed & ~self._latched):
                 # A stop has no use for the connector's offset; its law reads it as a switch.
@@ -95,9 +93,8 @@ class StuckJoint:
         self._place = model.scene.structure.planes.index(fault.plane), fault.section - 1
         planes = _opening_joints(model, 'faults of kind "stuck-vjoint"', "faults")
         joint, self._sense = planes[self._place[0]][self._place[1]]
-        linear = {"stiffness": fault.stiffness, "damping": fault.damping}
-        self._object = _torsion(model, joint.markers, activeConnector=False, **linear)
-        self._angle: float | None = None
+        linear = {"stiffness": fault.stiffness, "damping": fault.damping, "activeConnector": False}
+        self._object, self._angle = _torsion(model, joint.markers, **linear), math.nan
 
     def strike(self, angles: Array) -> None:
         """Hold the joint at the opening angle that it has now."""
@@ -109,7 +106,7 @@ class StuckJoint:
     def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
         """See ``Reacting``."""
         rate = rates[self._place]
-        if self._angle is None:
+        if math.isnan(self._angle):  # the fault has not struck
             return Reaction(0.0, 0.0, 0.0), rate
         return self._law.torque(float(angles[self._place]) - self._angle, rate), rate
 
@@ -117,10 +114,7 @@ class StuckJoint:
 class Faults:
     """The faults of a scene, in the order of their times, each struck between two steps.
 
-    Attributes
-    ----------
-    joints
-        V-joints that stick.
+    ``joints`` are the V-joints that will stick.
     """
 
     def __init__(self, model: Multibody, drive: CableDrive | None) -> None:
@@ -137,10 +131,8 @@ class Faults:
         return self._waiting[0][0].time if self._waiting else math.inf
 
     def strike(self, time: float, angles: Array, state: ChainState | None) -> bool:
-        """Strike all faults that are due; returns whether there was one.
-
-        ``angles`` are the opening angles, shape (planes, sections), rad, and ``state`` the cables
-        now, if the scene has any.
+        """Strike all faults that are due, at opening angles (rad) of shape (planes, sections) and
+        a state of the cables; returns whether there was one.
         """
         due = [one for one in self._waiting if one[0].time <= time + 1e-12]
         del self._waiting[: len(due)]

@@ -147,9 +147,10 @@ class Integration:
         self._fresh = True
         self._state.refresh()
         if not self._state.finite():
-            cure = "reduce solver.step or solver.tolerance"
-            reason = f"the state is not finite at {time:.6g} s: {cure}"
-            self._control.diverge(Reason(Cause.NOT_FINITE, reason))
+            text = (
+                f"the state is not finite at {time:.6g} s: reduce solver.step or solver.tolerance"
+            )
+            self._control.diverge(Reason(Cause.NOT_FINITE, text))
             return False
         found = self._weighed or self._measure(time)
         goes_on = self._control.accept(found, self._read(found))
@@ -260,5 +261,4 @@ class _Predictor:
 def _detail(message: str) -> str:
     """The line of exudyn's message that names the step that failed, or its first."""
     lines = [line.strip() for line in message.splitlines() if line.strip()]
-    detail = next((line for line in lines if "step" in line.lower()), lines[0] if lines else "")
-    return detail[:200]
+    return next((line for line in lines if "step" in line.lower()), [*lines, ""][0])[:200]

@@ -17,9 +17,7 @@ from ringsim.engine.readings import State
 from ringsim.engine.rotations import Array
 from ringsim.stepping.instant import Energies
 
-_KINETIC = exu.OutputVariableType.KineticEnergy
-_POTENTIAL = exu.OutputVariableType.PotentialEnergy
-_KINDS = exu.OutputVariableType.ForceLocal, exu.OutputVariableType.TorqueLocal
+_KIND = exu.OutputVariableType
 _Passing = tuple[float, Array, Array, ChainState | None]
 """Time (s), damping forces (N, N m) and the rates that they resist (m/s, rad/s), cables."""
 
@@ -52,9 +50,8 @@ class EnergyMeter:
 
         Opening angles and their rates have the shape (planes, sections), rad and rad/s.
         """
-        kinetic = sum(self._output(body, _KINETIC) for body in self._assembly.bodies)
-        elastic = sum(self._output(element, _POTENTIAL) for element in self._elements)
-        moved = (state.position - state.reference)[self._loaded]
+        kinetic = sum(self._output(body, _KIND.KineticEnergy) for body in self._assembly.bodies)
+        elastic = sum(self._output(element, _KIND.PotentialEnergy) for element in self._elements)
         forces, resisted = [np.zeros(0)], [np.zeros(0)]
         for connector in self._connectors:
             reaction, resisting = connector(state, angles, rates)
@@ -63,9 +60,19 @@ class EnergyMeter:
             resisted.append(np.ravel(resisting))
         if chain is not None:
             elastic += chain.elastic_energy.sum()
-        self._last = time, np.concatenate(forces), np.concatenate(resisted), chain
-        driven, lost = self._passed(*self._last)
-        work = float(np.sum(self._forces * moved))
+        pushing, moving = np.concatenate(forces), np.concatenate(resisted)
+        self._last = time, pushing, moving, chain
+        # Mean force times displacement.  That of a damper is the mean of its rates times the step,
+        # which differs from generalised-alpha's by a hundredth of the rates' change at most.
+        lost = math.nan if self._untold else self._assembly.dampers.lost(time)
+        driven = 0.0
+        if self._kept is not None:
+            begin, old_forces, old_rates, old_chain = self._kept
+            lost += 0.25 * (time - begin) * float((pushing + old_forces) @ (moving + old_rates))
+            if chain is not None and old_chain is not None:
+                driven, lost_in_cables = work_between(old_chain, chain)
+                lost += lost_in_cables
+        work = float(np.sum(self._forces * (state.position - state.reference)[self._loaded]))
         return Energies(float(kinetic), float(elastic), work, lost, driven)
 
     def keep(self) -> None:
@@ -80,24 +87,6 @@ class EnergyMeter:
             "damping takes: set rods.damping = 0 to have it"
         )
         return unknown if self._untold else ""
-
-    def _passed(
-        self, time: float, forces: Array, rates: Array, chain: ChainState | None
-    ) -> tuple[float, float]:
-        """Energy put in by the winches and lost, J: mean force times displacement.
-
-        The displacement of a damper is the mean of its rates times the step, which differs from
-        that of generalised-alpha by a hundredth of the rates' change over the step at most.
-        """
-        lost = math.nan if self._untold else self._assembly.dampers.lost(time)
-        driven = 0.0
-        if self._kept is not None:
-            begin, old_forces, old_rates, old_chain = self._kept
-            lost += 0.25 * (time - begin) * float((forces + old_forces) @ (rates + old_rates))
-            if chain is not None and old_chain is not None:
-                driven, lost_in_cables = work_between(old_chain, chain)
-                lost += lost_in_cables
-        return driven, lost
 
 
 class StressMeter:
@@ -121,8 +110,10 @@ class StressMeter:
         # Places of the outer ends from the elements' middles (m); by what force is divided (m^2)
         # and moment multiplied (1/m^3) to give stress.
         self._outside, self._area, self._per_moment = np.array(numbers).T
-        dampers = model.assembly.dampers.numbers
-        self._damped = [dampers[int(e)] for e in self._elements] if dampers else None
+        # All elements have a damper each, in their order, or none has.
+        dampers = {int(e): k for k, e in enumerate(e for rod in model.rods for e in rod.elements)}
+        damped = model.scene.rods.damping > 0.0
+        self._damped = [dampers[int(e)] for e in self._elements] if damped else None
 
     def read(self) -> Array:
         """Stresses at the current state, shape (rod halves, sections), Pa."""
@@ -164,5 +155,5 @@ class BendingMeter:
 
 def _in_the_middle(assembly: Assembly, elements: Sequence[Any]) -> list[Array]:
     """Force (N) and moment (N m) of elements in their axes, shape (3, elements) each."""
-    output = assembly.system.GetObjectOutputBody
-    return [np.array([output(e, kind, [0.0] * 3) for e in elements]).T for kind in _KINDS]
+    output, kinds = assembly.system.GetObjectOutputBody, (_KIND.ForceLocal, _KIND.TorqueLocal)
+    return [np.array([output(e, kind, [0.0] * 3) for e in elements]).T for kind in kinds]

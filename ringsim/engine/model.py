@@ -29,9 +29,7 @@ _JOINTS: dict[str, Any] = {
 
 
 class BuiltJoint(NamedTuple):
-    """A joint of the layout as built: its markers, and the node and arm (m, in its axes) of each
-    side.  A side in space has no node.
-    """
+    """A joint as built: markers, nodes (None in space) and arms (m, in the nodes' axes) by side."""
 
     part: parts.Joint
     markers: tuple[Any, Any]
@@ -40,16 +38,8 @@ class BuiltJoint(NamedTuple):
 
 
 class Multibody:
-    """Bodies, rods, joints and loads of a scene's layout in its initial state.
-
-    Attributes
-    ----------
-    layout
-        What it is built from, at the start of the run.
-    bodies
-        Body and node of every rigid body.
-    rods, joints
-        In the order of the layout.
+    """Bodies (each with its node), rods, joints and loads of a scene's layout at the start, in the
+    layout's order.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -60,8 +50,9 @@ class Multibody:
         self.bodies: list[tuple[Any, Any]] = []
         for body in self.layout.bodies:
             node = assembly.add_rigid_node(started(body.pose))
-            number = assembly.add_body(node, body.mass, body.inertia, body.centre)
-            self.bodies.append((number, node))
+            self.bodies.append(
+                (assembly.add_body(node, body.mass, body.inertia, body.centre), node)
+            )
         self.rods: list[BuiltRod] = []
         for part in self.layout.rods:
             poses = [started(part.station(share)) for share in part.stations]
@@ -72,10 +63,8 @@ class Multibody:
         self.joints = [self._joint(joint) for joint in self.layout.joints]
         for number, force in self.layout.forces:
             # Constant in space, not in the ring: bodyFixed is not set.
-            marker = self.joints[number].markers[0]
-            assembly.system.AddLoad(
-                item.LoadForceVector(markerNumber=marker, loadVector=list(force))
-            )
+            load = partial(item.LoadForceVector, loadVector=list(force))
+            assembly.system.AddLoad(load(markerNumber=self.joints[number].markers[0]))
 
     def openings(self) -> list[list[tuple[BuiltJoint, float]]]:
         """Joints that open, with their senses, by plane and section; empty for other angles."""

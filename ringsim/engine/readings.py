@@ -49,7 +49,7 @@ class _Side:
         return self._read(state.position[self._where], state.velocity[self._where])
 
     def spin_about(self, state: State, axes: Array) -> Array:
-        """Angular rate about given axes, shape (n, 3), rad/s; of nodes with Euler parameters."""
+        """Angular rate about axes, shape (n, 3), rad/s; of nodes with Euler parameters."""
         place, rates = state.position[self._where], state.velocity[self._where]
         return np.asarray(np.sum(spin(place[:, 3:7], rates[:, 3:7]) * axes, axis=1))
 
@@ -108,8 +108,7 @@ class Openings:
         for plane, joints in zip(model.layout.openings, model.openings(), strict=True):
             if joints:
                 group = JointGroup(model, [joint for joint, _ in joints])
-                senses = np.array([sense for _, sense in joints])
-                self._planes.append(partial(_of_joints, group, senses))
+                self._planes.append(partial(_of_joints, group, np.array([s for _, s in joints])))
             else:
                 chords = [one for one in plane if isinstance(one, ChordOpening)]
                 nodes = [model.bodies[one.body][1] for one in chords]

@@ -56,19 +56,10 @@ class Reading(NamedTuple):
 
 
 class RodDampers:
-    """The dampers of all rods of a model.
-
-    Attributes
-    ----------
-    numbers
-        Damper of each damped element, by the element's number.
-    latest
-        The last reading.
-    """
+    """The dampers of all elements of all rods of a model, in their order; ``latest`` reading."""
 
     def __init__(self, system: Any) -> None:
         self._system = system
-        self.numbers: dict[int, int] = {}
         none = np.zeros((0, 6))
         self.latest = Reading(-1.0, none, none, none, by_velocity=False)
         self._dampers: list[Any] = []
@@ -79,18 +70,15 @@ class RodDampers:
         self._lead, self._offsets, self._by_velocity = 0.0, np.zeros(6), False
         self._kept: Reading | None = None
 
-    def add(self, markers: list[Any], damping: Array, relaxation: float) -> int:
-        """A damper between two markers that coincide; returns its row in ``latest``.
-
-        ``damping`` is C, shape (6, 6), N s/m and N m s, and ``relaxation`` the rod's tau, s.
+    def add(self, markers: list[Any], damping: Array, relaxation: float) -> None:
+        """A damper C, shape (6, 6), N s/m and N m s, between two markers that coincide, of a rod's
+        element with tau = ``relaxation``, s.
         """
-        damper = item.ObjectConnectorRigidBodySpringDamper(
-            markerNumbers=markers, useIntrinsicFormulation=True
-        )
+        kind = item.ObjectConnectorRigidBodySpringDamper
+        damper = kind(markerNumbers=markers, useIntrinsicFormulation=True)
         self._dampers.append(self._system.AddObject(damper))
         self._matrices.append(damping)
         self._short = max(self._short, _SHORT * relaxation)
-        return len(self._dampers) - 1
 
     def prepare(self, system: Any, time: float, newton: int, discontinuous: int) -> None:
         """Called by exudyn before every residual; acts before the first of each attempt."""

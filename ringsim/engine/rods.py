@@ -19,10 +19,7 @@ from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 
 
 class BuiltRod(NamedTuple):
-    """A chain of beam elements, one fewer than nodes, from start to end.
-
-    The nodes' frames have x along the rod and z along the section's normal.
-    """
+    """A chain of beam elements; its nodes' axes: x along the rod, z along the joints' axis."""
 
     nodes: list[Any]
     elements: list[Any]
@@ -42,7 +39,6 @@ class GeometricallyExact:
     has_strains = True
     """Whether exudyn reports strains, forces and moments of the elements."""
     constant_curvature = True
-    """Whether the curvature is constant in an element."""
 
     def add_node(self, assembly: Assembly, pose: Pose) -> Any:
         """A node at a pose; as for ``Assembly.add_rigid_node``."""
@@ -63,13 +59,10 @@ class GeometricallyExact:
                 for node, arm in zip(nodes, (middle, -middle), strict=True)
             ]
             tau = float(section.dampingMatrix[0][0] / section.stiffnessMatrix[0][0])
-            number = assembly.dampers.add(markers, damping, tau)
-        element = assembly.system.AddObject(
+            assembly.dampers.add(markers, damping, tau)
+        return assembly.system.AddObject(
             item.ObjectBeamGeometricallyExact(nodeNumbers=nodes, length=length, sectionData=section)
         )
-        if damping.any():
-            assembly.dampers.numbers[int(element)] = number
-        return element
 
     def add_mass(self, assembly: Assembly, node: Any, mass: float) -> None:
         """A body without inertia of its own: the beam lends the node its rotary inertia."""
@@ -84,10 +77,7 @@ class GeometricallyExact:
 
 
 class Ancf:
-    """The papers' beams: absolute nodal coordinates, 9 a node with two slope vectors.
-
-    Attributes and methods are those of ``GeometricallyExact``.
-    """
+    """The papers' beams: absolute nodal coordinates, 9 a node with two slope vectors."""
 
     has_strains = False
     constant_curvature = False
@@ -135,18 +125,13 @@ def beam_section(rods: Rods, part: parts.Rod, constant_over: float) -> Any:
     along it: a cantilever of one element is a quarter too stiff.  Its residual flexibility
     L^2 / 12 EI belongs to the shear force alone, so it is given to the shear, 1 / kGA +
     L^2 / 12 EI; the nodes of a rod that is loaded at its nodes are then exact with any number of
-    elements (MacNeal, A simple quadrilateral shell element, 1978).
-
-    Parameters
-    ----------
-    constant_over
-        Length over which the curvature is constant, m; 0 for elements that bend by themselves.
+    elements (MacNeal, A simple quadrilateral shell element, 1978).  ``constant_over`` is the length
+    over which the curvature is constant, m; 0 for elements that bend by themselves.
     """
     young, area, second = part.young_modulus, part.tube.area, part.tube.second_moment
-    shear = young * rods.shear_modulus_ratio
+    shear, bending = young * rods.shear_modulus_ratio, young * second
     direct = part.tube.shear_factor(rods.poisson_ratio) * shear * area
     across = 1.0 / (1.0 / direct + constant_over**2 / (12.0 * young * second))
-    bending = young * second
     stiffness = np.diag([young * area, across, across, shear * 2.0 * second, bending, bending])
     section = exu.BeamSection()
     section.massPerLength = rods.density * area
@@ -157,11 +142,7 @@ def beam_section(rods: Rods, part: parts.Rod, constant_over: float) -> Any:
 
 
 def add_rod(
-    assembly: Assembly,
-    formulation: Formulation,
-    part: parts.Rod,
-    poses: Sequence[Pose],
-    rods: Rods,
+    assembly: Assembly, formulation: Formulation, part: parts.Rod, poses: Sequence[Pose], rods: Rods
 ) -> BuiltRod:
     """A rod of the layout with the poses of its nodes; as for ``Assembly.add_rigid_node``."""
     nodes = [formulation.add_node(assembly, pose) for pose in poses]

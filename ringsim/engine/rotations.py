@@ -43,7 +43,6 @@ def spin(turns: Array, rates: Array) -> Array:
 
 def turn_rates(turns: Array, spins: Array) -> Array:
     """Rates q_dot = G^T spin / 4 of unit quaternions, 1/s, shape (n, 4); the inverse of ``spin``.
-
     Angular accelerations of bodies at rest give the second derivatives.
     """
     return np.asarray(0.25 * np.einsum("nij,ni->nj", gyration(turns), spins))

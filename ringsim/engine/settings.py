@@ -18,9 +18,6 @@ from ringsim.scene import Scene
 from ringsim.stepping.instant import Scales
 from ringsim.theory.one_coordinate import OneCoordinate
 
-_SLIGHT = 1e-3
-"""Energy that does not matter, over the largest force of a structure's springs along a rod."""
-
 
 def solver_settings(scene: Scene, tolerance: float) -> Any:
     """Generalised-alpha with modified Newton, which stops at a residual norm ``tolerance`` (N); the
@@ -28,7 +25,6 @@ def solver_settings(scene: Scene, tolerance: float) -> Any:
     """
     settings = exu.SimulationSettings()
     settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = 2.0 * scene.solver.end_time
     settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
     time = settings.timeIntegration
     time.verboseMode = 0
@@ -59,8 +55,8 @@ def scales_of(built: Built) -> Scales:
     inertia = folding / per_angle**2
     # The mean rate if the first acceleration lasted, at least that of the longest run.
     rate = max(math.sqrt(0.5 * abs(acceleration) * travel), travel / scene.solver.end_time)
-    # Springs of its own set their own scale: what they would do along a rod.
-    pushed = _SLIGHT * structure.push * structure.reach
+    # Springs of its own set the scale: a thousandth of their force times a rod does not matter.
+    pushed = 1e-3 * structure.push * structure.reach
     energy = pushed or 0.5 * inertia * rate**2
     found = Scales(rate, energy, travel, structure.reach, contact_step=_contact_step(model))
     if built.cables is None:
@@ -93,12 +89,12 @@ def _contact_step(model: Multibody) -> float:
     opening, stop = model.layout.openings[0][0], model.scene.stop
     if stop is None or not isinstance(opening, JointOpening):
         return math.inf
-    joint, inertia = model.layout.joints[opening.joint], 0.0
-    for mount in (joint.first, joint.second):
-        if isinstance(mount, OnRod):
-            rod = model.layout.rods[mount.rod]
-            ends = sum(mass for _, mass, _ in rod.masses)
-            inertia += (rod.mass / 3.0 + ends) * rod.length**2
+    joint = model.layout.joints[opening.joint]
+    sides = [mount for mount in (joint.first, joint.second) if isinstance(mount, OnRod)]
+    rods = [
+        (r, sum(mass for _, mass, _ in r.masses)) for r in (model.layout.rods[s.rod] for s in sides)
+    ]
+    inertia = sum((rod.mass / 3.0 + ends) * rod.length**2 for rod, ends in rods)
     return _swing_step(inertia, stop.stiffness, 20)
 
 
