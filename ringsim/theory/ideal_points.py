@@ -52,12 +52,8 @@ class Points:
         self.layout = self._layouts[0]
         hinges = [] if at is not None else _end_hinges(self.layout)
         self.swinging = tuple(hinge.body for hinge in hinges)
-        self.pins, self.normals = np.zeros((0, 3, 0)), np.zeros((0, 3))
-        if hinges:
-            self.pins = self.fit(
-                lambda layout: _stacked(layout.pose(h).at(0.0 * UP) for h in hinges)
-            )
-            self.normals = np.array([self.layout.pose(hinge).axes[:, 2] for hinge in hinges])
+        self.pins = self.fit(lambda layout: _stacked(layout.pose(h).at(0.0 * UP) for h in hinges))
+        self.normals = np.array([self.layout.pose(hinge).axes[:, 2] for hinge in hinges])
 
     def fit(self, read: Callable[[Layout], Pairs]) -> Array:
         """Coefficients of what is read of a layout, shape (..., 3, functions of the structure).
@@ -165,14 +161,11 @@ def _stacked(pairs: Iterable[Sequence[Array]]) -> Pairs:
 
 def _end_hinges(layout: Layout) -> list[OnBody]:
     """A mount on each hinge assembly at an end of an arc, all of whose hinges share one axis."""
+    revolutes = [joint for joint in layout.joints if joint.kind == "revolute"]
+    mounts = [mount for joint in revolutes for mount in (joint.first, joint.second)]
     found = []
-    for body in [plane[end] for end in (0, -1) for plane in layout.corners]:
-        hinges = [
-            mount
-            for joint in layout.joints
-            for mount in (joint.first, joint.second)
-            if joint.kind == "revolute" and isinstance(mount, OnBody) and mount.body == body
-        ]
+    for body in (plane[end] for end in (0, -1) for plane in layout.corners):
+        hinges = [one for one in mounts if isinstance(one, OnBody) and one.body == body]
         if np.ptp([hinge.axes[:, 2] for hinge in hinges], axis=0).max() < _CLOSE:
             found.append(hinges[0])
     return found
