@@ -103,10 +103,10 @@ class _IdealRun:
         return {"peak_tension": peak, "peak_tension_time": moment, "slack_duration": slack}
 
     def _series(self, read: _Reader) -> Series:
-        times, known = _readings(read, self._steps)
-        return _Evaluated(
-            times, known, self._grid, lambda where: _readings(read, self._instants(where))[1]
-        )
+        def evaluate(where: Array) -> Array:
+            return _readings(read, self._instants(where))[1]
+
+        return _Evaluated(*_readings(read, self._steps), self._grid, evaluate)
 
     def _instants(self, where: Array) -> list[Reading]:
         """The run at some times; the later piece where two meet."""

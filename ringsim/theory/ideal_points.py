@@ -61,17 +61,16 @@ class Points:
         Raises
         ------
         ValueError
-            If it is not linear in the structure's basis.
+            If it is not linear in the basis, or the basis cannot be told apart.
         """
-        count, rank = self._known.shape[1], np.linalg.matrix_rank(self._known)
-        if rank < count:
-            raise ValueError(
-                f"structure: basis() has {count} functions, but only {rank} can be told apart at "
-                f"{len(self._layouts)} coordinates: leave out those that depend on others"
-            )
         values = np.stack([part for layout in self._layouts for part in read(layout)])
         flat = values.reshape(len(values), -1)
-        found = np.linalg.lstsq(self._known, flat, rcond=None)[0]
+        found, _, rank, _ = np.linalg.lstsq(self._known, flat, rcond=None)
+        if rank < len(found):
+            raise ValueError(
+                f"structure: basis() has {len(found)} functions, but only {rank} can be told apart "
+                f"at {len(self._layouts)} coordinates: leave out those that depend on others"
+            )
         left = np.abs(self._known @ found - flat).max(initial=0.0)
         if left > _CLOSE * max(np.abs(flat).max(initial=0.0), 1.0):
             raise ValueError(
@@ -110,11 +109,6 @@ class Points:
             found[rows, 0], found[rows, 2 + swings] = value, slope
             found[rows, -2], found[rows, -1] = w[1:] * slope, -(w[1:] ** 2) * value
         return found
-
-    def masses(self) -> tuple[Array, Array]:
-        """All point masses, kg, and their coefficients; shapes (n,) and (n, 3, functions)."""
-        known = self.layout.point_masses()
-        return known.masses, self.swung(lambda layout: layout.point_masses()[2:], known.bodies)
 
     def frame(self, body: int) -> Array:
         """Coefficients of a body's origin, m, and of its axes; shape (4, 3, functions)."""
