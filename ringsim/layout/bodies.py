@@ -49,22 +49,12 @@ class Body:
 
 @dataclass(frozen=True)
 class Rod:
-    """A straight elastic rod.
+    """A straight elastic rod; its ends have the same axes: x along it, z along its joints' axis.
 
-    Attributes
-    ----------
-    name, section
-        Rods of one name, one a section, share a row of the results; sections count from 0.
-    group
-        What it is called where masses are listed and lines are drawn.
-    start, end
-        Poses of its ends, with the same axes: x along the rod, z along its joints' axis.
-    young_modulus, density
-        Pa and kg/m^3.
-    stations
-        Shares of the length at which it has nodes, from 0 to 1; its elements lie between.
-    masses
-        Point masses on nodes: station, kg, and what they are called where masses are listed.
+    Rods of one ``name``, one a ``section`` (from 0), share a row of the results; ``group`` is what
+    they are called where masses are listed and lines are drawn.  ``stations`` are the shares of the
+    length, from 0 to 1, at which nodes are, with elements between; ``masses`` are point masses on
+    nodes: station, kg, and what they are called.  ``young_modulus`` in Pa, ``density`` in kg/m^3.
     """
 
     name: str

@@ -44,8 +44,7 @@ def opening_angle_for(scene: Scene, time: float) -> float:
     cables = [] if scene.cables is None else [cable for _, cable in scene.cables.present()]
     # From these angles on every cable's bracket opens the ring, and no stop is in contact.
     held = [c.bracket.angle - 90.0 for c in cables if isinstance(c.bracket, BarHalfBracket)]
-    stowed = [] if scene.stop is None else [scene.stop.stowed_angle + _CLOSE]
-    least = max([_LEAST, *held, *stowed])
+    least = max([_LEAST, *held, 0.0 if scene.stop is None else scene.stop.stowed_angle + _CLOSE])
 
     def excess(angle: float) -> float:
         course = Course(plain.with_values({"structure.opening_angle": angle})).run()

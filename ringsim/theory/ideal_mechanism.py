@@ -85,7 +85,8 @@ class Mechanism:
 
     def __init__(self, scene: Scene, at: float | None = None) -> None:
         self.points = points = Points(scene, at)
-        masses, places = points.masses()
+        masses, bodies = points.layout.point_masses()[:2]
+        places = points.swung(lambda layout: layout.point_masses()[2:], bodies)
         count, flat = places.shape[-1], places.reshape(len(masses), -1)
         self._mass, self._first = float(masses.sum()), np.tensordot(masses, places, 1)
         second = ((flat.T * masses) @ flat).reshape(3, count, 3, count)

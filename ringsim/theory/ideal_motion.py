@@ -114,15 +114,18 @@ class IdealMotion:
         if now.pull is not None:
             speeds = state[self._motors].reshape(2, -1)[1]
             found[self._motors] = [*speeds, *((now.pull.commands - speeds) / MOTOR_LAG)]
-            found[-2] += now.pull.loss
-            found[-1] = now.pull.power
+            found[-2:] += now.pull.loss, now.pull.power
         return found
 
     def jacobian(self, time: float, state: Array) -> Array:
         """Derivatives of the rates by differences; nothing depends on the energies."""
         found = np.zeros((self.size, self.size))
         here = self.rates(time, state)
-        for k, step in enumerate(self._nudges()):
+        length, slip = (math.inf, math.inf) if self.cables is None else self.cables.nudges
+        steps = np.full(self.size - 2, _ANGLE)
+        steps[0] = steps[self._motors] = min(_ANGLE, length)
+        steps[self._rate] = min(_RATE, slip, 1e-3 * self.forces.slowest)
+        for k, step in enumerate(steps):
             moved = state.copy()
             moved[k] += step
             found[:, k] = (self.rates(time, moved) - here) / (moved[k] - state[k])
@@ -147,11 +150,3 @@ class IdealMotion:
         found[1:n], found[n + 1 : 2 * n] = 0.3 * relative, 3.0 * relative
         found[-2:] = 1e-3 * relative
         return found
-
-    def _nudges(self) -> Array:
-        length, slip = (math.inf, math.inf) if self.cables is None else self.cables.nudges
-        steps = np.full(self.size - 2, _ANGLE)
-        steps[0] = min(_ANGLE, length)
-        steps[self._rate] = min(_RATE, slip, 1e-3 * self.forces.slowest)
-        steps[self._motors] = min(_ANGLE, length)
-        return steps

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BPoly, CubicHermiteSpline
 
-from ringsim.cable.state import ChainState
 from ringsim.layout.pose import Array
 from ringsim.outputs.cable_tension import CableTension
 from ringsim.outputs.family import Output, Values, axes
@@ -94,16 +93,21 @@ class _IdealRun:
         times, tensions = _readings(CableTension().read, self._balanced)
         counts = times <= self.run.until
         peak, moment = _top(times[counts], np.nanmax(tensions[counts], axis=(1, 2)))
-        stretch = np.array([_stretches(now.chain) for now in self._balanced if now.chain])
-        slack = np.array([_time_below_zero(times, each) for each in stretch.T])
+        chains = [now.chain for now in self._balanced if now.chain]
+        # Path less natural length of the rope at each cable's first winch, m; -1 if it is cut.
+        stretch = [
+            np.where(chain.ropes.alive, chain.paths - chain.natural, -1.0)[chain.ropes.of_end[:, 0]]
+            for chain in chains
+        ]
+        slack = np.array([_time_below_zero(times, each) for each in np.transpose(stretch)])
         slack = self._balanced[0].by_plane(slack)
         return {"peak_tension": peak, "peak_tension_time": moment, "slack_duration": slack}
 
     def _series(self, read: _Reader) -> Series:
-        times, known = _readings(read, self._steps)
-        return _Evaluated(
-            times, known, self._grid, lambda where: _readings(read, self._instants(where))[1]
-        )
+        def evaluate(where: Array) -> Array:
+            return _readings(read, self._instants(where))[1]
+
+        return _Evaluated(*_readings(read, self._steps), self._grid, evaluate)
 
     def _instants(self, where: Array) -> list[Reading]:
         """The run at some times; the later piece where two meet."""
@@ -149,12 +153,6 @@ class _IdealRun:
 def _readings(read: _Reader, instants: list[Reading]) -> tuple[Array, Array]:
     values = np.array([read(now) for now in instants], dtype=float)
     return np.array([now.time for now in instants]), values
-
-
-def _stretches(chain: ChainState) -> Array:
-    """Path less natural length of the rope at each cable's first winch, m; -1 if it is cut."""
-    first = chain.ropes.of_end[:, 0]
-    return np.where(chain.ropes.alive[first], (chain.paths - chain.natural)[first], -1.0)
 
 
 def _top(times: Array, series: Array) -> tuple[float, float]:

@@ -52,12 +52,8 @@ class Points:
         self.layout = self._layouts[0]
         hinges = [] if at is not None else _end_hinges(self.layout)
         self.swinging = tuple(hinge.body for hinge in hinges)
-        self.pins, self.normals = np.zeros((0, 3, 0)), np.zeros((0, 3))
-        if hinges:
-            self.pins = self.fit(
-                lambda layout: _stacked(layout.pose(h).at(0.0 * UP) for h in hinges)
-            )
-            self.normals = np.array([self.layout.pose(hinge).axes[:, 2] for hinge in hinges])
+        self.pins = self.fit(lambda layout: _stacked(layout.pose(h).at(0.0 * UP) for h in hinges))
+        self.normals = np.array([self.layout.pose(hinge).axes[:, 2] for hinge in hinges])
 
     def fit(self, read: Callable[[Layout], Pairs]) -> Array:
         """Coefficients of what is read of a layout, shape (..., 3, functions of the structure).
@@ -65,17 +61,16 @@ class Points:
         Raises
         ------
         ValueError
-            If it is not linear in the structure's basis.
+            If it is not linear in the basis, or the basis cannot be told apart.
         """
-        count, rank = self._known.shape[1], np.linalg.matrix_rank(self._known)
-        if rank < count:
-            raise ValueError(
-                f"structure: basis() has {count} functions, but only {rank} can be told apart at "
-                f"{len(self._layouts)} coordinates: leave out those that depend on others"
-            )
         values = np.stack([part for layout in self._layouts for part in read(layout)])
         flat = values.reshape(len(values), -1)
-        found = np.linalg.lstsq(self._known, flat, rcond=None)[0]
+        found, _, rank, _ = np.linalg.lstsq(self._known, flat, rcond=None)
+        if rank < len(found):
+            raise ValueError(
+                f"structure: basis() has {len(found)} functions, but only {rank} can be told apart "
+                f"at {len(self._layouts)} coordinates: leave out those that depend on others"
+            )
         left = np.abs(self._known @ found - flat).max(initial=0.0)
         if left > _CLOSE * max(np.abs(flat).max(initial=0.0), 1.0):
             raise ValueError(
@@ -114,11 +109,6 @@ class Points:
             found[rows, 0], found[rows, 2 + swings] = value, slope
             found[rows, -2], found[rows, -1] = w[1:] * slope, -(w[1:] ** 2) * value
         return found
-
-    def masses(self) -> tuple[Array, Array]:
-        """All point masses, kg, and their coefficients; shapes (n,) and (n, 3, functions)."""
-        known = self.layout.point_masses()
-        return known.masses, self.swung(lambda layout: layout.point_masses()[2:], known.bodies)
 
     def frame(self, body: int) -> Array:
         """Coefficients of a body's origin, m, and of its axes; shape (4, 3, functions)."""
@@ -165,14 +155,11 @@ def _stacked(pairs: Iterable[Sequence[Array]]) -> Pairs:
 
 def _end_hinges(layout: Layout) -> list[OnBody]:
     """A mount on each hinge assembly at an end of an arc, all of whose hinges share one axis."""
+    revolutes = [joint for joint in layout.joints if joint.kind == "revolute"]
+    mounts = [mount for joint in revolutes for mount in (joint.first, joint.second)]
     found = []
-    for body in [plane[end] for end in (0, -1) for plane in layout.corners]:
-        hinges = [
-            mount
-            for joint in layout.joints
-            for mount in (joint.first, joint.second)
-            if joint.kind == "revolute" and isinstance(mount, OnBody) and mount.body == body
-        ]
+    for body in (plane[end] for end in (0, -1) for plane in layout.corners):
+        hinges = [one for one in mounts if isinstance(one, OnBody) and one.body == body]
         if np.ptp([hinge.axes[:, 2] for hinge in hinges], axis=0).max() < _CLOSE:
             found.append(hinges[0])
     return found

@@ -10,7 +10,7 @@ import pytest
 
 from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.engine.build import build
-from ringsim.layout.bodies import Lump
+from ringsim.layout.bodies import InSpace, Lump, OnBody
 from ringsim.layout.draft import Draft
 from ringsim.layout.layout import Layout, layout_at_opening, layout_of
 from ringsim.layout.pose import Pose
@@ -159,3 +159,45 @@ def test_a_structure_that_cannot_be_is_refused(structure: Structure, wanted: str
     scene: Scene = plain.model_copy(update={"structure": structure})
     with pytest.raises(ValueError, match=wanted):
         layout_of(scene, 0.5)
+
+
+class Bare(Structure):
+    """One body on a support: no corners, no track."""
+
+    kind: Literal["bare"] = "bare"
+    swapped: bool = False
+
+    def layout(self, scene: Any, coordinate: Any) -> Layout:
+        draft = Draft(scene)
+        body = draft.body(np.zeros(3), [Lump("mass", 1.0, np.zeros(3), np.eye(3))])
+        parts = (body, None) if self.swapped else (None, body)
+        draft.joint("weld", "", 0, parts, np.zeros(3))
+        return draft.finish()
+
+
+def with_bare(parts: dict[str, Any], *, swapped: bool = False) -> Layout:
+    scene = load_scene("ring18").with_values({"boom": "none", "net": "none", "loads": "none"})
+    update = {"structure": Bare(swapped=swapped), **parts}
+    return layout_of(scene.model_copy(update=update), 0.5)
+
+
+@pytest.mark.parametrize(
+    ("part", "wanted"),
+    [
+        ("boom", r'boom: this structure has no corners .* 2 of its planes.*\(boom = "none"\)'),
+        ("net", r'net: this structure has no corners .* 1 of its planes.*\(net = "none"\)'),
+        ("cables", r"no track for a cable in plane 1: leave it out, or give Draft.tracks one"),
+    ],
+)
+def test_what_a_structure_cannot_hold_is_refused(part: str, wanted: str) -> None:
+    given = getattr(load_scene("ring18-cable" if part == "cables" else "ring18"), part)
+    assert given is not None
+    with pytest.raises(ValueError, match=wanted):
+        with_bare({part: given})
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_space_comes_first_however_a_support_is_named(swapped: bool) -> None:
+    (support,) = with_bare({}, swapped=swapped).supports
+    assert isinstance(support.first, InSpace)
+    assert isinstance(support.second, OnBody)

@@ -89,6 +89,16 @@ class RingWithTooSmallBasis(PantographRing):
         return super().basis(coordinate)[:, :3]
 
 
+class RingWithRepeatedBasis(PantographRing):
+    """Its basis holds twice the first function, too."""
+
+    kind: Literal["ring-with-repeated-basis"] = "ring-with-repeated-basis"  # type: ignore[assignment]
+
+    def basis(self, coordinate: float) -> np.ndarray:
+        known = super().basis(coordinate)
+        return np.hstack([known, 2.0 * known[:, :1]])
+
+
 def of_kind(kind: type[PantographRing], scene: Scene) -> Scene:
     fields = scene.structure.model_dump(exclude={"kind"})
     return scene.model_copy(update={"structure": kind(**fields)})
@@ -110,6 +120,13 @@ def test_the_basis_gives_what_each_layout_gives(values):
         )
 
 
-def test_a_basis_that_leaves_out_a_function_is_refused():
-    with pytest.raises(ValueError, match="list in basis"):
-        OneCoordinate(of_kind(RingWithTooSmallBasis, pulled(5)))
+@pytest.mark.parametrize(
+    ("kind", "wanted"),
+    [
+        (RingWithTooSmallBasis, "list in basis"),
+        (RingWithRepeatedBasis, r"basis\(\) has 5 functions, but only 4 can be told apart"),
+    ],
+)
+def test_a_basis_that_leaves_out_or_repeats_a_function_is_refused(kind, wanted):
+    with pytest.raises(ValueError, match=wanted):
+        OneCoordinate(of_kind(kind, pulled(5)))
