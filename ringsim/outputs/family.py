@@ -26,39 +26,26 @@ VARIABLES: dict[str, Variable] = {}
 """What all outputs declare, with the error bars of those that have one."""
 
 COORDINATES = {
-    variable.name: variable
-    for variable in (
-        Variable("plane", ("plane",), "1", "plane of the structure", "str"),
-        Variable("section", ("section",), "1", "section number, from 1", "i4"),
-        Variable("time", ("time",), "s", "time since the start of the run"),
-        Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
-    )
+    "plane": Variable("plane", ("plane",), "1", "plane of the structure", "str"),
+    "section": Variable("section", ("section",), "1", "section number, from 1", "i4"),
+    "time": Variable("time", ("time",), "s", "time since the start of the run"),
+    "span": Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
 }
 """Dimensions of the variables; an output may declare more."""
 
 
 class Output:
-    """An output, or a few that are computed together; every run that needs it has its own.
-
-    Attributes
-    ----------
-    variables
-        What it gives.
-    coordinates
-        Dimensions that no other output has; an engine gives their values to its ``Recorder``.
-    needs
-        What a scene must hold for it, see ``Variable``.
-    limit
-        Field of ``ringsim.parts.limits.Limits`` that its largest reading must not pass.
-    rank
-        Place among the outputs in files and summaries; the smaller the earlier.
-    """
+    """An output, or a few that are computed together; every run that needs it has its own."""
 
     variables: ClassVar[tuple[Variable, ...]]
     coordinates: ClassVar[tuple[Variable, ...]] = ()
+    """Dimensions that no other output has; an engine gives their values to its ``Recorder``."""
     needs: ClassVar[tuple[str, ...]] = ()
+    """What a scene must hold for it, see ``Variable``."""
     limit: ClassVar[str] = ""
+    """Field of ``ringsim.parts.limits.Limits`` that its largest reading must not pass."""
     rank: ClassVar[int] = 50
+    """Place among the outputs in files and summaries; the smaller the earlier."""
 
     def __init_subclass__(cls) -> None:
         """Make it known to all that handle results."""

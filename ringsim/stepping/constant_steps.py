@@ -25,10 +25,11 @@ has made Newton fail to pass.  Before stops it stays as it is, or it would fail 
 
 
 class ConstantSteps:
-    """Steps of one length, shortened only where Newton fails; ``step`` is the next wanted, s."""
+    """Steps of one length, shortened only where Newton fails, which may ``recover`` it after that;
+    ``step`` is the next wanted, s.
+    """
 
     def __init__(self, step: float, recover: bool) -> None:
-        """Steps of this length (s), which may recover it after they were shortened."""
         self.step = self._full = self._last = step
         self._since, self._recovery = 0, _RECOVERY if recover else math.inf
 

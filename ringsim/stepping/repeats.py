@@ -1,14 +1,14 @@
 """Steps across which an indicator exceeds its allowance are repeated with a smaller one.
 
-The standard controller of step sizes: Hairer, Norsett, Wanner, Solving Ordinary Differential
-Equations I, section II.4, where such a safety factor and bounds of the ratio stand, too.
+An indicator falls with the p-th power of the step.  The controller is the standard one of step
+sizes: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.4, where such
+a safety factor and bounds of the ratio stand, too.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import ClassVar
 
 import numpy as np
 
@@ -40,9 +40,6 @@ class Indicator(ABC):
     step in s, infinite before the first.
     """
 
-    order: ClassVar[float]
-    """Power p of a step that it falls with."""
-
     def __init__(self, solver: Solver) -> None:
         self.limit = math.inf
         self._least = SHORTEST * solver.step
@@ -51,27 +48,28 @@ class Indicator(ABC):
     def ratio(self, before: Instant, after: Instant) -> float:
         """Indicator of a step over its allowance; NaN where it is unknown."""
 
+    @abstractmethod
+    def share(self, ratio: float) -> float:
+        """The safety factor times ratio^(-1/p)."""
+
     def shorter(self, before: Instant, after: Instant) -> float | None:
         """A smaller step in s to repeat this one with, or None if it is good enough."""
         step, ratio = after.time - before.time, self.ratio(before, after)
         # A step comes back as a difference of times: a little more than what was asked for.
         if not ratio > _REFUSED or step <= self._least * (1.0 + 1e-6):
             return None
-        return max(step * max(FALL, self._share(ratio)), self._least)
+        return max(step * max(FALL, self.share(ratio)), self._least)
 
     def accept(self, before: Instant, after: Instant) -> None:
         """Learn from a step that is taken."""
         step, ratio = after.time - before.time, self.ratio(before, after)
         # 1e-3 stands for 0: from 0.2 on down ``GROWTH`` bounds the step, whatever the ratio is.
-        growth = min(max(self._share(max(ratio, 1e-3)), FALL), GROWTH)
+        growth = min(max(self.share(max(ratio, 1e-3)), FALL), GROWTH)
         self.limit = max(step * growth, self._least) if math.isfinite(ratio) else math.inf
 
     def note(self) -> str:
         """What a run's reason must add about this; empty if every step was judged."""
         return ""
-
-    def _share(self, ratio: float) -> float:
-        return _SAFETY * math.pow(ratio, -1.0 / self.order)
 
 
 class EnergyImbalance(Indicator):
@@ -81,8 +79,6 @@ class EnergyImbalance(Indicator):
 
     Without ropes at most ``PATIENCE`` steps are repeated.
     """
-
-    order = 3.0
 
     def __init__(self, solver: Solver, scales: Scales) -> None:
         super().__init__(solver)
@@ -102,6 +98,10 @@ class EnergyImbalance(Indicator):
         stored = last.kinetic - first.kinetic + last.elastic - first.elastic
         imbalance = abs(stored + last.lost - (last.work - first.work + last.driven))
         return imbalance / (self._allowed * self._exchange(first, last))
+
+    def share(self, ratio: float) -> float:
+        """Of third order."""
+        return _SAFETY * math.pow(ratio, -1.0 / 3.0)
 
     def shorter(self, before: Instant, after: Instant) -> float | None:
         """See ``Indicator``; None once patience has ended."""
@@ -142,8 +142,6 @@ class TensionBend(Indicator):
     by |T2 - T1 - (T1 - T0) h2 / h1|.
     """
 
-    order = 2.0
-
     def __init__(self, solver: Solver, slack_tension: float) -> None:
         super().__init__(solver)
         self._allowed = TENSION_BEND * solver.tolerance
@@ -159,6 +157,10 @@ class TensionBend(Indicator):
         step = after.time - before.time
         bend = np.abs(last - first - (first - past) * (step / earlier)).max()
         return float(bend) / (self._allowed * max(self._largest, float(last.max())))
+
+    def share(self, ratio: float) -> float:
+        """Of second order."""
+        return _SAFETY / math.sqrt(ratio)
 
     def accept(self, before: Instant, after: Instant) -> None:
         """See ``Indicator``; remembers the tensions."""

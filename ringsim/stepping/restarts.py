@@ -22,12 +22,8 @@ def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Ou
     """A run that starts anew with smaller steps while that may help, at most ``solver.restarts``
     times, and has error bars where ``solver.error_bars`` asks for them.
 
-    Returns
-    -------
-    Outcome
-        That of the last start.  ``restarts`` says how many there were, ``step_used`` and
-        ``tolerance_used`` with which settings the last one ran (NaN where steps are constant);
-        ``total_steps``, ... count those of all attempts.
+    The outcome is that of the last start, whose settings are ``step_used`` and ``tolerance_used``
+    (NaN where steps are constant); ``total_steps``, ... count those of all attempts.
     """
     used, outcome, restarts = solver, solve(solver), 0
     first, totals = outcome, _counts(outcome)
@@ -46,10 +42,9 @@ def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Ou
     if solver.error_bars and outcome.status == Status.OK:
         outcome = _with_bars(outcome, solve, used, error_bars)
     tolerance = used.tolerance if used.step_control == "motion" else np.nan
-    outcome.values["restarts"] = np.array(restarts)
-    outcome.values["step_used"] = np.array(used.step)
-    outcome.values["tolerance_used"] = np.array(tolerance)
-    outcome.values.update({f"total_{name}": np.array(totals[name]) for name in COUNTS})
+    values = {"restarts": restarts, "step_used": used.step, "tolerance_used": tolerance}
+    values |= {f"total_{name}": totals[name] for name in COUNTS}
+    outcome.values.update({name: np.array(value) for name, value in values.items()})
     return outcome
 
 
@@ -70,7 +65,7 @@ def _with_bars(outcome: Outcome, solve: Solve, used: Solver, error_bars: ErrorBa
 
 
 def _counts(outcome: Outcome) -> Counter[str]:
-    """What one start of a run took; 0 where it ended too early to tell."""
+    """Zero where a start ended too early to tell."""
     return Counter({name: int(outcome.values.get(name, 0)) for name in COUNTS})
 
 

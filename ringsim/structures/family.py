@@ -85,10 +85,4 @@ class Structure(Model):
         raise NotImplementedError
 
     def check(self, scene: Any) -> None:
-        """Refuse a scene whose other parts do not go with this structure.
-
-        Raises
-        ------
-        ValueError
-            Naming the part, its value and the cure.
-        """
+        """Raise a ValueError with part, value and cure where a scene does not go with this kind."""

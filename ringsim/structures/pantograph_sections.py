@@ -21,20 +21,12 @@ def add_sections(
     plane: int = 0,
     prefix: str = "",
 ) -> None:
-    """Add the sections of a closed ring or an arc.
+    """Add the sections of a closed ring or an arc, with V-joints of ``vjoint_mass`` (kg) each.
 
-    Parameters
-    ----------
-    fold
-        Where their points are, at a complex coordinate (ringsim.layout.pose).
-    corners
-        Hinge assemblies by plane (upper, lower) and corner.
-    vjoint_mass
-        Of each V-joint, kg.
-    plane
-        Number of the upper plane; the lower one follows it.
-    prefix
-        Of the rods' names, where a structure has several rings.
+    ``fold`` tells where their points are at a complex coordinate (ringsim.layout.pose), ``corners``
+    the hinge assemblies by plane (upper, lower) and corner.  Where a structure has several rings,
+    ``plane`` is the number of the upper plane, which the lower one follows, and ``prefix`` that of
+    the rods' names.
     """
     rods = draft.scene.rods
     young = spread(rods.young_modulus, geometry.sections).tolist()

@@ -108,15 +108,14 @@ class PlanarTruss(Structure):
                 f"rest.buffer = {self.rest.buffer} m must leave the beams room to fold: the rest "
                 f"stands {self.rest_distance:.4g} m off the axis"
             )
-        least, most_cable = self.stowed_cable_length, self.axis_length + self.beam_length
-        if not least < self.cable_length < most_cable:
+        geometry, stowed = self.geometry(), self.stowed_angle
+        least, most = float(geometry.cable(stowed)), self.axis_length + self.beam_length
+        if not least < self.cable_length < most:
             raise ValueError(
                 f"cable_length = {self.cable_length} m must be above {least:.4g} m (at the rest) "
-                f"and below {most_cable:.4g} m (beams and axis in line)"
+                f"and below {most:.4g} m (beams and axis in line)"
             )
-        shortest, longest = self.geometry().strut(
-            [self.stowed_angle, max(self.coordinate, self.stowed_angle)]
-        )
+        shortest, longest = geometry.strut([stowed, self.coordinate])
         if not shortest >= self.strut_tube_length > 0.5 * longest:
             raise ValueError(
                 f"strut_tube_length = {self.strut_tube_length} m must be above "
@@ -166,11 +165,6 @@ class PlanarTruss(Structure):
     def stowed_angle(self) -> float:
         """Angle at the end of contraction, rad."""
         return math.asin(self.rest_distance / self.beam_length)
-
-    @property
-    def stowed_cable_length(self) -> float:
-        """Cable length at the end of contraction, m."""
-        return float(self.geometry().cable(self.stowed_angle))
 
     @property
     def coordinate(self) -> float:

@@ -111,7 +111,7 @@ def test_the_design_shows_the_published_features():
     assert max(gauge[0], gauge[-1]) < 0.15 * gauge.max()
     assert pull.min() > 0.05
     assert pull.max() < 2.0
-    assert TRUSS.stowed_cable_length == pytest.approx(0.1, abs=1e-4)
+    assert TRUSS.geometry().cable(TRUSS.stowed_angle) == pytest.approx(0.1, abs=1e-4)
 
 
 def test_no_station_is_strained_more_than_the_gauge():
