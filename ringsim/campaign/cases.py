@@ -31,8 +31,7 @@ def run_cases(
     ``cases`` are values by scene path, the same paths in each, one value (no lists) to a path;
     ``timeout`` is the longest time of one run, s; ``fidelity`` is "full" or "ideal".
 
-    InputError if a case is refused, or the folder cannot be written or holds another campaign;
-    KeyboardInterrupt if a signal stopped it: the same call goes on.
+    InputError if a case or the folder is refused, KeyboardInterrupt after a signal: call again.
     """
     paths, listed = list(cases[0]), io.StringIO()
     writer = csv.DictWriter(listed, paths, lineterminator="\n")

@@ -99,13 +99,10 @@ def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool
 def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> None:
     wanted = campaign.specification
     attributes = provenance(name=wanted.name, title=wanted.title, action="designed") | {
-        "seed": wanted.seed,
-        "solver": solver,
-        "campaign": campaign.text,
-        "campaign_name": wanted.name,
-        "scene": campaign.scene.to_toml(),
+        "seed": wanted.seed, "solver": solver, "scene": campaign.scene.to_toml(),
+        "campaign": campaign.text, "campaign_name": wanted.name,
         "output": wanted.output.model_dump_json(),
-    }
+    }  # fmt: skip
     content = json.dumps(_decisive(table, attributes), sort_keys=True)
     attributes["identity"] = hashlib.sha256(content.encode()).hexdigest()[:32]
     for draft in path.glob(f".{DESIGN}.*{DRAFT}"):

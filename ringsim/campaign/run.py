@@ -57,7 +57,7 @@ class Choices:
     scheduler: Scheduler
     limits: Limits
     max_failed: int | None = None
-    """Failures that are put up with, in the whole campaign; None for any number."""
+    """Failures that are tolerated, in the whole campaign; None for any number."""
     share: Share = Share()
     retry_failed: bool = False
 

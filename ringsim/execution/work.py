@@ -62,10 +62,9 @@ class Work:
 
 
 class Scheduler:
-    """The one seam between a campaign and the processes that compute it.
+    """The one seam between a campaign and its processes, all of which call the same methods.
 
-    Every process that takes part calls the same methods in the same order; what stands here is
-    for one that is alone.
+    What stands here is for one that is alone.
     """
 
     rank = 0

@@ -34,14 +34,9 @@ NOT_RUN = -1
 CHUNK_BYTES = 1 << 20
 """Size of what is compressed at once, about."""
 
-PER_SAMPLE = {
-    v.name: v
-    for v in (
-        VARIABLES["status"],
-        VARIABLES["cause"],
-        Variable("reason", (), "1", "why the run ended so", "str"),
-        Variable("log", (), "1", "end of what a failed run printed", "str"),
-    )
+PER_SAMPLE = {name: VARIABLES[name] for name in ("status", "cause")} | {
+    "reason": Variable("reason", (), "1", "why the run ended so", "str"),
+    "log": Variable("log", (), "1", "end of what a failed run printed", "str"),
 }
 """What is known of every sample beside its outputs."""
 
