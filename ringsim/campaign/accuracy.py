@@ -38,16 +38,24 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
     ``timeout`` is the longest time of one rung, s.  InputError if the scene is refused,
     ReferenceRunError if a reference run does not end well.
     """
-    scene = scene.with_values(
-        {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
-    )
+    plain = {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
+    scene = scene.with_values(plain)
     study = _Study(scene, partial(run_cases, folder, workers=workers, timeout=timeout))
     rungs = ladder(scene)
     for rung in rungs:
         scene.with_values(dict(rung.values))  # refused before anything has run
     in_time, in_space = references(rungs)
     for stage, places in (("first", in_time[:1]), ("reference", in_time + in_space)):
-        _require_ok(own := [rungs[k] for k in places], study.run(stage, own))
+        own = [rungs[k] for k in places]
+        found = study.run(stage, own)
+        for rung, code, reason in zip(own, found.status.values, found.reason.values, strict=True):
+            if code != Status.OK:
+                settings = ", ".join(f"{path} = {value}" for path, value in rung.values.items())
+                raise ReferenceRunError(
+                    f"the reference run with {settings} ended as {Status(code).word}: "
+                    f"{reason or 'no reason given'}: change the scene so that it ends well with "
+                    "fine steps, or give it more time (--timeout) in a new folder"
+                )
     results = study.run("settings", rungs)
     truths = _quadrature(scene)
     if (ideal := study.ideal()) is not None:
@@ -113,17 +121,6 @@ def _needed(file: Path) -> xr.Dataset:
         kept = found[[name for name in (*NEEDED, "reason") if name in found]].load()
     nothing = ("rung", np.full(kept.sizes["rung"], np.nan))
     return kept.assign({name: nothing for name in NEEDED if name not in kept})
-
-
-def _require_ok(rungs: Sequence[Rung], results: xr.Dataset) -> None:
-    for rung, code, reason in zip(rungs, results.status.values, results.reason.values, strict=True):
-        if code != Status.OK:
-            settings = ", ".join(f"{path} = {value}" for path, value in rung.values.items())
-            raise ReferenceRunError(
-                f"the reference run with {settings} ended as {Status(code).word}: "
-                f"{reason or 'no reason given'}: change the scene so that it ends well with fine "
-                "steps, or give it more time (--timeout) in a new folder"
-            )
 
 
 def _quadrature(scene: Scene) -> list[Truth]:

@@ -1,8 +1,4 @@
-"""Campaigns of listed cases, written and run by the program itself.
-
-What they leave behind is an ordinary campaign: ``NAME.toml`` and ``NAME.csv`` can be read, changed
-and run with ``ringsim campaign``.
-"""
+"""Campaigns of listed cases, written and run by the program itself."""
 
 from __future__ import annotations
 
@@ -31,12 +27,11 @@ def run_cases(
 ) -> Path:  # fmt: skip
     """Run the cases of a scene that are still missing; returns the merged file: sample k is case k.
 
-    Files and the campaign's folder, both called ``name``, go into ``folder``, which is created.
+    An ordinary campaign called ``name`` goes into ``folder``, which is created, file and all.
     ``cases`` are values by scene path, the same paths in each, one value (no lists) to a path;
     ``timeout`` is the longest time of one run, s; ``fidelity`` is "full" or "ideal".
 
-    InputError if a case is refused, or the folder cannot be written or holds another campaign;
-    KeyboardInterrupt if a signal stopped it: the same call goes on.
+    InputError if a case or the folder is refused, KeyboardInterrupt after a signal: call again.
     """
     paths, listed = list(cases[0]), io.StringIO()
     writer = csv.DictWriter(listed, paths, lineterminator="\n")

@@ -8,7 +8,7 @@ import os
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ringsim.campaign.specification import Campaign
 from ringsim.files import DRAFT, writing
@@ -19,8 +19,7 @@ from ringsim.storage.journal import FOLDER, Survey, survey
 from ringsim.storage.locks import GO_ON, locked, tries
 from ringsim.storage.merge import NAME as MERGED
 from ringsim.storage.merge import write_merged
-from ringsim.storage.netcdf import DESIGN, OutputTable, read_design, write_design
-from ringsim.storage.provenance import provenance
+from ringsim.storage.netcdf import DESIGN, OutputTable, provenance, read_design, write_design
 
 _KEPT = ("identity", "seed", "solver", "campaign", "campaign_name", "scene", "output")
 """Attributes of the design that a merged file has, too."""
@@ -31,24 +30,21 @@ class Folder:
     """A prepared campaign folder: the inputs of all samples, and the scene that they vary."""
 
     path: Path
-    identity: str
-    """Digest of everything that decides about the results."""
     table: Table
     scene: Scene
-    solver: str
-    """``module:function`` that runs one sample."""
     attributes: dict[str, Any]
+    """Those of the design: "identity", the digest of all that decides about the results, ..."""
 
     def survey(self) -> Survey:
         """What it holds of every sample."""
-        return survey(self.path, self.identity, self.table.samples)
+        return survey(self.path, self.attributes["identity"], self.table.samples)
 
 
 def open_folder(path: Path) -> Folder:
     """The campaign in a folder; InputError if there is none."""
     table, attributes = read_design(path)
     scene = scene_from_toml(attributes["scene"], source=f"{path / DESIGN}: scene")
-    return Folder(path, attributes["identity"], table, scene, attributes["solver"], attributes)
+    return Folder(path, table, scene, attributes)
 
 
 def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> None:
@@ -103,13 +99,10 @@ def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool
 def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> None:
     wanted = campaign.specification
     attributes = provenance(name=wanted.name, title=wanted.title, action="designed") | {
-        "seed": wanted.seed,
-        "solver": solver,
-        "campaign": campaign.text,
-        "campaign_name": wanted.name,
-        "scene": campaign.scene.to_toml(),
+        "seed": wanted.seed, "solver": solver, "scene": campaign.scene.to_toml(),
+        "campaign": campaign.text, "campaign_name": wanted.name,
         "output": wanted.output.model_dump_json(),
-    }
+    }  # fmt: skip
     content = json.dumps(_decisive(table, attributes), sort_keys=True)
     attributes["identity"] = hashlib.sha256(content.encode()).hexdigest()[:32]
     for draft in path.glob(f".{DESIGN}.*{DRAFT}"):
@@ -129,10 +122,7 @@ def _decisive(table: Table, attributes: dict[str, Any]) -> dict[str, Any]:
 
 
 def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder | None:
-    """The folder of this campaign, which may have fewer samples; None if it is not there yet.
-
-    InputError if it holds another campaign; the text says what differs.
-    """
+    """The campaign's folder, None if it is not there yet; InputError if it is another one's."""
     if not (path / DESIGN).exists():
         return None
     old = open_folder(path)
@@ -158,18 +148,11 @@ def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Fold
     return old
 
 
-class Merged(NamedTuple):
-    """Samples without a result and failed ones; the merged file, or None if it is not due yet."""
-
-    left: int
-    failed: int
-    path: Path | None
-
-
-def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
+def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, Path | None]:
     """Write ``campaign.nc``, one process at a time, so that it never loses samples it had.
 
     ``execution`` says who computed it; if samples are left, it is written only if ``partly``.
+    Returns the number of samples left, of failed ones, and the file, or None if it is not written.
     InputError if the folder cannot be written to.
     """
     path = campaign.path / MERGED
@@ -179,11 +162,11 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> Merged:
         found = campaign.survey()
         left, failed = len(found.missing), len(found.failed)
         if left and not partly:
-            return Merged(left, failed, None)
+            return left, failed, None
         design = campaign.attributes
         made = provenance(name=design["campaign_name"], title=design["title"], action="merged")
         attributes = made | {name: design[name] for name in _KEPT} | {"execution": execution}
         attributes["history"] += f"\n{design['history']}"
         output = OutputTable.model_validate_json(design["output"])
         failed += write_merged(campaign.path, found, campaign.table, output, attributes)
-    return Merged(left, failed, path)
+    return left, failed, path

@@ -77,10 +77,7 @@ class Panel:
 
 
 def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
-    """Panels for axes ``PATH=LOW..HIGH``, two to a panel; default ones if there are none.
-
-    InputError if a text, a path, a bound or any pair of values is refused.
-    """
+    """Panels for axes ``PATH=LOW..HIGH``, default ones if none; InputError if one is refused."""
     if len(over) % 2:
         raise InputError(
             f"--over {over[-1]}: has no partner, and a panel has two axes: give one more --over "
@@ -116,10 +113,7 @@ def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:
 
 
 def sweep_of(scene: Scene, text: str, points: int) -> Sweep:
-    """The axis ``PATH=LOW..HIGH``: geometric from a decade on, else linear; whole numbers stay so.
-
-    InputError if the text, the path or one of the bounds is refused.
-    """
+    """The axis ``PATH=LOW..HIGH``, geometric from a decade on; InputError if it is refused."""
     path, _, extent = (part.strip() for part in text.partition("="))
     try:
         low, high = (float(end) for end in extent.split(".."))

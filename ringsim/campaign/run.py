@@ -14,8 +14,7 @@ import xarray as xr
 from ringsim.analysis.campaign_notes import budget_lines, restart_lines
 from ringsim.campaign.folder import Folder, merge, open_folder
 from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
-from ringsim.execution.cost import longest_first, relative_cost
-from ringsim.execution.work import Limits, Scheduler, Work
+from ringsim.execution.work import Limits, Scheduler, Work, longest_first, relative_cost
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.refusal import InputError
 from ringsim.storage.journal import Journal
@@ -58,7 +57,7 @@ class Choices:
     scheduler: Scheduler
     limits: Limits
     max_failed: int | None = None
-    """Failures that are put up with, in the whole campaign; None for any number."""
+    """Failures that are tolerated, in the whole campaign; None for any number."""
     share: Share = Share()
     retry_failed: bool = False
 
@@ -91,9 +90,9 @@ def run_campaign(folder: Path, choices: Choices) -> int:
 def _run_missing(campaign: Folder, choices: Choices, stop: StopRequest) -> None:
     scheduler = choices.scheduler
     writer = f"{choices.share.writer}-rank{scheduler.rank}"
-    journal = Journal(campaign.path, campaign.identity, writer)
+    journal = Journal(campaign.path, campaign.attributes["identity"], writer)
     work = Work(
-        solver=campaign.solver, scene=campaign.scene.to_table(),
+        solver=campaign.attributes["solver"], scene=campaign.scene.to_table(),
         values_of=campaign.table.values_of, limits=choices.limits, keep=journal.append,
         stop=lambda: stop.reason,
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
 from collections import Counter
@@ -13,9 +14,8 @@ from ringsim.campaign.folder import Folder, opened_as
 from ringsim.campaign.run import Share
 from ringsim.campaign.specification import Campaign
 from ringsim.choice import kind_of
-from ringsim.execution.cost import relative_cost
 from ringsim.execution.local import Local
-from ringsim.execution.work import Work
+from ringsim.execution.work import Work, relative_cost
 from ringsim.sampling.columns import Column
 from ringsim.storage.journal import survey
 from ringsim.storage.locks import in_use
@@ -52,10 +52,9 @@ def status_lines(campaign: Folder) -> list[str]:
     ]
     running, rate = dict[int, float](), 0.0
     for path in sorted(campaign.path.glob("progress-*.json")):
-        try:
+        told = None
+        with contextlib.suppress(OSError, ValueError):
             told = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            continue
         if not isinstance(told, dict) or not told.keys() >= _TOLD:  # of another version
             continue
         state, writer = told["state"], path.stem.removeprefix("progress-")
@@ -89,7 +88,7 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver
     """
     table = campaign.draw()
     old = opened_as(campaign, folder, table, solver)
-    found = survey(folder, old.identity if old is not None else "", table.samples)
+    found = survey(folder, old.attributes["identity"] if old is not None else "", table.samples)
     todo = found.missing[share.holds(found.missing)]
     cost = relative_cost(table, campaign.scene)
     kind = kind_of(campaign.specification.design)

@@ -16,8 +16,5 @@ def command(folder: Path) -> None:
     It may be called at any time and any number of times, also while the campaign runs.
     """
     campaign = open_folder(folder)
-    merged = merge(campaign, execution="merged on its own", partly=True)
-    click.echo(
-        f"{merged.path}: {campaign.table.samples} samples, {merged.left} not run, "
-        f"{merged.failed} failed"
-    )
+    left, failed, path = merge(campaign, execution="merged on its own", partly=True)
+    click.echo(f"{path}: {campaign.table.samples} samples, {left} not run, {failed} failed")

@@ -41,7 +41,7 @@ def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
     before = next(campaign.survey().results([sample]), None)
     for path, value in values.items():
         click.echo(f"{path} = {value}")
-    result = solve(load_solver(campaign.solver), campaign.scene, sample, values)
+    result = solve(load_solver(campaign.attributes["solver"]), campaign.scene, sample, values)
     if result.log:
         click.echo(result.log)
     click.echo(f"sample {sample}: {result.status.word}: {result.reason} ({result.seconds:.2f} s)")

@@ -38,10 +38,7 @@ class Local(Scheduler):
 
 
 class Serial(Scheduler):
-    """One sample after the other in this process, for debugging: a crash ends everything.
-
-    Limits do not hold.
-    """
+    """One sample after the other in this process, without limits: a crash ends everything."""
 
     description = "in one process"
 

@@ -44,10 +44,7 @@ def launched_size() -> int:
 
 
 def mpi_world() -> Any:
-    """The communicator of all processes that the launcher has started.
-
-    InputError if there is no MPI library, or if it does not belong to the launcher.
-    """
+    """The communicator of all started processes; InputError without the launcher's own library."""
     expected = launched_size()
     if "OMPI_COMM_WORLD_SIZE" in os.environ:
         # Other libraries do not even start under this launcher: they end the process.
@@ -154,7 +151,9 @@ class Mpi(Scheduler):
             reason = reason or fault or work.stop()
             if reason or not (queue or slot.busy or any(held.values())):
                 break
-            ahead = self._ahead(mean, len(queue))
+            # A rank may hold two samples, more if they are short, one towards the end.
+            wanted = max(2, min(int(_AHEAD_SECONDS / max(mean, 1e-4)), _MOST_AHEAD))
+            ahead = max(1, min(wanted, len(queue) // (2 * self.workers)))
             for rank, mine in held.items():
                 if queue and len(mine) <= ahead // 2:
                     batch = [queue.popleft() for _ in range(min(ahead - len(mine), len(queue)))]
@@ -179,11 +178,6 @@ class Mpi(Scheduler):
         if fault:
             raise InputError(fault)
         return reason or work.stop()
-
-    def _ahead(self, mean: float, left: int) -> int:
-        """Samples that a rank may hold: two, more if they are short, one towards the end."""
-        wanted = max(2, min(int(_AHEAD_SECONDS / max(mean, 1e-4)), _MOST_AHEAD))
-        return max(1, min(wanted, left // (2 * self.workers)))
 
     def _serve(self, slot: Slot, work: Work) -> str:
         self._tell("hello", "")

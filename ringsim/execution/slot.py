@@ -98,8 +98,7 @@ class SolverProcess:
 
     def tell_where_it_is(self) -> None:
         """Let it print where it is just now."""
-        with contextlib.suppress(ProcessLookupError):
-            self._process.send_signal(signal.SIGUSR2)
+        self._process.send_signal(signal.SIGUSR2)
         time.sleep(_PRINTING_SECONDS)
 
     def memory(self) -> int:
@@ -131,8 +130,7 @@ class Slot:
     """Runs one sample at a time in a process of its own.
 
     A run that crashes, hangs or eats memory costs this process and nothing else.  A process
-    that somebody else killed is no fault of the sample: the run is repeated.  The parameters are
-    those of :class:`Work`.
+    that somebody else killed is no fault of the sample: the run is repeated.
     """
 
     pipe: Connection
@@ -187,10 +185,7 @@ class Slot:
         return None
 
     def serve(self, queue: deque[int], work: Work) -> Result | None:
-        """Keep the result that is there, if there is one, and start the next sample if it is free.
-
-        InputError if the solver process cannot be started, or the result not be written.
-        """
+        """Keep the result if there is one; start the next sample if free; InputError if refused."""
         result = self.poll()
         if result is not None:
             work.keep(result)

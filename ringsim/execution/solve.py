@@ -58,9 +58,8 @@ def solve(solver: Run, base: Scene, sample: int, values: dict[str, Any]) -> Resu
 def _not_finite(outcome: Outcome) -> str:
     """What is wrong with the numbers of a run that says it went well; empty if nothing is.
 
-    Missing values are right after the end of a run, for times that never came and in rows of
-    things that are not there; a gap in a series before the end of the run is not right, nor is
-    anything infinite.
+    Values may be missing after the end of a run, for times that never came and in rows of things
+    that are not there.
     """
     axis = outcome.coordinates.get("time")
     end = outcome.values.get("final_time")

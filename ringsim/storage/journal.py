@@ -45,10 +45,7 @@ class Journal:
         self._descriptor, self._size, self._synced = -1, 0, -_SYNC_SECONDS
 
     def append(self, result: Result) -> None:
-        """Add one result; the first one creates the file.
-
-        InputError if the disk is full; the records before remain whole.
-        """
+        """Add a result; InputError if the disk is full, and the records before remain whole."""
         header, body = result.header(), result.body
         check = _checksum(header, body, self._campaign)
         frame = _FRAME.pack(_MAGIC, len(header), len(body), check)
@@ -119,9 +116,7 @@ def _read_record(file: BinaryIO, place: int, campaign: str) -> Result | None:
 
 
 def _checksum(header: bytes, body: bytes, campaign: str) -> bytes:
-    check = hashlib.blake2b(header, digest_size=16, key=campaign.encode())
-    check.update(body)
-    return check.digest()
+    return hashlib.blake2b(header + body, digest_size=16, key=campaign.encode()).digest()
 
 
 @dataclass(frozen=True)
@@ -186,8 +181,6 @@ def survey(folder: Path, campaign: str, samples: int) -> Survey:
                 form[k] = forms.setdefault(result.form, len(forms))
                 owner[k], place[k] = number, start
         if damaged:
-            _log.warning(
-                "%s is damaged: %d of its records cannot be used, their samples run again",
-                path.name, damaged,
-            )  # fmt: skip
+            told = "%s is damaged: %d of its records cannot be used, their samples run again"
+            _log.warning(told, path.name, damaged)
     return Survey(campaign, journals, status, seconds, form, owner, place)

@@ -23,10 +23,9 @@ _LOCK_TRIES, _LOCK_PAUSE = 10, 0.1
 
 @contextlib.contextmanager
 def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[bool]:
-    """Hold an advisory lock; gives False at once if another process holds it, or else waits.
+    """Hold an advisory lock; False if another process holds it, unless it may ``wait``.
 
-    The file that carries the lock is created if it is not there, or else OSError.  A shared lock
-    may be held by others at the same time, shared as well.
+    Others may hold a shared lock, too.  OSError if its file is not there and cannot be created.
     """
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
@@ -50,10 +49,7 @@ def locked(path: Path, *, shared: bool = False, wait: bool = False) -> Iterator[
 
 @contextlib.contextmanager
 def reserved(folder: Path, writer: str, *, alone: bool) -> Iterator[None]:
-    """Keep a second process from running the samples of the share ``writer``, or if ``alone`` any.
-
-    InputError if another process runs them already, or if the folder cannot be written to.
-    """
+    """Keep other processes from the share ``writer``, or if ``alone`` from all; or InputError."""
     for _ in tries(folder):
         with contextlib.ExitStack() as held:
             with writing(folder / f"lock-{writer}", GO_ON):

@@ -13,15 +13,9 @@ from numpy.typing import NDArray
 from ringsim.files import whole
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.sampling.columns import Table, add_inputs
+from ringsim.storage import netcdf
 from ringsim.storage.journal import Survey
-from ringsim.storage.netcdf import (
-    CHUNK_BYTES,
-    PER_SAMPLE,
-    OutputTable,
-    add_coordinate,
-    add_variable,
-    blank,
-)  # fmt: skip
+from ringsim.storage.netcdf import PER_SAMPLE
 from ringsim.variables import Cause, Status, Variable
 
 NAME = "campaign.nc"
@@ -34,13 +28,16 @@ UNFIT = (
 
 
 def write_merged(
-    folder: Path, found: Survey, table: Table, output: OutputTable, attributes: Mapping[str, Any]
+    folder: Path,
+    found: Survey,
+    table: Table,
+    output: netcdf.OutputTable,
+    attributes: Mapping[str, Any],
 ) -> int:
     """Write ``campaign.nc`` of what was found in a folder, whole or not at all.
 
-    Samples that have not been run have the status "not_run" and missing values.  Returns how many
-    count as failed because their coordinates differ.  OSError or RuntimeError if the disk is full;
-    an older file stays.
+    Returns how many samples count as failed because their coordinates differ.  OSError or
+    RuntimeError if the disk is full; an older file stays.
     """
     axes, names, fits = _common(found)
     scalars = {n for n, v in VARIABLES.items() if not v.dims and not v.needs}
@@ -51,13 +48,13 @@ def write_merged(
     } | PER_SAMPLE
     with whole(folder / NAME) as draft, netCDF4.Dataset(draft, "w") as file:
         file.setncatts(dict(attributes))
-        add_coordinate(file, "sample", np.arange(table.samples))
+        netcdf.add_coordinate(file, "sample", np.arange(table.samples))
         for name, values in axes.items():
-            add_coordinate(file, name, values)
+            netcdf.add_coordinate(file, name, values)
         add_inputs(file, table, compression=output.compression)
         for name, variable in wanted.items():
             digits = output.significant_digits.get(name)
-            add_variable(file, variable, compression=output.compression, digits=digits)
+            netcdf.add_variable(file, variable, compression=output.compression, digits=digits)
         _copy(file, found, fits, wanted)
     return int((~fits[found.form[found.form >= 0]]).sum())
 
@@ -87,11 +84,11 @@ def _copy(
     sizes = {dim: d.size for dim, d in file.dimensions.items()}
     shapes = {n: tuple(sizes[dim] for dim in v.dims) for n, v in wanted.items()}
     bytes_each = sum(8 * int(np.prod(shape, dtype=np.int64)) for shape in shapes.values())
-    aligned = max(1, CHUNK_BYTES // max(1, bytes_each))
+    aligned = max(1, netcdf.CHUNK_BYTES // max(1, bytes_each))
     count = max(1, BLOCK_BYTES // max(1, bytes_each * aligned)) * aligned
     for start in range(0, len(found.status), count):
         stop = min(start + count, len(found.status))
-        blocks = {n: blank(v, (stop - start, *shapes[n])) for n, v in wanted.items()}
+        blocks = {n: netcdf.blank(v, (stop - start, *shapes[n])) for n, v in wanted.items()}
         for result in found.results(np.arange(start, stop)):
             k, fit = result.sample - start, fits[found.form[result.sample]]
             for name, values in result.arrays().items() if fit else ():

@@ -1,9 +1,14 @@
-"""How variables lie in netCDF files; ``design.nc``, what a campaign is going to run."""
+"""How variables lie in netCDF files, and where these come from; ``design.nc``."""
 
 from __future__ import annotations
 
 import math
+import os
+import platform
+import subprocess
 from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -21,6 +26,7 @@ from ringsim.units import Model
 from ringsim.variables import Variable, flags_of
 
 DESIGN = "design.nc"
+_PACKAGES = ("ringsim", "exudyn", "numpy", "scipy", "netCDF4", "mpi4py")
 
 NOT_RUN = -1
 """Value of ``status`` for samples that have not been run, and of codes that are missing."""
@@ -28,16 +34,9 @@ NOT_RUN = -1
 CHUNK_BYTES = 1 << 20
 """Size of what is compressed at once, about."""
 
-SAMPLE = Variable("sample", ("sample",), "1", "sample of the campaign", "i8")
-
-PER_SAMPLE = {
-    v.name: v
-    for v in (
-        VARIABLES["status"],
-        VARIABLES["cause"],
-        Variable("reason", (), "1", "why the run ended so", "str"),
-        Variable("log", (), "1", "end of what a failed run printed", "str"),
-    )
+PER_SAMPLE = {name: VARIABLES[name] for name in ("status", "cause")} | {
+    "reason": Variable("reason", (), "1", "why the run ended so", "str"),
+    "log": Variable("log", (), "1", "end of what a failed run printed", "str"),
 }
 """What is known of every sample beside its outputs."""
 
@@ -67,8 +66,9 @@ class OutputTable(Model):
 
 def add_coordinate(file: Any, name: str, values: NDArray[Any]) -> None:
     """Create a dimension with its coordinate variable in an open netCDF4 dataset."""
+    sample = Variable("sample", ("sample",), "1", "sample of the campaign", "i8")
     file.createDimension(name, len(values))
-    variable = _create(file, COORDINATES.get(name, SAMPLE), (name,))
+    variable = _create(file, COORDINATES.get(name, sample), (name,))
     if name == "sample":
         variable.standard_name = "realization"
     variable[:] = values.astype(object) if values.dtype.kind == "U" else values
@@ -148,3 +148,36 @@ def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
             "choose another folder"
         )
     return table, attributes
+
+
+def provenance(*, name: str, title: str, action: str) -> dict[str, Any]:
+    """Attributes after ACDD: by whom, when, where and with what a campaign's file was made."""
+    now = datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
+    software = f"ringsim {version('ringsim')}"
+    return {
+        "Conventions": "CF-1.11, ACDD-1.3",
+        "title": title or name,
+        "summary": f"Campaign {name} of simulated ring deployments: inputs and outputs by sample.",
+        "history": f"{now} {action} by {software}",
+        "date_created": now,
+        "source": f"{software}: multibody simulation with exudyn",
+        "creator_name": "ringsim", "creator_type": "institution", "creator_software": software,
+        "python_version": platform.python_version(), "platform": platform.platform(),
+        "host": platform.node(), "git_commit": _git_commit(),
+    } | {f"{package}_version": version(package) for package in _PACKAGES}  # fmt: skip
+
+
+def _git_commit() -> str:
+    """Commit of the source tree that runs, with "+changes" if files differ; or "unknown"."""
+    tree = Path(__file__).resolve().parents[2]
+    if not (tree / ".git").exists():
+        return "unknown"
+    # Without tags, so that it is the commit itself.
+    describe = ["describe", "--always", "--abbrev=40", "--dirty=+changes", "--exclude=*"]
+    try:
+        return subprocess.run(
+            ["git", "-C", os.fspath(tree), *describe],
+            capture_output=True, text=True, timeout=10, check=True,
+        ).stdout.strip()  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"

@@ -88,9 +88,8 @@ def pack(arrays: Mapping[str, NDArray[Any]]) -> tuple[str, bytes]:
     """Form and body of a run's values and coordinates, cast to their defined types.
 
     The body is compressed: a line of JSON with name, type and shape of each array, then their
-    bytes, all first bytes of an array before all second ones (as in HDF5's shuffle filter),
-    since neighbouring numbers differ in their last bytes only.  ValueError if a name has no
-    definition, or an array does not span its coordinates.
+    bytes, shuffled as by HDF5's filter since neighbouring numbers differ in their last bytes only.
+    ValueError if a name has no definition, or an array does not span its coordinates.
     """
     sizes = {name: np.shape(values) for name, values in arrays.items() if name in COORDINATES}
     described, parts, same = [], [], []

@@ -174,9 +174,9 @@ def journals(bench):
 def lose(bench, samples):
     """Take the results of some samples out of the journals, and the merged file away."""
     folder = open_folder(bench.folder / "out")
-    paths, new = journals(bench), Journal(folder.path, folder.identity, "all-rank0")
+    paths, new = journals(bench), Journal(folder.path, folder.attributes["identity"], "all-rank0")
     for path in paths:
-        for _, result in read_journal(path, folder.identity):
+        for _, result in read_journal(path, folder.attributes["identity"]):
             if result.sample not in samples:
                 new.append(result)
         path.unlink()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ringsim.campaign.specification import load_campaign
-from ringsim.execution.cost import longest_first, relative_cost
+from ringsim.execution.work import longest_first, relative_cost
 from ringsim.refusal import InputError
 
 ROOT = Path(__file__).parents[2]

@@ -20,11 +20,11 @@ from ringsim.variables import Status
 def write_journal(bench, writer, samples):
     """Leave a journal with results of some samples, as a killed writer does."""
     folder = open_folder(bench.folder / "out")
-    journal = Journal(folder.path, folder.identity, writer)
+    journal = Journal(folder.path, folder.attributes["identity"], writer)
     solver = load_solver("fake_solver:run")
     for sample in samples:
         journal.append(solve(solver, folder.scene, sample, folder.table.values_of(sample)))
-    assert len(list(read_journal(journal.path, folder.identity))) == len(samples)
+    assert len(list(read_journal(journal.path, folder.attributes["identity"]))) == len(samples)
     return journal.path
 
 
@@ -78,7 +78,7 @@ def test_journal_of_another_campaign_does_not_count(copied, caplog):
     (copied.folder / "out" / "campaign.nc").unlink()
     folder = open_folder(copied.folder / "out")
     (path,) = journals(copied)
-    assert len(survey(folder.path, folder.identity, 20).missing) == 0
+    assert len(survey(folder.path, folder.attributes["identity"], 20).missing) == 0
     assert len(survey(folder.path, "another", 20).missing) == 20
     assert f"{path.name} is damaged: 19 of its records" in caplog.text  # the last one may be torn
 
