@@ -39,14 +39,12 @@ NEEDED = (*OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "final
 
 
 class Truth(NamedTuple):
-    """A value that does not come from the multibody model: one of ``OUTPUTS`` in its unit.
-
-    Of the opening angle it is the mean one over time, shape (time,).
-    """
+    """A value that does not come from the multibody model: one of ``OUTPUTS`` in its unit."""
 
     output: str
     source: str
     value: Any
+    """Of the opening angle the mean one over time, shape (time,)."""
 
 
 def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -> xr.Dataset:
@@ -69,7 +67,6 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         If one of the references did not end well.
     """
     errors = Errors(results, rungs)
-    outputs = list(errors.of)
     error = np.array(list(errors.of.values())).T
     own = np.array(list(errors.uncertainty.values()))
     good = bounds(error, rungs, own)
@@ -85,7 +82,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     within = ranked <= np.array(TARGETS)[:, None, None]
     costs = np.where(within, in_favour(cost, ladders)[:, None], np.inf)
     pick = np.where(within.any(axis=1), costs.argmin(axis=1), -1)
-    best = [errors.best.get(name, np.nan) for name in outputs]
+    best = [errors.best.get(name, np.nan) for name in errors.of]
     both, one = ("rung", "output"), ("rung",)
     rows: list[tuple[str, tuple[str, ...], Any, str, str]] = [
         ("error", both, error, "error relative to the reference", "1"),
@@ -120,7 +117,9 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
             ("from_truth", ("rung", "truth"), np.where(errors.good, of_rungs, np.nan).T, text, "1"),
             ("reference_from_truth", ("truth",), apart[:, -1], f"reference: {text}", "1"),
         ]
-    found = xr.Dataset(coords={"output": outputs, "target": list(TARGETS), "graded": graded})
+    found = xr.Dataset(
+        coords={"output": list(errors.of), "target": list(TARGETS), "graded": graded}
+    )
     for name, dims, values, text, units in rows:
         found[name] = (dims, values, {"long_name": text} | ({"units": units} if units else {}))
     if truths:
