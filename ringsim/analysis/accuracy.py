@@ -17,15 +17,11 @@ from scipy.optimize import nnls
 
 from ringsim.analysis.errors import OUTPUTS, Array, Errors, largest
 from ringsim.analysis.ladder import PATHS, STANDING, Rung
+from ringsim.outputs import VARIABLES
 
 TARGETS = (1e-2, 1e-3, 1e-4)
 """Errors for which the cheapest setting is looked up."""
-_COUNTS = {
-    "cpu_time": ("processor time of the run", "s"),
-    "steps": ("time steps", "1"),
-    "newton_iterations": ("iterations of Newton's method", "1"),
-    "jacobians": ("Jacobians built and factorised", "1"),
-}
+_COUNTS = ("cpu_time", "steps", "newton_iterations", "jacobians")
 WORTH_A_CHANGE = 0.9
 """Cost of another setting over that of the scene's own up to which it is worth a change: smaller
 differences are within the fit of the cost and the luck of single steps."""
@@ -102,7 +98,8 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         ("status", one, results.status.to_numpy(), "how the run ended", ""),
         ("ladder", one, ladders, "what is varied", ""),
         ("label", one, [rung.label for rung in rungs], "the setting", ""),
-        *((name, one, count, *_COUNTS[name]) for name, count in counts.items()),
+        *((v.name, one, counts[v.name], v.long_name, v.units)
+          for v in (VARIABLES[name] for name in counts)),
     ]  # fmt: skip
     if "reason" in results:
         rows.append(("reason", one, results.reason.to_numpy().astype(str), "why", ""))
