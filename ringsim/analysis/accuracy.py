@@ -17,15 +17,11 @@ from scipy.optimize import nnls
 
 from ringsim.analysis.errors import OUTPUTS, Array, Errors, largest
 from ringsim.analysis.ladder import PATHS, STANDING, Rung
+from ringsim.outputs import VARIABLES
 
 TARGETS = (1e-2, 1e-3, 1e-4)
 """Errors for which the cheapest setting is looked up."""
-_COUNTS = {
-    "cpu_time": ("processor time of the run", "s"),
-    "steps": ("time steps", "1"),
-    "newton_iterations": ("iterations of Newton's method", "1"),
-    "jacobians": ("Jacobians built and factorised", "1"),
-}
+_COUNTS = ("cpu_time", "steps", "newton_iterations", "jacobians")
 WORTH_A_CHANGE = 0.9
 """Cost of another setting over that of the scene's own up to which it is worth a change: smaller
 differences are within the fit of the cost and the luck of single steps."""
@@ -39,14 +35,12 @@ NEEDED = (*OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "final
 
 
 class Truth(NamedTuple):
-    """A value that does not come from the multibody model: one of ``OUTPUTS`` in its unit.
-
-    Of the opening angle it is the mean one over time, shape (time,).
-    """
+    """A value that does not come from the multibody model: one of ``OUTPUTS`` in its unit."""
 
     output: str
     source: str
     value: Any
+    """Of the opening angle the mean one over time, shape (time,)."""
 
 
 def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -> xr.Dataset:
@@ -69,7 +63,6 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         If one of the references did not end well.
     """
     errors = Errors(results, rungs)
-    outputs = list(errors.of)
     error = np.array(list(errors.of.values())).T
     own = np.array(list(errors.uncertainty.values()))
     good = bounds(error, rungs, own)
@@ -85,7 +78,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     within = ranked <= np.array(TARGETS)[:, None, None]
     costs = np.where(within, in_favour(cost, ladders)[:, None], np.inf)
     pick = np.where(within.any(axis=1), costs.argmin(axis=1), -1)
-    best = [errors.best.get(name, np.nan) for name in outputs]
+    best = [errors.best.get(name, np.nan) for name in errors.of]
     both, one = ("rung", "output"), ("rung",)
     rows: list[tuple[str, tuple[str, ...], Any, str, str]] = [
         ("error", both, error, "error relative to the reference", "1"),
@@ -105,7 +98,8 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         ("status", one, results.status.to_numpy(), "how the run ended", ""),
         ("ladder", one, ladders, "what is varied", ""),
         ("label", one, [rung.label for rung in rungs], "the setting", ""),
-        *((name, one, count, *_COUNTS[name]) for name, count in counts.items()),
+        *((v.name, one, counts[v.name], v.long_name, v.units)
+          for v in (VARIABLES[name] for name in counts)),
     ]  # fmt: skip
     if "reason" in results:
         rows.append(("reason", one, results.reason.to_numpy().astype(str), "why", ""))
@@ -120,7 +114,9 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
             ("from_truth", ("rung", "truth"), np.where(errors.good, of_rungs, np.nan).T, text, "1"),
             ("reference_from_truth", ("truth",), apart[:, -1], f"reference: {text}", "1"),
         ]
-    found = xr.Dataset(coords={"output": outputs, "target": list(TARGETS), "graded": graded})
+    found = xr.Dataset(
+        coords={"output": list(errors.of), "target": list(TARGETS), "graded": graded}
+    )
     for name, dims, values, text, units in rows:
         found[name] = (dims, values, {"long_name": text} | ({"units": units} if units else {}))
     if truths:

@@ -44,7 +44,7 @@ def tables(found: xr.Dataset, title: str) -> str:
 
     ``found`` is from :func:`ringsim.analysis.accuracy.judge`; ``title`` is the heading.
     """
-    single = found.sel(output=[name for name in found.output.values if name not in GROUPS])
+    single = found.drop_sel(output=list(GROUPS), errors="ignore")
     parts = [f"# {title}", _ADVICE, _advice(found), _COSTS, _errors(single)]
     parts += [_ORDERS, _orders(single)]
     if "from_truth" in found:

@@ -36,13 +36,11 @@ def budget_lines(campaign: xr.Dataset) -> list[str]:
 
 def restart_lines(campaign: xr.Dataset) -> list[str]:
     """One line if samples were restarted with smaller steps (``restarts`` above 0), else none."""
-    if not {"restarts", "steps", "total_steps"} <= set(campaign.data_vars):
+    known = {"restarts", "steps", "total_steps"} <= set(campaign.data_vars)
+    if not known or not (anew := int((campaign["restarts"] > 0).sum())):
         return []
-    anew = int((campaign["restarts"] > 0).sum())
     # Missing counts are negative.
     counted, every = (float(campaign[n].clip(min=0).sum()) for n in ("steps", "total_steps"))
-    if not anew:
-        return []
     lost = 1.0 - counted / max(every, 1.0)
     return [
         f"{anew} of {campaign.sizes['sample']} samples were restarted with smaller steps "

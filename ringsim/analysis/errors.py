@@ -62,9 +62,7 @@ def limit(values: xr.DataArray) -> Limit:
     coarse, middle, fine = (values.isel(rung=k, drop=True) for k in range(3))
     first, last = middle - coarse, fine - middle
     before, now = float(abs(first).max()), float(abs(last).max())
-    if now == 0.0 == before:
-        return Limit(fine, 0.0)
-    if now * _SHRINKING > before:
+    if now * _SHRINKING > before or before == 0.0:
         return Limit(fine, max(before, now))
     least = before / _SECOND_ORDER / (_SECOND_ORDER - 1.0)
     if float((first * last).sum()) < 0.0:  # alternating: the limit lies between the last two
@@ -113,16 +111,15 @@ class Errors:
     """Errors, uncertainties and reference values by output.
 
     ``of`` has relative errors, shape (rung,) each, by output and group of outputs, NaN where a run
-    failed or has none; ``uncertainty`` that of the reference, relative; ``best`` the reference's
-    value in the output's unit, where it is a single one; ``good``, shape (rung,), whether a rung
-    ended well.
+    failed or has none; ``uncertainty`` that of the reference, relative; ``best`` the reference
+    where it is one number, in the output's unit; ``good``, shape (rung,): which rungs ended well.
     """
 
     def __init__(self, results: xr.Dataset, rungs: Sequence[Rung]) -> None:
         """Compare results over ``rung``; raises ValueError if a reference run did not end well."""
         self.results, self._rungs = results, rungs
         self._in_time, self._in_space = references(rungs)
-        places = [*self._in_time, *self._in_space]
+        places = self._in_time + self._in_space
         self.good = (results.status == 0).to_numpy()
         if not self.good[places].all():
             raise ValueError("a reference run did not end well")
@@ -156,8 +153,7 @@ class Errors:
     def scale(self, name: str, best: xr.DataArray) -> float:
         """What an error is relative to: the value itself, or the extent of a series."""
         if name.startswith("asynchrony"):
-            most = float(self.results.asynchrony_max.isel(rung=self._in_time[-1]))
-            return max(most, LEAST_ASYNCHRONY)
+            return max(float(self.results.asynchrony_max[self._in_time[-1]]), LEAST_ASYNCHRONY)
         return float(best.max() - best.min() if name == "opening_angle" else abs(best).max())
 
     def _judge(self, name: str) -> None:
@@ -176,9 +172,9 @@ class Errors:
     def orders(self) -> tuple[list[str], Array]:
         """Names of the ladders that may have an order, and those orders, shape (ladder, output).
 
-        NaN where errors are too small to tell, or hardly change.  Steps show the slope of their
-        errors against the limit of the steps, whatever the elements are; elements and formulations
-        that of the changes from level to level, which all share the error of their steps.
+        Steps show the slope of their errors against the limit of the steps, whatever the elements
+        are; elements and formulations that of the changes from level to level, which all share the
+        error of their steps.
         """
         ladders: dict[str, list[int]] = {}
         for k, rung in enumerate(self._rungs):
@@ -203,10 +199,8 @@ class Errors:
 
 
 def held(values: xr.DataArray) -> xr.DataArray:
-    """Series with their last value kept from the end of a run on: a locked V-joint stays locked.
-
-    What ``DataArray.ffill`` does, which needs bottleneck or numbagg.
-    """
+    """Series with their last value kept from the end of a run on: a locked V-joint stays locked."""
+    # What DataArray.ffill does, which needs bottleneck or numbagg.
     values = values.transpose(..., "time")
     series = values.to_numpy()
     last = np.where(np.isfinite(series), np.arange(series.shape[-1]), 0)

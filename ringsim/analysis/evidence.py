@@ -52,18 +52,14 @@ class Evidence(Model):
     def pick(self, accuracy: float, of: str = JUDGED_BY) -> Setting:
         """The cheapest setting that is good for a relative error of one of ``CHOICES``.
 
-        Raises
-        ------
-        InputError
-            If none is, or the scene has no such output.
+        Raises InputError if none is, or the scene has no such output.
         """
         errors = [setting.errors.get(of, np.inf) for setting in self.settings]
-        if not np.isfinite(errors).any():
+        if min(errors) == np.inf:
             there = ", ".join(name for name in CHOICES if name in self.settings[0].errors)
             raise InputError(f"--of {of}: {self.scene} has no such output: choose from {there}")
-        for setting, error in zip(self.settings, errors, strict=True):
-            if error <= accuracy:
-                return setting
+        if min(errors) <= accuracy:
+            return next(s for s, e in zip(self.settings, errors, strict=True) if e <= accuracy)
         best = float(f"{1.006 * min(errors):.2e}")  # rounded up, so that asking for it succeeds
         raise InputError(
             f"--accuracy {accuracy:g}: the best setting measured with {self.scene} is good for "

@@ -186,26 +186,24 @@ def summary(whole: xr.Dataset) -> str:
 
 
 def _checks(whole: xr.Dataset) -> list[str]:
-    check = whole["check"].values
-    holds, differs, unproven = (np.sum(check == w) for w in ("holds", "differs", "unproven"))
+    count = Counter(whole["check"].values.tolist())
     time, angle, tension = PROMISES.values()
     text = (
-        f"{np.sum(check != '')} random ok cells were run again with a quarter of the step and a "
-        f"sixteenth of the tolerance: {holds} held what ok promises ({100 * time:g} % of the "
-        f"deployment time, {angle:g} deg of the mean angle of runs that end before, "
-        f"{100 * tension:g} % of the largest tension), {differs} did not, {unproven} stayed "
-        "unproven because the finer run did not end or was hardly finer."
+        f"{count.total() - count['']} random ok cells were run again with a quarter of the step "
+        f"and a sixteenth of the tolerance: {count['holds']} held what ok promises "
+        f"({100 * time:g} % of the deployment time, {angle:g} deg of the mean angle of runs "
+        f"that end before, {100 * tension:g} % of the largest tension), {count['differs']} did "
+        f"not, {count['unproven']} stayed unproven because the finer run did not end or was hardly "
+        "finer."
     )
-    labels = ("deployment time", "mean angle", "largest tension")
+    words = ("- deployment time", "%"), ("- mean angle", "deg"), ("- largest tension", "%")
     lines = []
-    for name, label, unit in zip(PROMISES, labels, ("%", "deg", "%"), strict=True):
+    for name, (label, unit) in zip(PROMISES, words, strict=True):
         values = whole[name].dropna("cell").values * (100.0 if unit == "%" else 1.0)
         if len(values):
-            lines.append(
-                f"- {label}: {np.median(values):.2g} {unit} in the median, "
-                f"{values.max():.2g} {unit} at most ({len(values)} cells)"
-            )
-    return [text, "\n".join(lines)] if lines else [text]
+            median, most = (f"{size:.2g} {unit}" for size in (np.median(values), values.max()))
+            lines.append(f"{label}: {median} in the median, {most} at most ({len(values)} cells)")
+    return [text, *(["\n".join(lines)] if lines else [])]
 
 
 def borders(whole: xr.Dataset) -> list[list[str]]:

@@ -28,8 +28,7 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     style.span_sizes(axes, np.append(values.values, stated))
     axes.set_ylabel(style.label(values, width=40))
     style.time_axes(dataset, values, axes)
-    moment = style.deployment_time(dataset)
-    moving = values if math.isnan(moment) else values.where(values["time"] <= moment, drop=True)
+    moving = values[~(values["time"].values > style.deployment_time(dataset))]
     if moving.size:
         _mark_largest(axes, moving, stated)
     style.head(figure, axes, dataset, "Asynchrony")

@@ -44,10 +44,8 @@ def diagonal_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) 
     for axes, diagonal in zip(grid, diagonals, strict=True):
         for section, colour in coloured:
             for half, dashes in _HALVES.items():
-                values = stress.sel(rod=f"diagonal_{diagonal}_{half}", section=section)
-                axes.plot(
-                    values["time"], factor * values, color=colour, linestyle=dashes, linewidth=1.2
-                )
+                values = factor * stress.sel(rod=f"diagonal_{diagonal}_{half}", section=section)
+                axes.plot(values["time"], values, color=colour, linestyle=dashes, linewidth=1.2)
         style.name_panel(axes, f"{diagonal} diagonal")
     style.span_sizes(grid[0], factor * stress.values)
     style.time_axes(dataset, stress, *grid)

@@ -61,10 +61,10 @@ def strain_over_length(dataset: xr.Dataset) -> Figure:
     station = strain["station"].values
     middle = int(np.abs(station - 0.5 * (station[0] + station[-1])).argmin())
     largest = int(np.nanargmax(strain.max("time").values))
+    passages = list(zip(_split(dataset, strain), _PASSAGES, strict=True))
     for place, colour in ((largest, style.VERMILLION), (middle, style.GREEN)):
-        passages = _split(dataset, strain.isel(station=place))
-        for (lengths, values), (_, _, dashes) in zip(passages, _PASSAGES, strict=True):
-            left.plot(lengths, values, color=colour, linestyle=dashes)
+        for (lengths, values), (_, _, dashes) in passages:
+            left.plot(lengths, values.isel(station=place), color=colour, linestyle=dashes)
         left.plot([], [], color=colour, label=f"{1e3 * station[place]:.0f} mm along the beam")
     for name, _, dashes in _PASSAGES:
         left.plot([], [], color=style.GREY, linestyle=dashes, label=name)
@@ -73,7 +73,7 @@ def strain_over_length(dataset: xr.Dataset) -> Figure:
     left.set_ylim(0.0, 1.35 * float(strain.max()))
     left.legend(loc="upper left", ncols=2)
     left.ticklabel_format(axis="y", scilimits=(0, 0), useMathText=True)
-    _draw_along(right, *_split(dataset, strain)[0])
+    _draw_along(right, *passages[0][0])
     style.head(figure, left, dataset, "Bending of the upper beam", pad=18.0)
     return figure
 

@@ -79,10 +79,10 @@ def _panel(axes: Axes, cells: xr.Dataset, kinds: list[str]) -> None:
 
 
 def _kinds(cells: xr.Dataset) -> list[str]:
-    verdict, cause = (cells[name].values.astype(str) for name in ("verdict", "cause"))
-    good = np.where(cells["restarts"] > 0.0, _AGAIN, OK)
-    found: list[str] = np.select([verdict == OK, verdict == WRONG], [good, verdict], cause).tolist()
-    return found
+    restarted = cells["restarts"].values > 0.0
+    words = zip(cells["verdict"].values, cells["cause"].values, restarted, strict=True)
+    alone = {OK: OK, WRONG: WRONG}
+    return [_AGAIN if again and end == OK else alone.get(end, cause) for end, cause, again in words]
 
 
 def _label(group: xr.Dataset, axis: str, width: int) -> str:

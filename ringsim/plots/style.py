@@ -92,12 +92,11 @@ def deployment_time(dataset: xr.Dataset) -> float:
 def ending(dataset: xr.Dataset) -> str:
     """How the run ended, in one sentence."""
     word = Status(int(dataset["status"])).word.replace("_", " ")
-    deployed = deployment_time(dataset)
-    final = float(dataset.get("final_time", math.nan))
-    if word == "ok" and math.isfinite(deployed):
+    if word == "ok" and math.isfinite(deployed := deployment_time(dataset)):
         return f"Deployed after {deployed:.2f} s"
+    final = float(dataset.get("final_time", math.nan))
     reason = str(dataset.attrs.get("reason", "")).strip()
-    start = "Ended" if word == "ok" else word[:1].upper() + word[1:]
+    start = "Ended" if word == "ok" else word.capitalize()
     start += f" after {final:.4g} s" if math.isfinite(final) else ""
     return f"{start}: {reason}" if reason else start
 
