@@ -11,8 +11,6 @@ Its public words are loaded when they are used, so that importing ringsim costs 
 ('plane', 'section', 'time')
 """
 
-from __future__ import annotations
-
 import importlib
 from typing import TYPE_CHECKING, Any
 

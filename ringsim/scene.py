@@ -159,15 +159,15 @@ def _at(owner: Any, path: str) -> Any:
 
 def _check_faults(scene: Scene) -> None:
     cables = [] if scene.cables is None else scene.cables.present()
-    places = {"section": scene.structure.sections, "cable": len(cables)}
     for number, fault in enumerate(scene.faults, 1):
-        if isinstance(fault, CableFault) and not cables:
-            raise ValueError(
-                f"faults[{number}] is a fault of a cable, but the scene has none: add "
-                "[cables.upper], or leave the fault out"
-            )
-        if isinstance(fault, CableFault) and fault.cable <= len(cables):
-            pulleys = scene.pulleys_of(cables[fault.cable - 1][1])
+        places = {"section": scene.structure.sections, "cable": len(cables)}
+        if isinstance(fault, CableFault):
+            if not cables:
+                raise ValueError(
+                    f"faults[{number}] is a fault of a cable, but the scene has none: add "
+                    "[cables.upper], or leave the fault out"
+                )
+            pulleys = scene.pulleys_of(cables[min(fault.cable, len(cables)) - 1][1])
             places |= {"pulley": pulleys, "span": pulleys + 1}
         for name, most in places.items():
             if getattr(fault, name, 0) > most:

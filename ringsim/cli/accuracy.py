@@ -46,10 +46,10 @@ def command(
     except ReferenceRunError as error:
         click.echo(f"{chosen.name}: {error}", err=True)
         return EXIT_FAILED
-    found.attrs["title"] = f"Error against run time: {chosen.name}"
-    found.attrs["scene"] = chosen.to_toml()
+    title = f"Error against run time: {chosen.name}"
+    found.attrs |= {"title": title, "scene": chosen.to_toml()}
     save(found, folder / "accuracy.nc")
-    text = tables(found, str(found.attrs["title"]))
+    text = tables(found, title)
     write_text(folder / "accuracy.md", text)
     write_text(folder / "settings.toml", tomli_w.dumps(evidence_of(found).model_dump()))
     write(accuracy(found), folder / "accuracy.png")

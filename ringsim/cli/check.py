@@ -61,21 +61,19 @@ def _summary(scene: Scene) -> dict[str, str]:
 
 
 def _layout(scene: Scene) -> dict[str, str]:
-    layout, rods = layout_of(scene), scene.rods
+    layout = layout_of(scene)
     counts = Counter(joint.kind for joint in layout.joints)
     families = Counter(joint.family for joint in layout.joints)
     masses = layout.masses()
     parts = ", ".join(f"{name} {mass:.4g}" for name, mass in masses.items())
-    elements = ", ".join(
-        f"{_count(count, 'element')} in {group}"
-        for group, count in {rod.group: len(rod.stations) - 1 for rod in layout.rods}.items()
-    )
+    groups = {rod.group: _count(len(rod.stations) - 1, "element") for rod in layout.rods}
+    elements = ", ".join(f"{count} in {group}" for group, count in groups.items())
     points = {
         "hinge assemblies": sum(map(len, layout.corners)),
         "V-joints": families["vjoint"], "pivots": families["pivot"],
     }  # fmt: skip
     return {
-        "rods": f"{len(layout.rods)} {kind_of(rods)} ({elements})",
+        "rods": f"{len(layout.rods)} {kind_of(scene.rods)} ({elements})",
         "points": ", ".join(f"{count} {name}" for name, count in points.items() if count),
         "joints": ", ".join(_count(count, _JOINTS[kind]) for kind, count in counts.items()),
         "mobility": _mobility(layout),
@@ -94,11 +92,9 @@ def _count(number: int, noun: str) -> str:
 
 
 def _mobility(layout: Layout) -> str:
-    sections = len(layout.openings[0])
-    if sections > MOST_SECTIONS_FOR_MOBILITY:
+    if len(layout.openings[0]) > MOST_SECTIONS_FOR_MOBILITY:
         return f"not computed above {MOST_SECTIONS_FOR_MOBILITY} sections"
-    freedom = internal_mobility(layout)
-    return f"{_count(freedom, 'internal degree')} of freedom with rigid rods"
+    return f"{_count(internal_mobility(layout), 'internal degree')} of freedom with rigid rods"
 
 
 def _fields(part: Model) -> str:

@@ -67,9 +67,8 @@ def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
 def _differences(result: Result, before: Result) -> list[str]:
     """Names of what a replay gave differently, timings aside."""
     new, old = result.arrays(), before.arrays()
-    differing = ["status"] if result.status != before.status else []
-    for name in sorted(new.keys() & old.keys() - set(TIMINGS)):
-        numbers = new[name].dtype.kind == "f"
-        if not np.array_equal(new[name], old[name], equal_nan=numbers):
-            differing.append(name)
-    return differing
+    status = ["status"] if result.status != before.status else []
+    return status + [
+        name for name in sorted(new.keys() & old.keys() - set(TIMINGS))
+        if not np.array_equal(new[name], old[name], equal_nan=new[name].dtype.kind == "f")
+    ]  # fmt: skip

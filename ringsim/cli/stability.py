@@ -1,20 +1,16 @@
 """``ringsim stability SCENE``: where the solver is sound, and how it ends where it is not."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from ringsim.campaign.panels import Panel, panels_over
 from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.files import write_text
 from ringsim.scene import load_scene
-
-if TYPE_CHECKING:
-    from ringsim.campaign.panels import Panel
 
 
 @click.command()
@@ -51,16 +47,10 @@ def command(
     input; 3 some cells are wrong.
     """
     chosen = load_scene(scene).with_values(settings)
-
-    from ringsim.campaign.panels import panels_over
-
     panels = panels_over(chosen, over, points)
     for panel in panels:
-        axes = " ".join(
-            f"--over {sweep.label}={sweep.values[0]:g}..{sweep.values[-1]:g}"
-            for sweep in (panel.x, panel.y)
-        )
-        click.echo(f"{panel.title}: {axes}: {len(list(panel.cells()))} cells")
+        x, y = (f"--over {s.label}={s.values[0]:g}..{s.values[-1]:g}" for s in (panel.x, panel.y))
+        click.echo(f"{panel.title}: {x} {y}: {len(list(panel.cells()))} cells")
     return draw_map(out or Path("runs") / f"stability-{chosen.name}", panels, workers, percent)
 
 

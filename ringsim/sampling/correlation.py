@@ -29,17 +29,21 @@ def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correl
     There is one path per axis; ``a.b`` in a correlation also means every ``a.b[k]``, section by
     section.  InputError if a pair names what is not drawn, or if the pairs contradict each other.
     """
-    pairs = [
-        (first, second, pair.coefficient)
-        for pair in correlations
-        for first, second in _columns(paths, pair)
-    ]
-    moved = sorted({axis for first, second, _ in pairs for axis in (first, second)})
-    if not moved:
-        return points
     matrix = np.eye(len(paths))
-    for first, second, coefficient in pairs:
-        matrix[first, second] = matrix[second, first] = coefficient
+    for pair in correlations:
+        first, second = (_axes(paths, name) for name in pair.between)
+        where = f"correlations.between = {list(pair.between)}"
+        if set(first) & set(second):
+            raise InputError(f"{where} must name two different inputs")
+        if len(first) != len(second):
+            raise InputError(
+                f"{where}: one has {len(first)} values and the other {len(second)}: give both or "
+                "neither each_section = true"
+            )
+        matrix[first, second] = matrix[second, first] = pair.coefficient
+    moved = np.flatnonzero((matrix != np.eye(len(paths))).any(axis=0))
+    if not moved.size:
+        return points
     try:
         lower = np.linalg.cholesky(matrix[np.ix_(moved, moved)])
     except np.linalg.LinAlgError:
@@ -52,21 +56,7 @@ def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correl
     return dependent
 
 
-def _columns(paths: Sequence[str], pair: Correlation) -> list[tuple[int, int]]:
-    first, second = (_of(paths, name) for name in pair.between)
-    if set(first) & set(second):
-        raise InputError(
-            f"correlations.between = {list(pair.between)} must name two different inputs"
-        )
-    if len(first) != len(second):
-        raise InputError(
-            f"correlations.between = {list(pair.between)}: one has {len(first)} values and the "
-            f"other {len(second)}: give both or neither each_section = true"
-        )
-    return list(zip(first, second, strict=True))
-
-
-def _of(paths: Sequence[str], name: str) -> list[int]:
+def _axes(paths: Sequence[str], name: str) -> list[int]:
     found = [k for k, path in enumerate(paths) if path == name or path.startswith(f"{name}[")]
     if not found:
         hint = known_or_nearest(name, dict.fromkeys(path.split("[")[0] for path in paths))

@@ -42,5 +42,4 @@ class Grid(Design):
                 f"design.levels: the grid has {size} samples and must have at most {MOST_POINTS}: "
                 "use fewer levels"
             )
-        crossed = np.meshgrid(*lines, indexing="ij")
-        return np.stack([values.ravel() for values in crossed], axis=1)
+        return np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(size, -1)

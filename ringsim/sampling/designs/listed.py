@@ -87,7 +87,7 @@ def _from_netcdf(path: Path) -> dict[str, Values]:
     found: dict[str, Values] = {}
     for column in columns:
         if column.dim:
-            found |= {f"{column.path}[{k + 1}]": each for k, each in enumerate(column.values.T)}
+            found |= {f"{column.path}[{k}]": each for k, each in enumerate(column.values.T, 1)}
         else:
             found[column.path] = column.values
     return found
