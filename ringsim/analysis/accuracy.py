@@ -5,8 +5,6 @@ may cancel.  The error that a setting is good for is therefore the largest among
 settings that are finer than it, plus the reference's own uncertainty.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

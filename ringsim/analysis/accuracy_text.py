@@ -1,7 +1,5 @@
 """The tables of an accuracy study, in Markdown."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """What a merged campaign says about its numerics, in lines for people."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

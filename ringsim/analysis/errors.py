@@ -5,8 +5,6 @@ the next (4 at second order) leave d / (r - 1) of the last change d to go, Richa
 changes that do not shrink, or alternate in sign, are not extrapolated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Settings that an accuracy study found worth their cost, and picking one for an accuracy."""
 
-from __future__ import annotations
-
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path

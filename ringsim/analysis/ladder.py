@@ -6,8 +6,6 @@ integrator, Newton's tolerance, fidelity.  Ladders that are to show an order of 
 that only the setting they vary has an effect; the others are settings that a user might choose.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -4,8 +4,6 @@ A cell is "ok" if it ended well with its errors within their tolerances, "ended"
 reason name a cause, and "wrong" if it says ok and is not, or fails without a cause.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from collections.abc import Sequence

@@ -34,8 +34,6 @@ in how the stretch is distributed, is of second order in strain.  Energy is cons
 see docs/cables.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

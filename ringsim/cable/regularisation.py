@@ -14,8 +14,6 @@ rests between them.  The tension there is too high by
 which hardly depends on N; docs/cables.md lists it.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

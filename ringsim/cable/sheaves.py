@@ -3,8 +3,6 @@
 A node names a moving frame where the path is used: a mount of a layout, or a node of an engine.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -9,8 +9,6 @@ With width b (N) the elastic force y (N, negative when the rope is longer than i
 Above y = 10 b the tension exceeds y by less than 5e-5 b, below y = -10 b it is less than that.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ringsim.cable.ropes import Array

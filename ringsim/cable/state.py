@@ -1,7 +1,5 @@
 """The chain at one instant: tensions, forces, powers; and its work between two instants."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

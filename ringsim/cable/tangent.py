@@ -20,8 +20,6 @@ Where the rope runs straight over a pulley the angle has a kink (the wrap angle 
 negative); its derivative is taken as zero there, the mean of both sides.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -13,8 +13,6 @@ fall with the tension and y grows with V, so there is one solution for any EA an
 follows the structure uses the path taken up so far in the step, S_0 - S, not the rate at its start.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

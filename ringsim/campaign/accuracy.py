@@ -1,7 +1,5 @@
 """Running the ladder of an accuracy study, as campaigns like any other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial

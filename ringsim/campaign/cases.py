@@ -1,7 +1,5 @@
 """Campaigns of listed cases, written and run by the program itself."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """A campaign's folder: its design, its identity, whether it may be gone on with; its merging."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -4,8 +4,6 @@
 given, panels are chosen from what the scene holds, around its own values.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """The campaign file: which scene, which inputs, which design, which limits."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal

@@ -1,7 +1,5 @@
 """Running a stability map: each panel as ordinary campaigns, then the check of a share."""
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 from collections.abc import Sequence

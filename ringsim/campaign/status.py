@@ -1,7 +1,5 @@
 """What a campaign is going to do, and how far it is, also while its folder is being filled."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import time

@@ -1,7 +1,5 @@
 """Watching a campaign: the progress bar, the progress file for others, the stop signals."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

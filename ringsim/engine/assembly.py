@@ -1,7 +1,5 @@
 """The growing model: nodes with their initial accelerations, bodies, markers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable
 from types import SimpleNamespace
 from typing import Any

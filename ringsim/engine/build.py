@@ -1,7 +1,5 @@
 """From a scene to a model that is ready to be integrated."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import exudyn.itemInterface as item

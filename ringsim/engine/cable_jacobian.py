@@ -10,8 +10,6 @@ those of friction that turns round within a step.  Velocities of the points are 
 nodes turn at fixed rates; against the rest that is of the order of a node's turn within one step.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ringsim.cable.ropes import Ropes

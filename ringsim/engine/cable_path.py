@@ -14,8 +14,6 @@ Nodes have Euler parameters; with rods of kind "ancf" those of the bar halves ha
 instead, and blocks act on them as ``ringsim.engine.slope_blocks`` says.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

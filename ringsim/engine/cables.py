@@ -4,8 +4,6 @@ One exudyn object spans all nodes that the paths depend on.  Its force is the ch
 Jacobian that of ringsim.engine.cable_jacobian.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import exudyn as exu

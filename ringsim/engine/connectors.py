@@ -4,8 +4,6 @@ Each law of ``ringsim.parts`` acts in exudyn's connectors, as exudyn's expressio
 solved, and is evaluated again with numpy for the energy balance.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any

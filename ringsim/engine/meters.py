@@ -1,7 +1,5 @@
 """What is read of every state of a run: energies and their balance, stress and bending strain."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

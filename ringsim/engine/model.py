@@ -1,7 +1,5 @@
 """A layout assembled in exudyn: bodies, rods, joints and loads."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple

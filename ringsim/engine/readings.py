@@ -1,7 +1,5 @@
 """Reading a model's state with numpy: opening angles, joint rates and joint gaps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

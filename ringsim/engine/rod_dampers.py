@@ -23,8 +23,6 @@ the force is C de/dt with them, in the first frame: there exudyn's velocities ar
 damper works against, and in the intrinsic measure they are not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Rods as chains of beam elements, in the formulation of the scene's kind of rods."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -6,8 +6,6 @@ by hand (10.8 us against 10.9 us for 36 nodes), and a third of np.stack.  What s
 called in every residual: numpy's cross product takes 2.8 times as long on such small arrays.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation

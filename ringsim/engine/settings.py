@@ -1,7 +1,5 @@
 """Settings of exudyn's solver, and reference numbers of a structure for the control of its run."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -16,8 +16,6 @@ With u = v / \|v\| and any constant vector g,
 the rest is the chain rule.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ringsim.engine.rotations import Array, cross, skew

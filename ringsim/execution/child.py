@@ -1,7 +1,5 @@
 """The solver process: takes tasks from a pipe, one at a time, until its parent is gone."""
 
-from __future__ import annotations
-
 import ctypes
 import faulthandler
 import os

@@ -1,7 +1,5 @@
 """Running samples on this machine: in several solver processes at a time, or in this very one."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 from contextlib import ExitStack, closing

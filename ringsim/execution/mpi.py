@@ -4,8 +4,6 @@ Every rank supervises one solver process; rank 0 also hands out the samples.  No
 rank with nothing to do sleeps on its solver's pipe, a little longer each time.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import subprocess

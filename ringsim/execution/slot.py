@@ -1,7 +1,5 @@
 """A worker slot: samples one after the other in a supervised solver process."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

@@ -1,7 +1,5 @@
 """One run, whatever happens in it: a result with a status, never an exception."""
 
-from __future__ import annotations
-
 import importlib
 import time
 import traceback

@@ -1,7 +1,5 @@
 """What schedulers need to know about the samples that they run, their relative cost too."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar

@@ -1,7 +1,5 @@
 """Rigid bodies, elastic rods, and places on them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

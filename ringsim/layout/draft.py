@@ -3,8 +3,6 @@
 Places and axes are given at q + i STEP (ringsim.layout.pose): no structure differentiates anything.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

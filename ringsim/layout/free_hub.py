@@ -6,8 +6,6 @@ then that of the corners alone.  Where dampers act too, the hub is taken along a
 move, dx_hub = A^-1 sum A_i dx_i, A_i = k_i (u_i u_i^T + (s_i / L_i) (1 - u_i u_i^T)).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

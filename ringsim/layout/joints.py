@@ -1,7 +1,5 @@
 """What holds bodies and rods together, and which angles say how far a structure has opened."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

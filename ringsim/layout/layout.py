@@ -1,7 +1,5 @@
 """A structure at one value of its coordinate: the one description that every room reads."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

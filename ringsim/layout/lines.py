@@ -1,7 +1,5 @@
 """The straight lines that make up a drawing of a structure."""
 
-from __future__ import annotations
-
 from itertools import chain
 from typing import Any
 

@@ -6,8 +6,6 @@ ring has one freedom, an open arc five (four if a boom joins two end assemblies)
 bars lie straight, and each of the 2 N V-joints can start to move by itself.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How far the V-joints are apart."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

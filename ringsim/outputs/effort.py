@@ -1,7 +1,5 @@
 """What a run took: steps, iterations, starts, times, and the settings that it ended up with."""
 
-from __future__ import annotations
-
 from ringsim.outputs.family import Output, Run, Series, Values, Variable
 
 

@@ -5,8 +5,6 @@ with steps half as long by (1 - 1/4) of it, so that this difference counts four 
 states the factors of its bar (``ErrorBar``); docs/accuracy.md tells what they cover.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ringsim.outputs.family import VARIABLES, Array, ErrorBar

@@ -1,7 +1,5 @@
 """Recording a run step by step, and reducing it to its outcome at the end."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """What outputs read of a state, the readings over time, and a run that has ended."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What the antenna must not be driven past."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Error against cost: the work-precision figure of an accuracy study."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes

@@ -1,7 +1,5 @@
 """Asynchrony of the sections over time."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

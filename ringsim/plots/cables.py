@@ -1,7 +1,5 @@
 """Spans, tensions and pulley forces of a cable over time."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure

@@ -1,7 +1,5 @@
 """Stress in the diagonals of chosen sections over time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

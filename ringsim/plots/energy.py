@@ -1,7 +1,5 @@
 """Work, energies and energy balance of a run over time."""
 
-from __future__ import annotations
-
 import math
 
 import xarray as xr

@@ -1,7 +1,5 @@
 """Opening angles of all V-joints over time."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A planar truss over the length of its driving cable: tension, and strain of the upper beam."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes

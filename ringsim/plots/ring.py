@@ -1,7 +1,5 @@
 """The ring in space: stowed, half-way and deployed."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

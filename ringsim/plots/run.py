@@ -1,7 +1,5 @@
 """All figures that apply to a run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The stability map: a panel for each pair of axes, a square for each cell."""
 
-from __future__ import annotations
-
 import textwrap
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Style, words and axes shared by all figures."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Constant steps: what they are, and what shows that they do not resolve a run."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

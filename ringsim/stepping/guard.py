@@ -6,8 +6,6 @@ elastic energy.  Generalised-alpha takes energy out of what it does not resolve 
 none, so that growth (B > 0) means more than loss.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ringsim.parts.solver import Solver

@@ -1,7 +1,5 @@
 """What an engine tells of a run before it, and of the states that it reaches."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Which V-joints have reached their stops, when, and how steps should meet them."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Steps that follow the mean opening angle and the joints' deviations from it, and meet stops."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 

@@ -5,8 +5,6 @@ sizes: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, secti
 a safety factor and bounds of the ratio stand, too.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 

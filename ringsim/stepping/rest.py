@@ -1,7 +1,5 @@
 """Whether a structure has come to rest for good."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ringsim.stepping.instant import Array, Instant

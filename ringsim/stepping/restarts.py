@@ -1,7 +1,5 @@
 """Runs that start anew with smaller steps, and the second run that error bars need."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace

@@ -4,8 +4,6 @@ An engine calls ``next_step``; ``retry`` where Newton fails or ``shorter`` refus
 found; ``accept``, while that is true; and ``conclude``.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

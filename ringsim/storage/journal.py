@@ -1,7 +1,5 @@
 """Journals: every finished sample is in a file at once, one file for each process."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import os

@@ -1,7 +1,5 @@
 """Locks: which process may run which samples of a campaign's folder."""
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import os

@@ -1,7 +1,5 @@
 """Merging: all inputs beside all outputs in one file, in bounded memory."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The family of structures."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np

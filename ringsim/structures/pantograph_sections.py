@@ -1,7 +1,5 @@
 """Pantograph sections between hinge assemblies: rods, joints and the tracks of their cables."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -12,8 +12,6 @@ above.  Both beams, of length b, make the angle g with it: g = 0 folded down alo
 Source: paper 001, figs 4 and 7.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 

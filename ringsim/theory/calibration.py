@@ -1,7 +1,5 @@
 """Finding the stowed angle from a measured deployment time."""
 
-from __future__ import annotations
-
 import math
 
 from scipy.optimize import brentq

@@ -4,8 +4,6 @@ What rigid rods cannot represent is refused; the rest is integrated to tolerance
 the full model (``ringsim.theory.ideal_course``): the two differ by what the rods' elasticity does.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ axis z at z . (x x x'), with x a direction of its own square to z.  The generali
 is its force on each sheave times how that point moves with the coordinates.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import NamedTuple

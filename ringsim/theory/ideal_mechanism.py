@@ -15,8 +15,6 @@ gives V and W as functions of p and p'.
 Source: Kane and Levinson, Dynamics: Theory and Applications (1985), secs. 4.11 and 6.1.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ without them it has no angular momentum); the rope wound by each winch with feed
 and the energies lost and supplied so far.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import accumulate, pairwise
 from typing import NamedTuple

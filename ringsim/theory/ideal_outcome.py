@@ -1,7 +1,5 @@
 """From the steps of an ideal ring to an outcome with the variables of the full model."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

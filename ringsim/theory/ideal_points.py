@@ -12,8 +12,6 @@ a point of theirs at the arm a from the pin, a = b + c with b along the pin's ax
 linear in two more functions for each of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 

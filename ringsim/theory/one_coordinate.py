@@ -14,8 +14,6 @@ end assemblies of an open arc are held upright.  From rest at q_0 the time until
 The substitution q = q_0 - (q_0 - q_1) u^2 removes the singularity at the start.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple
 

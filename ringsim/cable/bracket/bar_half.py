@@ -1,7 +1,5 @@
 """A bracket that is a part of one bar half."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A bracket that a gear keeps on the bisector of the bar halves."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -10,8 +10,6 @@ either side of it have the lengths
 A kind gives a and b; b is the h of paper 000, eqs 20 and 21.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """A cable that breaks."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

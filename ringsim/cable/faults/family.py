@@ -1,7 +1,5 @@
 """The family of cable faults."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

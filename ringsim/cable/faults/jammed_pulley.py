@@ -1,7 +1,5 @@
 """A pulley that seizes the rope."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Friction in the pulley's bearing, without approximation."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A rope that slides on fixed sheaves."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

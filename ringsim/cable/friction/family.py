@@ -1,7 +1,5 @@
 """The family of friction laws: the loss of tension over a pulley."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ringsim.cable.ropes import Array

@@ -1,7 +1,5 @@
 """Pulleys without friction."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The family of winding laws: how much rope a winch has taken up, and how fast."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

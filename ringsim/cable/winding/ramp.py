@@ -1,7 +1,5 @@
 """Winding with a smooth start."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from ringsim.cable.winding.family import PrescribedWinding

@@ -1,7 +1,5 @@
 """Winding by a motor that stalls."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from ringsim.cable.winding.family import FeedbackWinding, WinchReading

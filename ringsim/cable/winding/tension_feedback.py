@@ -1,7 +1,5 @@
 """Winding that controls the tension of the rope, from measured bar angles."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from ringsim.cable.winding.family import FeedbackWinding, WinchReading
