@@ -1,6 +1,5 @@
 """Values of inputs: numbers, words, whole tables and lists of them, in arrays and in words."""
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -72,8 +71,8 @@ def extremes_of(values: Values) -> set[int]:
         return {int(flat.argmin()) // width, int(flat.argmax()) // width}
     # Beside words numbers are many, and only their ends tell anything.
     numbers = [float(v) if type(v) in (int, float) else np.nan for v in map(plain, flat)]
-    words = np.where(np.isfinite(numbers), " ", labels_of(flat))
-    found = set(np.unique(words, return_index=True)[1].tolist())
+    words = np.flatnonzero(~np.isfinite(numbers))
+    found = set(words[np.unique(labels_of(flat[words]), return_index=True)[1]].tolist())
     if np.isfinite(numbers).any():
         found |= {int(np.nanargmin(numbers)), int(np.nanargmax(numbers))}
     return {int(k) // width for k in found}
@@ -82,12 +81,3 @@ def extremes_of(values: Values) -> set[int]:
 def is_label(name: str) -> bool:
     """Whether a column of that name can only tell samples apart, as no scene has such a field."""
     return "." not in name and section_of(name)[0] not in Scene.model_fields
-
-
-def fault_of(value: Any) -> str:
-    """Why a value cannot be kept in a file; empty if it can."""
-    try:
-        json.dumps(value, allow_nan=False)
-    except (TypeError, ValueError):
-        return "must be a finite number, text, true or false, a table, or a list of these"
-    return ""

@@ -1,5 +1,6 @@
 """A finite set of values."""
 
+import json
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -7,7 +8,7 @@ from pydantic import Field, model_validator
 
 from ringsim.refusal import show
 from ringsim.sampling.distributions.family import Array, Distribution
-from ringsim.sampling.values import Values, array_of, fault_of, labels_of
+from ringsim.sampling.values import Values, array_of, labels_of
 from ringsim.units import ListIn
 
 
@@ -29,8 +30,13 @@ class Discrete(Distribution):
         if not self.values:
             raise ValueError("values must hold at least one value")
         for number, value in enumerate(self.values, 1):
-            if fault := fault_of(value):
-                raise ValueError(f"values[{number}] = {show(value)} {fault}")
+            try:
+                json.dumps(value, allow_nan=False)  # as files will hold it
+            except (TypeError, ValueError):
+                raise ValueError(
+                    f"values[{number}] = {show(value)} must be a finite number, text, true or "
+                    "false, a table, or a list of these"
+                ) from None
         if len(set(labels_of(array_of(self.values)).tolist())) < len(self.values):
             raise ValueError(f"values = {show(self.values)} must differ from each other")
         if self.probabilities is not None:
