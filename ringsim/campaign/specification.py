@@ -15,7 +15,7 @@ from ringsim.refusal import InputError, explain, show
 from ringsim.sampling.columns import Table
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Design
-from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
+from ringsim.sampling.table import AnyDesign, AnyDistribution, draw, first_inside
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import OutputTable
 from ringsim.units import Model
@@ -26,7 +26,8 @@ SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_id
 
 def _flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
     """Join nested tables to dotted paths, down to tables that have the key ``whole``."""
-    if not isinstance(table, dict) or (prefix and whole in table):
+    # Not a path that ends in "kind", whose own table lies below.
+    if not isinstance(table, dict) or (prefix and not isinstance(table.get(whole, {}), dict)):
         return {prefix: table} if prefix else table
     found: dict[str, Any] = {}
     for name, inner in table.items():
@@ -47,7 +48,7 @@ class Specification(Model):
     scene: str
     """Built-in scene, or scene file looked up beside the campaign file."""
     set: Annotated[dict[str, Any], BeforeValidator(_flat)] = Field(default_factory=dict)
-    """Values by scene path that all samples share."""
+    """Values by scene path that all samples share; tables are joined into those of the scene."""
     inputs: Annotated[
         dict[str, AnyDistribution], BeforeValidator(lambda table: _flat(table, "kind"))
     ] = Field(default_factory=dict)
@@ -83,11 +84,12 @@ class Campaign:
             )  # fmt: skip
         except InputError as error:
             raise InputError(f"{self.file.name}: {error}") from None
-        for path in wanted.set.keys() & {column.path for column in table.columns}:
-            raise InputError(
-                f"{self.file.name}: {path} has one value by [set] or --set, and others by the "
-                "inputs: leave out one of the two"
-            )
+        for path in [column.path for column in table.columns if column.path]:
+            if given := path if path in wanted.set else first_inside(path, wanted.set):
+                raise InputError(
+                    f"{self.file.name}: {given} has one value by [set] or --set, and others by the "
+                    "inputs: leave out one of the two"
+                )
         return table
 
 

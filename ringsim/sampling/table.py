@@ -1,7 +1,7 @@
 """The design of a campaign: which values every sample has, and which paths it may vary."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,6 +27,8 @@ FIXED = (
     "record",
 )  # fmt: skip
 """Paths that give a result its shape or its name: all samples of a campaign share them."""
+_NAMED_ALREADY = ("sample", "sample_seed", "reason", "log", "corner", "pulley")
+"""What files of campaigns hold beside inputs and outputs."""
 
 
 def draw(
@@ -81,12 +83,17 @@ def draw(
     sequences = (np.random.SeedSequence(seed, spawn_key=(k,)) for k in range(samples))
     states = [int(each.generate_state(1, np.uint64)[0]) >> 1 for each in sequences]
     table = Table(tuple(columns), np.array(states, dtype=np.int64))
-    taken = {*VARIABLES, *COORDINATES}
+    taken, before = {*VARIABLES, *COORDINATES, *_NAMED_ALREADY}, list[str]()
     for column in columns:
         if column.name in taken:
             where = column.path or f"label {column.name}"
             raise InputError(f"inputs: {where} would be named {column.name}, which is taken")
+        if lost := first_inside(column.path, before):
+            raise InputError(
+                f"inputs: {column.path} would replace what {lost} has: put it before that"
+            )
         taken.add(column.name)
+        before.append(column.path)
     _check_extremes(base, table, design)
     return table
 
@@ -121,6 +128,11 @@ def _places(base: Scene, name: str, distribution: Distribution) -> list[str]:
             "leave out each_section, or give each path an input of its own"
         )
     return [f"[{k + 1}]" for k in range(min(counts.values()))]
+
+
+def first_inside(path: str, others: Iterable[str]) -> str:
+    """The first path that leads into what ``path`` holds; empty if none does."""
+    return next((other for other in others if other.startswith((f"{path}.", f"{path}["))), "")
 
 
 def refuse_fixed(scene: Scene, path: str) -> None:

@@ -44,6 +44,14 @@ def test_tables_under_set_are_joined_into_the_scene(tmp_path):
     assert scene.cables.upper.winch.winding.kind == "constant"
 
 
+def test_kind_can_be_drawn_by_a_nested_path(tmp_path):
+    text = CHOOSING.partition("[inputs]")[0] + (
+        '[inputs.cables.upper.friction]\nkind = { kind = "discrete", values = ["none", "bearing"] }'
+    )
+    (column,) = load_campaign(written(tmp_path, text)).draw().columns
+    assert column.path == "cables.upper.friction.kind"
+
+
 def test_set_and_samples_stand_above_the_file(tmp_path):
     more = {"solver.end_time": 0.75, "stop": {"kind": "spring-damper", "stiffness": 50.0}}
     campaign = load_campaign(written(tmp_path), more, 3)
@@ -62,6 +70,10 @@ def test_set_and_samples_stand_above_the_file(tmp_path):
     [
         ("", "", {"solver.step": -1.0}, None, r"choosing.toml: set: .*solver.step = -1.0 s must"),
         ("", "", {"faults": []}, None, "faults has one value by .set. or --set, and others by"),
+        (
+            "random", "random",
+            {"cables.upper.friction.coefficient[2]": 1e-4}, None, "has one value by .set. or --set",
+        ),
         ("random", "grid", {}, 4, '--samples 4: a design of kind "grid" has as many as its levels'),
         (', samples = 12', "", {}, None, r"design.samples is missing"),
         ("random", "randon", {}, 4, "did you mean random"),

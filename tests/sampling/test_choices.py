@@ -131,6 +131,10 @@ def test_a_shared_value_is_one_axis_of_correlations_and_grids() -> None:
         ({UPPER: FRICTION | {"shared": [LOWER]}}, "also that of the input, or the input must"),
         ({"friction": FRICTION | {"shared": ["cables.uper.friction"]}}, "did you mean upper"),
         ({"friction": FRICTION | {"shared": []}}, "friction is not a known key"),
+        (
+            {UPPER + "[2]": FRICTION | {"shared": []}, UPPER: FRICTION | {"shared": []}},
+            r"coefficient would replace what .*coefficient\[2\] has: put it before that",
+        ),
         ({"structure": {"kind": "discrete", "values": [{"sections": 3}]}}, "drawn as a whole"),
         (
             {"cables.lower.winch.stop_time": STOP | {"values": ["never", 5.0]}},
