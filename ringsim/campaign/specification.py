@@ -116,14 +116,14 @@ def load_campaign(
         specification = Specification.model_validate(table)
     except ValidationError as error:
         raise InputError(explain(error, Specification, path.name)) from None
+    specification.set.update(settings or {})
+    for name, value in (settings or {}).items():
+        text += f"\n# called with --set {name} = {json.dumps(value, default=str)}"
     key = "scene"
     try:
         base = load_scene(specification.scene, beside=path)
         key = "set"
-        scene = base.with_values(specification.set | dict(settings or {}))
+        scene = base.with_values(specification.set)
     except InputError as error:
         raise InputError(f"{path.name}: {key}: {error}") from None
-    for name, value in (settings or {}).items():
-        text += f"\n# called with --set {name} = {json.dumps(value, default=str)}"
-    both = specification.model_copy(update={"set": specification.set | dict(settings or {})})
-    return Campaign(path, text, both, scene)
+    return Campaign(path, text, specification, scene)

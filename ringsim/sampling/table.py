@@ -112,15 +112,12 @@ def _paths_of(name: str, distribution: Distribution) -> tuple[str, ...]:
 def _places(base: Scene, name: str, distribution: Distribution) -> list[str]:
     """What follows the paths of an input, one factor each: "", or "[1]", "[2]", ..."""
     middle = plain(distribution.quantile(np.array([0.5]))[0])
-    counts: dict[str, int] = {}
-    for path in _paths_of(name, distribution):
+    for path in (paths := _paths_of(name, distribution)):
         refuse_fixed(base, path)
-        if distribution.each_section:
-            counts[path] = _each_of(base, path, middle)
-        else:
-            base.with_values({path: middle})
-    if not counts:
+    if not distribution.each_section:
+        base.with_values(dict.fromkeys(paths, middle))
         return [""]
+    counts = {path: _each_of(base, path, middle) for path in paths}
     if len(set(counts.values())) > 1:
         told = ", ".join(f"{path} has {count}" for path, count in counts.items())
         raise InputError(
@@ -197,7 +194,7 @@ def _check_extremes(base: Scene, table: Table, design: Design) -> None:
         try:
             spans.add(base.with_values(values).spans)
         except InputError as error:
-            path = next((p for p, v in values.items() if _refuses(base, p, v)), "")
+            path = max((path for path in values if path in str(error)), key=len, default="")
             raise InputError(f"{design.where(sample, path)}: {error}; {design.cure}") from None
     if len(spans) > 1:
         raise InputError(
@@ -205,11 +202,3 @@ def _check_extremes(base: Scene, table: Table, design: Design) -> None:
             'result, and end = "both" has a span more: draw only from "first" and "last", or '
             "run a campaign for each"
         )
-
-
-def _refuses(base: Scene, path: str, value: Any) -> bool:
-    try:
-        base.with_values({path: value})
-    except InputError:
-        return True
-    return False
