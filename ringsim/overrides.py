@@ -24,11 +24,24 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     path, _, raw = (part.strip() for part in text.partition("="))
     if not path or not raw:
         raise InputError(f"--set {text}: must read PATH=VALUE, for example loads.force=0.02")
+    return path, parse_value(raw, f"--set {path}")
+
+
+def parse_value(text: str, where: str) -> Any:
+    """What a text means as TOML, or the text itself if it is a bare word.
+
+    InputError, with where it stands, if it begins like a table or a list and is none.
+    """
     try:
-        table = tomllib.loads(f"value = {raw}")
-    except (ValueError, RecursionError):
-        return path, raw
-    return path, table["value"] if len(table) == 1 else raw
+        table = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError) as error:
+        if text.startswith(("{", "[")):
+            raise InputError(
+                f"{where} = {text}: no table or list as TOML writes them ({error}): write for "
+                'example { kind = "stall", speed = 0.1 }'
+            ) from None
+        return text
+    return table["value"] if len(table) == 1 else text
 
 
 def section_of(path: str) -> tuple[str, int | None]:
