@@ -39,7 +39,7 @@ def full_outcome(sections: int = 4) -> Outcome:
     for name, variable in VARIABLES.items():
         shape = tuple(sizes[dim] for dim in variable.dims)
         if np.dtype(variable.dtype).kind == "i":
-            values[name] = random.integers(0, 1000, shape)
+            values[name] = random.integers(0, np.iinfo(variable.dtype).max, shape)
         else:
             values[name] = random.normal(size=shape)
             if variable.dims:

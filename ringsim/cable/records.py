@@ -1,7 +1,5 @@
 """Records of the cables of a scene and their winches."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -49,7 +47,7 @@ class Winch(Model):
     that it has then, or go on with its law."""
 
     @model_validator(mode="after")
-    def _in_order(self) -> Winch:
+    def _in_order(self) -> "Winch":
         if self.stop_time is not None and self.stop_time < self.start_time:
             raise ValueError(
                 f"stop_time = {self.stop_time} s must not be before start_time = "
@@ -120,7 +118,7 @@ class Cable(Model):
     """What holds the V pulleys: a block on the bisector, or an element fixed to a bar half."""
 
     @model_validator(mode="after")
-    def _usable(self) -> Cable:
+    def _usable(self) -> "Cable":
         reason = self.friction.refusal(self.pulley_radius)
         if reason is not None:
             raise ValueError(reason)
@@ -163,7 +161,7 @@ class Cables(Model):
     """From a winch to its nearest pulley, along the boom; that span keeps its length."""
 
     @model_validator(mode="after")
-    def _any(self) -> Cables:
+    def _any(self) -> "Cables":
         if self.upper is None and self.lower is None:
             raise ValueError("upper or lower must hold a cable (or leave out the whole table)")
         return self

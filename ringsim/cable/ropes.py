@@ -5,8 +5,6 @@ cable of p points has p - 1 spans and p - 2 pulleys (its inner points); two of i
 jammed pulley.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -113,7 +111,7 @@ class Ropes:
         total = np.bincount(self.of_end.ravel(), ends.ravel(), len(self.starts))
         return np.asarray(total, dtype=float)
 
-    def jam(self, cable: int, pulley: int, stored: Array, wound: Array) -> Ropes:
+    def jam(self, cable: int, pulley: int, stored: Array, wound: Array) -> "Ropes":
         """The ropes after a pulley seizes the rope; cable and pulley count from 0 at the winch.
 
         At that instant ``stored`` is the natural length in each span, m, shape (spans,), and
@@ -131,7 +129,7 @@ class Ropes:
         content[k : k + 2] = held[k : k + 2]
         return split
 
-    def cut(self, cable: int, span: int) -> Ropes:
+    def cut(self, cable: int, span: int) -> "Ropes":
         """The ropes after a span parts; both count from 0.  ValueError if there is no such span."""
         alive = self.alive.copy()
         alive[self.of_span[self._span(cable, span, 1, "span")]] = False

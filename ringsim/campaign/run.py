@@ -1,7 +1,5 @@
 """Running a campaign: run what is missing in its folder, merge, say how it ended."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
 from dataclasses import dataclass, replace
@@ -29,7 +27,7 @@ class Share:
     count: int = 1
 
     @classmethod
-    def parse(cls, text: str) -> Share:
+    def parse(cls, text: str) -> "Share":
         """The share that ``i/n`` names; InputError if there is none.
 
         >>> Share.parse("2/8")

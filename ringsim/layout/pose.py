@@ -1,7 +1,5 @@
 """Where something stands at one value of a structure's coordinate, and how it moves with it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,7 +43,7 @@ class Pose:
     turn: Array
 
     @classmethod
-    def of(cls, place: Any, axes: Any) -> Pose:
+    def of(cls, place: Any, axes: Any) -> "Pose":
         """From an origin and axes computed at q + i ``STEP``."""
         frame = real_of(axes)
         spin = rate_of(axes) @ frame.T

@@ -1,7 +1,5 @@
 """The family of outputs, and what all of them together declare."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -19,7 +17,7 @@ __all__ = ["Array", "ErrorBar", "Output", "Reading", "Run", "Series", "Values", 
 Values = dict[str, Any]
 """Arrays and numbers by the names of their variables."""
 
-OUTPUTS: list[type[Output]] = []
+OUTPUTS: "list[type[Output]]" = []
 """All outputs, those of the smallest rank first."""
 
 VARIABLES: dict[str, Variable] = {}

@@ -1,7 +1,5 @@
 """How variables lie in netCDF files, and where these come from; ``design.nc``."""
 
-from __future__ import annotations
-
 import math
 import os
 import platform
@@ -56,7 +54,7 @@ class OutputTable(Model):
     """Output variables that the merged file does not hold."""
 
     @model_validator(mode="after")
-    def _known(self) -> OutputTable:
+    def _known(self) -> "OutputTable":
         for name in [*self.significant_digits, *self.leave_out]:
             if name not in VARIABLES:
                 hint = known_or_nearest(name, VARIABLES)

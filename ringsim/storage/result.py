@@ -1,7 +1,5 @@
 """One sample's result as bytes: a small header, and its arrays packed."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -52,7 +50,7 @@ class Result:
         return json.dumps(table, separators=(",", ":")).encode()
 
     @classmethod
-    def from_header(cls, header: bytes, body: bytes) -> Result:
+    def from_header(cls, header: bytes, body: bytes) -> "Result":
         """The result whose :meth:`header` is given."""
         table = json.loads(header)
         codes = {"status": Status(table["status"]), "cause": Cause(table.get("cause", 0))}

@@ -1,7 +1,5 @@
 """The pantograph ring: closed, or an open arc of the same polygon (two sections: the truss)."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, Literal
 
@@ -49,7 +47,7 @@ class PantographRing(Structure):
     """Initial angle between the bar halves: near 0 stowed, 180 deployed."""
 
     @model_validator(mode="after")
-    def _possible(self) -> PantographRing:
+    def _possible(self) -> "PantographRing":
         self.require_below(
             "half_bar", "half_diagonal", "the diagonals could not span the deployed section"
         )

@@ -1,7 +1,5 @@
 """The planar truss with a driving cable."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar, Literal
 
@@ -100,7 +98,7 @@ class PlanarTruss(Structure):
     rest: Rest = Rest()
 
     @model_validator(mode="after")
-    def _possible(self) -> PlanarTruss:
+    def _possible(self) -> "PlanarTruss":
         self.require_below("strut_head", "beam_length")
         self.require_below("strut_foot", "axis_length")
         if self.rest_distance >= self.beam_length:

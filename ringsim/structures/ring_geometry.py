@@ -7,8 +7,6 @@ the pins of a section is w = 2 l cos(phi) and its height h = sqrt(4 d^2 - w^2): 
 keeps all rod lengths, so each is an exact, stress-free configuration.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass
 from typing import Any
@@ -58,7 +56,7 @@ class RingGeometry:
         polygon_sections: int,
         aspect_ratio: float,
         **lengths: float,
-    ) -> RingGeometry:
+    ) -> "RingGeometry":
         """A closed ring, or the first ``sections`` sides of a polygon left open; with its
         ``lengths`` half_bar, half_diagonal and hinge_offset.
         """

@@ -4,8 +4,6 @@ A stop is a kink of the equations: a step that meets or leaves one is repeated t
 Switching a winch, and every fault, restarts the integration.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -77,7 +75,7 @@ class Course:
         self._end, self._contacts = scene.solver.end_time, 0
         self._stowed = 0.5 * (math.pi if scene.stop is None else scene.stop.most_folded)
 
-    def run(self) -> Course:
+    def run(self) -> "Course":
         """Integrate to the end; never raises."""
         faults, cables = self._scene.faults, self.motion.cables
         breaks = [] if cables is None else cables.breaks

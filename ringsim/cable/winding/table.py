@@ -1,7 +1,5 @@
 """Winding by a table of measured or optimised lengths."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
@@ -28,7 +26,7 @@ class TableWinding(PrescribedWinding):
     """Rope wound at those times, in metre; the first is 0."""
 
     @model_validator(mode="after")
-    def _usable(self) -> TableWinding:
+    def _usable(self) -> "TableWinding":
         if len(self.lengths) != len(self.times):
             raise ValueError(
                 f"lengths has {len(self.lengths)} values, but times has {len(self.times)}: "
