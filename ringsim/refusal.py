@@ -94,7 +94,7 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     match kind:
         case "extra_forbidden":
             # A model may tell of the keys that it once had.
-            hint = getattr(owner, "gone", {}).get(key)
+            hint = getattr(owner, "gone", {}).get(key) or _other_kinds_key(path, owner)
             hint = hint or known_or_nearest(key, owner.model_fields if owner else ())
             return f"{where} is not a known key ({hint})"
         case "union_tag_invalid":
@@ -111,6 +111,23 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
         return f"{shown}: {fault['msg'][0].lower()}{fault['msg'][1:]}"
     in_unit = f" in{unit}" if unit else ""
     return says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
+
+
+def _other_kinds_key(path: list[str], owner: type[BaseModel] | None) -> str:
+    """The hint behind a key that another kind of the same family has; empty if none has it.
+
+    It stays behind when ``kind`` alone is replaced.
+    """
+    families = [] if owner is None else [one for one in owner.__mro__[1:] if issubclass(one, Model)]
+    others = (kind for one in families if one is not Model for kind in leaves_of(one))
+    other = next((kind for kind in others if path[-1] in kind.model_fields), None)
+    if owner is None or other is None:
+        return ""
+    mine, table = show(_tag(owner)), ".".join(path[:-1])
+    return (
+        f"kind = {show(_tag(other))} has it, {mine} has not: leave it out, or replace the whole "
+        f"table by {table} = {{ kind = {mine} }}"
+    )
 
 
 def _walk(

@@ -20,13 +20,13 @@ SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_id
 """What maps a scene to its outcome, by fidelity."""
 
 
-def _flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
+def flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
     """Join nested tables to dotted paths, down to tables that have the key ``whole``."""
     if not isinstance(table, dict) or (prefix and whole in table):
         return {prefix: table} if prefix else table
     found: dict[str, Any] = {}
     for name, inner in table.items():
-        found |= _flat(inner, whole, f"{prefix}.{name}" if prefix else name)
+        found |= flat(inner, whole, f"{prefix}.{name}" if prefix else name)
     return found
 
 
@@ -42,10 +42,10 @@ class Specification(Model):
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     scene: str
     """Built-in scene, or scene file looked up beside the campaign file."""
-    set: Annotated[dict[str, Any], BeforeValidator(_flat)] = Field(default_factory=dict)
+    set: Annotated[dict[str, Any], BeforeValidator(flat)] = Field(default_factory=dict)
     """Values by scene path that all samples share."""
     inputs: Annotated[
-        dict[str, AnyDistribution], BeforeValidator(lambda table: _flat(table, "kind"))
+        dict[str, AnyDistribution], BeforeValidator(lambda table: flat(table, "kind"))
     ] = Field(default_factory=dict)
     """Distribution by scene path."""
     correlations: list[Correlation] = Field(default_factory=list)
@@ -84,8 +84,14 @@ class Campaign:
 def load_campaign(path: Path) -> Campaign:
     """Read a campaign file; InputError if it, its content or its scene is refused."""
     text = read_text(path)
+    table = parse_toml(text, path.name)
+    if "structure" in table and not {"scene", "design"} & set(table):
+        raise InputError(
+            f"{path.name}: structure: this is a scene, not a campaign file: run it with ringsim "
+            f'run, or name it in a campaign file, as scene = "{path.name}"'
+        )
     try:
-        specification = Specification.model_validate(parse_toml(text, path.name))
+        specification = Specification.model_validate(table)
     except ValidationError as error:
         raise InputError(explain(error, Specification, path.name)) from None
     key = "scene"
