@@ -21,8 +21,12 @@ SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_id
 
 
 def flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
-    """Join nested tables to dotted paths, down to tables that have the key ``whole``."""
-    if not isinstance(table, dict) or (prefix and whole in table):
+    """Join nested tables to dotted paths, down to values; with ``whole`` down to tables that have
+    this key, or would need it, since not all that they hold are tables.
+    """
+    if not isinstance(table, dict):
+        return {prefix: table} if prefix else table
+    if prefix and whole and not all(isinstance(inner, dict) for inner in table.values()):
         return {prefix: table} if prefix else table
     found: dict[str, Any] = {}
     for name, inner in table.items():
@@ -34,6 +38,7 @@ class Specification(Model):
     """Content of a campaign file."""
 
     gone: ClassVar[dict[str, str]] = {
+        "workers": "ringsim campaign FILE --workers N says how many: leave it out",
         "retry": "runs that fail start anew by themselves, see solver.restarts; leave it out",
     }
 

@@ -73,7 +73,9 @@ def main() -> None:
         code = EXIT_BAD_INPUT
     except click.ClickException as error:
         command = getattr(getattr(error, "ctx", None), "command_path", "ringsim")
-        click.echo(f"{command}: {error.format_message()} (see {command} --help)", err=True)
+        message = error.format_message().replace("integer range", "whole number")
+        message = message.replace("integer", "whole number").replace("float range", "number")
+        click.echo(f"{command}: {message} (see {command} --help)", err=True)
         code = EXIT_BAD_INPUT
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted", err=True)

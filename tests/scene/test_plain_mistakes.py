@@ -166,6 +166,96 @@ def test_changed_distribution_is_told_with_its_input(tmp_path: Path) -> None:
     assert "its scene differs: solver.end_time = 0.6 instead of 0.5" in line
 
 
+@pytest.mark.parametrize(
+    ("assignment", "named"),
+    [
+        ("end_time=3", "end_time is not a known key (did you mean solver.end_time?)"),
+        ("stiffness=3", "(did you mean stop.stiffness or net.stiffness or "),
+        ("solver.end_time=0,5", 'solver.end_time = "0,5" must be a finite number in s, without '
+         "quotes: write 0.5"),
+        ("solver.end_time=3s", "without quotes: write 3"),
+        ("solver.end_time=long", 'solver.end_time = "long" must be a finite number in s, without '),
+        ("structure.closed=True", 'structure.closed = "True" must be true or false, without '
+         "quotes: write true"),
+        ("structure.closed=no", "write false"),
+        ("boom=false", 'below it kind = "flexible" or "rigid", or boom = "none" to leave it out'),
+        ("rods=ancf", 'rods = "ancf" must be a table: write [rods], and below it kind = "ancf"'),
+        ("cables.upper.axial_stiffness=1e5", "cables.upper.winch is missing: give it a table"),
+        ("cables.upper.winch.start_time=3", "cables.upper.winch.winding is missing: give it a "
+         "table with its kind, one of constant, ramp,"),
+        ('faults={kind="stuck-vjoint",section=3}', "must be a list of tables: write [[faults]]"),
+    ],
+)  # fmt: skip
+def test_plausible_assignments_are_told_what_they_mean(assignment: str, named: str) -> None:
+    assert named in refused("check", "ring18", "--set", assignment)
+
+
+@pytest.mark.parametrize(
+    ("lines", "named"),
+    [
+        ('"loads.force" = { mean = 0.01, standard_deviation = 0.001 }',
+         "inputs.loads.force.kind is missing: say which kind it is"),
+        ("loads.force = { mean = 0.01, standard_deviation = 0.001 }",
+         "inputs.loads.force.kind is missing: say which kind it is"),
+        ('"loads.force" = 0.02', "inputs.loads.force = 0.02 must be a table"),
+        ('"force" = { kind = "uniform", low = 0.01, high = 0.02 }', "did you mean loads.force?"),
+        ("[set]\nworkers = 2", "workers is not a known key"),
+    ],
+)  # fmt: skip
+def test_plausible_campaigns_are_told_what_is_missing(
+    lines: str, named: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.toml"
+    start = CAMPAIGN.partition("[inputs]")[0].replace("set = { solver.end_time = 0.5 }\n", "")
+    path.write_text(f"{start.replace('truss2', 'ring18')}[inputs]\n{lines}\n")
+    assert named in refused("campaign", path, "--workers", 0, "--out", tmp_path / "out")
+
+
+def test_keys_that_belong_elsewhere_in_a_campaign_file(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    for line, named in (("samples = 4", "did you mean design.samples?"),
+                        ("workers = 2", "ringsim campaign FILE --workers N")):  # fmt: skip
+        path.write_text(f"{line}\n{CAMPAIGN}")
+        assert named in refused("campaign", path)
+
+
+@pytest.mark.parametrize("verb", ["run", "check", "campaign"])
+def test_a_result_is_no_input(verb: str, tmp_path: Path) -> None:
+    path = tmp_path / "old.nc"
+    save(xr.Dataset({"a": ("x", np.arange(3.0))}), path)
+    line = refused(verb, path)
+    assert line.startswith("old.nc: this is a netCDF file, not a text: give the TOML file")
+
+
+def test_places_without_a_campaign_are_told_apart(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(CAMPAIGN)
+    for verb, place, named in (
+        ("status", file, "this is a file"),
+        ("merge", tmp_path / "nowhere", "there is no such folder"),
+        ("status", tmp_path, "no campaign in this folder: design.nc is not there"),
+    ):
+        line = refused(verb, place)
+        assert f"{place}: {named}: give the folder that ringsim campaign named" in line
+    assert "there is no such file" in refused("campaign", tmp_path / "nowhere.toml")
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("run", "truss2", "--accuracy", "1%"), "'1%' is not a valid number"),
+        (("campaign", "a.toml", "--workers", "many"), "'many' is not a valid whole number"),
+        (("check", "truss2", "--deploys-in", "-3"), "'--deploys-in': -3.0 is not in the range x>0"),
+    ],
+)
+def test_bad_numbers_of_options_are_told_in_english(words: tuple[str, ...], named: str) -> None:
+    command = [sys.executable, "-m", "ringsim", *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == EXIT_BAD_INPUT
+    assert named in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
 @pytest.mark.parametrize("verb", ["", *VERBS])
 def test_help_reads_as_english(verb: str) -> None:
     text = ringsim(*verb.split(), "--help")
