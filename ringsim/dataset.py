@@ -55,7 +55,7 @@ def require_file(path: Path) -> None:
     if path.suffix != ".nc":
         raise InputError(
             f"{path}: the file is netCDF and its name must end with .nc: write {path.stem}.nc "
-            "(a table of it: xarray.open_dataset(...).to_dataframe().to_csv(...))"
+            '(one variable as a table: dataset["opening_angle"].to_series().to_csv(...))'
         )
 
 
