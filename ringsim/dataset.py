@@ -12,6 +12,7 @@ import xarray as xr
 from ringsim.files import require_place, whole, writing
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import axes, holds
+from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.variables import Fidelity, Outcome, Variable, flags_of
 
@@ -48,14 +49,25 @@ def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
     return xr.Dataset(arrays, coords=coordinates, attrs=_attributes(outcome, scene))
 
 
+def require_file(path: Path) -> None:
+    """Refuse (InputError) a name or a place at which no netCDF file can be written."""
+    require_place(path)
+    if path.suffix != ".nc":
+        raise InputError(
+            f"{path}: the file is netCDF and its name must end with .nc: write {path.stem}.nc "
+            '(one variable as a table: dataset["opening_angle"].to_series().to_csv(...))'
+        )
+
+
 def save(dataset: xr.Dataset, path: str | Path) -> None:
     """Write a netCDF-4 file, whole or not at all; an older one of that name is replaced.
 
     Numeric arrays are compressed (zlib level 4, shuffle), missing values are NaN, missing
-    counts -1.  InputError if the folder does not exist, or the file cannot be written there.
+    counts -1.  InputError if the folder does not exist, the file cannot be written there, or its
+    name does not end with ``.nc``.
     """
     path = Path(path)
-    require_place(path)
+    require_file(path)
     with writing(path), whole(path) as draft:
         dataset.drop_encoding().to_netcdf(
             draft, engine="netcdf4", format="NETCDF4", encoding=_encoding(dataset),

@@ -19,7 +19,16 @@ def read_text(path: Path | Traversable) -> str:
     """The text of a file; InputError if it cannot be read or is not UTF-8."""
     try:
         return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(
+            f"{path}: there is no such file: check its name, and the folder that you are in"
+        ) from None
     except UnicodeDecodeError as error:
+        if path.name.endswith(".nc"):
+            raise InputError(
+                f"{path.name}: this is a netCDF file, not a text: give the TOML file that it was "
+                "made from (its attributes scene and campaign hold the text)"
+            ) from None
         raise InputError(
             f"{path.name}: not a text file: byte {error.start + 1} is not UTF-8; "
             "save it as UTF-8 text"

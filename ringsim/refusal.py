@@ -1,8 +1,9 @@
 """Refusing bad input: one clear line, naming field, value, bound and cure."""
 
 import difflib
+import re
 import typing
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -10,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from ringsim.choice import leaves_of
 from ringsim.parts.persection import EACH, ONE
-from ringsim.units import Model, nested_in, unit_of
+from ringsim.units import LEFT_OUT, Model, nested_in, unit_of
 
 MOST_NAMED = 3
 """So many further faults are named beside the one that is described."""
@@ -91,10 +92,14 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     unit = f" {unit_of(field)}".removesuffix(" 1") if field is not None else ""
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     shown = f"{where} = {show(value)}{unit if number else ''}"
+    tables = [] if field is None else models_in(field.annotation)
+    kinds = _kinds(field)
     match kind:
         case "extra_forbidden":
             # A model may tell of the keys that it once had.
-            hint = getattr(owner, "gone", {}).get(key)
+            hint = getattr(owner, "gone", {}).get(key) or _other_kinds_key(path, owner)
+            if not hint and owner is not None and (inner := list(_below(key, owner))):
+                hint = f"did you mean {' or '.join(inner[:MOST_NAMED])}?"
             hint = hint or known_or_nearest(key, owner.model_fields if owner else ())
             return f"{where} is not a known key ({hint})"
         case "union_tag_invalid":
@@ -104,16 +109,66 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
         case "union_tag_not_found":
             choices = " or ".join(map(show, _kinds(field)))
             return f"{where}.kind is missing: say which kind it is with kind = {choices}"
+        case "missing" if tables:
+            one_of = f" with its kind, one of {', '.join(kinds)}" if kinds else ""
+            return f"{where} is missing: give it a table{one_of}"
+        case "model_type" | "model_attributes_type" if kinds:
+            choices = " or ".join(map(show, [value] if value in kinds else kinds))
+            none = f', or {where} = "{LEFT_OUT}" to leave it out' if value is False else ""
+            return f"{shown} must be a table: write [{where}], and below it kind = {choices}{none}"
+        case "tuple_type" if tables:
+            return f"{shown} must be a list of tables: write [[{where}]], and its keys below"
         case "value_error":
             text = str(limits["error"])
             return f"{where}.{text}" if where and not text.startswith(where) else text
     if (says := _SAYS.get(kind) or _SAYS.get(kind.split("_")[0])) is None:
         return f"{shown}: {fault['msg'][0].lower()}{fault['msg'][1:]}"
     in_unit = f" in{unit}" if unit else ""
-    told = says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
+    line = says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
+    if not isinstance(value, str):
+        return line
+    if meant := _meant(value, kind):
+        return f"{line}: write {meant}"
     optional = field is not None and type(None) in typing.get_args(field.annotation)
     # Who writes "never" looks for the word that leaves a value out.
-    return f'{told}, or "none" to leave it out' if optional and isinstance(value, str) else told
+    return f'{line}, or "none" to leave it out' if optional else line
+
+
+def _meant(text: str, kind: str) -> str:
+    """What a text may mean where a number or a truth is wanted; empty if nobody can tell."""
+    if kind.startswith("bool"):
+        return {"true": "true", "yes": "true", "false": "false", "no": "false"}.get(
+            text.lower(), ""
+        )
+    number = re.match(r"[-+]?\d+([.,]\d+)?(e[-+]?\d+)?", text.strip(), re.IGNORECASE)
+    return number[0].replace(",", ".") if number and kind.startswith("float") else ""
+
+
+def _below(key: str, owner: type[BaseModel], prefix: str = "") -> Iterator[str]:
+    """Where a key stands in the tables below one that does not have it itself."""
+    for name, field in owner.model_fields.items():
+        inside = models_in(field.annotation)
+        if any(key in table.model_fields for table in inside):
+            yield f"{prefix}{name}.{key}"
+        for table in inside[:1]:
+            yield from _below(key, table, f"{prefix}{name}.")
+
+
+def _other_kinds_key(path: list[str], owner: type[BaseModel] | None) -> str:
+    """The hint behind a key that another kind of the same family has; empty if none has it.
+
+    It stays behind when ``kind`` alone is replaced.
+    """
+    families = [] if owner is None else [one for one in owner.__mro__[1:] if issubclass(one, Model)]
+    others = (kind for one in families if one is not Model for kind in leaves_of(one))
+    other = next((kind for kind in others if path[-1] in kind.model_fields), None)
+    if owner is None or other is None:
+        return ""
+    mine, table = show(_tag(owner)), ".".join(path[:-1])
+    return (
+        f"kind = {show(_tag(other))} has it, {mine} has not: leave it out, or replace the whole "
+        f"table by {table} = {{ kind = {mine} }}"
+    )
 
 
 def _walk(

@@ -238,4 +238,10 @@ def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
     if not os.path.exists(path):  # Path.exists raises for names that are too long
         hint = known_or_nearest(name, builtin)
         raise InputError(f"{path}: no such file, and no built-in scene of that name ({hint})")
-    return scene_from_toml(read_text(path), source=path.name)
+    table = parse_toml(read_text(path), path.name)
+    if key := next((key for key in ("design", "inputs") if key in table), ""):
+        raise InputError(
+            f"{path.name}: {key}: this is a campaign file, not a scene: run it with ringsim "
+            "campaign, or give the scene that it names"
+        )
+    return scene_from_table(table, source=path.name)

@@ -1,5 +1,6 @@
 """A campaign's folder: its design, its identity, whether it may be gone on with; its merging."""
 
+import contextlib
 import hashlib
 import json
 import os
@@ -8,9 +9,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from ringsim.campaign.specification import Campaign
+from ringsim.campaign.specification import Campaign, flat
 from ringsim.files import DRAFT, writing
-from ringsim.refusal import InputError
+from ringsim.refusal import InputError, show
 from ringsim.sampling.columns import Table
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.journal import FOLDER, Survey, survey
@@ -18,6 +19,7 @@ from ringsim.storage.locks import GO_ON, locked, tries
 from ringsim.storage.merge import NAME as MERGED
 from ringsim.storage.merge import write_merged
 from ringsim.storage.netcdf import DESIGN, OutputTable, provenance, read_design, write_design
+from ringsim.units import LEFT_OUT
 
 _KEPT = ("identity", "seed", "solver", "campaign", "campaign_name", "scene", "output")
 """Attributes of the design that a merged file has, too."""
@@ -132,11 +134,12 @@ def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Fold
     wanted = _decisive(table, mine)
     what = " and ".join(word for word in wanted if wanted[word] != held[word])
     if what:
-        what = f"{what} differs"
+        scenes = [flat(scene.to_table()) for scene in (campaign.scene, old.scene)]
+        what = f"{what} differs{_first_change(*scenes) or _first_change(wanted, held)}"
     elif not table.starts_with(old.table):
         what = (
             f"its {old.table.samples} samples are not the first of the {table.samples} that "
-            f"{campaign.file.name} gives"
+            f"{campaign.file.name} gives{_changed_input(table, old.table)}"
         )
     if what:
         raise InputError(
@@ -144,6 +147,24 @@ def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Fold
             "--out, or delete this one"
         )
     return old
+
+
+def _first_change(new: dict[str, Any], old: dict[str, Any]) -> str:
+    """The first key of two tables whose value is not the same, with both values; empty if none."""
+    for key in {**new, **old}:
+        if new.get(key, LEFT_OUT) != old.get(key, LEFT_OUT):
+            values = (show(each.get(key, LEFT_OUT)) for each in (new, old))
+            return f": {key} = {' instead of '.join(values)}"
+    return ""
+
+
+def _changed_input(new: Table, old: Table) -> str:
+    """The first input that is distributed in another way than it was; empty if all are alike."""
+    for mine, held in zip(new.columns, old.columns, strict=True):
+        with contextlib.suppress(ValueError):  # one that is listed in a file is no JSON
+            if change := _first_change(json.loads(mine.origin), json.loads(held.origin)):
+                return f"; inputs.{mine.path}{change}"
+    return ""
 
 
 def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, Path | None]:

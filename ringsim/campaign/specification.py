@@ -24,14 +24,17 @@ SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_id
 """What maps a scene to its outcome, by fidelity."""
 
 
-def _flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
-    """Join nested tables to dotted paths, down to tables that have the key ``whole``."""
-    # Not a path that ends in "kind", whose own table lies below.
-    if not isinstance(table, dict) or (prefix and not isinstance(table.get(whole, {}), dict)):
+def flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
+    """Join nested tables to dotted paths, down to values; with ``whole`` down to tables that have
+    this key, or would need it, since not all that they hold are tables.
+    """
+    if not isinstance(table, dict):
+        return {prefix: table} if prefix else table
+    if prefix and whole and not all(isinstance(inner, dict) for inner in table.values()):
         return {prefix: table} if prefix else table
     found: dict[str, Any] = {}
     for name, inner in table.items():
-        found |= _flat(inner, whole, f"{prefix}.{name}" if prefix else name)
+        found |= flat(inner, whole, f"{prefix}.{name}" if prefix else name)
     return found
 
 
@@ -39,6 +42,7 @@ class Specification(Model):
     """Content of a campaign file."""
 
     gone: ClassVar[dict[str, str]] = {
+        "workers": "ringsim campaign FILE --workers N says how many: leave it out",
         "retry": "runs that fail start anew by themselves, see solver.restarts; leave it out",
     }
 
@@ -47,10 +51,10 @@ class Specification(Model):
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     scene: str
     """Built-in scene, or scene file looked up beside the campaign file."""
-    set: Annotated[dict[str, Any], BeforeValidator(_flat)] = Field(default_factory=dict)
+    set: Annotated[dict[str, Any], BeforeValidator(flat)] = Field(default_factory=dict)
     """Values by scene path that all samples share; tables are joined into those of the scene."""
     inputs: Annotated[
-        dict[str, AnyDistribution], BeforeValidator(lambda table: _flat(table, "kind"))
+        dict[str, AnyDistribution], BeforeValidator(lambda table: flat(table, "kind"))
     ] = Field(default_factory=dict)
     """Distribution by scene path."""
     correlations: list[Correlation] = Field(default_factory=list)
@@ -103,6 +107,11 @@ def load_campaign(
     """
     text = read_text(path)
     table = parse_toml(text, path.name)
+    if "structure" in table and not {"scene", "design"} & set(table):
+        raise InputError(
+            f"{path.name}: structure: this is a scene, not a campaign file: run it with ringsim "
+            f'run, or name it in a campaign file, as scene = "{path.name}"'
+        )
     if samples is not None and isinstance(design := table.get("design"), dict):
         kind = kinds_of(Design).get(str(design.get("kind")))
         if kind is not None and "samples" not in kind.model_fields:

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE, EXIT_INTERRUPTED
-from ringsim.refusal import InputError
+from ringsim.refusal import InputError, known_or_nearest
 
 VERBS = {
     "scenes": "List the built-in scenes.",
@@ -32,9 +32,10 @@ class _Verbs(click.Group):
         return list(VERBS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the verb's file."""
+        """Import the verb's file; InputError if there is no such verb."""
         if cmd_name not in VERBS:
-            return None
+            hint = known_or_nearest(cmd_name, VERBS)
+            raise InputError(f"ringsim {cmd_name}: there is no such verb ({hint})")
         command: click.Command = importlib.import_module(f"ringsim.cli.{cmd_name}").command
         return command
 
@@ -72,7 +73,9 @@ def main() -> None:
         code = EXIT_BAD_INPUT
     except click.ClickException as error:
         command = getattr(getattr(error, "ctx", None), "command_path", "ringsim")
-        click.echo(f"{command}: {error.format_message()} (see {command} --help)", err=True)
+        message = error.format_message().replace("integer range", "whole number")
+        message = message.replace("integer", "whole number").replace("float range", "number")
+        click.echo(f"{command}: {message} (see {command} --help)", err=True)
         code = EXIT_BAD_INPUT
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted", err=True)

@@ -17,18 +17,18 @@ from ringsim.scene import load_scene
 @SCENE
 @SETTINGS
 @click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/accuracy-SCENE).")
-@click.option("--workers", type=WORKERS, help="Solver processes (default: all cores).")
+@click.option("--workers", metavar="N", type=WORKERS, help="Solver processes (default: all cores).")
 @click.option(
-    "--timeout", type=click.FloatRange(0.0, min_open=True), default=1800.0, show_default=True,
-    help="Longest time of one setting, s.",
+    "--timeout", metavar="SECONDS", type=click.FloatRange(0.0, min_open=True), default=1800.0,
+    show_default=True, help="Longest time of one setting.",
 )  # fmt: skip
 def command(
     scene: str, settings: dict[str, Any], out: Path | None, workers: int | None, timeout: float
 ) -> int:
     """Compare numerical settings of SCENE: error against run time, and which to choose.
 
-    Writes accuracy.nc, accuracy.md, accuracy.png and settings.toml (for ``run --accuracy``); the
-    same command again goes on with an interrupted study.  Exit codes: 0 done, 2 bad input, 3 a
+    Writes accuracy.nc, accuracy.md, accuracy.png and settings.toml (for ringsim run --accuracy);
+    the same command again goes on with an interrupted study.  Exit codes: 0 done, 2 bad input, 3 a
     run that the reference needs did not end well.
     """
     chosen = load_scene(scene).with_values(settings)

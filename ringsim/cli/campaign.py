@@ -21,7 +21,7 @@ from ringsim.refusal import InputError
 @click.command()
 @click.argument("file", type=PATH)
 @click.option(
-    "--workers", type=click.IntRange(0, 4096),
+    "--workers", metavar="N", type=click.IntRange(0, 4096),
     help="Solver processes (default 1); 0 runs in this process, without isolation.",
 )  # fmt: skip
 @SETTINGS
@@ -29,8 +29,10 @@ from ringsim.refusal import InputError
     "--samples", type=click.IntRange(1, 10_000_000), metavar="N",
     help="Draw N samples instead of as many as the file says.",
 )  # fmt: skip
-@click.option("--out", type=PATH, help="Folder (default runs/NAME).")
-@click.option("--part", default="1/1", help="Run only the i-th of n shares of the samples: i/n.")
+@click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/NAME).")
+@click.option(
+    "--part", metavar="I/N", default="1/1", help="Run only the I-th of N shares of the samples."
+)
 @click.option("--retry-failed", is_flag=True, help="Run the failed samples again, too.")
 @click.option("--dry-run", is_flag=True, help="Show plan and predicted cost; keep nothing.")
 @click.option("--solver", default="", hidden=True)

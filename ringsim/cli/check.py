@@ -21,7 +21,7 @@ MOST_SECTIONS_FOR_MOBILITY = 72
 @click.argument("scene", metavar="FILE")
 @SETTINGS
 @click.option(
-    "--deploys-in", "time", type=float, metavar="SECONDS",
+    "--deploys-in", "time", type=click.FloatRange(0.0, min_open=True), metavar="SECONDS",
     help="Find the initial opening angle from which the ideal fidelity deploys in this time.",
 )  # fmt: skip
 def command(scene: str, settings: dict[str, Any], time: float | None) -> None:

@@ -20,14 +20,19 @@ from ringsim.variables import TIMINGS, Outcome
 @FOLDER
 @click.argument("sample", type=int)
 @click.option("--scene", is_flag=True, help="Print the sample's scene and do not run it.")
-@click.option("--save", type=PATH, help="Write the run to a netCDF file.")
+@click.option("--save", metavar="FILE", type=PATH, help="Write the run to a netCDF file.")
 def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
     """Run SAMPLE of the campaign in FOLDER again in this process, and compare the results.
 
     Nothing in the folder changes.  Everything that the solver prints is shown; a crash or a hang
     happens here, where a debugger can look at it.
     """
+    from ringsim.dataset import require_file
+    from ringsim.dataset import save as write
+
     campaign = open_folder(folder)
+    if save is not None:
+        require_file(save)
     if not 0 <= sample < campaign.table.samples:
         raise InputError(
             f"sample {sample} is not in {folder}: choose one from 0 to {campaign.table.samples - 1}"
@@ -46,7 +51,6 @@ def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
         click.echo(result.log)
     click.echo(f"sample {sample}: {result.status.word}: {result.reason} ({result.seconds:.2f} s)")
     if save is not None:
-        from ringsim.dataset import save as write
         from ringsim.dataset import to_dataset
 
         arrays = result.arrays()

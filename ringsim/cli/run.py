@@ -9,7 +9,6 @@ import numpy as np
 from ringsim.choice import kind_of
 from ringsim.cli.options import PATH, SCENE, SETTINGS
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
-from ringsim.files import require_place
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
@@ -18,15 +17,15 @@ from ringsim.scene import Scene, load_scene
 @click.command()
 @SCENE
 @SETTINGS
-@click.option("--out", metavar="FILE", type=PATH, help="netCDF file to write.")
+@click.option("--out", metavar="FILE", type=PATH, help="netCDF file to write (default SCENE.nc).")
 @click.option(
     "--fidelity", type=click.Choice(["full", "ideal"]), default="full", show_default=True,
     help="Full model, or the ideal ring of rigid rods (in seconds; no asynchrony, no stress).",
 )  # fmt: skip
 @click.option(
-    "--accuracy", type=click.FloatRange(1e-8, 1.0),
-    help="Relative error of deployment time and opening angle to aim at: picks the cheapest "
-    "settings measured to give it.",
+    "--accuracy", metavar="ERROR", type=click.FloatRange(1e-8, 1.0),
+    help="Relative error of deployment time and opening angle to aim at: picks the "
+    "cheapest settings measured to give it.",
 )  # fmt: skip
 @click.option(
     "--of", metavar="OUTPUT",
@@ -56,12 +55,14 @@ def command(
         chosen = chosen.with_values({"record.stress": True})
     target = out or Path(f"{chosen.name}.nc")
 
-    from ringsim.dataset import save, to_dataset
+    from ringsim.cli.progress import watched
+    from ringsim.dataset import require_file, save, to_dataset
     from ringsim.outputs import VARIABLES
     from ringsim.simulation import FIDELITIES
 
-    require_place(target)
-    outcome = FIDELITIES[fidelity](chosen)
+    require_file(target)
+    # Solved in seconds, the ideal ring needs no bar.
+    outcome = FIDELITIES[fidelity](chosen) if fidelity != "full" else watched(chosen)
     values = outcome.values
     click.echo(f"{chosen.name}: {outcome.status.word}: {outcome.reason}")
     if anew := _restarted(values, chosen.solver):
@@ -77,8 +78,11 @@ def command(
             bar = values.get(f"{name}_error")
             click.echo(line if bar is None else f"{line} +- {bar.item():.2g}")
     dataset = to_dataset(outcome, chosen)
+    # Replaced, not refused: to change a scene and run it again is what one does all day, and
+    # scripts do it with one name.  Everything of a run can be computed again from its file.
+    done = "replaced" if target.exists() else "wrote"
     save(dataset, target)
-    click.echo(f"wrote {target}")
+    click.echo(f"{done} {target}")
     if plot:
         from ringsim.plots.run import draw_run
 

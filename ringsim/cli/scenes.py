@@ -11,7 +11,7 @@ from ringsim.scene import builtin_scenes, scene_from_toml
 def command(name: str | None) -> None:
     """List the built-in scenes, or print the TOML of one.
 
-    ``ringsim scenes ring18 > my.toml`` starts a scene of your own.
+    To start a scene of your own: ringsim scenes ring18 > my.toml
     """
     texts = builtin_scenes()
     if name is not None:

@@ -22,17 +22,20 @@ from ringsim.scene import load_scene
     "Default: panels chosen from what the scene holds.",
 )  # fmt: skip
 @click.option(
-    "--points", type=click.IntRange(2, 30), default=5, show_default=True,
+    "--points", metavar="N", type=click.IntRange(2, 30), default=5, show_default=True,
     help="Values of each axis.",
 )  # fmt: skip
 @click.option(
     "--out", metavar="DIR", type=PATH,
     help="Folder for the map and its campaigns (default runs/stability-SCENE).",
 )  # fmt: skip
-@click.option("--workers", type=WORKERS, default=1, show_default=True, help="Solver processes.")
 @click.option(
-    "--check", "percent", type=click.FloatRange(0.0, 100.0, min_open=True), default=10.0,
-    show_default=True, help="Percentage of the ok cells that are run again with smaller steps.",
+    "--workers", metavar="N", type=WORKERS, default=1, show_default=True, help="Solver processes."
+)
+@click.option(
+    "--check", "percent", metavar="PERCENT", type=click.FloatRange(0.0, 100.0, min_open=True),
+    default=10.0, show_default=True,
+    help="Share of the ok cells that are run again with smaller steps.",
 )  # fmt: skip
 def command(
     scene: str, settings: dict[str, Any], over: tuple[str, ...], points: int, out: Path | None,

@@ -3,6 +3,7 @@ steps and on the end.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -29,10 +30,14 @@ _REFUSE = 10.0
 """Error that makes exudyn repeat a step; its tolerance is 1."""
 
 
-def solve(scene: Scene) -> Outcome:
+Watch = Callable[[Instant], None]
+"""What is shown every accepted state of a run."""
+
+
+def solve(scene: Scene, watch: Watch | None = None) -> Outcome:
     """Run a scene.  A solve that fails is a status, not an exception."""
     built = build(scene)
-    history = Integration(built).run()
+    history = Integration(built, watch).run()
     built.model.assembly.container.Reset()
     return history.outcome()
 
@@ -40,7 +45,8 @@ def solve(scene: Scene) -> Outcome:
 class Integration:
     """One run of a built model."""
 
-    def __init__(self, built: Built) -> None:
+    def __init__(self, built: Built, watch: Watch | None = None) -> None:
+        self._watch = watch
         model, scene = built.model, built.model.scene
         self._built, self._scene = built, scene
         self._system = model.assembly.system
@@ -154,6 +160,8 @@ class Integration:
             return False
         found = self._weighed or self._measure(time)
         goes_on = self._control.accept(found, self._read(found))
+        if self._watch is not None:
+            self._watch(self._control.now)
         if self._locks is not None:
             self._lock(self._locks.deployed, time)
         return goes_on

@@ -30,11 +30,11 @@ class _Picture(NamedTuple):
 
 
 PICTURES = (
-    _Picture("opening_angles", opening_angles, ("opening_angle", "asynchrony")),
+    _Picture("opening_angles", opening_angles, ("opening_angle",), ring_only=True),
     _Picture("asynchrony", asynchrony, ("asynchrony",)),
     _Picture("diagonal_stress", diagonal_stress, ("rod_stress",), ring_only=True),
-    _Picture("ring", ring, ("opening_angle", "asynchrony")),
-    _Picture("cables", cables, ("cable_tension", "asynchrony"), ring_only=True),
+    _Picture("ring", ring, ("opening_angle",), ring_only=True),
+    _Picture("cables", cables, ("cable_tension",), ring_only=True),
     _Picture("tension", tension_over_length, ("cable_tension", "cable_length")),
     _Picture("bending_strain", strain_over_length, ("bending_strain", "cable_length")),
     _Picture("energy", energy, ("work", "kinetic_energy", "elastic_energy", "dissipation")),

@@ -131,7 +131,10 @@ def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
     """The samples of a campaign, and the attributes of its design; InputError if there is none."""
     path = folder / DESIGN
     if not path.is_file():
-        raise InputError(f"{folder}: no campaign in this folder: {DESIGN} is not there")
+        what = "this is a file" if folder.exists() else "there is no such folder"
+        if folder.is_dir():
+            what = f"no campaign in this folder: {DESIGN} is not there"
+        raise InputError(f"{folder}: {what}: give the folder that ringsim campaign named")
     try:
         with netCDF4.Dataset(path) as file:
             attributes = {name: file.getncattr(name) for name in file.ncattrs()}

@@ -17,6 +17,9 @@ from ringsim.structures.pantograph_sections import add_sections
 from ringsim.structures.ring_geometry import RingGeometry
 from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
 
+LEAST_OPENING = 1.0
+"""Degree; below it stand angles meant in radians, and hardly a fold: two bar halves of 0.3 m end
+5 mm apart there, less than a bar is thick."""
 LEAST_HINGE_OFFSET = 1e-6
 """Metre; directions of the rope between two pulleys are then good to 1e-10 in doubles."""
 
@@ -63,6 +66,12 @@ class PantographRing(Structure):
             raise ValueError(
                 f"sections = {self.sections} must be below polygon_sections = "
                 f"{self.polygon_sections} for an open arc (raise it, or set closed = true)"
+            )
+        if self.opening_angle < LEAST_OPENING:
+            meant = math.degrees(self.opening_angle)
+            raise ValueError(
+                f"opening_angle = {self.opening_angle} deg must be at least {LEAST_OPENING:g} deg: "
+                f"angles are in degrees (write {meant:.4g} if {self.opening_angle} rad is meant)"
             )
         if self.opening_angle > 179.9:
             raise ValueError(
@@ -139,13 +148,15 @@ class PantographRing(Structure):
         chord = 2.0 * (self.half_bar + self.hinge_offset)
         major, (x, y) = geometry.plan[0, 0], geometry.plan[1, :2]
         minor = abs(y) / math.sqrt(1.0 - (x / major) ** 2)
+        degrees = math.degrees(self.opening_angle)
+        meant = f" ({self.opening_angle} rad would be {degrees:.4g} deg)" if degrees < 180.0 else ""
         return {
             "structure": f"{kind_of(self)}, {shape}, {self.sections} section"
             + "s" * (self.sections > 1),
             "polygon": f"equal chords of {chord:.4f} m on an ellipse with axes "
             f"{2.0 * chord * major:.4f} m and {2.0 * chord * minor:.4f} m",
             "deployed": _size(geometry, 0.0),
-            "initial": f"{_size(geometry, self.coordinate)} at {self.opening_angle} deg",
+            "initial": f"{_size(geometry, self.coordinate)} at {self.opening_angle} deg{meant}",
         }
 
     def path_slope(self, cable: Any, angles: Any) -> float:

@@ -7,11 +7,11 @@ from scipy.optimize import brentq
 from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.structures.pantograph_ring import PantographRing
+from ringsim.structures.pantograph_ring import LEAST_OPENING, PantographRing
 from ringsim.theory.ideal_course import Course
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 
-_WIDEST, _LEAST = 179.0, 1.0
+_WIDEST = 179.0
 """Opening angles that are tried, deg."""
 _PATIENCE, _LONGEST = 2.0, 1e6
 """A run is stopped after this multiple of the wanted time, or after this time (s)."""
@@ -42,7 +42,9 @@ def opening_angle_for(scene: Scene, time: float) -> float:
     cables = [] if scene.cables is None else [cable for _, cable in scene.cables.present()]
     # From these angles on every cable's bracket opens the ring, and no stop is in contact.
     held = [c.bracket.angle - 90.0 for c in cables if isinstance(c.bracket, BarHalfBracket)]
-    least = max([_LEAST, *held, 0.0 if scene.stop is None else scene.stop.stowed_angle + _CLOSE])
+    least = max(
+        [LEAST_OPENING, *held, 0.0 if scene.stop is None else scene.stop.stowed_angle + _CLOSE]
+    )
 
     def excess(angle: float) -> float:
         course = Course(plain.with_values({"structure.opening_angle": angle})).run()

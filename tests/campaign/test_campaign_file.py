@@ -149,7 +149,7 @@ def test_replay_gives_the_stored_result_and_saves_it(bench):
     assert (bench.folder / "two.nc").exists()
     assert "young_modulus" in bench.run("replay", "out", 2, "--scene")
     assert "choose one from 0 to 3" in bench.run("replay", "out", 4, code=2)
-    assert "no campaign in this folder" in bench.run("replay", "absent", 0, code=2)
+    assert "absent: there is no such folder" in bench.run("replay", "absent", 0, code=2)
 
 
 def test_long_runs_come_first(tmp_path):

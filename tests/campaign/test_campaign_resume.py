@@ -135,4 +135,5 @@ def test_changed_scene_file_is_another_campaign(bench):
     assert "half_bar = 0.2889" in scene
     (bench.folder / "mine.toml").write_text(scene.replace("half_bar = 0.2889", "half_bar = 0.28"))
     printed = bench.run(*start, code=2)
-    assert "this folder holds another campaign (its scene differs)" in printed
+    assert "this folder holds another campaign (its scene differs" in printed
+    assert "differs: structure.half_bar = 0.28 instead of 0.2889)" in printed

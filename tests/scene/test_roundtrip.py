@@ -50,7 +50,7 @@ def scene_tables(draw: st.DrawFn) -> dict[str, Any]:
             )
         )  # fmt: skip
 
-    opening = draw(st.floats(0.5, 179.0))
+    opening = draw(st.floats(1.0, 179.0))
     table: dict[str, Any] = {
         "name": draw(st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,20}", fullmatch=True)),
         "title": draw(st.text(st.characters(codec="utf-8"), max_size=40)),

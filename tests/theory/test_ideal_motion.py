@@ -201,7 +201,7 @@ def test_outcome_has_the_shapes_of_the_full_model():
         assert values.shape == tuple(sizes[dim] for dim in VARIABLES[name].dims), name
     assert outcome.fate is Fate.CUT_OFF
     assert value(outcome, "fidelity") == 1
-    assert value(outcome, "asynchrony_max") == 0.0
+    assert not {"asynchrony", "asynchrony_max"} & outcome.values.keys()
 
 
 def test_used_up_rope_is_said():

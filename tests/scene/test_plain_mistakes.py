@@ -1,0 +1,293 @@
+"""Mistakes that a new user makes: one line that names field, value, bound and cure."""
+
+import os
+import pty
+import re
+import subprocess
+import sys
+import termios
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+from ringsim import load_scene, simulate
+from ringsim.cli import VERBS, cli
+from ringsim.dataset import save
+from ringsim.exit_codes import EXIT_BAD_INPUT
+from ringsim.refusal import InputError
+
+CAMPAIGN = """name = "mine"
+scene = "truss2"
+fidelity = "ideal"
+set = { solver.end_time = 0.5 }
+design = { kind = "random", samples = 4 }
+[inputs]
+"structure.corner_mass" = { kind = "normal", mean = 0.02, standard_deviation = 0.001 }
+"""
+
+
+def refused(*arguments: object) -> str:
+    """The one line with which a command is refused."""
+    words = [str(each) for each in arguments]
+    result = CliRunner().invoke(cli, words, standalone_mode=False)  # as the command does
+    assert result.return_value == EXIT_BAD_INPUT, result.output
+    assert result.stdout == ""
+    assert len(result.stderr.splitlines()) == 1, result.stderr
+    return result.stderr.strip()
+
+
+def ringsim(*arguments: object) -> str:
+    result = CliRunner().invoke(cli, [str(each) for each in arguments])
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def test_unknown_verb_is_told_the_nearest() -> None:
+    assert refused("chek", "ring18") == "ringsim chek: there is no such verb (did you mean check?)"
+    assert "known: scenes, check, run" in refused("xyzzy")
+
+
+@pytest.mark.parametrize("verb", ["run", "check", "stability", "accuracy"])
+def test_campaign_file_is_no_scene(verb: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(CAMPAIGN)
+    line = refused(verb, path)
+    assert line.startswith("mine.toml: design: this is a campaign file, not a scene")
+    assert "run it with ringsim campaign" in line
+
+
+def test_scene_file_is_no_campaign(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(load_scene("truss2").to_toml())
+    line = refused("campaign", path)
+    assert line.startswith("mine.toml: structure: this is a scene, not a campaign file")
+    assert 'ringsim run, or name it in a campaign file, as scene = "mine.toml"' in line
+
+
+def test_simulate_takes_a_name_or_a_file(tmp_path: Path) -> None:
+    short = load_scene("truss2").with_values({"solver.end_time": 0.2})
+    path = tmp_path / "short.toml"
+    path.write_text(short.to_toml())
+    expected = simulate(short, "ideal")
+    for given in (path, str(path)):
+        found = simulate(given, "ideal")
+        np.testing.assert_array_equal(found["opening_angle"], expected["opening_angle"])
+
+
+def test_simulate_refuses_what_it_does_not_know() -> None:
+    with pytest.raises(InputError, match="did you mean ring18"):
+        simulate("ring81")
+    with pytest.raises(InputError, match=r'fidelity = "idael": .*did you mean ideal\?'):
+        simulate("truss2", fidelity="idael")
+
+
+def test_angle_in_radians_is_refused_with_the_degrees_it_means() -> None:
+    line = refused("check", "ring18", "--set", "structure.opening_angle=0.35")
+    assert "structure.opening_angle = 0.35 deg must be at least 1 deg" in line
+    assert "write 20.05 if 0.35 rad is meant" in line
+    assert "20.05" in refused("run", "truss2", "--set", "structure.opening_angle=0.35")
+
+
+def test_angle_that_may_be_in_radians_is_remarked() -> None:
+    shown = ringsim("check", "ring18", "--set", "structure.opening_angle=1.5")
+    assert "at 1.5 deg (1.5 rad would be 85.94 deg)" in shown
+    assert "rad" not in ringsim("check", "ring18").partition("initial")[2].splitlines()[0]
+
+
+def test_other_suffix_than_nc_is_refused_before_the_run(tmp_path: Path) -> None:
+    line = refused("run", "truss2", "--out", tmp_path / "t.csv")
+    assert f"{tmp_path / 't.csv'}: " in line
+    assert "must end with .nc: write t.nc" in line
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(InputError, match=r"must end with \.nc"):
+        save(xr.Dataset(), tmp_path / "t.h5")
+
+
+def test_a_run_says_that_it_replaces_a_file(tmp_path: Path) -> None:
+    words = "run", "truss2", "--fidelity", "ideal", "--set", "solver.end_time=0.2", "--out"
+    path = tmp_path / "t.nc"
+    assert f"wrote {path}" in ringsim(*words, path)
+    assert f"replaced {path}" in ringsim(*words, path)
+
+
+def test_ideal_run_tells_no_asynchrony(tmp_path: Path) -> None:
+    dataset = simulate(load_scene("truss2").with_values({"solver.end_time": 0.5}), "ideal")
+    assert "asynchrony" not in dataset
+    assert np.isnan(dataset["asynchrony_max"])
+    words = "run", "truss2", "--fidelity", "ideal", "--set", "solver.end_time=0.2"
+    assert "asynchrony" not in ringsim(*words, "--out", tmp_path / "t.nc")
+
+
+def test_stress_of_a_planar_truss_is_that_of_its_bending_strain() -> None:
+    """Where the strut pushes, both halves of the beam end: the larger of their stresses is at
+    least E times the mean bending strain there, which is recorded by itself."""
+    scene = load_scene("planar-truss").with_values(
+        {
+            "record.stress": True, "rods.damping": 0.0,
+            "solver.end_time": 0.3, "solver.energy_tolerance": 1e3,
+        }
+    )  # fmt: skip
+    run = simulate(scene)
+    assert run["rod_stress"].sizes["rod"] == 3
+    both = run["rod_stress"].sel(rod=["upper_beam_left", "upper_beam_right"])
+    largest = both.max(("rod", "section"))
+    at_strut = run["bending_strain"].sel(station=scene.structure.strut_head, method="nearest")
+    bending = np.abs(at_strut) * scene.rods.young_modulus
+    assert (bending > 0.0).any()
+    assert (largest >= bending * (1.0 - 1e-9)).all()
+
+
+def test_hinge_pulleys_that_coincide_are_refused_before_the_run() -> None:
+    line = refused("run", "truss2", "--set", "structure.hinge_offset=0")
+    assert "structure.hinge_offset = 0.0 m must be at least 1e-06 m with cables" in line
+
+
+def test_key_of_another_kind_is_told_from_a_misspelt_one() -> None:
+    line = refused("check", "planar-truss", "--set", "structure.kind=pantograph-ring")
+    assert 'structure.beam_length is not a known key (kind = "planar-truss" has it' in line
+    assert 'structure = { kind = "pantograph-ring" }' in line
+    line = refused("check", "ring18", "--set", "structure.kind=planar-truss")
+    assert '(kind = "pantograph-ring" has it, "planar-truss" has not' in line
+
+
+def test_changed_distribution_is_told_with_its_input(tmp_path: Path) -> None:
+    path, out = tmp_path / "mine.toml", tmp_path / "out"
+    path.write_text(CAMPAIGN)
+    ringsim("campaign", path, "--workers", 0, "--out", out)
+    path.write_text(CAMPAIGN.replace("mean = 0.02", "mean = 0.021"))
+    line = refused("campaign", path, "--workers", 0, "--out", out)
+    assert "inputs.structure.corner_mass: mean = 0.021 instead of 0.02" in line
+    assert "--out" in line
+    path.write_text(CAMPAIGN.replace("end_time = 0.5", "end_time = 0.6"))
+    line = refused("campaign", path, "--workers", 0, "--out", out)
+    assert "its scene differs: solver.end_time = 0.6 instead of 0.5" in line
+
+
+@pytest.mark.parametrize(
+    ("assignment", "named"),
+    [
+        ("end_time=3", "end_time is not a known key (did you mean solver.end_time?)"),
+        ("stiffness=3", "(did you mean stop.stiffness or net.stiffness or "),
+        ("solver.end_time=0,5", 'solver.end_time = "0,5" must be a finite number in s, without '
+         "quotes: write 0.5"),
+        ("solver.end_time=3s", "without quotes: write 3"),
+        ("solver.end_time=long", 'solver.end_time = "long" must be a finite number in s, without '),
+        ("structure.closed=True", 'structure.closed = "True" must be true or false, without '
+         "quotes: write true"),
+        ("structure.closed=no", "write false"),
+        ("boom=false", 'below it kind = "flexible" or "rigid", or boom = "none" to leave it out'),
+        ("rods=ancf", 'rods = "ancf" must be a table: write [rods], and below it kind = "ancf"'),
+        ("cables.upper.axial_stiffness=1e5", "cables.upper.winch is missing: give it a table"),
+        ("cables.upper.winch.start_time=3", "cables.upper.winch.winding is missing: give it a "
+         "table with its kind, one of constant, ramp,"),
+        ('faults={kind="stuck-vjoint",section=3}', "must be a list of tables: write [[faults]]"),
+    ],
+)  # fmt: skip
+def test_plausible_assignments_are_told_what_they_mean(assignment: str, named: str) -> None:
+    assert named in refused("check", "ring18", "--set", assignment)
+
+
+@pytest.mark.parametrize(
+    ("lines", "named"),
+    [
+        ('"loads.force" = { mean = 0.01, standard_deviation = 0.001 }',
+         "inputs.loads.force.kind is missing: say which kind it is"),
+        ("loads.force = { mean = 0.01, standard_deviation = 0.001 }",
+         "inputs.loads.force.kind is missing: say which kind it is"),
+        ('"loads.force" = 0.02', "inputs.loads.force = 0.02 must be a table"),
+        ('"force" = { kind = "uniform", low = 0.01, high = 0.02 }', "did you mean loads.force?"),
+        ("[set]\nworkers = 2", "workers is not a known key"),
+    ],
+)  # fmt: skip
+def test_plausible_campaigns_are_told_what_is_missing(
+    lines: str, named: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.toml"
+    start = CAMPAIGN.partition("[inputs]")[0].replace("set = { solver.end_time = 0.5 }\n", "")
+    path.write_text(f"{start.replace('truss2', 'ring18')}[inputs]\n{lines}\n")
+    assert named in refused("campaign", path, "--workers", 0, "--out", tmp_path / "out")
+
+
+def test_keys_that_belong_elsewhere_in_a_campaign_file(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    for line, named in (("samples = 4", "did you mean design.samples?"),
+                        ("workers = 2", "ringsim campaign FILE --workers N")):  # fmt: skip
+        path.write_text(f"{line}\n{CAMPAIGN}")
+        assert named in refused("campaign", path)
+
+
+@pytest.mark.parametrize("verb", ["run", "check", "campaign"])
+def test_a_result_is_no_input(verb: str, tmp_path: Path) -> None:
+    path = tmp_path / "old.nc"
+    save(xr.Dataset({"a": ("x", np.arange(3.0))}), path)
+    line = refused(verb, path)
+    assert line.startswith("old.nc: this is a netCDF file, not a text: give the TOML file")
+
+
+def test_places_without_a_campaign_are_told_apart(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(CAMPAIGN)
+    for verb, place, named in (
+        ("status", file, "this is a file"),
+        ("merge", tmp_path / "nowhere", "there is no such folder"),
+        ("status", tmp_path, "no campaign in this folder: design.nc is not there"),
+    ):
+        line = refused(verb, place)
+        assert f"{place}: {named}: give the folder that ringsim campaign named" in line
+    assert "there is no such file" in refused("campaign", tmp_path / "nowhere.toml")
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("run", "truss2", "--accuracy", "1%"), "'1%' is not a valid number"),
+        (("campaign", "a.toml", "--workers", "many"), "'many' is not a valid whole number"),
+        (("check", "truss2", "--deploys-in", "-3"), "'--deploys-in': -3.0 is not in the range x>0"),
+    ],
+)
+def test_bad_numbers_of_options_are_told_in_english(words: tuple[str, ...], named: str) -> None:
+    command = [sys.executable, "-m", "ringsim", *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == EXIT_BAD_INPUT
+    assert named in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("verb", ["", *VERBS])
+def test_help_reads_as_english(verb: str) -> None:
+    text = ringsim(*verb.split(), "--help")
+    assert "``" not in text
+    assert not re.search(r"\b(TEXT|PATH|INTEGER|FLOAT|RANGE)\b(?!=)", text)
+
+
+def terminal(*arguments: str) -> str:
+    """What a command writes to stderr where that is a terminal."""
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(theirs, (24, 110))
+    command = [sys.executable, "-m", "ringsim", *arguments]
+    with subprocess.Popen(command, stderr=theirs, stdout=subprocess.DEVNULL) as process:
+        os.close(theirs)
+        told = b""
+        try:
+            while more := os.read(ours, 65536):
+                told += more
+        except OSError:  # how Linux says that the other side is closed
+            pass
+        finally:
+            os.close(ours)
+        assert process.wait() == 0
+    return told.decode()
+
+
+def test_a_run_on_a_terminal_shows_its_progress(tmp_path: Path) -> None:
+    words = "run", "truss2", "--set", "solver.end_time=0.5", "--out", str(tmp_path / "t.nc")
+    told = terminal(*words)
+    assert "of 0.5 s" in told
+    assert "0 of 4 V-joints locked" in told
+    quiet = subprocess.run(
+        [sys.executable, "-m", "ringsim", *words], capture_output=True, text=True, check=True
+    )
+    assert quiet.stderr == ""
