@@ -7,15 +7,17 @@ from typing import Any
 import click
 
 from ringsim.campaign.folder import prepare_folder
+from ringsim.campaign.retry import FAILED, check_settings
 from ringsim.campaign.run import Choices, Share, run_campaign
 from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.campaign.status import plan
-from ringsim.cli.options import PATH
+from ringsim.cli.options import PATH, SETTINGS
 from ringsim.execution.local import Local, Serial
 from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.work import Scheduler
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.refusal import InputError
+from ringsim.variables import Status
 
 
 @click.command()
@@ -26,12 +28,16 @@ from ringsim.refusal import InputError
 )  # fmt: skip
 @click.option("--out", type=PATH, help="Folder (default runs/NAME).")
 @click.option("--part", default="1/1", help="Run only the i-th of n shares of the samples: i/n.")
-@click.option("--retry-failed", is_flag=True, help="Run the failed samples again, too.")
+@click.option(
+    "--retry-failed", is_flag=True,
+    help="Run the failed samples again, too; with --set only these, with other solver settings.",
+)  # fmt: skip
+@SETTINGS
 @click.option("--dry-run", is_flag=True, help="Show plan and predicted cost; keep nothing.")
 @click.option("--solver", default="", hidden=True)
 def command(
     file: Path, workers: int | None, out: Path | None, part: str, *, retry_failed: bool,
-    dry_run: bool, solver: str,
+    settings: dict[str, Any], dry_run: bool, solver: str,
 ) -> int:  # fmt: skip
     """Run the campaign of FILE; the same command again goes on with what is missing.
 
@@ -48,6 +54,12 @@ def command(
                 "process: leave out --workers"
             )
         campaign, share = load_campaign(file), Share.parse(part)
+        if settings and not retry_failed:
+            raise InputError(
+                f"--set {next(iter(settings))}: give it under [set] of {file.name}, or with "
+                "--retry-failed, for the failed samples alone"
+            )
+        check_settings(campaign.scene, settings)
         wanted = campaign.specification
         folder, name = out or Path("runs") / wanted.name, solver or SOLVERS[wanted.fidelity]
         if dry_run:
@@ -56,7 +68,8 @@ def command(
                 click.echo(line)
         else:
             prepare_folder(campaign, folder, solver=name)
-        return folder, (wanted.limits, wanted.max_failed, share, retry_failed)
+        again = FAILED if retry_failed else frozenset[Status]()
+        return folder, (wanted.limits, wanted.max_failed, share, again, settings)
 
     if dry_run:
         prepare()
