@@ -114,6 +114,7 @@ def _decisive(table: Table, attributes: dict[str, Any]) -> dict[str, Any]:
         "its scene": attributes["scene"],
         "its seed": int(attributes["seed"]),
         "the version of ringsim": attributes["ringsim_version"],
+        "the version of exudyn": attributes["exudyn_version"],
         "its inputs": [column.path for column in table.columns],
         "its solver": attributes["solver"],
     }
@@ -127,7 +128,7 @@ def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Fold
     held = _decisive(old.table, old.attributes)
     mine = {
         "scene": campaign.scene.to_toml(), "seed": campaign.specification.seed, "solver": solver,
-        "ringsim_version": version("ringsim"),
+        **{f"{name}_version": version(name) for name in ("ringsim", "exudyn")},
     }  # fmt: skip
     wanted = _decisive(table, mine)
     what = " and ".join(word for word in wanted if wanted[word] != held[word])
