@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.ladder import Rung, references
+from ringsim.variables import GOALS
 
 Array = NDArray[np.float64]
 OUTPUTS = {
@@ -122,7 +123,7 @@ class Errors:
     def __init__(self, results: xr.Dataset, rungs: Sequence[Rung]) -> None:
         """Compare results over ``rung``; raises ValueError if too few references ended well."""
         self.results, self._rungs = results, rungs
-        self.good = (results.status == 0).to_numpy()
+        self.good = ((results.status == 0) & results.outcome.isin(GOALS)).to_numpy()
         self._in_time, self._in_space = references(rungs, self.good)
         places = self._in_time + self._in_space
         ends = results[["deployment_time", "final_time"]].isel(rung=places).min(skipna=False)

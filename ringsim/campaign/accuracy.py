@@ -16,7 +16,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 from ringsim.theory.one_coordinate import OneCoordinate, opening_time
-from ringsim.variables import Status
+from ringsim.variables import GOALS, Fate, Status
 
 _STEP_LIMIT = 1_000_000
 """Steps of one rung: its time is limited instead."""
@@ -53,13 +53,11 @@ def run_ladder(
     for stage, places in (("first", in_time[:1]), ("reference", in_time + in_space)):
         own = [rungs[k] for k in places]
         found = study.run(stage, own)
-        ends = zip(places, found.status.values, found.reason.values, strict=True)
-        failed |= {k: _failure(rungs[k], code, why) for k, code, why in ends if code != Status.OK}
+        failed |= {places[k]: told for k, told in _failures(own, found).items()}
         _require_references(rungs, failed)
     remarks += [f"{told}; the reference is made of other runs" for told in failed.values()]
     results = study.run("settings", rungs)
-    ends = zip(range(len(rungs)), results.status.values, results.reason.values, strict=True)
-    failed |= {k: _failure(rungs[k], code, why) for k, code, why in ends if code != Status.OK}
+    failed |= _failures(rungs, results)
     _require_references(rungs, failed)
     truths = _quadrature(scene)
     if (ideal := study.ideal()) is not None:
@@ -74,10 +72,17 @@ def run_ladder(
     return judged.assign_attrs(remarks="\n".join(f"- {each}" for each in remarks))
 
 
-def _failure(rung: Rung, code: int, reason: str) -> str:
-    settings = ", ".join(f"{path} = {value}" for path, value in rung.values.items())
-    why = reason or "no reason given"
-    return f"the reference run with {settings} ended as {Status(code).word}: {why}"
+def _failures(rungs: Sequence[Rung], found: xr.Dataset) -> dict[int, str]:
+    """How each of the runs ended that cannot be a reference, by its place."""
+    told = {}
+    ends = zip(*(found[name].values for name in ("status", "outcome", "reason")), strict=True)
+    for k, (code, fate, reason) in enumerate(ends):
+        if fate not in GOALS:
+            word = (Fate(int(fate)) if code == Status.OK else Status(code)).word
+            settings = ", ".join(f"{path} = {value}" for path, value in rungs[k].values.items())
+            why = reason or "no reason given"
+            told[k] = f"the reference run with {settings} ended as {word}: {why}"
+    return told
 
 
 def _require_references(rungs: Sequence[Rung], failed: dict[int, str]) -> None:

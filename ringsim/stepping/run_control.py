@@ -16,9 +16,12 @@ from ringsim.stepping.instant import Instant, Scales
 from ringsim.stepping.locks import Locks, Overrun, StopContact, lock_times
 from ringsim.stepping.motion_steps import DeviationSteps, MotionSteps
 from ringsim.stepping.repeats import EnergyImbalance, Indicator, TensionBend
-from ringsim.stepping.rest import Rest
+from ringsim.stepping.rest import MOVED, Rest
 from ringsim.variables import Cause, Fate, Reason, Status
 
+_TOLD = 0.2
+"""Share of ``limits.overrun`` from which a run tells how far a V-joint was past its stop: 2 deg by
+default, twice what the hardest impacts of the benchmarks' random rings reach."""
 _ROUND_OFF = 1e-12
 """Relative difference of two times that are the same."""
 
@@ -45,7 +48,8 @@ class RunControl:
         with ``follow_deviations`` steps resolve how the joints deviate from their mean angle.
         """
         self.now, self._solver, self._locks, self._limits = start, solver, locks, limits
-        self._rest, self._farthest = Rest(start, solver.end_time), Overrun()
+        self._rest = Rest(start, solver.end_time, scales.energy)
+        self._farthest = Overrun()
         self._roped = scales.slack_tension is not None
         self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, locks is None)
         self._indicators: list[Indicator] = []
@@ -61,7 +65,7 @@ class RunControl:
         self._guard = Guard(solver, scales)
         self._shorter: float | None = None
         self._count, self.repeats, self._settled_at = 0, 0, math.inf
-        self.status, self.fate, self.reason = Status.OK, Fate.UNKNOWN, Reason()
+        self.status, self.fate, self.reason = Status.OK, Fate.NONE, Reason()
         self.goes_on = True
         self._watch()
 
@@ -126,7 +130,7 @@ class RunControl:
 
     def diverge(self, reason: Reason) -> None:
         """End a run that cannot be sound."""
-        self.status, self.fate, self.reason = Status.DIVERGED, Fate.UNKNOWN, reason
+        self.status, self.fate, self.reason = Status.DIVERGED, Fate.NONE, reason
         self.goes_on = False
 
     def conclude(self) -> None:
@@ -135,6 +139,16 @@ class RunControl:
         if refused and self.status == Status.OK:
             self.diverge(refused)
         self.reason += "".join(indicator.note() for indicator in self._indicators)
+        past = self._farthest
+        if (
+            self.status == Status.OK
+            and past.angle > _TOLD * self._limits.farthest
+            and (self.fate != Fate.OVERLOADED)
+        ):
+            self.reason += (
+                f"; V-joint {past.joint} was up to {math.degrees(past.angle):.3g} deg past its "
+                f"stop, at {past.time:.6g} s (limits.overrun = {self._limits.overrun:g} deg)"
+            )
 
     def _contact(self, at: Instant) -> StopContact:
         return StopContact() if self._locks is None else self._locks.contact(at)
@@ -180,7 +194,9 @@ class RunControl:
             some = locks.deployed.any()
             self._end(
                 Fate.PARTLY_DEPLOYED if some else Fate.STALLED,
-                f"came to rest with {locks.missing()}: nothing drives it any more",
+                f"came to rest with {locks.missing()}: no winch turns, and within "
+                f"{self._rest.window:.3g} s no V-joint has moved by more than "
+                f"{math.degrees(MOVED):.2g} deg",
             )
         elif self._count >= solver.step_limit:
             self._give_up(

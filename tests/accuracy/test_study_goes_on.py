@@ -42,11 +42,15 @@ def study(tmp_path, monkeypatch):
             for case in cases:
                 exact, bad = scene.with_values(dict(case)), [f for f in failing if f == dict(case)]
                 good = dict.fromkeys(NEEDED, 1.0) | {
-                    "deployment_time": model(exact), "final_time": 12.0, "status": 0,
+                    "deployment_time": model(exact), "final_time": 12.0, "status": 0, "outcome": 1,
                     "cpu_time": 1.0 / exact.solver.tolerance, "reason": "fine",
                 }  # fmt: skip
                 missing = dict.fromkeys(NEEDED, np.nan)
-                late = missing | {"status": int(Status.TIMEOUT), "reason": "took too long"}
+                late = missing | {
+                    "status": int(Status.TIMEOUT),
+                    "outcome": -1,
+                    "reason": "took too long",
+                }
                 rows.append(late if bad else good)
             names = ["deployment_time", "reason", *set(NEEDED) - {"opening_angle", "asynchrony"}]
             found = xr.Dataset({n: ("sample", [row[n] for row in rows]) for n in names})
