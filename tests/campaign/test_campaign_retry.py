@@ -62,6 +62,14 @@ def test_samples_that_have_not_run_are_left_to_the_plain_command(bench):
     assert bench.result("out").overrides.values.tolist() == ["", WORDS, ""]
 
 
+def test_all_ranks_run_with_the_other_settings(bench, mpi):
+    bench.write_listed([12, 12, 12, 12, 30, 12])
+    poisoned(bench)
+    bench.run(*START, *BETTER, ranks=2, solver="fake_solver:poisoned")
+    assert bench.result("out").status.values.tolist() == [0] * 6
+    assert bench.result("out").overrides.values.tolist() == [WORDS] * 4 + ["", WORDS]
+
+
 def test_nothing_failed_nothing_runs(bench):
     bench.write_listed([30, 30])
     poisoned(bench)
