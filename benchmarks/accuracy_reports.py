@@ -3,23 +3,47 @@
 Run: python benchmarks/accuracy_reports.py [scene ...]
 
 Writes docs/accuracy/SCENE.md and .png, and ringsim/scenes/evidence/SCENE.toml.  A study that was
-interrupted goes on from runs/accuracy-SCENE; delete that folder after changing the engine.
+interrupted goes on from runs/accuracy-SCENE, and begins anew if the engine has changed since.
 """
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 from ringsim.scene import builtin_scenes
 
 ROOT = Path(__file__).parents[1]
+READERS = {"analysis", "campaign", "cli", "execution", "plots", "sampling", "scenes", "storage"}
+"""Rooms without an effect on the numbers of a run."""
+
+
+def engine() -> str:
+    """A digest of all code that decides about the numbers of a run."""
+    found = hashlib.sha256(version("exudyn").encode())
+    for path in sorted((ROOT / "ringsim").rglob("*.py")):
+        if path.relative_to(ROOT / "ringsim").parts[0] not in READERS:
+            found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+def fresh(folder: Path) -> Path:
+    """The folder, without what another engine left there."""
+    mark = folder / "engine.txt"
+    if folder.exists() and (not mark.exists() or mark.read_text() != engine()):
+        print(f"{folder}: the engine has changed: the study begins anew", flush=True)
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    mark.write_text(engine())
+    return folder
 
 
 def remake(name: str) -> None:
-    folder = ROOT / "runs" / f"accuracy-{name}"
+    folder = fresh(ROOT / "runs" / f"accuracy-{name}")
     command = [sys.executable, "-m", "ringsim", "accuracy", name, "--out", str(folder)]
     subprocess.run(command, check=True)
     docs, evidence = ROOT / "docs" / "accuracy", ROOT / "ringsim" / "scenes" / "evidence"

@@ -1,6 +1,6 @@
 """What a campaign costs beside the simulations: overhead, efficiency, memory, many ranks.
 
-python benchmarks/campaign_overhead.py [overhead] [efficiency] [scheduler] [large] [ranks]
+python benchmarks/campaign_overhead.py [overhead] [efficiency] [scheduler] [look] [large] [ranks]
 
 Figures depend on what else the machine does: the load is printed with them.
 """
@@ -17,6 +17,11 @@ import time
 from pathlib import Path
 
 import netCDF4
+import numpy as np
+
+from ringsim.storage.journal import FOLDER, Journal, survey
+from ringsim.storage.result import Result, pack
+from ringsim.variables import Status
 
 HERE = Path(__file__).parent
 CAMPAIGN = """
@@ -159,6 +164,32 @@ def large():
     )
 
 
+def look():
+    """Looking at the journals for the first time, and once more."""
+    samples, times, angles = 4000, np.linspace(0.0, 60.0, 601), np.linspace(30.0, 180.0, 601)
+    noise = np.random.default_rng(1).normal(size=(2, 18, 601))
+    arrays = {"plane": np.array(["upper", "lower"]), "section": np.arange(1, 19), "time": times}
+    form, body = pack(arrays | {"opening_angle": angles + noise})
+    with tempfile.TemporaryDirectory(prefix="ringsim-bench-") as name:
+        folder = Path(name)
+        (folder / FOLDER).mkdir()
+        journal = Journal(folder, "bench", "all-rank0")
+        for k in range(samples):
+            journal.append(Result(k, Status.OK, "locked", seconds=1.0, form=form, body=body))
+        journal.close()
+        spent = []
+        for _ in range(2):
+            begin = time.perf_counter()
+            assert len(survey(folder, "bench", samples).missing) == 0
+            spent.append(time.perf_counter() - begin)
+        size = journal.path.stat().st_size
+    print(
+        f"journals of {samples} samples ({size / 1e6:.0f} MB) looked through in {spent[0]:.3f} s, "
+        f"once more in {spent[1]:.4f} s: {spent[0] / spent[1]:.0f} times faster",
+        flush=True,
+    )
+
+
 def ranks():
     wall, used, _ = run(1280, 1.0, "asleep", ranks=64)
     print(
@@ -168,7 +199,7 @@ def ranks():
     )
 
 
-ALL = {f.__name__: f for f in (overhead, efficiency, scheduler, large, ranks)}
+ALL = {f.__name__: f for f in (overhead, efficiency, scheduler, look, large, ranks)}
 
 if __name__ == "__main__":
     for name in sys.argv[1:] or ALL:

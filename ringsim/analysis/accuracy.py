@@ -58,7 +58,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     Raises
     ------
     ValueError
-        If one of the references did not end well.
+        If too few runs for a reference ended well.
     """
     errors = Errors(results, rungs)
     error = np.array(list(errors.of.values())).T

@@ -43,7 +43,8 @@ def tables(found: xr.Dataset, title: str) -> str:
     ``found`` is from :func:`ringsim.analysis.accuracy.judge`; ``title`` is the heading.
     """
     single = found.drop_sel(output=list(GROUPS), errors="ignore")
-    parts = [f"# {title}", _ADVICE, _advice(found), _COSTS, _errors(single)]
+    parts = [f"# {title}", *filter(None, [found.attrs.get("remarks")])]
+    parts += [_ADVICE, _advice(found), _COSTS, _errors(single)]
     parts += [_ORDERS, _orders(single)]
     if "from_truth" in found:
         parts += [_TRUTHS, _truths(found)]

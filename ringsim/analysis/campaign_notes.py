@@ -32,6 +32,19 @@ def budget_lines(campaign: xr.Dataset) -> list[str]:
     return lines
 
 
+def override_lines(campaign: xr.Dataset) -> list[str]:
+    """A line for each other setting with which samples were run that had failed before."""
+    if "overrides" not in campaign:
+        return []
+    texts, status = campaign["overrides"].to_numpy(), campaign["status"].to_numpy()
+    return [
+        f"{len(own)} of {len(texts)} samples were run again with {text} (overrides): "
+        f"{int((own == 0).sum())} ok"
+        for text in sorted(set(texts) - {""})
+        for own in [status[texts == text]]
+    ]
+
+
 def restart_lines(campaign: xr.Dataset) -> list[str]:
     """One line if samples were restarted with smaller steps (``restarts`` above 0), else none."""
     known = {"restarts", "steps", "total_steps"} <= set(campaign.data_vars)

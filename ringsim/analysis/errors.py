@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.ladder import Rung, references
+from ringsim.variables import GOALS
 
 Array = NDArray[np.float64]
 OUTPUTS = {
@@ -55,8 +56,11 @@ def limit(values: xr.DataArray) -> Limit:
     """Limit of three levels along ``rung``, each with steps (or elements) half as long.
 
     The uncertainty is all that was extrapolated, and at least what second order would leave of
-    the first change: two fine runs may agree by chance.
+    the first change: two fine runs may agree by chance.  Of two levels nothing is extrapolated.
     """
+    if values.sizes["rung"] == 2:
+        finer = values.isel(rung=1, drop=True)
+        return Limit(finer, float(abs(values.diff("rung")).max()))
     coarse, middle, fine = (values.isel(rung=k, drop=True) for k in range(3))
     first, last = middle - coarse, fine - middle
     before, now = float(abs(first).max()), float(abs(last).max())
@@ -70,8 +74,11 @@ def limit(values: xr.DataArray) -> Limit:
 
 
 def reference(in_time: xr.DataArray, in_space: xr.DataArray) -> Limit:
-    """Limit of three levels of steps, and what three levels of elements change, along ``rung``."""
-    steps, elements = limit(in_time), limit(in_space)
+    """Limit of three levels of steps, and what levels of elements change, along ``rung``.
+
+    Of the elements the last three levels are extrapolated; the first has those of ``in_time``.
+    """
+    steps, elements = limit(in_time), limit(in_space.isel(rung=slice(-3, None)))
     more = elements.value - in_space.isel(rung=0, drop=True)
     return Limit(steps.value + more, steps.uncertainty + elements.uncertainty)
 
@@ -114,13 +121,11 @@ class Errors:
     """
 
     def __init__(self, results: xr.Dataset, rungs: Sequence[Rung]) -> None:
-        """Compare results over ``rung``; raises ValueError if a reference run did not end well."""
+        """Compare results over ``rung``; raises ValueError if too few references ended well."""
         self.results, self._rungs = results, rungs
-        self._in_time, self._in_space = references(rungs)
+        self.good = ((results.status == 0) & results.outcome.isin(GOALS)).to_numpy()
+        self._in_time, self._in_space = references(rungs, self.good)
         places = self._in_time + self._in_space
-        self.good = (results.status == 0).to_numpy()
-        if not self.good[places].all():
-            raise ValueError("a reference run did not end well")
         ends = results[["deployment_time", "final_time"]].isel(rung=places).min(skipna=False)
         deployed = float(ends.deployment_time)
         self._end = float(ends.final_time) if np.isnan(deployed) else deployed
@@ -191,8 +196,8 @@ class Errors:
                     if name not in ("elements", "formulation"):
                         error = np.where(self.good, largest(values - steps.value), np.nan)
                         found[row, column] = slope(sizes, error[own], steps.uncertainty)
-                    elif self.good[own].all():
-                        found[row, column] = order(values.isel(rung=own), steps.uncertainty)
+                    elif self.good[own[-3:]].all():
+                        found[row, column] = order(values.isel(rung=own[-3:]), steps.uncertainty)
         return list(ladders), found
 
 

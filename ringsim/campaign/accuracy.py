@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.accuracy import NEEDED, Truth, judge
-from ringsim.analysis.ladder import PATHS, Rung, ladder, references, standing
+from ringsim.analysis.ladder import PATHS, Rung, ladder, left_out, references, standing
 from ringsim.campaign.cases import run_cases
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError
@@ -26,37 +26,39 @@ class ReferenceRunError(Exception):
     """A scene has no reference to compare with: its message names setting, reason and cure."""
 
 
-def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.Dataset:
+def run_ladder(
+    folder: Path, scene: Scene, workers: int, timeout: float, most_elements: int = 4
+) -> xr.Dataset:
     """Errors and cost of all settings of a scene's ladder (``judge``).
 
     A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
     cheapest run of the reference goes first, then the whole reference, then the rest, so that a
     scene which cannot be studied costs little.  The ideal fidelity is a setting too, where it can
-    represent the scene.  ``folder`` holds the campaigns, and a study that was interrupted goes on;
-    ``timeout`` is the longest time of one rung, s.  InputError if the scene is refused,
-    ReferenceRunError if a reference run does not end well.
+    represent the scene.  ``folder`` holds the campaigns, and a study that was interrupted goes on,
+    also with rungs that took longer than ``timeout``, the longest time of one rung, s;
+    ``most_elements`` (4 or 8) is how many times more than the scene's are tried.  What the study
+    had to do without is in the attribute ``remarks``.  InputError if the scene is refused,
+    ReferenceRunError if too few runs for a reference end well.
     """
     plain = {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
     scene = scene.with_values(plain)
-    study = _Study(scene, partial(run_cases, folder, workers=workers, timeout=timeout))
-    rungs = ladder(scene)
+    remarks = left_out(scene)
+    late = frozenset({Status.TIMEOUT})
+    study = _Study(scene, partial(run_cases, folder, workers=workers, timeout=timeout, again=late))
+    rungs = ladder(scene, most_elements)
     for rung in rungs:
         scene.with_values(dict(rung.values))  # refused before anything has run
     in_time, in_space = references(rungs)
+    failed: dict[int, str] = {}
     for stage, places in (("first", in_time[:1]), ("reference", in_time + in_space)):
         own = [rungs[k] for k in places]
         found = study.run(stage, own)
-        ends = [found[name].values for name in ("status", "outcome", "reason")]
-        for rung, code, fate, reason in zip(own, *ends, strict=True):
-            if fate not in GOALS:
-                word = (Fate(int(fate)) if code == Status.OK else Status(code)).word
-                settings = ", ".join(f"{path} = {value}" for path, value in rung.values.items())
-                raise ReferenceRunError(
-                    f"the reference run with {settings} ended as {word}: "
-                    f"{reason or 'no reason given'}: change the scene so that it ends well with "
-                    "fine steps, or give it more time (--timeout) in a new folder"
-                )
+        failed |= {places[k]: told for k, told in _failures(own, found).items()}
+        _require_references(rungs, failed)
+    remarks += [f"{told}; the reference is made of other runs" for told in failed.values()]
     results = study.run("settings", rungs)
+    failed |= _failures(rungs, results)
+    _require_references(rungs, failed)
     truths = _quadrature(scene)
     if (ideal := study.ideal()) is not None:
         results = xr.concat([ideal, results], "rung")
@@ -66,7 +68,32 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
             mean = ideal.opening_angle.isel(rung=0).mean(("plane", "section")).to_numpy()
             truths.append(Truth("deployment_time", source, ideal.deployment_time.item()))
             truths.append(Truth("opening_angle", f"{source}, mean angle", mean))
-    return judge(results, rungs, truths)
+    judged = judge(results, rungs, truths)
+    return judged.assign_attrs(remarks="\n".join(f"- {each}" for each in remarks))
+
+
+def _failures(rungs: Sequence[Rung], found: xr.Dataset) -> dict[int, str]:
+    """How each of the runs ended that cannot be a reference, by its place."""
+    told = {}
+    ends = zip(*(found[name].values for name in ("status", "outcome", "reason")), strict=True)
+    for k, (code, fate, reason) in enumerate(ends):
+        if fate not in GOALS:
+            word = (Fate(int(fate)) if code == Status.OK else Status(code)).word
+            settings = ", ".join(f"{path} = {value}" for path, value in rungs[k].values.items())
+            why = reason or "no reason given"
+            told[k] = f"the reference run with {settings} ended as {word}: {why}"
+    return told
+
+
+def _require_references(rungs: Sequence[Rung], failed: dict[int, str]) -> None:
+    """Raise ReferenceRunError if without the rungs that failed too few are left to compare with."""
+    try:
+        references(rungs, [k not in failed for k in range(len(rungs))])
+    except ValueError:
+        raise ReferenceRunError(
+            f"{next(iter(failed.values()))}: change the scene so that it ends well with fine "
+            "steps, or give it more time (--timeout)"
+        ) from None
 
 
 @dataclass

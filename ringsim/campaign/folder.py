@@ -14,7 +14,7 @@ from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError, show
 from ringsim.sampling.columns import Table
 from ringsim.scene import Scene, scene_from_toml
-from ringsim.storage.journal import FOLDER, Survey, survey
+from ringsim.storage.journal import FOLDER, DamagedError, Survey, survey
 from ringsim.storage.locks import GO_ON, locked, tries
 from ringsim.storage.merge import NAME as MERGED
 from ringsim.storage.merge import write_merged
@@ -116,6 +116,7 @@ def _decisive(table: Table, attributes: dict[str, Any]) -> dict[str, Any]:
         "its scene": attributes["scene"],
         "its seed": int(attributes["seed"]),
         "the version of ringsim": attributes["ringsim_version"],
+        "the version of exudyn": attributes["exudyn_version"],
         "its inputs": [column.path for column in table.columns],
         "its solver": attributes["solver"],
     }
@@ -129,7 +130,7 @@ def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Fold
     held = _decisive(old.table, old.attributes)
     mine = {
         "scene": campaign.scene.to_toml(), "seed": campaign.specification.seed, "solver": solver,
-        "ringsim_version": version("ringsim"),
+        **{f"{name}_version": version(name) for name in ("ringsim", "exudyn")},
     }  # fmt: skip
     wanted = _decisive(table, mine)
     what = " and ".join(word for word in wanted if wanted[word] != held[word])
@@ -174,18 +175,23 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
     Returns the number of samples left, of failed ones, and the file, or None if it is not written.
     InputError if the folder cannot be written to.
     """
-    path = campaign.path / MERGED
+    path, design = campaign.path / MERGED, campaign.attributes
+    made = provenance(name=design["campaign_name"], title=design["title"], action="merged")
+    attributes = made | {name: design[name] for name in _KEPT} | {"execution": execution}
+    attributes["history"] += f"\n{design['history']}"
+    output = OutputTable.model_validate_json(design["output"])
     with writing(path, GO_ON), locked(campaign.path / "lock-merge", wait=True):
         for draft in campaign.path.glob(f".{MERGED}.*{DRAFT}"):
             draft.unlink(missing_ok=True)
-        found = campaign.survey()
-        left, failed = len(found.missing), len(found.failed)
-        if left and not partly:
-            return left, failed, None
-        design = campaign.attributes
-        made = provenance(name=design["campaign_name"], title=design["title"], action="merged")
-        attributes = made | {name: design[name] for name in _KEPT} | {"execution": execution}
-        attributes["history"] += f"\n{design['history']}"
-        output = OutputTable.model_validate_json(design["output"])
-        failed += write_merged(campaign.path, found, campaign.table, output, attributes)
+        for whole in (False, True):
+            found = campaign.survey()
+            left, failed = len(found.missing), len(found.failed)
+            if left and not partly:
+                return left, failed, None
+            try:
+                failed += write_merged(campaign.path, found, campaign.table, output, attributes)
+                break
+            except DamagedError:
+                if whole:
+                    raise
     return left, failed, path

@@ -2,14 +2,15 @@
 
 import contextlib
 import sys
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import budget_lines, restart_lines
+from ringsim.analysis.campaign_notes import budget_lines, override_lines, restart_lines
 from ringsim.campaign.folder import Folder, merge, open_folder
 from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
 from ringsim.execution.work import Limits, Scheduler, Work, longest_first, relative_cost
@@ -17,6 +18,7 @@ from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.refusal import InputError
 from ringsim.storage.journal import Journal
 from ringsim.storage.locks import reserved
+from ringsim.variables import Status
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,10 @@ class Choices:
     max_failed: int | None = None
     """Failures that are tolerated, in the whole campaign; None for any number."""
     share: Share = Share()
-    retry_failed: bool = False
+    again: frozenset[Status] = frozenset()
+    """Samples that ended so run again, too."""
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+    """Settings by scene path with which those run, and nothing else does."""
 
 
 def run_campaign(folder: Path, choices: Choices) -> int:
@@ -89,9 +94,11 @@ def _run_missing(campaign: Folder, choices: Choices, stop: StopRequest) -> None:
     scheduler = choices.scheduler
     writer = f"{choices.share.writer}-rank{scheduler.rank}"
     journal = Journal(campaign.path, campaign.attributes["identity"], writer)
+    own = dict(choices.overrides)
     work = Work(
         solver=campaign.attributes["solver"], scene=campaign.scene.to_table(),
-        values_of=campaign.table.values_of, limits=choices.limits, keep=journal.append,
+        values_of=lambda sample: campaign.table.values_of(sample) | own, limits=choices.limits,
+        keep=lambda result: journal.append(replace(result, overrides=own)),
         stop=lambda: stop.reason,
     )  # fmt: skip
     samples: list[int] = []
@@ -121,16 +128,17 @@ def _watched(
 ) -> tuple[list[int], Progress, Work]:
     """The samples to run, longest ones first, and the work with somebody who watches it."""
     share, most = choices.share, choices.max_failed
-    before = campaign.survey()
-    missing, failed = before.missing, before.failed
-    if choices.retry_failed:
-        missing, failed = np.union1d(missing, failed), failed[:0]
+    before, every = campaign.survey(), np.arange(campaign.table.samples)
+    again = every[np.isin(before.status, list(choices.again))]
+    failed, open_ = np.setdiff1d(before.failed, again), np.union1d(before.missing, again)
+    if choices.overrides and not len(again):
+        _tell("no sample has failed: nothing is run again")
+    missing = again if choices.overrides else open_
     missing, mine = missing[share.holds(missing)], int(share.holds(failed).sum())
-    total = int(share.holds(np.arange(campaign.table.samples)).sum())
+    done, total = (int(share.holds(each).sum()) for each in (np.setdiff1d(every, open_), every))
     progress = Progress(
         campaign.path / f"progress-{share.writer}.json", campaign.attributes["campaign_name"],
-        total=total, done=total - len(missing), failed=mine,
-        workers=choices.scheduler.workers,
+        total=total, done=done, failed=mine, workers=choices.scheduler.workers,
     )  # fmt: skip
 
     def asked() -> str:
@@ -159,7 +167,7 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
         _tell(f"{path}: {campaign.table.samples} samples, {failed} failed")
         listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
         with xr.open_dataset(path) as dataset:
-            notes = restart_lines(dataset)
+            notes = override_lines(dataset) + restart_lines(dataset)
             if listed or campaign.scene.solver.error_bars:
                 notes += budget_lines(dataset)
         for line in notes:
@@ -167,13 +175,16 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
     if stop.reason and not stop.signalled:
         _tell(
             f"{stop.reason}; {left} samples are left: raise max_failed, or mend what fails and "
-            "give the same command with --retry-failed"
+            "give the same command with --retry-failed (and --set solver.tolerance=...)"
         )
         return EXIT_FAILED
-    interrupted = left and (stop.signalled or choices.share.count == 1)
+    alone = choices.share.count == 1 and not choices.overrides
+    interrupted = left and (stop.signalled or alone)
     if interrupted:
         why = stop.reason or "some results were lost"
         _tell(f"{why}; {left} samples are left: the same command goes on with them")
+    elif left and choices.overrides:
+        _tell(f"{left} samples are left: give the command without --retry-failed and --set")
     elif left:
         _tell(f"this part is done; {left} samples of other parts are left")
     if failed == campaign.table.samples:

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from ringsim.campaign.folder import prepare_folder
+from ringsim.campaign.retry import FAILED, check_settings
 from ringsim.campaign.run import Choices, Share, run_campaign
 from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.campaign.status import plan
@@ -16,6 +17,7 @@ from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.work import Scheduler
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.refusal import InputError
+from ringsim.variables import Status
 
 
 @click.command()
@@ -33,7 +35,10 @@ from ringsim.refusal import InputError
 @click.option(
     "--part", metavar="I/N", default="1/1", help="Run only the I-th of N shares of the samples."
 )
-@click.option("--retry-failed", is_flag=True, help="Run the failed samples again, too.")
+@click.option(
+    "--retry-failed", is_flag=True,
+    help="Run the failed samples again, too; with --set only these, with other solver settings.",
+)  # fmt: skip
 @click.option("--dry-run", is_flag=True, help="Show plan and predicted cost; keep nothing.")
 @click.option("--solver", default="", hidden=True)
 def command(
@@ -54,7 +59,10 @@ def command(
                 f"--workers {workers}: under an MPI launcher every rank drives one solver "
                 "process: leave out --workers"
             )
-        campaign, share = load_campaign(file, settings, samples), Share.parse(part)
+        # With --retry-failed they are settings of the failed samples alone.
+        own, theirs = ({}, settings) if retry_failed else (settings, {})
+        campaign, share = load_campaign(file, own, samples), Share.parse(part)
+        check_settings(campaign.scene, theirs)
         wanted = campaign.specification
         folder, name = out or Path("runs") / wanted.name, solver or SOLVERS[wanted.fidelity]
         if dry_run:
@@ -63,7 +71,8 @@ def command(
                 click.echo(line)
         else:
             prepare_folder(campaign, folder, solver=name)
-        return folder, (wanted.limits, wanted.max_failed, share, retry_failed)
+        again = FAILED if retry_failed else frozenset[Status]()
+        return folder, (wanted.limits, wanted.max_failed, share, again, theirs)
 
     if dry_run:
         prepare()

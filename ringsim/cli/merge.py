@@ -16,5 +16,6 @@ def command(folder: Path) -> None:
     It may be called at any time and any number of times, also while the campaign runs.
     """
     campaign = open_folder(folder)
+    samples = campaign.table.samples
     left, failed, path = merge(campaign, execution="merged on its own", partly=True)
-    click.echo(f"{path}: {campaign.table.samples} samples, {left} not run, {failed} failed")
+    click.echo(f"{path}: {samples} samples, {samples - left} done, {left} not run, {failed} failed")

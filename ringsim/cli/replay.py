@@ -37,13 +37,13 @@ def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
         raise InputError(
             f"sample {sample} is not in {folder}: choose one from 0 to {campaign.table.samples - 1}"
         )
-    values = campaign.table.values_of(sample)
+    before = next(campaign.survey().results([sample]), None)
+    values = campaign.table.values_of(sample) | (before.overrides if before is not None else {})
     exact = campaign.scene.with_values(values)
     if scene:
         click.echo(exact.to_toml())
         return EXIT_DONE
     faulthandler.enable()
-    before = next(campaign.survey().results([sample]), None)
     for path, value in values.items():
         click.echo(f"{path} = {value}")
     result = solve(load_solver(campaign.attributes["solver"]), campaign.scene, sample, values)

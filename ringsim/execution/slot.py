@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from ringsim.execution.scratch import scratch_folder
 from ringsim.execution.solve import LOG_CHARACTERS
 from ringsim.execution.work import Limits, Work
 from ringsim.refusal import InputError
@@ -65,7 +66,7 @@ class SolverProcess:
         command = [sys.executable, "-P", "-u", "-m", "ringsim.execution.child"]
         scratch = ""
         try:
-            scratch = tempfile.mkdtemp(prefix="ringsim-")
+            scratch = scratch_folder()
             with other, open(f"{scratch}/log", "ab") as log:
                 self._process = subprocess.Popen(
                     [*command, str(other.fileno()), str(os.getpid())],

@@ -9,15 +9,17 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.files import sync, writing
+from ringsim.refusal import InputError
 from ringsim.storage.locks import GO_ON
 from ringsim.storage.netcdf import NOT_RUN
 from ringsim.storage.result import Result
+from ringsim.storage.verified import RECORD, Verified, forget, recall, remember
 from ringsim.variables import Status
 
 FOLDER = "journals"
@@ -27,6 +29,10 @@ _MAGIC = b"ringsim2"
 _SYNC_SECONDS = 1.0
 """Records are forced to the disk when this much time has passed since the last time: for samples
 longer than that each is, for shorter ones it would cost more than the run."""
+
+
+class DamagedError(InputError):
+    """A record that was whole is no longer; the next survey finds which ones are."""
 
 
 class Journal:
@@ -77,23 +83,25 @@ class Journal:
         self._synced = time.monotonic()
 
 
-def read_journal(path: Path, campaign: str) -> Iterator[tuple[int, Result | None]]:
-    """The records of a journal in their order, each with its place.
+def read_journal(
+    path: Path, campaign: str, place: int = 0
+) -> Iterator[tuple[int, int, Result | None]]:
+    """The records of a journal in their order from a place on, each with its place and its end.
 
     None stands for bytes between two records that are no record of this campaign.  What a writer
     left unfinished at the end is left out: the file may still be growing.
     """
     with path.open("rb") as file:
-        place, size = 0, os.fstat(file.fileno()).st_size
+        size = os.fstat(file.fileno()).st_size
         while place < size:
             if (result := _read_record(file, place, campaign)) is not None:
-                yield place, result
+                yield place, file.tell(), result
                 place = file.tell()
                 continue
             file.seek(place + 1)
             if (gap := file.read().find(_MAGIC)) < 0:
                 return
-            yield place, None
+            yield place, place + 1 + gap, None
             place += 1 + gap
 
 
@@ -132,6 +140,8 @@ class Survey:
     owner: NDArray[np.int64]
     """Journal with the result that counts of each sample, -1 where there is none."""
     place: NDArray[np.int64]
+    attempts: NDArray[np.int64]
+    """Results of each sample in all journals, also those that do not count."""
 
     @property
     def missing(self) -> NDArray[np.int64]:
@@ -150,7 +160,11 @@ class Survey:
             with self.journals[number].open("rb") as file:
                 for place in np.sort(self.place[samples][owner == number]):
                     if (result := _read_record(file, int(place), self.campaign)) is None:
-                        raise OSError(f"{self.journals[number]} has been damaged meanwhile")
+                        forget(self.journals[number].parents[1])
+                        raise DamagedError(
+                            f"{self.journals[number]} has been damaged meanwhile: give the same "
+                            "command again"
+                        )
                     yield result
 
 
@@ -159,26 +173,57 @@ def survey(folder: Path, campaign: str, samples: int) -> Survey:
 
     Of several results of one sample, one that went well counts before one that failed, whatever
     the clocks said; otherwise the later one does.  A warning in the log tells of records that are
-    damaged, or of another ``campaign``.
+    damaged, or of another ``campaign``.  What was verified once is remembered in the folder.
     """
     journals = sorted((folder / FOLDER).glob("*.journal"))
-    status = np.full(samples, NOT_RUN, dtype=np.int8)
-    seconds, best = np.full(samples, np.nan), np.full(samples, -np.inf)
-    form, owner, place = (np.full(samples, -1, dtype=np.int64) for _ in range(3))
-    forms: dict[str, int] = {}
-    for number, path in enumerate(journals):
-        damaged = 0
-        for start, result in read_journal(path, campaign):
-            if result is None:
-                damaged += 1
-                continue
-            # No clock is 1e12 s (30,000 years) wrong.
-            k, weight = result.sample, result.finished + 1e12 * (not result.status.failed)
-            if 0 <= k < samples and weight > best[k]:
-                status[k], seconds[k], best[k] = result.status, result.seconds, weight
-                form[k] = forms.setdefault(result.form, len(forms))
-                owner[k], place[k] = number, start
-        if damaged:
+    before = recall(folder, campaign)
+    known = {path.name: _verified(path, campaign, before.get(path.name)) for path in journals}
+    if any(known[name] is not before.get(name) for name in known):
+        remember(folder, campaign, known)
+    for name, found in known.items():
+        if found.damaged:
             told = "%s is damaged: %d of its records cannot be used, their samples run again"
-            _log.warning(told, path.name, damaged)
-    return Survey(campaign, journals, status, seconds, form, owner, place)
+            _log.warning(told, name, found.damaged)
+    records = np.concatenate([np.empty(0, RECORD), *(each.records for each in known.values())])
+    counts = np.array([len(each.records) for each in known.values()], dtype=np.int64)
+    owner = np.repeat(np.arange(len(known)), counts)
+    inside = (records["sample"] >= 0) & (records["sample"] < samples)
+    records, owner = records[inside], owner[inside]
+    # No clock is 1e12 s (30,000 years) wrong.
+    weight = records["finished"] + 1e12 * (records["status"] < Status.SOLVER_FAILED)
+    order = np.lexsort((-np.arange(len(records)), weight, records["sample"]))
+    which, attempts = np.unique(records["sample"], return_counts=True)
+    best = order[np.cumsum(attempts) - 1]  # the last of each sample's
+
+    def of_each(values: NDArray[Any], missing: Any) -> NDArray[Any]:
+        found = np.full(samples, missing, dtype=values.dtype)
+        found[which] = values
+        return found
+
+    return Survey(
+        campaign, journals,
+        status=of_each(records["status"][best], NOT_RUN),
+        seconds=of_each(records["seconds"][best], np.nan),
+        form=of_each(np.unique(records["form"][best], return_inverse=True)[1], -1),
+        owner=of_each(owner[best], -1), place=of_each(records["place"][best], -1),
+        attempts=of_each(attempts, 0),
+    )  # fmt: skip
+
+
+def _verified(path: Path, campaign: str, before: Verified | None) -> Verified:
+    """The records of a journal: those that were verified before, and what has come since."""
+    now, old = path.stat(), before or Verified()
+    if (now.st_size, now.st_mtime_ns) == (old.size, old.changed):
+        return old
+    if now.st_size <= old.size:  # it has not grown: somebody else wrote to it
+        old = Verified()
+    end, damaged, new = old.end, old.damaged, []
+    for place, after, result in read_journal(path, campaign, old.end):
+        end = after
+        if result is None:
+            damaged += 1
+        else:
+            number = result.sample, result.status, result.seconds, result.finished
+            new.append((place, *number, result.form))
+    records = np.concatenate([old.records, np.array(new, dtype=RECORD)])
+    return Verified(records, now.st_size, now.st_mtime_ns, end, damaged)

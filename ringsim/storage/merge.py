@@ -96,5 +96,7 @@ def _copy(
             blocks["cause"][k] = result.cause if fit else Cause.UNFIT
             blocks["reason"][k] = result.reason if fit else UNFIT
             blocks["log"][k] = result.log
+            blocks["overrides"][k] = result.settings()
+        blocks["attempts"][:] = found.attempts[start:stop]
         for name, values in blocks.items():
             file[name][start:stop] = values

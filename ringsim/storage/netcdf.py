@@ -35,6 +35,8 @@ CHUNK_BYTES = 1 << 20
 PER_SAMPLE = {name: VARIABLES[name] for name in ("status", "cause")} | {
     "reason": Variable("reason", (), "1", "why the run ended so", "str"),
     "log": Variable("log", (), "1", "end of what a failed run printed", "str"),
+    "overrides": Variable("overrides", (), "1", "settings given for this sample alone", "str"),
+    "attempts": Variable("attempts", (), "1", "results on file, failures too", "i4"),
 }
 """What is known of every sample beside its outputs."""
 

@@ -43,11 +43,21 @@ class Result:
     """The same for results whose arrays have the same names, shapes and coordinates."""
     body: bytes = field(default=b"", repr=False)
     """The arrays, see :func:`pack`."""
+    overrides: dict[str, Any] = field(default_factory=dict)
+    """Settings by scene path that it was run with instead of the campaign's."""
 
     def header(self) -> bytes:
         """Everything but the body."""
         table = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "body"}
         return json.dumps(table, separators=(",", ":")).encode()
+
+    def settings(self) -> str:
+        """The overrides in words.
+
+        >>> Result(0, Status.OK, "", overrides={"solver.tolerance": 1e-4}).settings()
+        'solver.tolerance = 0.0001'
+        """
+        return ", ".join(f"{path} = {json.dumps(v)}" for path, v in self.overrides.items())
 
     @classmethod
     def from_header(cls, header: bytes, body: bytes) -> "Result":

@@ -49,6 +49,7 @@ def made_up() -> xr.Dataset:
                 "jacobians": 100.0 / np.sqrt(error),
                 "newton_iterations": 300.0 / np.sqrt(error),
                 "status": 0,
+                "outcome": 1,
                 "final_time": 12.0,
             }
         )

@@ -176,7 +176,7 @@ def lose(bench, samples):
     folder = open_folder(bench.folder / "out")
     paths, new = journals(bench), Journal(folder.path, folder.attributes["identity"], "all-rank0")
     for path in paths:
-        for _, result in read_journal(path, folder.attributes["identity"]):
+        for *_, result in read_journal(path, folder.attributes["identity"]):
             if result.sample not in samples:
                 new.append(result)
         path.unlink()

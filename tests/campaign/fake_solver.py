@@ -81,6 +81,8 @@ def poisoned(scene: Scene) -> Outcome:
         case 11:
             if "CURED" not in os.environ:
                 raise ZeroDivisionError("not cured")
+        case 12 if scene.solver.tolerance > 2e-4:
+            return Outcome(Status.SOLVER_FAILED, "a tolerance too large")
     return run(scene)
 
 

@@ -1,0 +1,98 @@
+"""Failed samples run again with other numerical settings; nothing of the first try is lost."""
+
+from __future__ import annotations
+
+import pytest
+import xarray as xr
+
+from campaign_bench import comparable, journals, lose
+from ringsim.campaign.folder import open_folder
+from ringsim.storage.journal import read_journal
+from ringsim.variables import Status
+
+START = ("campaign", "listed.toml", "--out", "out")
+BETTER = ("--retry-failed", "--set", "solver.tolerance=1e-4", "--set", "solver.step=0.1")
+WORDS = "solver.tolerance = 0.0001, solver.step = 0.1"
+
+
+def poisoned(bench, *words, code=0):
+    return bench.run(*START, *words, solver="fake_solver:poisoned", code=code)
+
+
+def stored(bench):
+    folder = open_folder(bench.folder / "out")
+    identity = folder.attributes["identity"]
+    return [each for path in journals(bench) for *_, each in read_journal(path, identity)]
+
+
+def test_failed_samples_run_again_with_other_settings(bench):
+    """Those only; the file says how each was computed, and replay repeats it so."""
+    bench.write_listed([30, 12, 30, 12, 9])
+    poisoned(bench)
+    before = bench.result("out")
+    assert before.status.values.tolist() == [0, 2, 0, 2, 2]
+    assert set(before.overrides.values) == {""}
+    printed = poisoned(bench, *BETTER)
+    assert f"3 of 5 samples were run again with {WORDS} (overrides): 2 ok" in printed
+    after = bench.result("out")
+    assert after.status.values.tolist() == [0, 0, 0, 0, 2]
+    assert after.overrides.values.tolist() == ["", WORDS, "", WORDS, WORDS]
+    assert after.attempts.values.tolist() == [1, 2, 1, 2, 2]
+    sound = {"sample": [0, 2]}
+    xr.testing.assert_identical(comparable(before.isel(sound)), comparable(after.isel(sound)))
+    # The first failures are on file, with what they were computed with.
+    first = [r for r in stored(bench) if r.status is Status.SOLVER_FAILED and not r.overrides]
+    assert sorted(r.sample for r in first) == [1, 3, 4]
+    printed = bench.run("replay", "out", 1)
+    assert "solver.tolerance = 0.0001" in printed
+    assert "identical to the stored result" in printed
+    assert "tolerance = 0.0001" in bench.run("replay", "out", 1, "--scene")
+    assert "tolerance = 0.0003" in bench.run("replay", "out", 0, "--scene")
+    assert "3 of 5 samples done, 2 left" not in poisoned(bench)  # the plain command goes on as ever
+
+
+def test_samples_that_have_not_run_are_left_to_the_plain_command(bench):
+    bench.write_listed([30, 12, 30])
+    poisoned(bench)
+    lose(bench, [2])
+    printed = poisoned(bench, *BETTER)
+    assert "1 samples are left: give the command without --retry-failed and --set" in printed
+    poisoned(bench)
+    assert bench.result("out").status.values.tolist() == [0, 0, 0]
+    assert bench.result("out").overrides.values.tolist() == ["", WORDS, ""]
+
+
+def test_all_ranks_run_with_the_other_settings(bench, mpi):
+    bench.write_listed([12, 12, 12, 12, 30, 12])
+    poisoned(bench)
+    bench.run(*START, *BETTER, ranks=2, solver="fake_solver:poisoned")
+    assert bench.result("out").status.values.tolist() == [0] * 6
+    assert bench.result("out").overrides.values.tolist() == [WORDS] * 4 + ["", WORDS]
+
+
+def test_nothing_failed_nothing_runs(bench):
+    bench.write_listed([30, 30])
+    poisoned(bench)
+    assert "no sample has failed: nothing is run again" in poisoned(bench, *BETTER)
+    assert len(stored(bench)) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--retry-failed", "--set", "loads.force=0.02"], "another antenna is another campaign"),
+        (["--retry-failed", "--set", "solver={ step = 0.1 }"], "solver.* or record.* settings"),
+        (["--retry-failed", "--set", "solver.end_time=30.0"], "it shapes the result"),
+        (["--retry-failed", "--set", "record.interval=0.2"], "it shapes the result"),
+        (["--retry-failed", "--set", "solver.tolerance=1.0"], "must be at most 0.1"),
+        (["--retry-failed", "--set", "solver.tolerence=1e-4"], "did you mean tolerance?"),
+        (["--set", "solver.tolerance=1e-4"], "under [set] of listed.toml, or with"),
+    ],
+)  # fmt: skip
+def test_other_physics_is_refused(words, told, bench):
+    bench.write_listed([30, 12])
+    poisoned(bench)
+    printed = poisoned(bench, *words, code=2)
+    assert told in printed
+    assert len(printed.splitlines()) == 1
+    assert len(stored(bench)) == 2
