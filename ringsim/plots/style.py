@@ -1,6 +1,7 @@
 """Style, words and axes shared by all figures."""
 
 import math
+import re
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from ringsim.variables import Status
+from ringsim.variables import Fate, Status
 
 INK, GREY, PALE = "#222222", "#6e6e6e", "#e4e4e4"
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
@@ -90,11 +91,16 @@ def deployment_time(dataset: xr.Dataset) -> float:
 def ending(dataset: xr.Dataset) -> str:
     """How the run ended, in one sentence."""
     word = Status(int(dataset["status"])).word.replace("_", " ")
-    if word == "ok" and math.isfinite(deployed := deployment_time(dataset)):
+    overloaded = int(dataset.get("outcome", Fate.UNKNOWN)) == Fate.OVERLOADED
+    deployed = deployment_time(dataset)
+    if word == "ok" and math.isfinite(deployed) and not overloaded:
         return f"Deployed after {deployed:.2f} s"
     final = float(dataset.get("final_time", math.nan))
     reason = str(dataset.attrs.get("reason", "")).strip()
-    start = "Ended" if word == "ok" else word.capitalize()
+    if word == "ok":
+        fate = Fate(int(dataset.get("outcome", Fate.UNKNOWN)))
+        word = "ended" if fate == Fate.UNKNOWN else fate.word.replace("_", " ")
+    start = word.capitalize()
     start += f" after {final:.4g} s" if math.isfinite(final) else ""
     return f"{start}: {reason}" if reason else start
 
@@ -102,13 +108,27 @@ def ending(dataset: xr.Dataset) -> str:
 def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: float = 8.0) -> None:
     """Subject and scene above the figure, how the run ended above its first axes."""
     inches = figure.get_size_inches()[0]
-    words, width = f"{subject}: {dataset.attrs.get('title', '')}".rstrip(": "), int(10.3 * inches)
+    words, width = f"{subject}: {scene_title(dataset)}".rstrip(": "), int(10.3 * inches)
     lines = len(textwrap.wrap(words, width))
     # The narrowest text with as few lines: all are about equally long.
     fitting = (w for w in range(1, width) if len(textwrap.wrap(words, w)) <= lines)
     title(figure, textwrap.fill(words, next(fitting, width)))
     end = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
     axes.set_title("\n".join(end), pad=pad)
+
+
+def scene_title(dataset: xr.Dataset) -> str:
+    """The scene's title with the number of sections that the run had, whatever the title says.
+
+    >>> run = xr.Dataset(coords={"section": [1, 2]}, attrs={"title": "18-section ring"})
+    >>> scene_title(run)
+    '2-section ring'
+    """
+    text, count = str(dataset.attrs.get("title", "")), dataset.sizes.get("section")
+    if count is None:
+        return text
+    true, told = re.subn(r"\b\d+-section\b", f"{count}-section", text)
+    return true if told else f"{text}, {count} section{'s' * (count != 1)}".removeprefix(", ")
 
 
 def section_colours(sections: int) -> Colormap:
@@ -174,5 +194,5 @@ def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
 
 @styled
 def write(figure: Figure, path: Path) -> None:
-    """Write a PNG."""
-    figure.savefig(path, format="png")
+    """Write a file of the kind that its name tells: png, svg or pdf."""
+    figure.savefig(path)

@@ -13,17 +13,18 @@ from matplotlib.collections import LineCollection
 from ringsim.dataset import to_dataset
 from ringsim.outputs import VARIABLES
 from ringsim.plots.asynchrony import asynchrony
-from ringsim.plots.diagonal_stress import default_sections, diagonal_stress
 from ringsim.plots.energy import energy, imbalance
 from ringsim.plots.opening_angles import opening_angles
 from ringsim.plots.ring import ring
+from ringsim.plots.rod_stress import default_sections, rod_stress
 from ringsim.plots.run import PICTURES, draw_run
+from ringsim.plots.section_map import section_map
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
 from ringsim.variables import Outcome, Status
 
-DRAWINGS = [opening_angles, asynchrony, diagonal_stress, energy, ring]
-CHARTS = [opening_angles, asynchrony, diagonal_stress, energy]
+DRAWINGS = [opening_angles, asynchrony, rod_stress, energy, ring, section_map]
+CHARTS = [opening_angles, asynchrony, rod_stress, energy, section_map]
 
 
 def words(figure) -> str:
@@ -56,7 +57,7 @@ def test_time_axis_is_named_by_the_dataset(draw, deployed):
     [
         (opening_angles, "opening_angle", "Some name (degree)"),
         (asynchrony, "asynchrony", "Some name (degree)"),
-        (diagonal_stress, "rod_stress", "Some name (MPa)"),
+        (rod_stress, "rod_stress", "Some name (MPa)"),
         (energy, "work", "some name"),
     ],
 )
@@ -188,7 +189,7 @@ def test_stress_lines_are_the_halves_of_the_diagonals_in_black_and_red(deployed)
 @pytest.mark.parametrize("sections", [[], [0], [1, 19], range(1, 8)])
 def test_sections_that_do_not_exist_are_refused(sections, deployed):
     with pytest.raises(ValueError, match=r"sections = .* 1\.\.18"):
-        diagonal_stress(deployed, sections)
+        rod_stress(deployed, sections)
 
 
 def test_imbalance_is_what_the_energies_lack(deployed):
@@ -225,16 +226,16 @@ def test_no_words_leave_the_sheet_or_meet(sections, closed, scene_of, made_run):
             assert not any(box.overlaps(other) for other in boxes[:number]), draw.__name__
 
 
-OF_RINGS = {"opening_angles", "asynchrony", "diagonal_stress", "ring", "energy"}
+OF_RINGS = {"opening_angles", "asynchrony", "section_map", "rod_stress", "ring", "energy"}
 """Figures of a ring without cables."""
 
 
 def test_only_figures_that_apply_are_written(tmp_path, deployed, scene_of, made_run):
     names = {path.name for path in draw_run(deployed, tmp_path / "all")}
-    assert names == {f"{name}.png" for name in OF_RINGS}
+    assert names == {f"run-fig-{name}.png" for name in OF_RINGS}
     plain = made_run(scene_of(6, parts=False), stress=False)
     paths = draw_run(plain, tmp_path / "plain")
-    assert "diagonal_stress.png" not in {path.name for path in paths}
+    assert "run-fig-rod_stress.png" not in {path.name for path in paths}
     assert len(paths) == len(OF_RINGS) - 1
     for path in paths:
         assert path.read_bytes().startswith(b"\x89PNG")
