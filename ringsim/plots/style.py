@@ -90,17 +90,13 @@ def deployment_time(dataset: xr.Dataset) -> float:
 
 def ending(dataset: xr.Dataset) -> str:
     """How the run ended, in one sentence."""
-    word = Status(int(dataset["status"])).word.replace("_", " ")
-    overloaded = int(dataset.get("outcome", Fate.UNKNOWN)) == Fate.OVERLOADED
-    deployed = deployment_time(dataset)
-    if word == "ok" and math.isfinite(deployed) and not overloaded:
+    status, fate = Status(int(dataset["status"])), Fate(int(dataset.get("outcome", Fate.NONE)))
+    word = (status if status.failed else fate).word.replace("_", " ")
+    if fate == Fate.DEPLOYED and math.isfinite(deployed := deployment_time(dataset)):
         return f"Deployed after {deployed:.2f} s"
     final = float(dataset.get("final_time", math.nan))
     reason = str(dataset.attrs.get("reason", "")).strip()
-    if word == "ok":
-        fate = Fate(int(dataset.get("outcome", Fate.UNKNOWN)))
-        word = "ended" if fate == Fate.UNKNOWN else fate.word.replace("_", " ")
-    start = word.capitalize()
+    start = "Ended" if word == "none" else word.capitalize()
     start += f" after {final:.4g} s" if math.isfinite(final) else ""
     return f"{start}: {reason}" if reason else start
 
