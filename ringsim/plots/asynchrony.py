@@ -34,7 +34,8 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     whole.set_ylim(0.0, 1.25 * max(float(np.max(heights)), 1e-9))
     whole.set_ylabel(style.label(values, width=40))
     begin, last = _last_seconds(dataset, end, peak.time)
-    close.set_xlim(begin, last)
+    if begin < last:
+        close.set_xlim(begin, last)
     close.set_ylim(0.0, 1.25 * max(float(np.max(heights[times >= begin])), 1e-9))
     mark(whole, peak, str(values.attrs.get("units", "")), _apart_in_words(dataset, peak.time))
     if peak.time >= begin:

@@ -32,11 +32,10 @@ class Peak(NamedTuple):
         own = here.items() <= self.place.items()
         if not own or not math.isfinite(self.value):
             return times, heights
+        if factor * self.value in heights[times == self.time]:
+            return times, heights
         at = int(np.searchsorted(times, self.time))
-        new = at == len(times) or times[at] != self.time
-        kept = heights if new else np.delete(heights, at)
-        times = np.insert(times, at, self.time) if new else times
-        return times, np.insert(kept, at, factor * self.value)
+        return np.insert(times, at, self.time), np.insert(heights, at, factor * self.value)
 
 
 def peak_of(dataset: xr.Dataset, series: str, value: str, stem: str, until: float) -> Peak:

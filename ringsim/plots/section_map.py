@@ -56,7 +56,8 @@ def section_map(dataset: xr.Dataset) -> Figure:
     label = style.label(found, width=34)
     figure.colorbar(image, ax=grid, pad=0.015, label=label).outline.set_visible(False)
     figure.supylabel(style.label(dataset["section"]), fontsize=10.5)
-    words = {"^": "leader at the largest asynchrony", "v": "laggard"}
+    size = f"{peak.value:.3g} {found.attrs.get('units', '')}"
+    words = {"^": f"leader at the largest asynchrony, {size}", "v": "laggard"}
     looks = [{"marker": marker, "label": word} | _TRIANGLE for marker, word in words.items()]
     looks += [{"marker": "o", "label": "locks"} | _DOT] if locked else []
     entries = [Line2D([], [], linestyle="none", **look) for look in looks]

@@ -120,7 +120,7 @@ def scene_title(dataset: xr.Dataset) -> str:
     >>> scene_title(run)
     '2-section ring'
     """
-    text, count = str(dataset.attrs.get("title", "")), dataset.sizes.get("section")
+    text, count = str(dataset.attrs.get("title", "")).strip(), dataset.sizes.get("section")
     if count is None:
         return text
     true, told = re.subn(r"\b\d+-section\b", f"{count}-section", text)
