@@ -37,7 +37,8 @@ def asynchrony(dataset: xr.Dataset) -> Figure:
     if begin < last:
         close.set_xlim(begin, last)
     close.set_ylim(0.0, 1.25 * max(float(np.max(heights[times >= begin])), 1e-9))
-    mark(whole, peak, str(values.attrs.get("units", "")), _apart_in_words(dataset, peak.time))
+    leader, laggard = ("{} {}".format(*joint) for joint in apart(dataset, peak.time))
+    mark(whole, peak, str(values.attrs.get("units", "")), f"{laggard} behind {leader}")
     if peak.time >= begin:
         close.plot(peak.time, peak.value, "o", color=style.VERMILLION, markersize=6, zorder=4)
     style.name_panel(close, "the end, enlarged")
@@ -58,16 +59,10 @@ def apart(dataset: xr.Dataset, time: float) -> tuple[tuple[str, int], tuple[str,
     return found[0], found[1]
 
 
-def _apart_in_words(dataset: xr.Dataset, time: float) -> str:
-    if "opening_angle" not in dataset:
-        return ""
-    leader, laggard = ("{} {}".format(*joint) for joint in apart(dataset, time))
-    return f"{laggard} behind {leader}"
-
-
 def _last_seconds(dataset: xr.Dataset, end: float, peak: float) -> tuple[float, float]:
     """From before the largest value or the first lock to the end, within bounds."""
     locks = dataset["lock_time"].values if "lock_time" in dataset else np.array(math.nan)
     first = float(np.nanmin(np.append(locks, peak)))
     least, most = (share * end for share in _CLOSE)
-    return end - min(max(1.5 * (end - first), least), most), end + 0.02 * end
+    length = min(max(1.5 * (end - first), least), most)
+    return end - length, max(end, np.nan_to_num(style.deployment_time(dataset))) + 0.05 * length

@@ -93,8 +93,10 @@ def cables(dataset: xr.Dataset) -> Figure:
         style.time_axes(dataset, dataset["opening_angle"], *column, named=number == 0)
         for axes, name in zip(column, names, strict=True):
             for section, row in enumerate(series[plane][name].values):
-                (line,) = axes.plot(dataset["time"], row, color=colours(section), linewidth=1.2)
-                line.set_label(f"section {section + 1}")
+                axes.plot(
+                    dataset["time"], row, color=colours(section), linewidth=1.2,
+                    label=f"section {section + 1}",
+                )  # fmt: skip
         style.name_panel(column[0], f"{plane} cable", height=0.2)
     for row, name in zip(grid, names, strict=True):
         drawn = np.concatenate([series[plane][name].values for plane in planes])
@@ -110,8 +112,10 @@ def cables(dataset: xr.Dataset) -> Figure:
         if plane == peak.place["plane"]:
             worst = peak.within(spans.sel(span=peak.place["span"]))
             axes.plot(*worst, color=style.VERMILLION, linewidth=1.0, zorder=3)
-            mark(axes, peak, str(tension.attrs["units"]), f"span {peak.place['span']} of the cable")
-    if 1 < sections <= 6:
-        grid[0, -1].legend(loc="best")
+            later = " until all have locked" if float(tension.max()) > peak.value else ""
+            mark(axes, peak, str(tension.attrs["units"]), f"span {peak.place['span']}{later}")
+    shown = np.unique(np.linspace(0, sections - 1, 6).round().astype(int))
+    lines = [grid[0, 0].get_legend_handles_labels()[0][section] for section in shown]
+    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))
     style.head(figure, grid[0, 0], dataset, "Cables")
     return figure

@@ -32,7 +32,7 @@ class _Picture(NamedTuple):
 
 PICTURES = (
     _Picture("opening_angles", opening_angles, ("opening_angle", "asynchrony")),
-    _Picture("asynchrony", asynchrony, ("asynchrony",)),
+    _Picture("asynchrony", asynchrony, ("asynchrony", "opening_angle")),
     _Picture("section_map", section_map, ("opening_angle", "asynchrony")),
     _Picture("rod_stress", rod_stress, ("rod_stress",), ring_only=True),
     _Picture("ring", ring, ("opening_angle", "asynchrony")),
