@@ -22,7 +22,9 @@ def command(file: Path, formats: tuple[str, ...] | None, out: Path | None) -> No
         dataset = xr.load_dataset(file, engine="netcdf4")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{file}: cannot be read as a netCDF file: {reason}") from None
+        raise InputError(
+            f"{file}: cannot be read as a netCDF file: {reason}; give one that ringsim run has written"
+        ) from None
     if "sample" in dataset.dims:
         raise InputError(
             f"{file}: holds {dataset.sizes['sample']} samples of a campaign: write one of them "

@@ -113,7 +113,9 @@ def cables(dataset: xr.Dataset) -> Figure:
             worst = peak.within(spans.sel(span=peak.place["span"]))
             axes.plot(*worst, color=style.VERMILLION, linewidth=1.0, zorder=3)
             later = " until all have locked" if float(tension.max()) > peak.value else ""
-            mark(axes, peak, str(tension.attrs["units"]), f"span {peak.place['span']}{later}")
+            name = spans.sel(span=peak.place["span"]).coords.get("span_name")
+            place = f"span {peak.place['span']}" + (f", {name.item()}" if name is not None else "")
+            mark(axes, peak, str(tension.attrs["units"]), place + later)
     shown = np.unique(np.linspace(0, sections - 1, 6).round().astype(int))
     lines = [grid[0, 0].get_legend_handles_labels()[0][section] for section in shown]
     figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))

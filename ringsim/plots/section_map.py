@@ -24,7 +24,7 @@ def section_map(dataset: xr.Dataset) -> Figure:
     """Deviation of each ``opening_angle`` (plane, section, time) from the mean of all, as a colour.
 
     One axes a plane, one colour scale; dots are where V-joints lock, triangles the two that are
-    farthest apart when ``asynchrony`` is largest.
+    farthest apart when ``asynchrony`` is largest, which may be between two records.
     """
     found = deviations(dataset).transpose("plane", "section", "time")
     times, sections = found["time"].values, found["section"].values
