@@ -23,7 +23,8 @@ def command(file: Path, formats: tuple[str, ...] | None, out: Path | None) -> No
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(
-            f"{file}: cannot be read as a netCDF file: {reason}; give one that ringsim run has written"
+            f"{file}: cannot be read as a netCDF file: {reason}; give a file that ringsim run has "
+            "written"
         ) from None
     if "sample" in dataset.dims:
         raise InputError(

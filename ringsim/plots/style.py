@@ -137,13 +137,15 @@ def time_axes(
 ) -> None:
     """Time axis of a run, shared by panels above each other, without margins.
 
-    It spans the times at which something was ``recorded``.  A dashed line marks where the last
+    It spans the times at which something was ``recorded``, and the run's end.  A dashed line marks where the last
     V-joint locked, if it did, with its time above the first panel where that is ``named``.
     """
     panels[-1].set_xlabel(label(dataset["time"]))
     time = recorded.dropna("time", how="all")["time"].values
     if len(time) > 1:
-        panels[0].set_xlim(float(time[0]), float(time[-1]))
+        # A peak may lie between the last record and the end of the run.
+        final = float(np.nan_to_num(dataset.get("final_time", math.nan)))
+        panels[0].set_xlim(float(time[0]), max(float(time[-1]), final))
     moment = deployment_time(dataset)
     if math.isnan(moment):
         return
