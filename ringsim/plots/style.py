@@ -137,8 +137,9 @@ def time_axes(
 ) -> None:
     """Time axis of a run, shared by panels above each other, without margins.
 
-    It spans the times at which something was ``recorded``, and the run's end.  A dashed line marks where the last
-    V-joint locked, if it did, with its time above the first panel where that is ``named``.
+    It spans the times at which something was ``recorded``, and the run's end.  A dashed line marks
+    where the last V-joint locked, if it did, with its time above the first panel where that is
+    ``named``.
     """
     panels[-1].set_xlabel(label(dataset["time"]))
     time = recorded.dropna("time", how="all")["time"].values
