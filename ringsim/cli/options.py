@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from ringsim.overrides import parse_assignment
+from ringsim.refusal import InputError, known_or_nearest
 
 PATH = click.Path(path_type=Path)
 WORKERS = click.IntRange(1, 4096)
@@ -15,6 +16,22 @@ def _assigned(_context: Any, _option: Any, texts: tuple[str, ...]) -> dict[str, 
     return dict(parse_assignment(text) for text in texts)
 
 
+def _formats(_context: Any, _option: Any, text: str | None) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    asked = tuple(dict.fromkeys(word.strip().lower() for word in text.split(",")))
+    for word in asked:
+        if word not in PLOT_FORMATS:
+            known = known_or_nearest(word, PLOT_FORMATS)
+            raise InputError(f"--plot-format {text}: {word!r} is no format of a figure ({known})")
+    return asked
+
+
+PLOT_FORMATS = ("png", "svg", "pdf")
+PLOT_FORMAT = click.option(
+    "--plot-format", "formats", metavar="png,svg,pdf", callback=_formats,
+    help="Formats of the figures, one or more (default png).",
+)  # fmt: skip
 SCENE = click.argument("scene", metavar="SCENE")
 FOLDER = click.argument("folder", type=PATH)
 SETTINGS = click.option(

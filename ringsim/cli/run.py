@@ -7,7 +7,7 @@ import click
 import numpy as np
 
 from ringsim.choice import kind_of
-from ringsim.cli.options import PATH, SCENE, SETTINGS
+from ringsim.cli.options import PATH, PLOT_FORMAT, SCENE, SETTINGS
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
@@ -36,9 +36,11 @@ from ringsim.scene import Scene, load_scene
     help="settings.toml of ringsim accuracy (default: that of the built-in scene most alike).",
 )  # fmt: skip
 @click.option("--plot", is_flag=True, help="Draw figures beside the netCDF file.")
+@PLOT_FORMAT
 def command(
     scene: str, settings: dict[str, Any], out: Path | None, fidelity: str,
     accuracy: float | None, of: str | None, evidence: Path | None, *, plot: bool,
+    formats: tuple[str, ...] | None,
 ) -> int:  # fmt: skip
     """Run SCENE (a built-in name or a TOML file) and write SCENE.nc."""
     chosen = load_scene(scene)
@@ -47,6 +49,10 @@ def command(
     for name, value in (("--of", of), ("--evidence", evidence)):
         if value is not None and accuracy is None:
             raise InputError(f"{name} {value}: says nothing without --accuracy; give both")
+    if formats is not None and not plot:
+        raise InputError(
+            f"--plot-format {','.join(formats)}: says nothing without --plot; give both"
+        )
     chosen = chosen.with_values(settings)
     if fidelity == "ideal" and chosen.record.stress:
         chosen = chosen.with_values({"record.stress": False})
@@ -86,7 +92,7 @@ def command(
     if plot:
         from ringsim.plots.run import draw_run
 
-        for picture in draw_run(dataset, target.parent, prefix=f"{target.stem}-"):
+        for picture in draw_run(dataset, target.parent, target.stem, formats or ("png",)):
             click.echo(f"wrote {picture}")
     return EXIT_FAILED if outcome.status.failed else EXIT_DONE
 

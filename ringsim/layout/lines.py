@@ -13,7 +13,8 @@ from ringsim.layout.pose import Array
 
 def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> dict[str, Array]:
     """End points of lines, shape (lines, 2, 3), m, by group: those of the rods, "hinge assemblies",
-    "boom", "net, taut" (springs longer than ``taut_beyond``, m) and "net, slack".
+    "boom", "net, taut" (springs longer than ``taut_beyond``, m) and "net, slack".  Lines of
+    "V-joints" are points, one for each of ``openings``, in their order.
 
     Everything stands as the layout, at the mean opening angle, says, centred on the vertical axis,
     but for the joints that open: each stands at the depth of its own opening angle (``openings``,
@@ -24,11 +25,12 @@ def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> di
         for number, rod in enumerate(layout.rods)
         for station, share in enumerate(rod.stations)
     }
+    found: dict[str, list[Any]] = {}
     for plane, angles in zip(layout.openings, openings, strict=True):
         for opening, angle in zip(plane, angles, strict=True):
             if isinstance(opening, JointOpening):
-                _open(layout, ends, opening, float(angle))
-    found: dict[str, list[Any]] = {}
+                at = _open(layout, ends, opening, float(angle))
+                found.setdefault("V-joints", []).append((at, at))
     for half in chain.from_iterable(layout.halves().values()):
         line = ends[half.rod, half.first], ends[half.rod, half.last]
         found.setdefault(layout.rods[half.rod].group, []).append(line)
@@ -58,8 +60,8 @@ def lines_of(layout: Layout, openings: Array, *, taut_beyond: float = 0.0) -> di
 
 def _open(
     layout: Layout, ends: dict[tuple[int, int], Array], opening: JointOpening, angle: float
-) -> None:
-    """Move a joint between two rods of one length to where its opening angle puts it."""
+) -> Array:
+    """Move a joint between two rods of one length to where its opening angle puts it: (3,), m."""
     joint = layout.joints[opening.joint]
     first, second = joint.first, joint.second
     assert isinstance(first, OnRod)
@@ -68,5 +70,6 @@ def _open(
     start, end = ends[first.rod, 0], ends[second.rod, len(layout.rods[second.rod].stations) - 1]
     chord = (end - start) / np.linalg.norm(end - start)
     aside = -opening.sense * np.cross(rod.start.axes[:, 2], chord)
-    at = 0.5 * (start + end) + rod.length * np.cos(0.5 * angle) * aside
+    at: Array = 0.5 * (start + end) + rod.length * np.cos(0.5 * angle) * aside
     ends[first.rod, first.station] = ends[second.rod, second.station] = at
+    return at

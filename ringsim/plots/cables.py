@@ -1,10 +1,13 @@
 """Spans, tensions and pulley forces of a cable over time."""
 
+import math
+
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from ringsim.plots import style
+from ringsim.plots.peaks import mark, peak_of
 from ringsim.scene import scene_from_toml
 from ringsim.structures.pantograph_ring import PantographRing
 
@@ -72,25 +75,49 @@ def section_series(dataset: xr.Dataset, plane: str) -> xr.Dataset:
 def cables(dataset: xr.Dataset) -> Figure:
     """Span lengths, elongations, decays, tensions and forces on the pulleys, section by section.
 
-    Of a ring's upper cable, or the lower where there is no other; colour counts the sections from
-    the winch.
+    One column for each plane with a cable; colour counts the sections from the winch.  Bands hold
+    the tensions of all spans, and the span with ``peak_tension`` is drawn beside the sections'.
     """
     tension = dataset["cable_tension"]
-    plane = next(str(p) for p in dataset["plane"].values if np.isfinite(tension.sel(plane=p)).any())
-    series = section_series(dataset, plane)
-    colours = style.section_colours(sections := series.sizes["section"])
-    figure = Figure(figsize=(11.0, 8.4))
-    grid = figure.subplots(3, 2, sharex=True)
-    for axes, (name, values) in zip(grid.ravel(), series.items(), strict=True):
-        for number, row in enumerate(values.values):
-            (line,) = axes.plot(series["time"], row, color=colours(number), linewidth=1.2)
-            line.set_label(f"section {number + 1}")
-        axes.set_ylabel(style.label(values))
+    planes = tension.dropna("plane", how="all")["plane"].values.tolist()
+    series = {plane: section_series(dataset, plane) for plane in planes}
+    names = list(series[planes[0]])
+    sections = dataset.sizes["section"]
+    colours = style.section_colours(sections)
+    until = style.deployment_time(dataset)
+    until = until if math.isfinite(until) else math.inf
+    peak = peak_of(dataset, "cable_tension", "peak_tension", "peak_tension", until)
+    figure = Figure(figsize=(5.4 * len(planes) + 0.4, 2.1 * len(names) + 0.8))
+    grid = figure.subplots(len(names), len(planes), sharex=True, sharey="row", squeeze=False)
+    for number, (column, plane) in enumerate(zip(grid.T, planes, strict=True)):
+        style.time_axes(dataset, dataset["opening_angle"], *column, named=number == 0)
+        for axes, name in zip(column, names, strict=True):
+            for section, row in enumerate(series[plane][name].values):
+                axes.plot(
+                    dataset["time"], row, color=colours(section), linewidth=1.2,
+                    label=f"section {section + 1}",
+                )  # fmt: skip
+        style.name_panel(column[0], f"{plane} cable", height=0.2)
+    for row, name in zip(grid, names, strict=True):
+        drawn = np.concatenate([series[plane][name].values for plane in planes])
+        if name == "tension":
+            drawn = np.append(tension.values, peak.value)
+        row[0].set_ylabel(style.label(series[planes[0]][name], width=26))
         if name not in ("length", "decay"):
-            style.span_sizes(axes, values.where(values > 1e-6).values)
-    for column in grid.T:
-        style.time_axes(dataset, dataset["opening_angle"], *column, named=False)
-    if 1 < sections <= 6:
-        grid[0, 0].legend(loc="best")
-    style.head(figure, grid[0, 0], dataset, f"{plane.capitalize()} cable")
+            style.span_sizes(row[0], np.where(drawn > 1e-6, drawn, np.nan))
+    for axes, plane in zip(grid[names.index("tension")], planes, strict=True):
+        spans = tension.sel(plane=plane)
+        least, most = spans.min("span"), spans.max("span")
+        axes.fill_between(dataset["time"], least, most, color=style.PALE, linewidth=0.0)
+        if plane == peak.place["plane"]:
+            worst = peak.within(spans.sel(span=peak.place["span"]))
+            axes.plot(*worst, color=style.VERMILLION, linewidth=1.0, zorder=3)
+            later = " until all have locked" if float(tension.max()) > peak.value else ""
+            name = spans.sel(span=peak.place["span"]).coords.get("span_name")
+            place = f"span {peak.place['span']}" + (f", {name.item()}" if name is not None else "")
+            mark(axes, peak, str(tension.attrs["units"]), place + later)
+    shown = np.unique(np.linspace(0, sections - 1, 6).round().astype(int))
+    lines = [grid[0, 0].get_legend_handles_labels()[0][section] for section in shown]
+    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))
+    style.head(figure, grid[0, 0], dataset, "Cables")
     return figure

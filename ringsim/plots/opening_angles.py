@@ -12,19 +12,20 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from ringsim.plots import style
 
-_LEAST_SPAN = 0.01
+LEAST_SPAN = 0.01
 """Smallest range (degree) of the axis of deviations, so that round-off is not magnified."""
 
 
 @style.styled
 def opening_angles(dataset: xr.Dataset) -> Figure:
-    """``opening_angle`` (plane, section, time) and its deviation from the mean.
+    """``opening_angle`` (plane, section, time) and, until all have locked, its deviation from the
+    mean of all.
 
     Each plane has a column, and colour counts the sections; ``lock_time`` and ``deployment_time``
     are marked where they are known.
     """
     angle = dataset["opening_angle"].dropna("time", how="all")
-    deviation = angle - angle.mean(("plane", "section"), skipna=True)
+    deviation = deviations(dataset)
     planes, sections = dataset["plane"].values.tolist(), dataset["section"]
     figure = Figure(figsize=(5.2 * len(planes) + 0.6, 6.4))
     grid = figure.subplots(
@@ -36,7 +37,7 @@ def opening_angles(dataset: xr.Dataset) -> Figure:
         _mark_locks(upper, dataset, plane)
         style.name_panel(upper, f"{plane} plane", height=0.91)
         style.time_axes(dataset, angle, upper, lower)
-    _limits(grid, angle, deviation, style.deployment_time(dataset))
+    _limits(grid, angle, deviation)
     grid[0, 0].set_ylabel(style.label(angle))
     grid[1, 0].set_ylabel(f"Deviation from\nthe mean ({angle.attrs.get('units', '')})")
     figure.align_ylabels(grid[:, 0])
@@ -47,6 +48,18 @@ def opening_angles(dataset: xr.Dataset) -> Figure:
         bar.outline.set_visible(False)
     style.head(figure, grid[0, 0], dataset, "Opening angles")
     return figure
+
+
+def deviations(dataset: xr.Dataset) -> xr.DataArray:
+    """Opening angles less their mean over all V-joints, (plane, section, time), degree.
+
+    As recorded up to the deployment, or the end of a run without: what locked joints do when they
+    rebound is no deviation.
+    """
+    angle = dataset["opening_angle"].dropna("time", how="all")
+    angle = angle[..., ~(angle["time"].values > style.deployment_time(dataset))]
+    found = angle - angle.mean(("plane", "section"), skipna=True)
+    return found.assign_attrs(angle.attrs, long_name="deviation from the mean opening angle")
 
 
 def _draw_lines(axes: Axes, values: xr.DataArray) -> LineCollection:
@@ -74,12 +87,11 @@ def _mark_locks(axes: Axes, dataset: xr.Dataset, plane: str) -> None:
     )  # fmt: skip
 
 
-def _limits(grid: np.ndarray, angle: xr.DataArray, deviation: xr.DataArray, moment: float) -> None:
-    """Room for all angles; for the deviations until all have locked (the rebound may leave)."""
+def _limits(grid: np.ndarray, angle: xr.DataArray, deviation: xr.DataArray) -> None:
+    """Room for all that is drawn."""
     lowest, highest = (float(angle.min()), float(angle.max())) if angle.size else (0.0, 180.0)
     grid[0, 0].set_ylim(30.0 * math.floor(lowest / 30.0), max(188.0, highest + 4.0))
     for axes in grid[0]:
         axes.yaxis.set_major_locator(MultipleLocator(30.0))
-    moving = deviation.where(deviation["time"] <= moment) if math.isfinite(moment) else deviation
-    span = max(1.15 * style.largest_magnitude(moving), _LEAST_SPAN)
+    span = max(1.15 * style.largest_magnitude(deviation), LEAST_SPAN)
     grid[1, 0].set_ylim(-span, span)

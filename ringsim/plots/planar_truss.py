@@ -8,6 +8,7 @@ from matplotlib.ticker import MultipleLocator
 from scipy.constants import kilogram_force
 
 from ringsim.plots import style
+from ringsim.plots.peaks import Peak, peak_of
 
 _PASSAGES = (("reeled in", style.BLUE, "-"), ("reeled out", style.ORANGE, (0, (5, 1.5))))
 _SHOWN = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -26,8 +27,10 @@ def tension_over_length(dataset: xr.Dataset) -> Figure:
     parts = zip(_split(dataset, tension), _PASSAGES, strict=True)
     for (lengths, values), (name, colour, dashes) in parts:
         axes.plot(lengths, values, color=colour, linestyle=dashes, label=name)
+    top = peak_of(dataset, "cable_tension", "peak_tension", "peak_tension", np.inf)
+    _mark(axes, dataset, top, str(tension.attrs["units"]))
     _length_axis(axes, dataset)
-    axes.set_ylim(0.0, 1.12 * (peak := float(tension.max())))
+    axes.set_ylim(0.0, 1.12 * (peak := top.value))
     axes.set_ylabel(style.label(tension))
     both_ways = (lambda n: np.divide(n, kilogram_force), lambda w: np.multiply(w, kilogram_force))
     weight = axes.secondary_yaxis("right", functions=both_ways)
@@ -60,12 +63,14 @@ def strain_over_length(dataset: xr.Dataset) -> Figure:
     middle = int(np.abs(station - 0.5 * (station[0] + station[-1])).argmin())
     largest = int(np.nanargmax(strain.max("time").values))
     passages = list(zip(_split(dataset, strain), _PASSAGES, strict=True))
-    for place, colour in ((largest, style.VERMILLION), (middle, style.GREEN)):
+    for place, colour in {largest: style.VERMILLION, middle: style.GREEN}.items():
         for (lengths, values), (_, _, dashes) in passages:
             left.plot(lengths, values.isel(station=place), color=colour, linestyle=dashes)
         left.plot([], [], color=colour, label=f"{1e3 * station[place]:.0f} mm along the beam")
     for name, _, dashes in _PASSAGES:
         left.plot([], [], color=style.GREY, linestyle=dashes, label=name)
+    peak = "peak_bending_strain"
+    _mark(left, dataset, peak_of(dataset, "bending_strain", peak, peak, np.inf), "")
     _length_axis(left, dataset)
     left.set_ylabel(style.label(strain))
     left.set_ylim(0.0, 1.35 * float(strain.max()))
@@ -88,6 +93,15 @@ def _draw_along(axes: Axes, lengths: xr.DataArray, strain: xr.DataArray) -> None
     axes.set_xlim(left=0.0)
     axes.set_xlabel(style.label(strain["station"], "mm", width=40))
     axes.legend(loc="upper left")
+
+
+def _mark(axes: Axes, dataset: xr.Dataset, peak: Peak, units: str) -> None:
+    """A dot at the largest value, at the cable's length at that time."""
+    lengths = 1e3 * dataset["cable_length"].isel(plane=0).dropna("time")
+    axes.plot(
+        np.interp(peak.time, lengths["time"], lengths), peak.value, "o", color=style.VERMILLION,
+        label=f"largest: {peak.value:.3g} {units}".rstrip(), clip_on=False, zorder=4,
+    )  # fmt: skip
 
 
 def _split(dataset: xr.Dataset, values: xr.DataArray) -> list[tuple[xr.DataArray, xr.DataArray]]:

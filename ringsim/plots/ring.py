@@ -25,11 +25,15 @@ _BELOW, _ABOVE, _BAR, _CAPTION = 1.2, 1.12, 0.46, 2.4
 """Room on the sheet, in inch: the drawing; beside, below and above it; a caption's width."""
 _FADE = 0.6
 """Share of white in the farthest line."""
+_POINT = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1e-3]])
+"""Ends of the line, m, that stands for a point: one without a length is not drawn."""
 _LOOKS: dict[str, dict[str, Any]] = {
     "diagonals": {"color": style.BLUE, "linewidth": 1.5},
     "bars": {"color": style.VERMILLION, "linewidth": 1.5, "label": "folding bars"},
     "hinge assemblies": {"color": style.INK, "linewidth": 3.0},
     "boom": {"color": style.GREY, "linewidth": 5.0},
+    "V-joints, locked": {"color": style.INK, "linewidth": 5.0, "marker": "o"},
+    "V-joints, free": {"color": style.ORANGE, "linewidth": 5.0, "marker": "o"},
     "net, taut": {"color": style.GREEN, "linewidth": 0.9},
     "net, slack": {"color": style.GREEN, "linewidth": 0.9, "linestyle": (0, (1.5, 2.5))},
 }
@@ -45,7 +49,7 @@ def ring(dataset: xr.Dataset) -> Figure:
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
     azimuth = facing_azimuth(scene)
     moments = instants(dataset)
-    shots = [_shot(scene, angles, azimuth) for _, angles in moments]
+    shots = [_shot(scene, angles, _locked(dataset, angles), azimuth) for _, angles in moments]
     low = np.array([lines.min(axis=(0, 1)) for _, lines, _ in shots])
     sizes = np.array([lines.max(axis=(0, 1)) for _, lines, _ in shots]) - low
     height = float(sizes[:, 1].max())
@@ -65,6 +69,7 @@ def ring(dataset: xr.Dataset) -> Figure:
     _scale_bar(axes, _WIDTH / scale, height)
     drawn = {name for names, _, _ in shots for name in names}
     looks = [{"label": name} | look for name, look in _LOOKS.items() if name in drawn]
+    looks = [look | {"linestyle": "none"} if "marker" in look else look for look in looks]
     entries = [Line2D([], [], **look) for look in looks]
     figure.legend(handles=entries, loc="lower center", ncols=len(entries))
     style.head(figure, axes, dataset, "Deployment", pad=72.0 * _BAR)
@@ -74,7 +79,8 @@ def ring(dataset: xr.Dataset) -> Figure:
 def lines_at(scene: Scene, openings: Array) -> dict[str, Array]:
     """Lines of a scene at opening angles in rad, shape (planes, sections): see ``lines_of``."""
     beyond = 0.0 if scene.net is None or scene.net.two_sided else scene.net.neutral_length
-    return lines_of(layout_at_opening(scene, float(openings.mean())), openings, taut_beyond=beyond)
+    mean = min(float(openings.mean()), np.pi)  # joints may be past it, the ring cannot
+    return lines_of(layout_at_opening(scene, mean), openings, taut_beyond=beyond)
 
 
 def facing_azimuth(scene: Scene) -> float:
@@ -103,7 +109,7 @@ def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
     """Name and opening angles (plane, section) of the three recorded instants to draw.
 
     The first, the one whose mean opening angle is nearest to the middle between the ends, and the
-    deployment, at which every V-joint stands at 180 deg by definition, or else the last.
+    deployment, or else the last.
     """
     angle = dataset["opening_angle"].dropna("time", how="any")
     mean = angle.mean(("plane", "section")).values
@@ -115,9 +121,26 @@ def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
     names = ("stowed" if opens else "start", "half-way", "deployed" if done else "end of the run")
     angles = [angle.isel(time=k) for k in (0, middle, last)]
     if done:
-        angles[2] = xr.full_like(angles[2], 180.0)
-        angles[2]["time"] = angles[2]["time"].copy(data=deployed)
+        angles[2] = _at_deployment(dataset, angle, deployed)
     return list(zip(names, angles, strict=True))
+
+
+def _at_deployment(dataset: xr.Dataset, angle: xr.DataArray, moment: float) -> xr.DataArray:
+    """Opening angles (plane, section) at a moment in s: between records, and 180 deg at a lock."""
+    found, times = angle.isel(time=0).copy(deep=True), angle["time"].values
+    for number, lock in np.ndenumerate(dataset["lock_time"].transpose(*found.dims).values):
+        at = int(np.searchsorted(times, lock))
+        course = np.insert(angle.transpose(*found.dims, "time").values[number], at, 180.0)
+        found.values[number] = np.interp(moment, np.insert(times, at, lock), course)
+    return found.assign_coords(time=angle["time"][0].copy(data=moment))
+
+
+def _locked(dataset: xr.Dataset, angles: xr.DataArray) -> NDArray[np.bool_]:
+    """Which V-joints have locked by the time of some angles, shape (planes, sections)."""
+    if "lock_time" not in dataset:
+        return np.zeros((dataset.sizes["plane"], dataset.sizes["section"]), dtype=bool)
+    locks = dataset["lock_time"].transpose("plane", "section").values
+    return np.asarray(locks <= float(angles["time"]))
 
 
 def _fit(widths: Array, height: float) -> tuple[float, Array]:
@@ -148,12 +171,19 @@ def _caption(axes: Axes, middle: float, name: str, angles: xr.DataArray) -> None
         )  # fmt: skip
 
 
-def _shot(scene: Scene, angles: xr.DataArray, azimuth: float) -> tuple[list[str], Array, Array]:
+def _shot(
+    scene: Scene, angles: xr.DataArray, locked: NDArray[np.bool_], azimuth: float
+) -> tuple[list[str], Array, Array]:
     """Parts, ends on the paper and nearness of all lines at one instant, the farthest first."""
     parts = lines_at(scene, np.radians(angles.transpose("plane", "section").values))
+    joints = parts.pop("V-joints") + _POINT
+    for name, own in (("V-joints, locked", locked.ravel()), ("V-joints, free", ~locked.ravel())):
+        parts |= {name: joints[own]} if own.any() else {}
     names = [name for name, ends in parts.items() for _ in ends]
     lines, depths = view(np.concatenate(list(parts.values())), azimuth, _ELEVATION)
     near = depths.mean(axis=-1)
+    # A joint stands before the rods that it joins.
+    near += [1e-6 * name.startswith("V-joints") for name in names]
     order = np.argsort(near, kind="stable")
     return [names[k] for k in order], lines[order], near[order]
 
@@ -169,6 +199,7 @@ def _draw(axes: Axes, names: list[str], lines: Array, near: Array, scale: float)
         list(lines), colors=colours + fade * (1.0 - colours), capstyle="round",
         linewidths=[thin * look["linewidth"] for look in looks],
         linestyles=[look.get("linestyle", "solid") for look in looks], clip_on=False,
+        snap=False,
     )  # fmt: skip
     axes.add_collection(drawn, autolim=False)
 

@@ -1,6 +1,6 @@
 """All figures that apply to a run."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,11 +12,12 @@ from ringsim.files import writing
 from ringsim.plots import style
 from ringsim.plots.asynchrony import asynchrony
 from ringsim.plots.cables import cables
-from ringsim.plots.diagonal_stress import diagonal_stress
 from ringsim.plots.energy import energy
 from ringsim.plots.opening_angles import opening_angles
 from ringsim.plots.planar_truss import strain_over_length, tension_over_length
 from ringsim.plots.ring import ring
+from ringsim.plots.rod_stress import rod_stress
+from ringsim.plots.section_map import section_map
 from ringsim.scene import scene_from_toml
 from ringsim.structures.pantograph_ring import PantographRing
 
@@ -31,8 +32,9 @@ class _Picture(NamedTuple):
 
 PICTURES = (
     _Picture("opening_angles", opening_angles, ("opening_angle",), ring_only=True),
-    _Picture("asynchrony", asynchrony, ("asynchrony",)),
-    _Picture("diagonal_stress", diagonal_stress, ("rod_stress",), ring_only=True),
+    _Picture("asynchrony", asynchrony, ("asynchrony", "opening_angle")),
+    _Picture("section_map", section_map, ("opening_angle",), ring_only=True),
+    _Picture("rod_stress", rod_stress, ("rod_stress",), ring_only=True),
     _Picture("ring", ring, ("opening_angle",), ring_only=True),
     _Picture("cables", cables, ("cable_tension",), ring_only=True),
     _Picture("tension", tension_over_length, ("cable_tension", "cable_length")),
@@ -41,12 +43,14 @@ PICTURES = (
 )
 
 
-def draw_run(dataset: xr.Dataset, folder: str | Path, prefix: str = "") -> list[Path]:
-    """Write every figure for which the run recorded something, as PNG.
+def draw_run(
+    dataset: xr.Dataset, folder: str | Path, name: str = "run", formats: Sequence[str] = ("png",)
+) -> list[Path]:
+    """Write every figure for which the run recorded something, as NAME-fig-FIGURE.png.
 
     ``dataset`` is a run, finished or not, as ``ringsim.dataset.to_dataset`` makes it.  ``folder``
-    is created if it does not exist; all names begin with ``prefix``.  Returns the files written,
-    none if the run ended before its first record.
+    is created if it does not exist; ``formats`` are any of png, svg and pdf.  Returns the files
+    written, none if the run ended before its first record.
 
     Raises
     ------
@@ -59,10 +63,13 @@ def draw_run(dataset: xr.Dataset, folder: str | Path, prefix: str = "") -> list[
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, draw, needs, ring_only in PICTURES:
+    for subject, draw, needs, ring_only in PICTURES:
         recorded = all(n in dataset and bool(np.isfinite(dataset[n]).any()) for n in needs)
-        if recorded and (is_ring or not ring_only):
-            figure, path = draw(dataset), folder / f"{prefix}{name}.png"
+        if not recorded or (ring_only and not is_ring):
+            continue
+        figure = draw(dataset)
+        for kind in formats:
+            path = folder / f"{name}-fig-{subject}.{kind}"
             with writing(folder):
                 style.write(figure, path)
             written.append(path)

@@ -1,6 +1,7 @@
 """Style, words and axes shared by all figures."""
 
 import math
+import re
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -103,13 +104,27 @@ def ending(dataset: xr.Dataset) -> str:
 def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: float = 8.0) -> None:
     """Subject and scene above the figure, how the run ended above its first axes."""
     inches = figure.get_size_inches()[0]
-    words, width = f"{subject}: {dataset.attrs.get('title', '')}".rstrip(": "), int(10.3 * inches)
+    words, width = f"{subject}: {scene_title(dataset)}".rstrip(": "), int(10.3 * inches)
     lines = len(textwrap.wrap(words, width))
     # The narrowest text with as few lines: all are about equally long.
     fitting = (w for w in range(1, width) if len(textwrap.wrap(words, w)) <= lines)
     title(figure, textwrap.fill(words, next(fitting, width)))
     end = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
     axes.set_title("\n".join(end), pad=pad)
+
+
+def scene_title(dataset: xr.Dataset) -> str:
+    """The scene's title with the number of sections that the run had, whatever the title says.
+
+    >>> run = xr.Dataset(coords={"section": [1, 2]}, attrs={"title": "18-section ring"})
+    >>> scene_title(run)
+    '2-section ring'
+    """
+    text, count = str(dataset.attrs.get("title", "")).strip(), dataset.sizes.get("section")
+    if count is None:
+        return text
+    true, told = re.subn(r"\b\d+-section\b", f"{count}-section", text)
+    return true if told else f"{text}, {count} section{'s' * (count != 1)}".removeprefix(", ")
 
 
 def section_colours(sections: int) -> Colormap:
@@ -122,13 +137,16 @@ def time_axes(
 ) -> None:
     """Time axis of a run, shared by panels above each other, without margins.
 
-    It spans the times at which something was ``recorded``.  A dashed line marks where the last
-    V-joint locked, if it did, with its time above the first panel where that is ``named``.
+    It spans the times at which something was ``recorded``, and the run's end.  A dashed line marks
+    where the last V-joint locked, if it did, with its time above the first panel where that is
+    ``named``.
     """
     panels[-1].set_xlabel(label(dataset["time"]))
     time = recorded.dropna("time", how="all")["time"].values
     if len(time) > 1:
-        panels[0].set_xlim(float(time[0]), float(time[-1]))
+        # A peak may lie between the last record and the end of the run.
+        final = float(np.nan_to_num(dataset.get("final_time", math.nan)))
+        panels[0].set_xlim(float(time[0]), max(float(time[-1]), final))
     moment = deployment_time(dataset)
     if math.isnan(moment):
         return
@@ -175,5 +193,5 @@ def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
 
 @styled
 def write(figure: Figure, path: Path) -> None:
-    """Write a PNG."""
-    figure.savefig(path, format="png")
+    """Write a file of the kind that its name tells: png, svg or pdf."""
+    figure.savefig(path)

@@ -50,7 +50,7 @@ def test_a_section_that_is_ahead_is_drawn_ahead(scene_of):
 
 def test_parts_that_the_scene_leaves_out_are_not_drawn(scene_of):
     lines = lines_at(scene_of(6, parts=False), np.radians(np.full((2, 6), 90.0)))
-    assert set(lines) == {"diagonals", "bars", "hinge assemblies"}
+    assert set(lines) == {"diagonals", "bars", "hinge assemblies", "V-joints"}
 
 
 def test_springs_are_taut_beyond_their_neutral_length(scene_of):
@@ -137,3 +137,31 @@ def test_a_ring_that_folds_is_not_called_stowed(scene_of, made_run):
     backwards = run.isel(time=slice(0, 100)).copy(deep=True)
     backwards["opening_angle"].values[:] = backwards["opening_angle"].values[..., ::-1]
     assert [name for name, _ in instants(backwards)] == ["start", "half-way", "end of the run"]
+
+
+def test_joints_are_drawn_where_the_bars_meet(scene_of):
+    opening = np.radians(np.linspace(60.0, 189.0, 12).reshape(2, 6))
+    lines = lines_at(scene_of(6), opening)
+    assert lines["V-joints"].shape == (12, 2, 3)
+    meet = lines["bars"][LEFT, 1]
+    np.testing.assert_allclose(lines["V-joints"][:, 0], meet, atol=1e-12)
+    beyond = np.radians(180.0) < opening.ravel()
+    assert beyond.any()
+
+
+def test_the_deployed_ring_shows_joints_past_their_stop(deployed):
+    run = deployed.copy(deep=True)
+    run["opening_angle"].values[1, 4, run.time.values > run.lock_time.values[1, 4]] = 189.0
+    _, opened = instants(run)[-1]
+    assert float(opened.sel(plane="lower", section=5)) == pytest.approx(189.0)
+    latest = deployed.lock_time == deployed.deployment_time
+    assert float(opened.where(latest).max()) == pytest.approx(180.0, abs=1e-9)
+    assert ring(run).axes
+
+
+def test_joints_change_their_colour_when_they_lock(deployed):
+    words = [text.get_text() for text in ring(deployed).legends[0].get_texts()]
+    assert {"V-joints, free", "V-joints, locked"} <= set(words)
+    free = deployed.assign(lock_time=deployed.lock_time.where(False), deployment_time=np.nan)
+    words = [text.get_text() for text in ring(free).legends[0].get_texts()]
+    assert "V-joints, locked" not in words

@@ -59,7 +59,7 @@ def test_ending_tells_success_failure_and_the_lack_of_an_end(deployed, failed, u
 
 
 def test_a_long_title_is_broken_into_even_lines(deployed):
-    run = deployed.assign_attrs(title="word " * 30)
+    run = deployed.assign_attrs(title="word " * 26)
     figure = Figure(figsize=(8.0, 3.0))
     style.head(figure, figure.subplots(), run, "Subject")
     lines = figure.get_suptitle().splitlines()
@@ -71,3 +71,12 @@ def test_a_run_that_does_not_tell_its_outcome_gives_the_reason(unfinished):
     run = unfinished.drop_vars("outcome")
     run.attrs["reason"] = "the end time was reached"
     assert style.ending(run) == "Ended after 12 s: the end time was reached"
+
+
+@pytest.mark.parametrize(("title", "wanted"), [
+    ("18-section ring, 2 cables", "2-section ring, 2 cables"),
+    ("Truss of paper 000", "Truss of paper 000, 2 sections"),
+    ("", "2 sections"),
+])  # fmt: skip
+def test_titles_tell_the_true_number_of_sections(title, wanted, unfinished):
+    assert style.scene_title(unfinished.assign_attrs(title=title)) == wanted
