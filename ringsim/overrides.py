@@ -31,21 +31,27 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     return path, table["value"] if len(table) == 1 else raw
 
 
-def section_of(path: str) -> tuple[str, int | None]:
-    """Split ``a.b[k]`` into ``a.b`` and k; without ``[k]`` the second is None.
+def section_of(path: str) -> tuple[str, int | str | None]:
+    """Split ``a.b[k]`` into ``a.b`` and k, or the name of a pulley; without them None.
+
+    Shells may have taken the quotes of a name.
 
     >>> section_of("rods.young_modulus[3]"), section_of("loads.force")
     (('rods.young_modulus', 3), ('loads.force', None))
+    >>> section_of('cables.upper.friction.coefficient["section 6 V"]')
+    ('cables.upper.friction.coefficient', 'section 6 V')
     """
-    matched = re.fullmatch(r"(.*)\[([0-9]{1,6})\]", path, re.DOTALL)
-    return (matched[1], int(matched[2])) if matched else (path, None)
+    if matched := re.fullmatch(r"(.*)\[([0-9]{1,6})\]", path, re.DOTALL):
+        return matched[1], int(matched[2])
+    matched = re.fullmatch(r"(.*)\[(\"?)(\w[\w -]*)\2\]", path)
+    return (matched[1], matched[3]) if matched else (path, None)
 
 
 def field_at(record: Any, path: str) -> Any:
-    """The value of a record at a dotted path, one entry of a list at ``name[k]``."""
-    inner, section = section_of(path)
+    """The value of a scene at a dotted path, one entry of a list at ``name[k]``."""
+    inner, section = section_of(record.with_number(path))
     value = operator.attrgetter(inner)(record)
-    return value[section - 1] if section is not None and isinstance(value, tuple) else value
+    return value[section - 1] if isinstance(section, int) and isinstance(value, tuple) else value
 
 
 def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
@@ -58,6 +64,8 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
     through a value that is not a table.
     """
     inner, section = section_of(path)
+    if isinstance(section, str):  # of something that has no names
+        inner = path
     *steps, name = inner.split(".")
     for step in steps:
         if not _NAME.fullmatch(step):
@@ -70,7 +78,7 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
     if not _NAME.fullmatch(name):
         raise InputError(f"{path}: {name!r} is not a field name, or one with its section: name[1]")
     old = table.get(name)
-    if section is not None:
+    if isinstance(section, int):
         if old is None:
             raise InputError(f"{path}: there is no {name} yet: give one value for all first")
         values = list(old) if isinstance(old, (list, tuple)) else [old] * length

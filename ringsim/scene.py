@@ -11,8 +11,9 @@ import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
 from ringsim.cable.faults.family import CableFault
-from ringsim.cable.records import Cable, Cables, pulleys_of
-from ringsim.choice import OneOf
+from ringsim.cable.places import number_of, numbered, path_of, spans_of
+from ringsim.cable.records import Cable, Cables
+from ringsim.choice import OneOf, kinds_of
 from ringsim.files import parse_toml, read_text
 from ringsim.overrides import section_of, set_path
 from ringsim.parts.boom.family import Boom
@@ -34,6 +35,8 @@ from ringsim.units import ListIn, Model
 
 MOST_RECORDS = 1_000_000
 """Output times of one run, at most."""
+MOST_SECTIONS = 1000
+"""A table that asks for more is refused, and names of their pulleys would only fill the memory."""
 
 
 class Scene(Model):
@@ -93,21 +96,38 @@ class Scene(Model):
             )
         return self
 
+    @model_validator(mode="before")
+    @classmethod
+    def _without_names(cls, table: Any) -> Any:
+        return numbered(table, _points_in(table)) if isinstance(table, dict) else table
+
+    def path_of(self, cable: Cable) -> tuple[str, ...]:
+        """Names of the points of a cable's path: its winch, pulleys, and end or other winch."""
+        return path_of(_points_in(self), cable.end)
+
     def pulleys_of(self, cable: Cable) -> int:
         """Pulleys of one of the scene's cables: a second winch takes one more."""
-        return self.structure.pulleys + len(cable.winches) - 1
+        return len(self.path_of(cable)) - 2
+
+    @property
+    def span_names(self) -> dict[str, tuple[str, ...]]:
+        """Names of the spans of each plane's cable, from its winch on; none of one without."""
+        present = dict([] if self.cables is None else self.cables.present())
+        return {
+            name: spans_of(self.path_of(present[plane])) if plane in present else ()
+            for plane, name in enumerate(self.structure.planes)
+        }
 
     @property
     def spans(self) -> int:
         """Spans of the cable that has most of them; 0 without cables."""
-        present = [] if self.cables is None else self.cables.present()
-        return max((self.pulleys_of(cable) + 1 for _, cable in present), default=0)
+        return max(map(len, self.span_names.values()), default=0)
 
     def with_values(self, values: dict[str, Any]) -> "Scene":
         """A copy with the fields at dotted paths replaced in their order, validated again.
 
-        See :func:`ringsim.overrides.set_path` for ``name[k]`` and ``none``.  InputError if a path
-        or a value is refused.
+        See :func:`ringsim.overrides.set_path` for ``name[k]`` and ``none``; k may be the name of a
+        pulley: ``coefficient["section 6 V"]``.  InputError if a path or a value is refused.
 
         >>> scene = load_scene("ring18").with_values({"loads.force": 0.02, "boom": "none"})
         >>> scene.loads.force, scene.boom
@@ -117,8 +137,17 @@ class Scene(Model):
         """
         table = self.to_table()
         for path, value in copy.deepcopy(values).items():  # later paths may lead into its tables
+            path = _with_number(table, path)
             set_path(table, path, value, _length_at(table, section_of(path)[0]) or 1)
         return scene_from_table(table, source=f"scene {self.name}")
+
+    def pulleys_at(self, path: str) -> tuple[str, ...]:
+        """Names of the pulleys for which a list at a path has values, if it has."""
+        return _pulleys_at(self, path)
+
+    def with_number(self, path: str) -> str:
+        """A path whose ``name["section 6 V"]`` is a number; InputError if it is not known."""
+        return _with_number(self, path)
 
     def to_table(self) -> dict[str, Any]:
         """The scene as nested plain tables, without the parts that it leaves out."""
@@ -140,14 +169,42 @@ def place_of(path: str, *, closed: bool) -> str | None:
 
 def _length_at(scene: Scene | dict[str, Any], path: str) -> int | None:
     """Values in a list at ``path``, also of tables that may still be refused; None: any number."""
-    sections = _at(scene, "structure.sections")
-    if not isinstance(sections, int):
-        return None
     place = place_of(path, closed=_at(scene, "structure.closed") is not False)
-    pulleys = scene.structure.pulleys if isinstance(scene, Scene) else pulleys_of(sections)
-    both = _at(scene, ".".join([*path.split(".")[:2], "end"])) == "both"
-    lengths = {"section": sections, "corner": sections + 1, "pulley": pulleys + both}
-    return lengths.get(place or "")
+    sections = _at(scene, "structure.sections")
+    if place == "pulley" or not isinstance(sections, int):
+        return len(_pulleys_at(scene, path)) or None
+    return {"section": sections, "corner": sections + 1}.get(place or "")
+
+
+def _points_in(scene: Scene | dict[str, Any]) -> tuple[str, ...]:
+    """What cables run along, also of tables; nothing where these are sure to be refused."""
+    kind = str(_at(scene, "structure.kind") or "pantograph-ring")
+    structure: Any = kinds_of(Structure).get(kind)
+    if structure is None:
+        return ()
+    if (sections := _at(scene, "structure.sections")) is None:
+        own = structure.model_fields.get("sections")  # a constant of the class if it is no field
+        sections = structure.sections if own is None else own.default
+    usable = type(sections) is int and 0 < sections <= MOST_SECTIONS
+    return tuple(structure.cable_points(sections)) if usable else ()
+
+
+def _pulleys_at(scene: Scene | dict[str, Any], path: str) -> tuple[str, ...]:
+    """Names of the pulleys that a list at ``path`` has values for, if it has."""
+    points = _points_in(scene) if place_of(path, closed=True) == "pulley" else ()
+    end = _at(scene, ".".join([*path.split(".")[:2], "end"]))
+    return path_of(points, end)[1:-1] if points else ()
+
+
+def _with_number(scene: Scene | dict[str, Any], path: str) -> str:
+    inner, name = section_of(path)
+    names = _pulleys_at(scene, inner) if isinstance(name, str) else ()
+    if not isinstance(name, str) or not names:
+        return path
+    try:
+        return f"{inner}[{number_of(name, names, path)}]"
+    except ValueError as error:
+        raise InputError(str(error)) from None
 
 
 def _at(owner: Any, path: str) -> Any:

@@ -166,5 +166,7 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
         attributes = made | {name: design[name] for name in _KEPT} | {"execution": execution}
         attributes["history"] += f"\n{design['history']}"
         output = OutputTable.model_validate_json(design["output"])
-        failed += write_merged(campaign.path, found, campaign.table, output, attributes)
+        failed += write_merged(
+            campaign.path, found, campaign.table, campaign.scene, output, attributes
+        )
     return left, failed, path

@@ -57,7 +57,7 @@ def command(
     target = out or Path(f"{chosen.name}.nc")
 
     from ringsim.dataset import save, to_dataset
-    from ringsim.outputs import VARIABLES
+    from ringsim.outputs.summary import summary
     from ringsim.simulation import FIDELITIES
 
     require_place(target)
@@ -66,16 +66,8 @@ def command(
     click.echo(f"{chosen.name}: {outcome.status.word}: {outcome.reason}")
     if anew := _restarted(values, chosen.solver):
         click.echo(f"  {anew}")
-    for name, variable in VARIABLES.items():
-        if variable.summary is None or (name == "total_steps" and not anew):
-            continue
-        number = float(values.get(name, np.nan))
-        if np.isfinite(number):
-            label, style = variable.summary
-            unit = {"degree": "deg", "1": ""}.get(variable.units, variable.units)
-            line = f"  {label:20s}{values[name].item():{style}} {unit}".rstrip()
-            bar = values.get(f"{name}_error")
-            click.echo(line if bar is None else f"{line} +- {bar.item():.2g}")
+    for line in summary(values, chosen):
+        click.echo(f"  {line}")
     dataset = to_dataset(outcome, chosen)
     save(dataset, target)
     click.echo(f"wrote {target}")

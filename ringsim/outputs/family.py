@@ -33,6 +33,9 @@ COORDINATES = {
 }
 """Dimensions of the variables; an output may declare more."""
 
+SPAN_NAME = Variable("span_name", ("plane", "span"), "1", "ends of the span", "str")
+"""Coordinate of every result that has spans; empty where a plane's cable has fewer."""
+
 
 class Output:
     """An output, or a few that are computed together; every run that needs it has its own."""
@@ -74,6 +77,10 @@ class Output:
             values[self.variables[1].name] = np.abs(series.values).max()
         return values
 
+    def told(self, values: Values, scene: Scene) -> str:
+        """When and where the value in its summary was, in words; empty if that is not known."""
+        return ""
+
 
 def _declared(output: type[Output]) -> dict[str, Variable]:
     """Variables of an output and their error bars ``NAME_error``.
@@ -111,3 +118,9 @@ def axes(scene: Scene) -> dict[str, NDArray[Any]]:
         "time": output_times(scene),
         "span": np.arange(1, scene.spans + 1),
     }
+
+
+def span_names(scene: Scene) -> NDArray[Any]:
+    """Values of ``SPAN_NAME``, shape (planes, spans)."""
+    rows = ([*names, *[""] * (scene.spans - len(names))] for names in scene.span_names.values())
+    return np.array(list(rows), dtype=str)

@@ -6,6 +6,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.cable.places import CABLES
+
 
 @dataclass(frozen=True)
 class Column:
@@ -24,6 +26,8 @@ class Column:
     """The distribution, in words."""
     values: NDArray[Any]
     """Shape (samples,), or (samples, k) with a value for each place."""
+    places: tuple[str, ...] = ()
+    """Names of the k places, if they have some."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,12 @@ class Table:
     def samples(self) -> int:
         """Number of samples."""
         return len(self.seeds)
+
+    @property
+    def moves_winches(self) -> bool:
+        """Whether samples count the pulleys of a cable from different ends."""
+        ends = [f"cables.{cable}.end" for cable in CABLES]
+        return any(f"{end}.".startswith(f"{c.path}.") for c in self.columns for end in ends)
 
     def values_of(self, sample: int) -> dict[str, Any]:
         """Values by path of one sample, as :meth:`Scene.with_values` takes them."""
@@ -75,10 +85,24 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
             | ({"dtype": "bool"} if values.dtype.kind == "b" else {})
         )
         variable[:] = values.astype(object if text else kind)
+        if column.places and not table.moves_winches:
+            variable.coordinates = _add_names(file, column)
     seeds = file.createVariable("sample_seed", "i8", ("sample",))
     seeds.long_name = "seed of the sample, from the campaign's seed and the sample's index"
     seeds.units = "1"
     seeds[:] = table.seeds
+
+
+def _add_names(file: Any, column: Column) -> str:
+    """The coordinate with the names of a column's places; its own if another has other names."""
+    places = np.array(column.places, dtype=object)
+    name = f"{column.dim}_name"
+    if name in file.variables and not np.array_equal(file[name][:], places):
+        name = f"{column.name}_{name}"
+    if name not in file.variables:
+        file.createVariable(name, str, (column.dim,))[:] = places
+        file[name].long_name = f"place of the {column.dim.partition('_')[0]}"
+    return name
 
 
 def read_inputs(file: Any) -> tuple[Column, ...]:
@@ -92,5 +116,8 @@ def read_inputs(file: Any) -> tuple[Column, ...]:
             kind = says.get("dtype", str if values.dtype.kind == "O" else values.dtype)
             dim, origin = "".join(variable.dimensions[1:]), says.get("distribution", "")
             units = says.get("units", "1")
-            columns.append(Column(name, says["path"], dim, units, origin, values.astype(kind)))
+            named = says.get("coordinates")
+            places = tuple(file[named][:]) if named else ()
+            values = values.astype(kind)
+            columns.append(Column(name, says["path"], dim, units, origin, values, places))
     return tuple(columns)

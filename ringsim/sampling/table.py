@@ -1,5 +1,6 @@
 """The design of a campaign: which values every sample has, and which paths it may vary."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -51,8 +52,9 @@ def draw(
         else:
             base.with_values({path: middle})
             own = [path]
+        drawn_already = {base.with_number(each) for each in factors}
         for each in own:
-            if each in factors:
+            if base.with_number(each) in drawn_already:
                 raise InputError(f"inputs: {each} is drawn twice: leave out one of its inputs")
             factors[each] = distribution
     drawn = design.table(factors, correlations, seed=seed, folder=folder)
@@ -107,16 +109,17 @@ def _each_of(base: Scene, path: str, value: Any) -> int:
 
 def _column(base: Scene, path: str, values: Values, origin: Distribution | None) -> Column:
     scene = base.with_values({path: values[0].tolist()})
-    dim = ""
+    dim, places = "", tuple[str, ...]()
     if values.ndim == 2:
         dim = place_of(path, closed=scene.structure.closed) or f"place_{values.shape[1]}"
-        if dim == "pulley" and values.shape[1] != scene.structure.pulleys:
+        places = scene.pulleys_at(path)
+        if places and field_at(scene, path.partition(".friction")[0]).end == "both":
             dim = "pulley_of_two_winches"
-    name = path.replace(".", "_").replace("[", "_").removesuffix("]")
+    name = re.sub(r"\W+", "_", path).strip("_")
     words = "listed in a file" if origin is None else origin.model_dump_json(exclude_none=True)
     if values.dtype.kind in "iu" and isinstance(field_at(scene, path), float):
         values = values.astype(float)
-    return Column(name, path, dim, unit_at(scene, path), words, values)
+    return Column(name, path, dim, unit_at(scene, path), words, values, places)
 
 
 def _check_extremes(base: Scene, table: Table) -> None:

@@ -1,0 +1,50 @@
+"""When and where the largest of an output's readings was."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ringsim.outputs.family import Array, Run, Values, Variable
+from ringsim.scene import Scene
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Variables ``NAME_time`` and ``NAME_DIM`` for each dimension of a reading."""
+
+    name: str
+    dims: tuple[str, ...]
+    words: str
+    """What is the largest."""
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """Whole numbers where the dimension has numbers (-1 if missing), text elsewhere."""
+        numbers = ("section", "span")
+        where = (
+            Variable(
+                f"{self.name}_{dim}", (), "1", f"{dim} of {self.words}",
+                "i4" if dim in numbers else "str",
+            )
+            for dim in self.dims
+        )  # fmt: skip
+        return (Variable(f"{self.name}_time", (), "s", f"time of {self.words}"), *where)
+
+    def of(self, run: Run, times: Array, values: Array) -> Values:
+        """Of values with the shape (times, *dims); the first of equal ones, NaN counts as none."""
+        moment, *where = np.unravel_index(int(np.nanargmax(values)), values.shape)
+        found: Values = {f"{self.name}_time": times[moment]}
+        for dim, place in zip(self.dims, where, strict=True):
+            found[f"{self.name}_{dim}"] = run.coordinates[dim][place]
+        return found
+
+    def told(self, values: Values, scene: Scene) -> str:
+        """As "at 0.3 s: upper, span 1 (winch to section 1 first hinge)"; empty if it is unknown."""
+        if not np.isfinite(time := float(values.get(f"{self.name}_time", np.nan))):
+            return ""
+        where = {dim: np.asarray(values[f"{self.name}_{dim}"]).item() for dim in self.dims}
+        words = [str(v) if isinstance(v, str) else f"{dim} {v}" for dim, v in where.items()]
+        names = scene.span_names.get(where.get("plane", ""), ())
+        if 0 < (span := where.get("span", 0)) <= len(names):
+            words[-1] += f" ({names[span - 1]})"
+        return f"at {time:.4g} s: {', '.join(words)}"
