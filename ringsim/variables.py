@@ -73,8 +73,8 @@ class Cause(Code):
 class Fate(Code):
     """What the antenna did, as far as a run whose numbers hold tells."""
 
-    UNKNOWN = 0
-    """The numbers do not hold."""
+    NONE = 0
+    """The numbers do not hold: nothing is said."""
     DEPLOYED = 1
     """Every V-joint has reached 180 deg, whatever it did afterwards."""
     PARTLY_DEPLOYED = 2
@@ -89,6 +89,10 @@ class Fate(Code):
     """Still moving or driven at ``solver.end_time``."""
     FINISHED = 7
     """A structure that does not lock, driven until ``solver.end_time``."""
+
+
+GOALS = (Fate.DEPLOYED, Fate.FOLDED, Fate.FINISHED)
+"""What runs are made for; the others ended before."""
 
 
 class Reason(str):
@@ -163,3 +167,8 @@ class Outcome:
     """Arrays by name; shapes follow ``ringsim.outputs.VARIABLES`` and ``coordinates``.  A failed
     run has what was recorded until then, NaN elsewhere."""
     cause: Cause = Cause.NONE
+
+    @property
+    def fate(self) -> Fate:
+        """What the antenna did."""
+        return Fate(int(self.values.get("outcome", Fate.NONE)))

@@ -29,7 +29,7 @@ _SAME = ("solver.step_control", "rods.kind")
 _SMALLER = (
     "solver.step", "solver.tolerance", "solver.deviation_tolerance", "solver.newton_tolerance",
 )  # fmt: skip
-NEEDED = (*OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "final_time")
+NEEDED = (*OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "outcome", "final_time")
 
 
 class Truth(NamedTuple):

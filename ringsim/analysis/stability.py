@@ -16,7 +16,7 @@ from ringsim.analysis.errors import held
 from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
 from ringsim.tables import markdown_table
-from ringsim.variables import Cause, Status
+from ringsim.variables import GOALS, Cause, Fate, Status
 
 OK, ENDED, WRONG = "ok", "ended", "wrong"
 _NAMELESS = {Cause.NONE, Cause.EXCEPTION, Cause.CRASH, Cause.UNFIT}
@@ -61,6 +61,13 @@ def word_of(cause: Cause) -> str:
     return "" if cause in _NAMELESS else _WORDS.get(cause, cause.word.replace("_", " "))
 
 
+def _word(status: int, cause: int, fate: int) -> str:
+    """Why a cell ended before its goal; empty if it did not."""
+    if status == Status.OK:
+        return "" if fate in GOALS else Fate(fate).word.replace("_", " ")
+    return word_of(Cause(cause)) or Status(status).word
+
+
 def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr.Dataset:
     """The cells of a merged campaign, given the values of the two axes for each of its samples.
 
@@ -70,8 +77,10 @@ def cells_of(campaign: xr.Dataset, x: Sequence[float], y: Sequence[float]) -> xr
     unknown = np.full(campaign.sizes["sample"], np.nan)
     status = campaign["status"].values.astype(int)
     causes = [
-        "" if code == Status.OK else word_of(Cause(cause)) or Status(code).word
-        for code, cause in zip(status, campaign["cause"].values.astype(int), strict=True)
+        _word(*codes)
+        for codes in zip(
+            status, *(campaign[n].values.astype(int) for n in ("cause", "outcome")), strict=True
+        )
     ]
     found = {
         "x": np.array(x, dtype=float), "y": np.array(y, dtype=float), "status": status,
@@ -96,7 +105,7 @@ def judged(cells: xr.Dataset) -> xr.Dataset:
     an energy error over its tolerance, or whose check (see :func:`checked`) failed, is "wrong".
     """
     status = cells["status"].values
-    good = status == Status.OK
+    good = cells["cause"].values == ""
     nameless = [Status(code).word for code in status] == cells["cause"].values
     crashed = np.isin(status, (Status.ERROR, Status.CRASHED)) & (cells["cause"] != "refused").values
     wrong = (~good & nameless) | crashed | (good & (cells["energy_error"] > ENERGY_PROMISE).values)

@@ -16,7 +16,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 from ringsim.theory.one_coordinate import OneCoordinate, opening_time
-from ringsim.variables import Status
+from ringsim.variables import GOALS, Fate, Status
 
 _STEP_LIMIT = 1_000_000
 """Steps of one rung: its time is limited instead."""
@@ -46,11 +46,13 @@ def run_ladder(folder: Path, scene: Scene, workers: int, timeout: float) -> xr.D
     for stage, places in (("first", in_time[:1]), ("reference", in_time + in_space)):
         own = [rungs[k] for k in places]
         found = study.run(stage, own)
-        for rung, code, reason in zip(own, found.status.values, found.reason.values, strict=True):
-            if code != Status.OK:
+        ends = [found[name].values for name in ("status", "outcome", "reason")]
+        for rung, code, fate, reason in zip(own, *ends, strict=True):
+            if fate not in GOALS:
+                word = (Fate(int(fate)) if code == Status.OK else Status(code)).word
                 settings = ", ".join(f"{path} = {value}" for path, value in rung.values.items())
                 raise ReferenceRunError(
-                    f"the reference run with {settings} ended as {Status(code).word}: "
+                    f"the reference run with {settings} ended as {word}: "
                     f"{reason or 'no reason given'}: change the scene so that it ends well with "
                     "fine steps, or give it more time (--timeout) in a new folder"
                 )

@@ -58,7 +58,9 @@ class Integration:
         self._gaps = joint_groups(model)
         angles = self._openings.read(self._state)[0]
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
-        self._locks = Locks(angles, stowed) if scene.structure.locks else None
+        self._locks = (
+            Locks(angles, stowed, scene.structure.planes) if scene.structure.locks else None
+        )
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None

@@ -32,7 +32,7 @@ class Recorder:
         self.rates: list[Array] = []
         self.energies: list[Energies] = []
         self.gaps: list[float] = []
-        self.status, self.fate, self.reason = Status.OK, Fate.UNKNOWN, Reason()
+        self.status, self.fate, self.reason = Status.OK, Fate.NONE, Reason()
         self.repeats = self.newton_iterations = self.jacobians = 0
 
     def note(self, now: Reading) -> None:

@@ -14,7 +14,7 @@ from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from ringsim.variables import Status
+from ringsim.variables import Fate, Status
 
 INK, GREY, PALE = "#222222", "#6e6e6e", "#e4e4e4"
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
@@ -89,12 +89,13 @@ def deployment_time(dataset: xr.Dataset) -> float:
 
 def ending(dataset: xr.Dataset) -> str:
     """How the run ended, in one sentence."""
-    word = Status(int(dataset["status"])).word.replace("_", " ")
-    if word == "ok" and math.isfinite(deployed := deployment_time(dataset)):
+    status, fate = Status(int(dataset["status"])), Fate(int(dataset.get("outcome", Fate.NONE)))
+    word = (status if status.failed else fate).word.replace("_", " ")
+    if fate == Fate.DEPLOYED and math.isfinite(deployed := deployment_time(dataset)):
         return f"Deployed after {deployed:.2f} s"
     final = float(dataset.get("final_time", math.nan))
     reason = str(dataset.attrs.get("reason", "")).strip()
-    start = "Ended" if word == "ok" else word.capitalize()
+    start = "Ended" if word == "none" else word.capitalize()
     start += f" after {final:.4g} s" if math.isfinite(final) else ""
     return f"{start}: {reason}" if reason else start
 

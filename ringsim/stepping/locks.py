@@ -1,6 +1,7 @@
 """Which V-joints have reached their stops, when, and how steps should meet them."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -37,11 +38,6 @@ class StopContact(NamedTuple):
     resting_rate: float = 0.0
 
 
-def name_of(plane: int, section: int) -> str:
-    """A V-joint by its place, both from 0: "upper 3"."""
-    return f"{PLANES[plane]} {section + 1}"
-
-
 class Locks:
     """The V-joints' memory of their stops.
 
@@ -50,8 +46,14 @@ class Locks:
     to leave it before it can come back.
     """
 
-    def __init__(self, angles: Array, stowed_angle: float | None) -> None:
-        """Begin with these opening angles (rad); the stowed stop's is None without stops."""
+    def __init__(
+        self, angles: Array, stowed_angle: float | None, planes: Sequence[str] = PLANES
+    ) -> None:
+        """Begin with these opening angles (rad); the stowed stop's is None without stops.
+
+        ``planes`` are the names by which sentences call the rows of the angles.
+        """
+        self._planes = planes
         self.stops = stowed_angle is not None
         self._stowed_angle = stowed_angle or 0.0
         self.deployed, self.stowed = np.zeros((2, *angles.shape), dtype=bool)
@@ -67,11 +69,15 @@ class Locks:
         """The V-joint that is farthest past its stop."""
         past: Array = np.maximum(now.angles - math.pi, self._stowed_angle - now.angles)
         plane, section = divmod(int(past.argmax()), past.shape[1])
-        return Overrun(float(past[plane, section]), name_of(plane, section), now.time)
+        return Overrun(float(past[plane, section]), self._name(plane, section), now.time)
+
+    def _name(self, plane: int, section: int) -> str:
+        """A V-joint by its place, both from 0: "upper 3"."""
+        return f"{self._planes[plane]} {section + 1}"
 
     def missing(self) -> str:
         """How many V-joints have locked, and which have not."""
-        open_ = [name_of(*place) for place in np.argwhere(~self.deployed)]
+        open_ = [self._name(*place) for place in np.argwhere(~self.deployed)]
         count = f"{int(self.deployed.sum())} of {self.deployed.size} V-joints locked"
         if not open_ or len(open_) == self.deployed.size:
             return count

@@ -4,28 +4,46 @@ import numpy as np
 
 from ringsim.stepping.instant import Array, Instant
 
-MOVED = 1e-3
-"""Angle that a V-joint at rest may still move by, rad: 0.06 deg."""
+MOVED = 0.01
+"""Angle that a V-joint at rest may still move by within a window, rad: joints that a slack rope has
+left to their friction creep for hours."""
 WINDOW = 0.1
-"""Time over which it is watched, over ``solver.end_time``: one that creeps on unseen would move
-by 10 times ``MOVED``, half a degree, in all the time that there is."""
+"""Time over which it is watched, over ``solver.end_time``: what creeps at that rate moves by less
+than 10 times ``MOVED``, 6 deg, in all the time that there is."""
+_STILL = 1e-12
+"""Kinetic energy that is round-off, over the structure's reference energy."""
 
 
 class Rest:
     """Watches whether anything moves or will move.
 
     A structure is at rest once no V-joint has moved by more than ``MOVED`` within a window in which
-    no winch has turned, and none will and no fault is to come (``Instant.driven``).
+    no winch has turned, and none will and no fault is to come (``Instant.driven``), and in which
+    its kinetic energy has not grown: one that its loads set in motion has hardly moved either.
     """
 
-    def __init__(self, start: Instant, end_time: float) -> None:
-        """Begin to watch at this instant a run that ends at ``end_time`` (s)."""
-        self._window = WINDOW * end_time
-        self._since, self._angles = start.time, start.angles
+    def __init__(self, start: Instant, end_time: float, energy: float) -> None:
+        """Begin to watch at this instant a run that ends at ``end_time`` (s), of a structure with a
+        reference energy (J).
+        """
+        self.window, self._still = WINDOW * end_time, _STILL * energy
+        self._begin(start)
 
     def reached(self, now: Instant) -> bool:
         """Whether the structure is at rest by now; to be asked after every step."""
         moved: Array = np.abs(now.angles - self._angles)
         if now.driven or moved.max() > MOVED:
-            self._since, self._angles = now.time, now.angles
-        return now.time - self._since >= self._window
+            self._begin(now)
+        late = now.time - self._since > 0.5 * self.window
+        self._largest[late] = max(self._largest[late], now.energies.kinetic)
+        if now.time - self._since < self.window:
+            return False
+        if self._largest[True] <= max(self._largest[False], self._still):
+            return True
+        self._begin(now)
+        return False
+
+    def _begin(self, now: Instant) -> None:
+        """Open a window: where it starts, and the largest energy in its halves."""
+        self._since, self._angles = now.time, now.angles
+        self._largest = {False: 0.0, True: 0.0}

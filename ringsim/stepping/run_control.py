@@ -16,7 +16,7 @@ from ringsim.stepping.instant import Instant, Scales
 from ringsim.stepping.locks import Locks, Overrun, StopContact, lock_times
 from ringsim.stepping.motion_steps import DeviationSteps, MotionSteps
 from ringsim.stepping.repeats import EnergyImbalance, Indicator, TensionBend
-from ringsim.stepping.rest import Rest
+from ringsim.stepping.rest import MOVED, Rest
 from ringsim.variables import Cause, Fate, Reason, Status
 
 _ROUND_OFF = 1e-12
@@ -45,7 +45,8 @@ class RunControl:
         with ``follow_deviations`` steps resolve how the joints deviate from their mean angle.
         """
         self.now, self._solver, self._locks, self._limits = start, solver, locks, limits
-        self._rest, self._farthest = Rest(start, solver.end_time), Overrun()
+        self._rest = Rest(start, solver.end_time, scales.energy)
+        self._farthest = Overrun()
         self._roped = scales.slack_tension is not None
         self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, locks is None)
         self._indicators: list[Indicator] = []
@@ -61,7 +62,7 @@ class RunControl:
         self._guard = Guard(solver, scales)
         self._shorter: float | None = None
         self._count, self.repeats, self._settled_at = 0, 0, math.inf
-        self.status, self.fate, self.reason = Status.OK, Fate.UNKNOWN, Reason()
+        self.status, self.fate, self.reason = Status.OK, Fate.NONE, Reason()
         self.goes_on = True
         self._watch()
 
@@ -126,7 +127,7 @@ class RunControl:
 
     def diverge(self, reason: Reason) -> None:
         """End a run that cannot be sound."""
-        self.status, self.fate, self.reason = Status.DIVERGED, Fate.UNKNOWN, reason
+        self.status, self.fate, self.reason = Status.DIVERGED, Fate.NONE, reason
         self.goes_on = False
 
     def conclude(self) -> None:
@@ -180,7 +181,9 @@ class RunControl:
             some = locks.deployed.any()
             self._end(
                 Fate.PARTLY_DEPLOYED if some else Fate.STALLED,
-                f"came to rest with {locks.missing()}: nothing drives it any more",
+                f"came to rest with {locks.missing()}: no winch turns, and within "
+                f"{self._rest.window:.3g} s no V-joint has moved by more than "
+                f"{math.degrees(MOVED):.2g} deg",
             )
         elif self._count >= solver.step_limit:
             self._give_up(

@@ -69,7 +69,7 @@ class Course:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self.motion = scene, IdealMotion(scene)
-        self.status, self.fate, self.reason = Status.OK, Fate.UNKNOWN, Reason()
+        self.status, self.fate, self.reason = Status.OK, Fate.NONE, Reason()
         self.lock_time = math.nan
         self.pieces: list[Piece] = []
         self.evaluations, self.jacobians = 0, 0
@@ -94,7 +94,7 @@ class Course:
                     self._state = self.motion.strike(fault, self._time, self._state)
         except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
             too_long = self.evaluations > MOST_EVALUATIONS
-            self.status, self.fate = Status.SOLVER_FAILED, Fate.UNKNOWN
+            self.status, self.fate = Status.SOLVER_FAILED, Fate.NONE
             words = f"the ideal ring's solver gave up at {self._time:.6g} s: {error}"
             self.reason = Reason(Cause.STEP_LIMIT if too_long else Cause.NEWTON, words)
         if not self.reason:

@@ -108,7 +108,7 @@ def test_few_elements_widen_what_they_bend() -> None:
 @pytest.mark.parametrize("which", [0, 1])
 def test_no_bars_without_two_good_runs(which: int) -> None:
     pair = [outcome(1e-4), outcome(4e-4)]
-    pair[which] = outcome(1e-4, Status.UNFINISHED)
+    pair[which] = outcome(1e-4, Status.DIVERGED)
     assert error_bars(*pair, elements=1, tolerance=0.0) == {}
 
 

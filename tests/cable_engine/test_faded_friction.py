@@ -9,7 +9,7 @@ import pytest
 from driven import outcome, truss
 from ringsim.scene import Scene
 from ringsim.simulation import run_ideal
-from ringsim.variables import Status
+from ringsim.variables import Fate
 
 SLOW = 5e-4
 STALLED = {"kind": "stall", "speed": 0.05, "max_tension": 0.03}
@@ -29,7 +29,7 @@ def slowly(**values: Any) -> Scene:
 @pytest.mark.parametrize("fidelity", [outcome, run_ideal], ids=["full", "ideal"])
 def test_too_fast_a_slip_speed_is_named_with_its_cure(fidelity: Any) -> None:
     found = fidelity(slowly(cables__upper__slip_speed=2e-4))
-    assert found.status == Status.UNFINISHED
+    assert found.fate is Fate.CUT_OFF
     # 0.5 x 5e-4 m/s over 6 spans; the lower cable follows its winch.
     assert "cables.upper.slip_speed = 0.0002 m/s is too fast" in found.reason
     assert "at most 4.2e-05 m/s" in found.reason

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from driven import outcome, truss
-from ringsim.variables import Outcome, Status
+from ringsim.variables import Fate, Outcome
 
 STRIKES = 1.0
 ENERGY = 3e-4
@@ -59,7 +59,7 @@ def test_a_cut_cable_pulls_nothing_and_the_other_goes_on() -> None:
 
 def test_both_cables_cut_leave_the_truss_to_its_friction() -> None:
     found = struck(*({"kind": "cut-cable", "cable": c, "span": 6} for c in (1, 2)), end=4.0)
-    assert found.status == Status.UNFINISHED
+    assert found.fate is Fate.CUT_OFF
     angle = found.values["opening_angle"]
     rest = found.coordinates["time"] > 3.0
     assert np.ptp(angle[..., rest], axis=-1).max() < 0.2
@@ -68,7 +68,7 @@ def test_both_cables_cut_leave_the_truss_to_its_friction() -> None:
 
 def test_a_stuck_joint_stays_and_the_rest_goes_on() -> None:
     found = struck({"kind": "stuck-vjoint", "plane": "upper", "section": 1})
-    assert found.status == Status.UNFINISHED
+    assert found.fate is Fate.CUT_OFF
     _, after = parts(found)
     angle = found.values["opening_angle"]
     # 1000 N m/rad holds the few N m that the rods turn it by.

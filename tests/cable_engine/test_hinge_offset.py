@@ -7,7 +7,7 @@ import pytest
 from driven import outcome, truss
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
-from ringsim.variables import Outcome, Status
+from ringsim.variables import Fate, Outcome
 
 
 def opened(offset: float, sections: int = 2) -> Outcome:
@@ -33,7 +33,7 @@ def test_coinciding_hinge_pulleys_are_refused(scene: str) -> None:
 
 
 def test_a_single_section_has_no_span_between_hinges() -> None:
-    assert opened(0.0, sections=1).status == Status.UNFINISHED
+    assert opened(0.0, sections=1).fate is Fate.CUT_OFF
 
 
 def test_the_least_offset_that_is_allowed_is_the_limit() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from driven import outcome, truss
 from ringsim.scene import Scene, load_scene
-from ringsim.variables import Outcome, Status
+from ringsim.variables import Fate, Outcome, Status
 
 RAMP = {"kind": "ramp", "speed": 0.05, "duration": 0.5}
 BALANCE = 1e-3
@@ -45,7 +45,7 @@ def test_a_prescribed_law_winds_what_it_says(winding: dict[str, Any]) -> None:
 def test_a_table_ends_and_the_truss_rests_where_its_rope_ends() -> None:
     table = {"kind": "table", "times": [0.0, 1.0, 3.0], "lengths": [0.0, 0.03, 0.12]}
     found = outcome(scene(winding=table, both__initial_slack=0.0, joints__vjoint__viscous=0.5))
-    assert found.status == Status.UNFINISHED
+    assert found.fate is Fate.CUT_OFF
     assert found.values["wound_length"][:, -1] == pytest.approx(0.12, abs=1e-12)
     opened = np.radians(found.values["opening_angle"][..., -1].mean())
     ring = load_scene("truss2").structure
@@ -118,7 +118,7 @@ def test_a_late_motor_and_one_that_stops() -> None:
     assert late.values["wound_length"][:, before].max() < 1e-7
     assert angles[..., -1].min() > 65.0
     stopped = outcome(scene(both__winch__stop_time=2.0, joints__vjoint__viscous=0.5, **loose))
-    assert stopped.status == Status.UNFINISHED
+    assert stopped.fate is Fate.CUT_OFF
     rest = stopped.values["opening_angle"][..., times > 3.0]
     assert np.ptp(rest, axis=-1).max() < 0.2
     assert stopped.values["wound_length"][:, -1] == pytest.approx(0.05 * 1.75, abs=1e-12)

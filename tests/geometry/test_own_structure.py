@@ -14,7 +14,7 @@ from ringsim.layout.layout import layout_of
 from ringsim.layout.mobility import internal_mobility
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.theory.one_coordinate import OneCoordinate, opening_time
-from ringsim.variables import Status
+from ringsim.variables import Fate, Status
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def test_cables_stress_faults_and_its_own_text_work_as_with_any_other(
     )  # fmt: skip
     assert scene_from_toml(scene.to_toml(), source="text") == scene
     run = ringsim.simulate(scene)
-    assert int(run.status) == Status.UNFINISHED, run.attrs["reason"]
+    assert int(run.outcome) == Fate.CUT_OFF, run.attrs["reason"]
     assert {"inner_bar_upper_left", "diagonal_rising_right"} <= set(run.rod.values)
     assert run.rod_stress.sizes["rod"] == 16
     assert float(run.cable_tension.sel(plane="upper").max()) > 0.0

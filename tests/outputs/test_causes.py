@@ -1,4 +1,4 @@
-"""Every way to end has a code, which survives restarts, journals and files."""
+"""Every way to fail has a code, which survives restarts, journals and files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ RING = load_scene("ring18").with_values(
 @pytest.mark.parametrize(
     ("values", "cause"),
     [
-        ({"solver.end_time": 0.2}, Cause.END_TIME),
         ({"solver.step_limit": 5, "solver.restarts": 0}, Cause.STEP_LIMIT),
         (
             {"solver.step_control": "constant", "solver.step": 0.2, "solver.restarts": 0}

@@ -15,7 +15,7 @@ from ringsim.dataset import to_dataset
 from ringsim.outputs import OUTPUTS, VARIABLES, Output
 from ringsim.scene import load_scene
 from ringsim.simulation import FIDELITIES, simulate
-from ringsim.variables import Cause, Outcome, Status, Variable
+from ringsim.variables import Cause, Fate, Outcome, Status, Variable
 
 SHORT = {"structure.opening_angle": 160.0, "solver.end_time": 2.0}
 SCENE = load_scene("truss2").with_values(SHORT)
@@ -92,9 +92,10 @@ def test_a_campaign_has_it(opening_rate, tmp_path, monkeypatch) -> None:
         assert found.opening_rate_max.dims == ("sample",)
         assert (found.opening_rate_max > 0.0).all()
         assert found.cause.dtype == np.int8
-        assert found.cause.values.tolist() == [Cause.END_TIME, Cause.END_TIME]
+        assert found.cause.values.tolist() == [Cause.NONE, Cause.NONE]
         words = found.cause.attrs["flag_meanings"].split()
-        assert words[:3] == ["unknown", "none", "end_time"]
+        assert words[:3] == ["unknown", "none", "blow_up"]
+        assert found.outcome.values.tolist() == [Fate.CUT_OFF, Fate.CUT_OFF]
         assert found.cause.attrs["flag_values"].tolist() == [-1, *Cause]
 
 

@@ -11,7 +11,7 @@ from ring_rods import RODS
 
 from ringsim.dataset import to_dataset
 from ringsim.scene import Scene, scene_from_table
-from ringsim.variables import PLANES, Outcome, Status
+from ringsim.variables import PLANES, Fate, Outcome, Status
 
 DEPLOYED = 17.58
 REASON = "the step fell below its bound at 9.3 s: lower solver.step or raise solver.tolerance"
@@ -70,7 +70,8 @@ def _made_run(
     last = DEPLOYED + 0.3 if until is None else until
     for array in values.values():
         array[..., time > last] = np.nan
-    values |= {"final_time": np.array(last)}
+    fate = Fate.DEPLOYED if until is None else Fate.NONE if status.failed else Fate.CUT_OFF
+    values |= {"final_time": np.array(last), "outcome": np.array(int(fate))}
     if until is None:
         values |= {
             "deployment_time": np.array(DEPLOYED),
@@ -112,4 +113,4 @@ def failed() -> xr.Dataset:
 
 @pytest.fixture(scope="session")
 def unfinished() -> xr.Dataset:
-    return _made_run(_scene_of(2, closed=False), status=Status.UNFINISHED, until=12.0)
+    return _made_run(_scene_of(2, closed=False), until=12.0)

@@ -9,7 +9,6 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from ringsim.plots.ring import facing_azimuth, instants, lines_at, ring, view
-from ringsim.variables import Status
 
 LEFT = [*range(6), *range(12, 18)]
 """Left halves of the bars of six sections, upper plane first."""
@@ -134,7 +133,7 @@ def test_views_stand_side_by_side_inside_the_sheet(sections, closed, scene_of, m
 
 
 def test_a_ring_that_folds_is_not_called_stowed(scene_of, made_run):
-    run = made_run(scene_of(6), status=Status.UNFINISHED, until=12.0)
+    run = made_run(scene_of(6), until=12.0)
     backwards = run.isel(time=slice(0, 100)).copy(deep=True)
     backwards["opening_angle"].values[:] = backwards["opening_angle"].values[..., ::-1]
     assert [name for name, _ in instants(backwards)] == ["start", "half-way", "end of the run"]

@@ -55,7 +55,7 @@ def test_long_labels_are_broken_between_words():
 def test_ending_tells_success_failure_and_the_lack_of_an_end(deployed, failed, unfinished):
     assert style.ending(deployed) == "Deployed after 17.58 s"
     assert style.ending(failed).startswith("Solver failed after 9.25 s: the step fell below")
-    assert style.ending(unfinished).startswith("Unfinished after 12 s: ")
+    assert style.ending(unfinished).startswith("Cut off after 12 s: ")
 
 
 def test_a_long_title_is_broken_into_even_lines(deployed):
@@ -67,8 +67,7 @@ def test_a_long_title_is_broken_into_even_lines(deployed):
     assert abs(len(lines[0]) - len(lines[1])) <= len("word ")
 
 
-def test_success_without_locking_gives_the_reason(unfinished):
-    run = unfinished.copy(deep=True)
-    run["status"] = run["status"].copy(data=np.int8(0))
+def test_a_run_that_does_not_tell_its_outcome_gives_the_reason(unfinished):
+    run = unfinished.drop_vars("outcome")
     run.attrs["reason"] = "the end time was reached"
     assert style.ending(run) == "Ended after 12 s: the end time was reached"

@@ -26,18 +26,18 @@ from ringsim.analysis.stability import (
 )
 from ringsim.parts.solver import Solver
 from ringsim.plots.stability import stability
-from ringsim.variables import Cause, Status
+from ringsim.variables import Cause, Fate, Status
 
 NEWTON = "the solver gave up at 1 s after 9 reductions of the step: reduce solver.step"
 ENDS = {
-    "all V-joints have reached 180 deg": (Status.OK, Cause.NONE),
+    "all V-joints have reached 180 deg": (Status.OK, Cause.NONE, Fate.DEPLOYED),
     "solver.end_time = 4 s was reached with 0 of 4 V-joints locked": (
-        Status.UNFINISHED, Cause.END_TIME,
+        Status.OK, Cause.NONE, Fate.CUT_OFF,
     ),
-    NEWTON: (Status.SOLVER_FAILED, Cause.NEWTON),
-    "still running after limits.timeout = 90 s: raise it": (Status.TIMEOUT, Cause.TIME_LIMIT),
-    "KeyError: 'x'": (Status.ERROR, Cause.EXCEPTION),
-    "the solver process died of SIGSEGV": (Status.CRASHED, Cause.CRASH),
+    NEWTON: (Status.SOLVER_FAILED, Cause.NEWTON, Fate.NONE),
+    "still running after limits.timeout = 90 s": (Status.TIMEOUT, Cause.TIME_LIMIT, Fate.NONE),
+    "KeyError: 'x'": (Status.ERROR, Cause.EXCEPTION, Fate.NONE),
+    "the solver process died of SIGSEGV": (Status.CRASHED, Cause.CRASH, Fate.NONE),
 }  # fmt: skip
 
 
@@ -51,7 +51,7 @@ def campaign(*reasons: str, **values: list[float]) -> xr.Dataset:
         "peak_tension": [10.0] * count, "cpu_time": [1.0] * count, "steps": [1.0] * count,
     }  # fmt: skip
     found = {name: ("sample", np.array(v)) for name, v in (numbers | values).items()}
-    for place, name in enumerate(("status", "cause")):
+    for place, name in enumerate(("status", "cause", "outcome")):
         found[name] = ("sample", np.array([int(ENDS[r][place]) for r in reasons], dtype="i1"))
     found["reason"] = ("sample", np.array(reasons, dtype=object))
     found["opening_angle"] = (("sample", "plane", "section", "time"), angle)
@@ -74,7 +74,7 @@ def cells(*reasons: str, **values: list[float]) -> xr.Dataset:
 def test_every_end_has_its_verdict_and_its_cause() -> None:
     found = judged(cells(*ENDS))
     assert found["cause"].values.tolist() == [
-        "", "end time", "Newton", "time limit", "error", "crashed",
+        "", "cut off", "Newton", "time limit", "error", "crashed",
     ]  # fmt: skip
     assert found["verdict"].values.tolist() == [OK, ENDED, ENDED, ENDED, WRONG, WRONG]
 
@@ -135,7 +135,7 @@ def test_borders_name_the_ranges_and_what_lies_beyond() -> None:
     group["x"].values[:] = [1, 2, 3, 4, 5] * 2
     group["y"].values[:] = [7] * 5 + [8] * 5
     along, across = borders(joined([(WORDS, group)]))
-    assert along == ["group", "stiffness (N)", "2 .. 3", "1 .. 5", "Newton", "end time"]
+    assert along == ["group", "stiffness (N)", "2 .. 3", "1 .. 5", "Newton", "cut off"]
     assert across == ["group", "speed (m/s)", "none", "7 .. 8", "-", "-"]
 
 
@@ -147,7 +147,7 @@ def test_text_and_figure_tell_every_kind_of_cell() -> None:
     assert NEWTON in text
     figure = stability(whole)
     legend = [entry.get_text() for entry in figure.legends[0].get_texts()]
-    assert legend == ["ok", "r  ok, after a new start", "t  end time", "N  Newton",
+    assert legend == ["ok", "r  ok, after a new start", "t  cut off", "N  Newton",
                       "T  time limit", "!  wrong"]  # fmt: skip
     assert "Stiffness (N)" in [axes.get_xlabel() for axes in figure.axes]
 

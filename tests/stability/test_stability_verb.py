@@ -50,7 +50,7 @@ def test_two_axes_make_a_panel_of_runs_of_the_scene(mapped) -> None:
     with xr.open_dataset(mapped[0] / "stability.nc") as found:
         assert found["x"].values.tolist() == [0.01, 0.01, 1.0, 1.0]
         assert found["y"].values.tolist() == [100.0, 200.0] * 2
-        assert found["cause"].values.tolist() == ["end time", "end time", "", ""]
+        assert found["cause"].values.tolist() == ["cut off", "cut off", "", ""]
         assert found["verdict"].values.tolist() == [ENDED, ENDED, OK, OK]
         assert sorted(found["check"].values.tolist()) == ["", "", "", "holds"]
         labels = [str(found[name].values[0]) for name in ("x_label", "x_units", "y_label")]
@@ -63,7 +63,7 @@ def test_text_and_figure_are_written(mapped) -> None:
     assert f"panel 1: --over {SPEED}=0.01..1 --over {STOP}=100..200: 4 cells" in said
     assert re.search(r"4 cells in 1 panel: 2 ended, 2 ok", said)
     text = (out / "stability.md").read_text(encoding="utf-8")
-    assert f"| panel 1 | {SPEED} (m/s) | 1 .. 1 | 1 .. 1 | end time | - |" in text
+    assert f"| panel 1 | {SPEED} (m/s) | 1 .. 1 | 1 .. 1 | cut off | - |" in text
     assert (out / "stability.png").read_bytes().startswith(b"\x89PNG")
 
 

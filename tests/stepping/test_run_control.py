@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ringsim.parts.limits import Limits
 from ringsim.parts.solver import Solver
 from ringsim.stepping.instant import Energies, Instant, Scales
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
-from ringsim.variables import Status
+from ringsim.variables import Fate, Status
 
 INERTIA, TORQUE, BEGIN = 0.2, 0.01, math.radians(20.0)
 """Of each of six V-joints, kg m^2 and N m, and the opening angle that they start from."""
@@ -146,7 +147,7 @@ def test_a_failed_newton_halves_the_step_and_a_solver_that_gives_up_says_so() ->
 @pytest.mark.parametrize(
     ("solver", "status", "words"),
     [
-        (Solver(end_time=1.0), Status.UNFINISHED, "reached with 0 of 6 V-joints locked"),
+        (Solver(end_time=1.0), Status.OK, "reached with 0 of 6 V-joints locked"),
         (Solver(step_limit=30), Status.SOLVER_FAILED, "solver.step_limit = 30 steps"),
     ],
 )
@@ -177,6 +178,7 @@ def test_constant_steps_without_locks_run_to_the_end_time(slack_tension, words) 
     times = follow(motion, control)
     assert times == pytest.approx([*(0.3 * np.arange(14)), 4.0])
     assert control.status is Status.OK
+    assert control.fate is Fate.FINISHED
     assert control.reason == f"{words} until solver.end_time = 4 s"
 
 
@@ -241,3 +243,79 @@ def test_tensions_are_judged_until_the_last_lock() -> None:
         found = motion.at(control.now.time + control.next_step())
         jumped = replace(found, tensions=np.full(2, 11.0))
         assert (control.shorter(jumped) is None) is locked
+
+
+def parted(time: float) -> tuple[float, float]:
+    """Opens within 4 s, and goes on at the same rate."""
+    rate = (math.pi - BEGIN) / 4.0
+    return BEGIN + rate * time, rate
+
+
+def spread(motion: Motion, left: int) -> Motion:
+    """The same motion, but the last joints stay where they are."""
+    at = motion.at
+
+    def held(time: float) -> Instant:
+        now = at(time)
+        angles, rates = now.angles.copy(), now.rates.copy()
+        angles.flat[6 - left :], rates.flat[6 - left :] = BEGIN, 0.0
+        return replace(now, angles=angles, rates=rates)
+
+    motion.at = held  # type: ignore[method-assign]
+    return motion
+
+
+def test_a_joint_past_its_limit_ends_a_sound_run_and_is_named() -> None:
+    motion = spread(Motion(parted), left=1)
+    control = control_of(motion, Solver(end_time=20.0), limits=Limits(overrun=10.0))
+    times = follow(motion, control)
+    assert (control.status, control.fate) == (Status.OK, Fate.OVERLOADED)
+    rate = (math.pi - BEGIN) / 4.0
+    assert times[-1] == pytest.approx(4.0 + math.radians(10.0) / rate, abs=0.2)
+    assert "V-joint upper 1 was driven 1" in control.reason
+    assert control.reason.endswith(
+        "more than limits.overrun = 10 deg, with 5 of 6 V-joints locked, not lower 3"
+    )
+
+
+def test_joints_past_180_deg_are_named_where_there_is_no_stop() -> None:
+    motion = spread(Motion(parted), left=1)
+    locks = Locks(motion.at(0.0).angles, None)
+    control = RunControl(Solver(end_time=20.0), SCALES, motion.at(0.0), locks)
+    follow(motion, control)
+    assert control.fate is Fate.OVERLOADED
+    assert "past 180 deg, where the scene has no stop," in control.reason
+
+
+@pytest.mark.parametrize(
+    ("left", "fate", "words"),
+    [
+        (
+            6,
+            Fate.STALLED,
+            "came to rest with 0 of 6 V-joints locked: no winch turns, and within 3 s",
+        ),
+        (2, Fate.PARTLY_DEPLOYED, "came to rest with 4 of 6 V-joints locked, not lower 2, lower 3"),
+    ],
+)
+def test_what_rests_before_its_goal_ends_at_once(left: int, fate: Fate, words: str) -> None:
+    rate = (math.pi - BEGIN) / 4.0
+    motion = spread(
+        Motion(lambda t: (min(BEGIN + rate * t, math.pi), rate if t < 4.0 else 0.0)), left
+    )
+    solver = Solver(end_time=30.0, energy_tolerance=1e3)  # rates jump: no balance holds
+    control = control_of(motion, solver)
+    times = follow(motion, control)
+    assert (control.status, control.fate) == (Status.OK, fate)
+    assert control.reason.startswith(words)
+    assert times[-1] < 4.0 + 0.1 * 30.0 + 1.0
+
+
+def test_the_end_time_cuts_a_motion_off_and_tells_which_joints_are_missing() -> None:
+    motion = spread(Motion(parted), left=1)
+    control = control_of(motion, Solver(end_time=4.2))
+    follow(motion, control)
+    assert (control.status, control.fate) == (Status.OK, Fate.CUT_OFF)
+    assert control.reason == (
+        "solver.end_time = 4.2 s was reached with 5 of 6 V-joints locked, not lower 3"
+    )
