@@ -11,11 +11,11 @@ import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
 from ringsim.cable.faults.family import CableFault
-from ringsim.cable.places import number_of, numbered, path_of, spans_of
+from ringsim.cable.places import numbered, path_of, spans_of
 from ringsim.cable.records import Cable, Cables
-from ringsim.choice import OneOf, kinds_of
+from ringsim.choice import OneOf
 from ringsim.files import parse_toml, read_text
-from ringsim.overrides import section_of, set_path
+from ringsim.overrides import length_at, points_in, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.faults.family import Fault
 from ringsim.parts.joints import Joints
@@ -35,8 +35,6 @@ from ringsim.units import ListIn, Model
 
 MOST_RECORDS = 1_000_000
 """Output times of one run, at most."""
-MOST_SECTIONS = 1000
-"""A table that asks for more is refused, and names of their pulleys would only fill the memory."""
 
 
 class Scene(Model):
@@ -60,7 +58,7 @@ class Scene(Model):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         for path, value in _lists(self):
-            wanted = _length_at(self, path)
+            wanted = length_at(self, path)
             if wanted not in (None, len(value)):
                 raise ValueError(
                     f"{path} has {len(value)} values, but the structure needs {wanted}: give "
@@ -99,11 +97,11 @@ class Scene(Model):
     @model_validator(mode="before")
     @classmethod
     def _without_names(cls, table: Any) -> Any:
-        return numbered(table, _points_in(table)) if isinstance(table, dict) else table
+        return numbered(table, points_in(table)) if isinstance(table, dict) else table
 
     def path_of(self, cable: Cable) -> tuple[str, ...]:
         """Names of the points of a cable's path: its winch, pulleys, and end or other winch."""
-        return path_of(_points_in(self), cable.end)
+        return path_of(points_in(self), cable.end)
 
     def pulleys_of(self, cable: Cable) -> int:
         """Pulleys of one of the scene's cables: a second winch takes one more."""
@@ -137,17 +135,8 @@ class Scene(Model):
         """
         table = self.to_table()
         for path, value in copy.deepcopy(values).items():  # later paths may lead into its tables
-            path = _with_number(table, path)
-            set_path(table, path, value, _length_at(table, section_of(path)[0]) or 1)
+            set_path(table, path, value)
         return scene_from_table(table, source=f"scene {self.name}")
-
-    def pulleys_at(self, path: str) -> tuple[str, ...]:
-        """Names of the pulleys for which a list at a path has values, if it has."""
-        return _pulleys_at(self, path)
-
-    def with_number(self, path: str) -> str:
-        """A path whose ``name["section 6 V"]`` is a number; InputError if it is not known."""
-        return _with_number(self, path)
 
     def to_table(self) -> dict[str, Any]:
         """The scene as nested plain tables, without the parts that it leaves out."""
@@ -156,62 +145,6 @@ class Scene(Model):
     def to_toml(self) -> str:
         """The scene as TOML text; reading it back gives an equal scene."""
         return tomli_w.dumps(self.to_table())
-
-
-def place_of(path: str, *, closed: bool) -> str | None:
-    """What a list at ``path`` has one value for: a section, corner or pulley; None if nothing."""
-    if path == "net.stiffness" and not closed:
-        return "corner"
-    if path.startswith("cables."):
-        return "pulley" if path.endswith(".coefficient") else None
-    return "section"
-
-
-def _length_at(scene: Scene | dict[str, Any], path: str) -> int | None:
-    """Values in a list at ``path``, also of tables that may still be refused; None: any number."""
-    place = place_of(path, closed=_at(scene, "structure.closed") is not False)
-    sections = _at(scene, "structure.sections")
-    if place == "pulley" or not isinstance(sections, int):
-        return len(_pulleys_at(scene, path)) or None
-    return {"section": sections, "corner": sections + 1}.get(place or "")
-
-
-def _points_in(scene: Scene | dict[str, Any]) -> tuple[str, ...]:
-    """What cables run along, also of tables; nothing where these are sure to be refused."""
-    kind = str(_at(scene, "structure.kind") or "pantograph-ring")
-    structure: Any = kinds_of(Structure).get(kind)
-    if structure is None:
-        return ()
-    if (sections := _at(scene, "structure.sections")) is None:
-        own = structure.model_fields.get("sections")  # a constant of the class if it is no field
-        sections = structure.sections if own is None else own.default
-    usable = type(sections) is int and 0 < sections <= MOST_SECTIONS
-    return tuple(structure.cable_points(sections)) if usable else ()
-
-
-def _pulleys_at(scene: Scene | dict[str, Any], path: str) -> tuple[str, ...]:
-    """Names of the pulleys that a list at ``path`` has values for, if it has."""
-    points = _points_in(scene) if place_of(path, closed=True) == "pulley" else ()
-    end = _at(scene, ".".join([*path.split(".")[:2], "end"]))
-    return path_of(points, end)[1:-1] if points else ()
-
-
-def _with_number(scene: Scene | dict[str, Any], path: str) -> str:
-    inner, name = section_of(path)
-    names = _pulleys_at(scene, inner) if isinstance(name, str) else ()
-    if not isinstance(name, str) or not names:
-        return path
-    try:
-        return f"{inner}[{number_of(name, names, path)}]"
-    except ValueError as error:
-        raise InputError(str(error)) from None
-
-
-def _at(owner: Any, path: str) -> Any:
-    """What a dotted path leads to in a record or in nested tables; None if nothing."""
-    for step in path.split("."):
-        owner = owner.get(step) if isinstance(owner, dict) else getattr(owner, step, None)
-    return owner
 
 
 def _check_faults(scene: Scene) -> None:

@@ -57,6 +57,7 @@ def command(
     target = out or Path(f"{chosen.name}.nc")
 
     from ringsim.dataset import save, to_dataset
+    from ringsim.outputs import VARIABLES
     from ringsim.outputs.summary import summary
     from ringsim.simulation import FIDELITIES
 
@@ -66,8 +67,10 @@ def command(
     click.echo(f"{chosen.name}: {outcome.status.word}: {outcome.reason}")
     if anew := _restarted(values, chosen.solver):
         click.echo(f"  {anew}")
-    for line in summary(values, chosen):
-        click.echo(f"  {line}")
+    for name, told in summary(values, chosen.span_names).items():
+        label = (VARIABLES[name].summary or ("",))[0]
+        if anew or name != "total_steps":
+            click.echo(f"  {label:20s}{told}")
     dataset = to_dataset(outcome, chosen)
     save(dataset, target)
     click.echo(f"wrote {target}")

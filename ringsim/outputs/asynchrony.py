@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.outputs.family import Array, ErrorBar, Output, Run, Series, Values, Variable
-from ringsim.scene import Scene
+from ringsim.outputs.family import Array, ErrorBar, Output, Run, Series, SpanNames, Values, Variable
 
 _POINTS = 8
 """Points in each step at which the largest spread is looked for: a parabola rises above the largest
@@ -61,12 +60,12 @@ class Asynchrony(Output):
             values[f"asynchrony_{who}_section"] = run.coordinates["section"][section]
         return values
 
-    def told(self, values: Values, scene: Scene) -> str:
+    def told(self, values: Values, span_names: SpanNames) -> str:
         """As "at 16.1 s: upper 10 behind lower 2"; empty if all joints open alike."""
         if not values.get("asynchrony_max", 0.0) > 0.0:
             return ""
         last, first = (
-            f"{values[f'asynchrony_{who}_plane']} {values[f'asynchrony_{who}_section']}"
+            f"{values[f'asynchrony_{who}_plane']} {values[f'asynchrony_{who}_section']:.0f}"
             for who in ("laggard", "leader")
         )
         return f"at {values['asynchrony_max_time']:.4g} s: {last} behind {first}"

@@ -4,10 +4,19 @@ import math
 
 import numpy as np
 
-from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.family import (
+    Array,
+    ErrorBar,
+    Output,
+    Reading,
+    Run,
+    Series,
+    SpanNames,
+    Values,
+    Variable,
+)
 from ringsim.outputs.peaks import Peak
 from ringsim.parts.solver import TENSION_BEND
-from ringsim.scene import Scene
 
 PEAK = Peak("peak_tension", ("plane", "span"), "the largest tension")
 
@@ -59,6 +68,6 @@ class CableTension(Output):
         peak = {"peak_tension": np.nanmax(values)} | PEAK.of(run, times, values)
         return super().reduce(run, series) | peak
 
-    def told(self, values: Values, scene: Scene) -> str:
+    def told(self, values: Values, span_names: SpanNames) -> str:
         """See ``Output``."""
-        return PEAK.told(values, scene)
+        return PEAK.told(values, span_names)

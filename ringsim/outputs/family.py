@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -14,10 +15,22 @@ from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
 from ringsim.variables import ErrorBar, Variable
 
-__all__ = ["Array", "ErrorBar", "Output", "Reading", "Run", "Series", "Values", "Variable"]
+__all__ = [
+    "Array",
+    "ErrorBar",
+    "Output",
+    "Reading",
+    "Run",
+    "Series",
+    "SpanNames",
+    "Values",
+    "Variable",
+]
 
 Values = dict[str, Any]
 """Arrays and numbers by the names of their variables."""
+SpanNames = Mapping[str, Sequence[str]]
+"""By plane, from the winch on."""
 
 OUTPUTS: list[type[Output]] = []
 """All outputs, those of the smallest rank first."""
@@ -77,7 +90,7 @@ class Output:
             values[self.variables[1].name] = np.abs(series.values).max()
         return values
 
-    def told(self, values: Values, scene: Scene) -> str:
+    def told(self, values: Values, span_names: SpanNames) -> str:
         """When and where the value in its summary was, in words; empty if that is not known."""
         return ""
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringsim.outputs.family import Array, Run, Values, Variable
-from ringsim.scene import Scene
+from ringsim.outputs.family import Array, Run, SpanNames, Values, Variable
 
 
 @dataclass(frozen=True)
@@ -38,13 +37,13 @@ class Peak:
             found[f"{self.name}_{dim}"] = run.coordinates[dim][place]
         return found
 
-    def told(self, values: Values, scene: Scene) -> str:
+    def told(self, values: Values, span_names: SpanNames) -> str:
         """As "at 0.3 s: upper, span 1 (winch to section 1 first hinge)"; empty if it is unknown."""
         if not np.isfinite(time := float(values.get(f"{self.name}_time", np.nan))):
             return ""
         where = {dim: np.asarray(values[f"{self.name}_{dim}"]).item() for dim in self.dims}
-        words = [str(v) if isinstance(v, str) else f"{dim} {v}" for dim, v in where.items()]
-        names = scene.span_names.get(where.get("plane", ""), ())
-        if 0 < (span := where.get("span", 0)) <= len(names):
-            words[-1] += f" ({names[span - 1]})"
+        words = [v if isinstance(v, str) else f"{dim} {v:.0f}" for dim, v in where.items()]
+        names = span_names.get(where.get("plane", ""), ())
+        if names:
+            words[-1] += f" ({names[int(where['span']) - 1]})"
         return f"at {time:.4g} s: {', '.join(words)}"

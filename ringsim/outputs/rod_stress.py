@@ -2,9 +2,18 @@
 
 import numpy as np
 
-from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.family import (
+    Array,
+    ErrorBar,
+    Output,
+    Reading,
+    Run,
+    Series,
+    SpanNames,
+    Values,
+    Variable,
+)
 from ringsim.outputs.peaks import Peak
-from ringsim.scene import Scene
 
 PEAK = Peak("peak_stress", ("rod", "section"), "the largest stress of a rod")
 
@@ -38,6 +47,6 @@ class RodStress(Output):
         values, peak = super().reduce(run, series), PEAK.of(run, series.times, series.values)
         return values | peak | {"peak_rod_stress": np.nanmax(series.values)}
 
-    def told(self, values: Values, scene: Scene) -> str:
+    def told(self, values: Values, span_names: SpanNames) -> str:
         """See ``Output``."""
-        return PEAK.told(values, scene)
+        return PEAK.told(values, span_names)

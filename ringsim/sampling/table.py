@@ -9,13 +9,13 @@ import numpy as np
 
 from ringsim.choice import OneOf
 from ringsim.outputs import COORDINATES, VARIABLES
-from ringsim.overrides import field_at, section_of
+from ringsim.overrides import field_at, place_of, pulleys_at, section_of, with_number
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Design
 from ringsim.sampling.distributions.family import Distribution, Values
-from ringsim.scene import Scene, place_of
+from ringsim.scene import Scene
 from ringsim.units import unit_at
 
 AnyDistribution = Annotated[Distribution, OneOf()]
@@ -52,9 +52,9 @@ def draw(
         else:
             base.with_values({path: middle})
             own = [path]
-        drawn_already = {base.with_number(each) for each in factors}
+        drawn_already = {with_number(base, each) for each in factors}
         for each in own:
-            if base.with_number(each) in drawn_already:
+            if with_number(base, each) in drawn_already:
                 raise InputError(f"inputs: {each} is drawn twice: leave out one of its inputs")
             factors[each] = distribution
     drawn = design.table(factors, correlations, seed=seed, folder=folder)
@@ -112,7 +112,7 @@ def _column(base: Scene, path: str, values: Values, origin: Distribution | None)
     dim, places = "", tuple[str, ...]()
     if values.ndim == 2:
         dim = place_of(path, closed=scene.structure.closed) or f"place_{values.shape[1]}"
-        places = scene.pulleys_at(path)
+        places = pulleys_at(scene, path)
         if places and field_at(scene, path.partition(".friction")[0]).end == "both":
             dim = "pulley_of_two_winches"
     name = re.sub(r"\W+", "_", path).strip("_")
