@@ -41,7 +41,7 @@ def full_outcome(sections: int = 4) -> Outcome:
         if variable.dtype == "str":
             values[name] = np.full(shape, "upper")
         elif np.dtype(variable.dtype).kind == "i":
-            values[name] = random.integers(0, 1000, shape)
+            values[name] = random.integers(0, 100, shape)  # codes have 8 bits
         else:
             values[name] = random.normal(size=shape)
             if variable.dims:

@@ -49,7 +49,8 @@ def number_of(name: str, names: Sequence[str], where: str) -> int:
     """Number, from 1, of a named pulley or span; ValueError with the nearest name if unknown."""
     if name in names:
         return names.index(name) + 1
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    begun = [each for each in names if each.startswith(f"{name} ")]  # a span by its pulley
+    near = begun or difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     hint = f'did you mean "{near[0]}"?' if near else f'the first is "{names[0]}"'
     raise ValueError(f"{where}: there is no place of that name ({hint})")
 
