@@ -62,7 +62,8 @@ class Asynchrony(Output):
 
     def told(self, values: Values, span_names: SpanNames) -> str:
         """As "at 16.1 s: upper 10 behind lower 2"; empty if all joints open alike."""
-        if not values.get("asynchrony_max", 0.0) > 0.0:
+        known = str(values.get("asynchrony_leader_plane", ""))
+        if not (known and values["asynchrony_max"] > 0.0):
             return ""
         last, first = (
             f"{values[f'asynchrony_{who}_plane']} {values[f'asynchrony_{who}_section']:.0f}"

@@ -39,11 +39,12 @@ class Peak:
 
     def told(self, values: Values, span_names: SpanNames) -> str:
         """As "at 0.3 s: upper, span 1 (winch to section 1 first hinge)"; empty if it is unknown."""
-        if not np.isfinite(time := float(values.get(f"{self.name}_time", np.nan))):
+        found = [values.get(f"{self.name}_{dim}", np.nan) for dim in ("time", *self.dims)]
+        time, *places = (np.asarray(value).item() for value in found)
+        if any(each == "" or each != each for each in (time, *places)):
             return ""
-        where = {dim: np.asarray(values[f"{self.name}_{dim}"]).item() for dim in self.dims}
+        where = dict(zip(self.dims, places, strict=True))
         words = [v if isinstance(v, str) else f"{dim} {v:.0f}" for dim, v in where.items()]
-        names = span_names.get(where.get("plane", ""), ())
-        if names:
+        if names := span_names.get(where.get("plane", ""), ()):
             words[-1] += f" ({names[int(where['span']) - 1]})"
         return f"at {time:.4g} s: {', '.join(words)}"

@@ -173,7 +173,7 @@ def test_places_and_names_survive_a_campaign(tmp_path, monkeypatch) -> None:
     run = simulate(load_scene("truss2").with_values({"solver.end_time": 0.1, **values}))
     assert run.peak_tension_span == found.peak_tension_span[1]
     assert run.peak_tension.item() == found.peak_tension[1].item()
-    worst = int(found.peak_tension.argmax())
+    worst = int(np.argmax(found.peak_tension.values))
     span, plane = int(found.peak_tension_span[worst]), found.peak_tension_plane[worst].item()
     line = (
         f"  largest tension in sample {worst}: {found.peak_tension[worst]:.3f} N at "
@@ -193,3 +193,13 @@ def test_names_are_left_out_where_samples_differ_in_them(tmp_path, monkeypatch) 
         assert not {"span_name", "pulley_name"} & set(found.variables)
         assert found.peak_tension_span.isin(found.span).all()
     assert " span 1 (" not in ended.output
+
+
+def test_results_without_places_tell_none() -> None:
+    """Of an older file, or of a solver that does not know them: text is empty, numbers missing."""
+    values = {"peak_tension_time": 1.0, "peak_tension_plane": "", "peak_tension_span": np.nan}
+    assert CableTension().told(values, TRUSS.span_names) == ""
+    assert CableTension().told({"peak_tension": 1.0}, TRUSS.span_names) == ""
+    assert RodStress().told({"peak_stress_time": np.nan}, {}) == ""
+    assert Asynchrony().told({"asynchrony_max": 3.0, "asynchrony_leader_plane": ""}, {}) == ""
+    assert Asynchrony().told({"asynchrony_max": 3.0}, {}) == ""
