@@ -19,6 +19,9 @@ from ringsim.stepping.repeats import EnergyImbalance, Indicator, TensionBend
 from ringsim.stepping.rest import MOVED, Rest
 from ringsim.variables import Cause, Fate, Reason, Status
 
+_TOLD = 0.2
+"""Share of ``limits.overrun`` from which a run tells how far a V-joint was past its stop: 2 deg by
+default, twice what the hardest impacts of the benchmarks' random rings reach."""
 _ROUND_OFF = 1e-12
 """Relative difference of two times that are the same."""
 
@@ -136,6 +139,16 @@ class RunControl:
         if refused and self.status == Status.OK:
             self.diverge(refused)
         self.reason += "".join(indicator.note() for indicator in self._indicators)
+        past = self._farthest
+        if (
+            self.status == Status.OK
+            and past.angle > _TOLD * self._limits.farthest
+            and (self.fate != Fate.OVERLOADED)
+        ):
+            self.reason += (
+                f"; V-joint {past.joint} was up to {math.degrees(past.angle):.3g} deg past its "
+                f"stop, at {past.time:.6g} s (limits.overrun = {self._limits.overrun:g} deg)"
+            )
 
     def _contact(self, at: Instant) -> StopContact:
         return StopContact() if self._locks is None else self._locks.contact(at)
