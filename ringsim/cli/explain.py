@@ -18,14 +18,10 @@ def command(names: tuple[str, ...]) -> None:
     """
     known = COORDINATES | {SPAN_NAME.name: SPAN_NAME} | VARIABLES
     for name in names:
-        if name not in known and not _has_pulleys(name):
+        if name not in known and place_of(name, closed=True) != "pulley":
             raise InputError(f"{name}: no variable of a result ({known_or_nearest(name, known)})")
     for name in names or known:
         click.echo(explained(known[name]) if name in known else _PULLEYS.format(path=name))
-
-
-def _has_pulleys(path: str) -> bool:
-    return place_of(path, closed=True) == "pulley"
 
 
 _PULLEYS = """\
