@@ -62,27 +62,24 @@ def numbered(table: dict[str, Any], points: Sequence[str]) -> dict[str, Any]:
     value for each named pulley.  ValueError if a name is unknown, or the default is missing.
     """
     cables, faults = table.get("cables"), table.get("faults")
-    if not points:
-        return table
     known = cables if isinstance(cables, dict) else {}
-    found = {n: c for n in CABLES if isinstance(c := known.get(n), dict)}
-    paths = {name: path_of(points, cable.get("end", "first")) for name, cable in found.items()}
-    changed = {
-        name: cable | {"friction": law | {"coefficient": _listed(law["coefficient"], path, name)}}
-        for (name, cable), path in zip(found.items(), paths.values(), strict=True)
-        if isinstance(law := cable.get("friction"), dict)
-        and isinstance(law.get("coefficient"), dict)
-    }
-    if changed:
-        table = table | {"cables": known | changed}
-    if isinstance(faults, (list, tuple)):
-        each = list(paths.values())
-        table = table | {"faults": [_fault(fault, each, k) for k, fault in enumerate(faults, 1)]}
+    paths, changed = [], dict(known)
+    for name in CABLES if points else ():
+        if not isinstance(cable := known.get(name), dict):
+            continue
+        paths.append(path_of(points, cable.get("end", "first")))
+        law = cable.get("friction")
+        if isinstance(law, dict) and isinstance(law.get("coefficient"), dict):
+            listed = _listed(law["coefficient"], paths[-1], f"cables.{name}.friction.coefficient")
+            changed[name] = cable | {"friction": law | {"coefficient": listed}}
+    if changed != known:
+        table = table | {"cables": changed}
+    if points and isinstance(faults, (list, tuple)):
+        table = table | {"faults": [_fault(fault, paths, k) for k, fault in enumerate(faults, 1)]}
     return table
 
 
-def _listed(given: dict[str, Any], path: Sequence[str], cable: str) -> list[Any]:
-    where = f"cables.{cable}.friction.coefficient"
+def _listed(given: dict[str, Any], path: Sequence[str], where: str) -> list[Any]:
     if "default" not in given:
         raise ValueError(f"{where}.default is missing: give it for all pulleys that have no own")
     values = [given["default"]] * (len(path) - 2)

@@ -4,17 +4,7 @@ import math
 
 import numpy as np
 
-from ringsim.outputs.family import (
-    Array,
-    ErrorBar,
-    Output,
-    Reading,
-    Run,
-    Series,
-    SpanNames,
-    Values,
-    Variable,
-)
+from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
 from ringsim.outputs.peaks import Peak
 from ringsim.parts.solver import TENSION_BEND
 
@@ -30,6 +20,7 @@ class CableTension(Output):
 
     rank = 40
     needs = ("cables",)
+    peak = PEAK
     limit = "tension"
     variables = (
         Variable("cable_tension", ("plane", "span", "time"), "N", "tension of a cable's span"),
@@ -67,7 +58,3 @@ class CableTension(Output):
             values = np.append(values[before], series.at(last), axis=0)
         peak = {"peak_tension": np.nanmax(values)} | PEAK.of(run, times, values)
         return super().reduce(run, series) | peak
-
-    def told(self, values: Values, span_names: SpanNames) -> str:
-        """See ``Output``."""
-        return PEAK.told(values, span_names)

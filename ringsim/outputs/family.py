@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.choice import kind_of
+from ringsim.outputs.peaks import Peak, SpanNames, Values
 from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
@@ -27,10 +27,6 @@ __all__ = [
     "Variable",
 ]
 
-Values = dict[str, Any]
-"""Arrays and numbers by the names of their variables."""
-SpanNames = Mapping[str, Sequence[str]]
-"""By plane, from the winch on."""
 
 OUTPUTS: list[type[Output]] = []
 """All outputs, those of the smallest rank first."""
@@ -58,6 +54,8 @@ class Output:
     """Dimensions that no other output has; an engine gives their values to its ``Recorder``."""
     needs: ClassVar[tuple[str, ...]] = ()
     """What a scene must hold for it, see ``Variable``."""
+    peak: ClassVar[Peak | None] = None
+    """Variables that tell when and where the value in its summary was."""
     limit: ClassVar[str] = ""
     """Field of ``ringsim.parts.limits.Limits`` that its largest reading must not pass."""
     rank: ClassVar[int] = 50
@@ -92,7 +90,7 @@ class Output:
 
     def told(self, values: Values, span_names: SpanNames) -> str:
         """When and where the value in its summary was, in words; empty if that is not known."""
-        return ""
+        return "" if self.peak is None else self.peak.told(values, span_names)
 
 
 def _declared(output: type[Output]) -> dict[str, Variable]:

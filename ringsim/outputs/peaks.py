@@ -1,10 +1,19 @@
 """When and where the largest of an output's readings was."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ringsim.outputs.family import Array, Run, SpanNames, Values, Variable
+from ringsim.outputs.series import Run
+from ringsim.stepping.instant import Array
+from ringsim.variables import Variable
+
+Values = dict[str, Any]
+"""Arrays and numbers by the names of their variables."""
+SpanNames = Mapping[str, Sequence[str]]
+"""By plane, from the winch on."""
 
 
 @dataclass(frozen=True)
@@ -19,14 +28,11 @@ class Peak:
     @property
     def variables(self) -> tuple[Variable, ...]:
         """Whole numbers where the dimension has numbers (-1 if missing), text elsewhere."""
-        numbers = ("section", "span")
+        types = {"section": "i4", "span": "i4"}
         where = (
-            Variable(
-                f"{self.name}_{dim}", (), "1", f"{dim} of {self.words}",
-                "i4" if dim in numbers else "str",
-            )
-            for dim in self.dims
-        )  # fmt: skip
+            Variable(f"{self.name}_{d}", (), "1", f"{d} of {self.words}", types.get(d, "str"))
+            for d in self.dims
+        )
         return (Variable(f"{self.name}_time", (), "s", f"time of {self.words}"), *where)
 
     def of(self, run: Run, times: Array, values: Array) -> Values:

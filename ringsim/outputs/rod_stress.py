@@ -2,17 +2,7 @@
 
 import numpy as np
 
-from ringsim.outputs.family import (
-    Array,
-    ErrorBar,
-    Output,
-    Reading,
-    Run,
-    Series,
-    SpanNames,
-    Values,
-    Variable,
-)
+from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
 from ringsim.outputs.peaks import Peak
 
 PEAK = Peak("peak_stress", ("rod", "section"), "the largest stress of a rod")
@@ -23,6 +13,7 @@ class RodStress(Output):
 
     rank = 30
     needs = ("stress",)
+    peak = PEAK
     limit = "rod_stress"
     coordinates = (Variable("rod", ("rod",), "1", "rod half of a section", "str"),)
     variables = (
@@ -46,7 +37,3 @@ class RodStress(Output):
         """Interpolated, and the largest reading."""
         values, peak = super().reduce(run, series), PEAK.of(run, series.times, series.values)
         return values | peak | {"peak_rod_stress": np.nanmax(series.values)}
-
-    def told(self, values: Values, span_names: SpanNames) -> str:
-        """See ``Output``."""
-        return PEAK.told(values, span_names)

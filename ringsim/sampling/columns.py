@@ -86,21 +86,19 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
         )
         variable[:] = values.astype(object if text else kind)
         if column.places and not table.moves_winches:
-            variable.coordinates = _add_names(file, column)
+            variable.coordinates = _add_names(file, column, table)
     seeds = file.createVariable("sample_seed", "i8", ("sample",))
     seeds.long_name = "seed of the sample, from the campaign's seed and the sample's index"
     seeds.units = "1"
     seeds[:] = table.seeds
 
 
-def _add_names(file: Any, column: Column) -> str:
-    """The coordinate with the names of a column's places; its own if another has other names."""
-    places = np.array(column.places, dtype=object)
-    name = f"{column.dim}_name"
-    if name in file.variables and not np.array_equal(file[name][:], places):
-        name = f"{column.name}_{name}"
+def _add_names(file: Any, column: Column, table: Table) -> str:
+    """The coordinate with the names of a column's places; its own where columns differ in them."""
+    shared = len({each.places for each in table.columns if each.dim == column.dim}) == 1
+    name = f"{column.dim}_name" if shared else f"{column.name}_{column.dim}_name"
     if name not in file.variables:
-        file.createVariable(name, str, (column.dim,))[:] = places
+        file.createVariable(name, str, (column.dim,))[:] = np.array(column.places, dtype=object)
         file[name].long_name = f"place of the {column.dim.partition('_')[0]}"
     return name
 

@@ -55,8 +55,8 @@ def write_merged(
         for name, values in axes.items():
             netcdf.add_coordinate(file, name, values)
         names_of_spans = span_names(scene)
-        wide = tuple(len(axes.get(dim, ())) for dim in SPAN_NAME.dims)
-        if names_of_spans.shape == wide and not table.moves_winches:
+        wide = [len(axes[dim]) for dim in SPAN_NAME.dims if dim in axes]
+        if wide == [*names_of_spans.shape] and not table.moves_winches:
             netcdf.add_span_names(file, names_of_spans)
         add_inputs(file, table, compression=output.compression)
         for name, variable in wanted.items():
