@@ -1,0 +1,119 @@
+"""What a winch does once its plane has locked, while the other plane still opens."""
+
+import functools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from driven import truss
+from ringsim.refusal import InputError
+from ringsim.scene import load_scene
+from ringsim.simulation import run, run_ideal
+from ringsim.variables import Fate, Outcome, Status
+
+
+@functools.cache
+def uneven(after_lock: str, **values: Any) -> Outcome:
+    """A truss whose upper winch is the faster one: its V-joint locks first."""
+    fields = {
+        "structure__opening_angle": 165.0,
+        "joints__vjoint__viscous": 0.1,
+        "solver__end_time": 4.0,
+        "record__interval": 0.01,
+        "both__winch__winding__speed": 0.05,
+        "both__winch__after_lock": after_lock,
+        "limits__overrun": 40.0,
+        "solver__tolerance": 1e-3,
+    }
+    scene = truss(**fields | values).with_values({"cables.upper.winch.winding.speed": 0.1})
+    return run(scene)
+
+
+def after_upper_lock(found: Outcome) -> tuple[np.ndarray, slice]:
+    """Times from a little after the upper plane's lock on, until the last lock."""
+    times = found.coordinates["time"]
+    lock, last = found.values["lock_time"][0].max(), found.values["deployment_time"]
+    assert last > lock + 0.1
+    inside = np.flatnonzero((times > lock + 0.03) & (times < last))
+    return times, slice(inside[0], inside[-1] + 1)
+
+
+@pytest.mark.parametrize("after_lock", ["stop", "hold", "pull"])
+def test_winches_do_after_the_lock_what_they_are_told(after_lock: str) -> None:
+    found = uneven(after_lock)
+    assert found.status == Status.OK, found.reason
+    assert found.fate is Fate.DEPLOYED
+    times, after = after_upper_lock(found)
+    wound = found.values["wound_length"]
+    upper = np.diff(wound[0, after]) / np.diff(times[after])
+    if after_lock == "pull":
+        assert upper == pytest.approx(0.1, rel=1e-6)
+    elif after_lock == "stop":
+        assert upper == pytest.approx(0.0, abs=1e-12)
+        # At most one step's rope more than at the lock.
+        lock = found.values["lock_time"][0].max()
+        assert 0.0 <= wound[0, after][-1] - 0.1 * lock < 0.1 * 0.02
+    else:
+        tension = found.values["cable_tension"][0, 0, after]
+        assert np.ptp(tension) < 0.3 * tension.mean()
+        assert np.abs(upper).max() < 0.1
+    # The other winch goes on by its law until its own plane has locked.
+    assert wound[1, after] == pytest.approx(0.05 * times[after], abs=1e-9)
+    assert found.values["energy_error"] < 1e-3
+
+
+def test_a_winch_that_pulls_on_a_locked_plane_loads_its_rope_and_joints() -> None:
+    stopped, pulling = uneven("stop"), uneven("pull")
+    peaks = [float(one.values["peak_tension"]) for one in (stopped, pulling)]
+    assert peaks[1] > 2.0 * peaks[0]
+    assert "past its stop" not in stopped.reason
+    assert "V-joint upper 1 was up to" in pulling.reason
+
+
+@pytest.mark.parametrize("after_lock", ["stop", "pull"])
+def test_the_ideal_ring_stops_its_winches_at_the_lock(after_lock: str) -> None:
+    scene = load_scene("ring18-cable").with_values(
+        {
+            "structure.sections": 4,
+            "structure.opening_angle": 170.0,
+            "boom": "none",
+            "solver.settling_time": 0.5,
+        }
+        | {f"cables.{plane}.winch.after_lock": after_lock for plane in ("upper", "lower")}
+    )
+    found = run_ideal(scene.with_values({"record.interval": 0.02}))
+    times, lock = found.coordinates["time"], float(found.values["deployment_time"])
+    wound = found.values["wound_length"][0, times > lock]
+    wound = wound[np.isfinite(wound)]
+    assert bool(np.ptp(wound) > 1e-12) is (after_lock == "pull")
+
+
+def test_limits_that_a_run_passes_are_told_with_value_and_time() -> None:
+    found = uneven("stop")
+    peak, time = (float(found.values[n]) for n in ("peak_tension", "peak_tension_time"))
+    limited = uneven("stop", limits__tension=0.5 * peak)
+    assert (limited.status, limited.fate) == (Status.OK, Fate.OVERLOADED)
+    assert limited.reason == (
+        f"{found.reason}; {peak:.4g} N at {time:.6g} s, more than limits.tension = {0.5 * peak:g} N"
+    )
+    assert np.isfinite(limited.values["deployment_time"])
+
+
+def test_the_stress_has_a_limit_too() -> None:
+    found = uneven("stop", record__stress=True, limits__rod_stress=1e3)
+    assert found.fate is Fate.OVERLOADED
+    assert "more than limits.rod_stress = 1000 Pa" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"limits.rod_stress": 1e8}, "limits.rod_stress = 1e+08 Pa needs the stress of the rods"),
+        ({"limits.tension": 10.0, "cables": "none"}, "limits.tension = 10 N needs a cable"),
+        ({"limits.overrun": 120.0}, "limits.overrun = 120.0 deg must be at most 90"),
+    ],
+)
+def test_limits_of_what_is_not_there_are_refused(values: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words.replace("+", r"\+")):
+        load_scene("truss2").with_values(values)
