@@ -30,11 +30,24 @@ def parse_assignment(text: str) -> tuple[str, Any]:
     path, _, raw = (part.strip() for part in text.partition("="))
     if not path or not raw:
         raise InputError(f"--set {text}: must read PATH=VALUE, for example loads.force=0.02")
+    return path, parse_value(raw, f"--set {path}")
+
+
+def parse_value(text: str, where: str) -> Any:
+    """What a text means as TOML, or the text itself if it is a bare word.
+
+    InputError, with where it stands, if it begins like a table or a list and is none.
+    """
     try:
-        table = tomllib.loads(f"value = {raw}")
-    except (ValueError, RecursionError):
-        return path, raw
-    return path, table["value"] if len(table) == 1 else raw
+        table = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError) as error:
+        if text.startswith(("{", "[")):
+            raise InputError(
+                f"{where} = {text}: no table or list as TOML writes them ({error}): write for "
+                'example { kind = "stall", speed = 0.1 }'
+            ) from None
+        return text
+    return table["value"] if len(table) == 1 else text
 
 
 def section_of(path: str) -> tuple[str, int | str | None]:
@@ -116,8 +129,8 @@ def place_of(path: str, *, closed: bool) -> str | None:
 
 def length_at(scene: Any, path: str) -> int | None:
     """Values in a list at ``path``, also of tables; None: any number."""
-    place = place_of(path, closed=_at(scene, "structure.closed") is not False)
-    sections = _at(scene, "structure.sections")
+    place = place_of(path, closed=at_path(scene, "structure.closed") is not False)
+    sections = at_path(scene, "structure.sections")
     if place == "pulley" or not isinstance(sections, int):
         return len(pulleys_at(scene, path)) or None
     return {"section": sections, "corner": sections + 1}.get(place or "")
@@ -125,11 +138,11 @@ def length_at(scene: Any, path: str) -> int | None:
 
 def points_in(scene: Any) -> tuple[str, ...]:
     """What cables run along, also of tables; nothing where these are sure to be refused."""
-    kind = str(_at(scene, "structure.kind") or "pantograph-ring")
+    kind = str(at_path(scene, "structure.kind") or "pantograph-ring")
     structure: Any = kinds_of(Structure).get(kind)
     if structure is None:
         return ()
-    if (sections := _at(scene, "structure.sections")) is None:
+    if (sections := at_path(scene, "structure.sections")) is None:
         own = structure.model_fields.get("sections")  # a constant of the class if it is no field
         sections = structure.sections if own is None else own.default
     usable = type(sections) is int and 0 < sections <= MOST_SECTIONS
@@ -139,7 +152,7 @@ def points_in(scene: Any) -> tuple[str, ...]:
 def pulleys_at(scene: Any, path: str) -> tuple[str, ...]:
     """Names of the pulleys that a list at ``path`` has values for, if it has."""
     points = points_in(scene) if place_of(path, closed=True) == "pulley" else ()
-    end = _at(scene, ".".join([*path.split(".")[:2], "end"]))
+    end = at_path(scene, ".".join([*path.split(".")[:2], "end"]))
     return path_of(points, end)[1:-1] if points else ()
 
 
@@ -155,7 +168,7 @@ def with_number(scene: Any, path: str) -> str:
         raise InputError(str(error)) from None
 
 
-def _at(owner: Any, path: str) -> Any:
+def at_path(owner: Any, path: str) -> Any:
     """What a dotted path leads to in a record or in nested tables; None if nothing."""
     for step in path.split("."):
         owner = owner.get(step) if isinstance(owner, dict) else getattr(owner, step, None)

@@ -110,7 +110,10 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     if (says := _SAYS.get(kind) or _SAYS.get(kind.split("_")[0])) is None:
         return f"{shown}: {fault['msg'][0].lower()}{fault['msg'][1:]}"
     in_unit = f" in{unit}" if unit else ""
-    return says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
+    told = says.format(shown=shown, where=where, key=key, unit=unit, in_unit=in_unit, **limits)
+    optional = field is not None and type(None) in typing.get_args(field.annotation)
+    # Who writes "never" looks for the word that leaves a value out.
+    return f'{told}, or "none" to leave it out' if optional and isinstance(value, str) else told
 
 
 def _walk(
@@ -127,7 +130,7 @@ def _walk(
             inside, owner = tagged, tagged[0]
         elif named := [m for m in inside if step in m.model_fields]:
             owner, field = named[0], named[0].model_fields[str(step)]
-            inside = _models_in(field.annotation)
+            inside = models_in(field.annotation)
             path.append(str(step))
         elif isinstance(step, int):
             path[-1:] = [f"{path[-1] if path else ''}[{step + 1}]"]
@@ -139,7 +142,7 @@ def _walk(
 
 
 def _kinds(field: FieldInfo | None) -> list[str]:
-    models = _models_in(field.annotation) if field is not None else []
+    models = models_in(field.annotation) if field is not None else []
     return [str(kind) for kind in map(_tag, models) if kind is not None]
 
 
@@ -147,7 +150,8 @@ def _tag(model: type[BaseModel]) -> Any:
     return model.model_fields["kind"].default if "kind" in model.model_fields else None
 
 
-def _models_in(annotation: Any) -> list[type[BaseModel]]:
+def models_in(annotation: Any) -> list[type[BaseModel]]:
+    """The records that a field may hold, every kind of a family."""
     types = (part for part in nested_in(annotation) if isinstance(part, type))
     return [kind for each in types if issubclass(each, Model) for kind in leaves_of(each)]
 

@@ -2,20 +2,20 @@
 
 import copy
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Self
 
 import tomli_w
-from pydantic import Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.places import numbered, path_of, spans_of
 from ringsim.cable.records import Cable, Cables
 from ringsim.choice import OneOf
 from ringsim.files import parse_toml, read_text
-from ringsim.overrides import length_at, points_in, set_path
+from ringsim.overrides import at_path, length_at, points_in, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.faults.family import Fault
 from ringsim.parts.joints import Joints
@@ -28,7 +28,7 @@ from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.solver import Record, Solver
 from ringsim.parts.stop.family import Stop
 from ringsim.parts.stop.spring_damper import SpringDamperStop
-from ringsim.refusal import InputError, explain, known_or_nearest
+from ringsim.refusal import InputError, explain, known_or_nearest, models_in
 from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import ListIn, Model
@@ -125,7 +125,9 @@ class Scene(Model):
         """A copy with the fields at dotted paths replaced in their order, validated again.
 
         See :func:`ringsim.overrides.set_path` for ``name[k]`` and ``none``; k may be the name of a
-        pulley: ``coefficient["section 6 V"]``.  InputError if a path or a value is refused.
+        pulley: ``coefficient["section 6 V"]``.  A table takes the place of the whole part; a new
+        ``kind`` keeps the fields that it has, and those given here.  InputError if a path or a
+        value is refused.
 
         >>> scene = load_scene("ring18").with_values({"loads.force": 0.02, "boom": "none"})
         >>> scene.loads.force, scene.boom
@@ -136,6 +138,8 @@ class Scene(Model):
         table = self.to_table()
         for path, value in copy.deepcopy(values).items():  # later paths may lead into its tables
             set_path(table, path, value)
+            if path.endswith(".kind"):
+                _take_kind(table, path.removesuffix(".kind"), values)
         return scene_from_table(table, source=f"scene {self.name}")
 
     def to_table(self) -> dict[str, Any]:
@@ -145,6 +149,20 @@ class Scene(Model):
     def to_toml(self) -> str:
         """The scene as TOML text; reading it back gives an equal scene."""
         return tomli_w.dumps(self.to_table())
+
+
+def _take_kind(table: dict[str, Any], path: str, given: Mapping[str, Any]) -> None:
+    """Leave out what the part at ``path`` had and its kind has not, unless it is given, too."""
+    inside: list[type[BaseModel]] = [Scene]
+    for step in path.split("."):
+        fields = [m.model_fields[step] for m in inside if step in m.model_fields]
+        inside = [model for field in fields for model in models_in(field.annotation)]
+    part = at_path(table, path)
+    for kind in inside:
+        if "kind" in kind.model_fields and kind.model_fields["kind"].default == part["kind"]:
+            for name in part.keys() - kind.model_fields.keys():
+                if f"{path}.{name}" not in given:
+                    del part[name]
 
 
 def _check_faults(scene: Scene) -> None:

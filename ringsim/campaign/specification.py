@@ -1,17 +1,21 @@
 """The campaign file: which scene, which inputs, which design, which limits."""
 
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError
 
+from ringsim.choice import kinds_of
 from ringsim.execution.work import Limits
 from ringsim.files import parse_toml, read_text
-from ringsim.refusal import InputError, explain
+from ringsim.refusal import InputError, explain, show
 from ringsim.sampling.columns import Table
 from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
+from ringsim.sampling.designs.family import Design
+from ringsim.sampling.table import AnyDesign, AnyDistribution, draw, first_inside
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import OutputTable
 from ringsim.units import Model
@@ -22,7 +26,8 @@ SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_id
 
 def _flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
     """Join nested tables to dotted paths, down to tables that have the key ``whole``."""
-    if not isinstance(table, dict) or (prefix and whole in table):
+    # Not a path that ends in "kind", whose own table lies below.
+    if not isinstance(table, dict) or (prefix and not isinstance(table.get(whole, {}), dict)):
         return {prefix: table} if prefix else table
     found: dict[str, Any] = {}
     for name, inner in table.items():
@@ -43,7 +48,7 @@ class Specification(Model):
     scene: str
     """Built-in scene, or scene file looked up beside the campaign file."""
     set: Annotated[dict[str, Any], BeforeValidator(_flat)] = Field(default_factory=dict)
-    """Values by scene path that all samples share."""
+    """Values by scene path that all samples share; tables are joined into those of the scene."""
     inputs: Annotated[
         dict[str, AnyDistribution], BeforeValidator(lambda table: _flat(table, "kind"))
     ] = Field(default_factory=dict)
@@ -73,21 +78,47 @@ class Campaign:
         """All inputs of all samples; InputError if the scene refuses one."""
         wanted = self.specification
         try:
-            return draw(
+            table = draw(
                 self.scene, wanted.inputs, wanted.correlations, wanted.design, seed=wanted.seed,
                 folder=self.file.parent, error_bars_every=wanted.error_bars_every,
             )  # fmt: skip
         except InputError as error:
             raise InputError(f"{self.file.name}: {error}") from None
+        for path in [column.path for column in table.columns if column.path]:
+            if given := path if path in wanted.set else first_inside(path, wanted.set):
+                raise InputError(
+                    f"{self.file.name}: {given} has one value by [set] or --set, and others by the "
+                    "inputs: leave out one of the two"
+                )
+        return table
 
 
-def load_campaign(path: Path) -> Campaign:
-    """Read a campaign file; InputError if it, its content or its scene is refused."""
+def load_campaign(
+    path: Path, settings: Mapping[str, Any] | None = None, samples: int | None = None
+) -> Campaign:
+    """Read a campaign file; InputError if it, its content or its scene is refused.
+
+    ``settings`` are values by scene path beyond those under [set], ``samples`` another size of the
+    design; both become comments at the end of the campaign's text.
+    """
     text = read_text(path)
+    table = parse_toml(text, path.name)
+    if samples is not None and isinstance(design := table.get("design"), dict):
+        kind = kinds_of(Design).get(str(design.get("kind")))
+        if kind is not None and "samples" not in kind.model_fields:
+            raise InputError(
+                f"--samples {samples}: a design of kind {show(design.get('kind'))} has as many as "
+                "its levels or its file give: leave it out"
+            )
+        design["samples"] = samples
+        text += f"\n# called with --samples {samples}"
     try:
-        specification = Specification.model_validate(parse_toml(text, path.name))
+        specification = Specification.model_validate(table)
     except ValidationError as error:
         raise InputError(explain(error, Specification, path.name)) from None
+    specification.set.update(settings or {})
+    for name, value in (settings or {}).items():
+        text += f"\n# called with --set {name} = {json.dumps(value, default=str)}"
     key = "scene"
     try:
         base = load_scene(specification.scene, beside=path)

@@ -15,6 +15,7 @@ from ringsim.choice import kind_of
 from ringsim.execution.local import Local
 from ringsim.execution.work import Work, relative_cost
 from ringsim.sampling.columns import Column
+from ringsim.sampling.values import labels_of
 from ringsim.storage.journal import survey
 from ringsim.storage.locks import in_use
 from ringsim.storage.netcdf import NOT_RUN
@@ -130,6 +131,8 @@ def _extent(column: Column) -> str:
         unit = "" if column.units == "1" else f" {column.units}"
         extent = f"{values.min():.6g} to {values.max():.6g}{unit}"
     else:
-        extent = ", ".join(sorted({str(value) for value in values.ravel()}))
+        words = sorted(set(labels_of(values).ravel().tolist()))
+        more = [f"and {len(words) - _MOST_SHOWN} more"] if len(words) > _MOST_SHOWN else []
+        extent = ", ".join(words[:_MOST_SHOWN] + more)
     each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
-    return f"  {column.path}: {extent}{each}"
+    return f"  {column.path or f'label {column.name}'}: {extent}{each}"

@@ -10,7 +10,7 @@ from ringsim.campaign.folder import prepare_folder
 from ringsim.campaign.run import Choices, Share, run_campaign
 from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.campaign.status import plan
-from ringsim.cli.options import PATH
+from ringsim.cli.options import PATH, SETTINGS
 from ringsim.execution.local import Local, Serial
 from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.work import Scheduler
@@ -24,14 +24,19 @@ from ringsim.refusal import InputError
     "--workers", type=click.IntRange(0, 4096),
     help="Solver processes (default 1); 0 runs in this process, without isolation.",
 )  # fmt: skip
+@SETTINGS
+@click.option(
+    "--samples", type=click.IntRange(1, 10_000_000), metavar="N",
+    help="Draw N samples instead of as many as the file says.",
+)  # fmt: skip
 @click.option("--out", type=PATH, help="Folder (default runs/NAME).")
 @click.option("--part", default="1/1", help="Run only the i-th of n shares of the samples: i/n.")
 @click.option("--retry-failed", is_flag=True, help="Run the failed samples again, too.")
 @click.option("--dry-run", is_flag=True, help="Show plan and predicted cost; keep nothing.")
 @click.option("--solver", default="", hidden=True)
 def command(
-    file: Path, workers: int | None, out: Path | None, part: str, *, retry_failed: bool,
-    dry_run: bool, solver: str,
+    file: Path, workers: int | None, settings: dict[str, Any], samples: int | None,
+    out: Path | None, part: str, *, retry_failed: bool, dry_run: bool, solver: str,
 ) -> int:  # fmt: skip
     """Run the campaign of FILE; the same command again goes on with what is missing.
 
@@ -47,7 +52,7 @@ def command(
                 f"--workers {workers}: under an MPI launcher every rank drives one solver "
                 "process: leave out --workers"
             )
-        campaign, share = load_campaign(file), Share.parse(part)
+        campaign, share = load_campaign(file, settings, samples), Share.parse(part)
         wanted = campaign.specification
         folder, name = out or Path("runs") / wanted.name, solver or SOLVERS[wanted.fidelity]
         if dry_run:

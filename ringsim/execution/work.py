@@ -96,7 +96,7 @@ def relative_cost(table: Table, base: Scene) -> Array:
         values = column.values.reshape(table.samples, -1)
         if path == "rods.kind":
             cost *= np.where(values[:, 0] == "ancf", _ANCF, 1.0)
-        elif path in _EXPONENTS and path != f"solver.{unused}":
+        elif path in _EXPONENTS and path != f"solver.{unused}" and not column.in_words:
             size = np.abs(values.astype(float)).mean(axis=1)
             cost *= np.maximum(size, 1e-12) ** _EXPONENTS[path]  # no force, no division by it
     return np.asarray(cost / cost.mean())

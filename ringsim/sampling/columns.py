@@ -1,5 +1,6 @@
 """The inputs of all samples, and how they lie in netCDF files."""
 
+import json
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.places import CABLES
+from ringsim.sampling.values import Values, array_of, label_of, labels_of, plain
 
 
 @dataclass(frozen=True)
@@ -16,7 +18,7 @@ class Column:
     name: str
     """Name in netCDF files: the path with underscores."""
     path: str
-    """Scene path that the values are written to."""
+    """Scene path that the values are written to; empty for labels, which tell samples apart."""
     dim: str
     """Second dimension of ``values``, or empty: "section", "corner", "pulley",
     "pulley_of_two_winches" (one more), or "place_k" for lists of any other length k."""
@@ -24,10 +26,15 @@ class Column:
     """SI unit of the field."""
     origin: str
     """The distribution, in words."""
-    values: NDArray[Any]
+    values: Values
     """Shape (samples,), or (samples, k) with a value for each place."""
     places: tuple[str, ...] = ()
     """Names of the k places, if they have some."""
+
+    @property
+    def in_words(self) -> bool:
+        """Whether files hold the values as text: words, tables, lists, or these beside numbers."""
+        return self.values.dtype.kind in "UO"
 
 
 @dataclass(frozen=True)
@@ -50,14 +57,14 @@ class Table:
 
     def values_of(self, sample: int) -> dict[str, Any]:
         """Values by path of one sample, as :meth:`Scene.with_values` takes them."""
-        return {column.path: column.values[sample].tolist() for column in self.columns}
+        return {c.path: plain(c.values[sample]) for c in self.columns if c.path}
 
     def starts_with(self, other: Self) -> bool:
         """Whether the first samples are those of ``other``, bit by bit."""
         count = other.samples
         return (
             count <= self.samples
-            and [c.path for c in self.columns] == [c.path for c in other.columns]
+            and [c.name for c in self.columns] == [c.name for c in other.columns]
             and np.array_equal(self.seeds[:count], other.seeds)
             and all(
                 np.array_equal(mine.values[:count], old.values)
@@ -67,23 +74,31 @@ class Table:
 
 
 def add_inputs(file: Any, table: Table, *, compression: int) -> None:
-    """Create a variable for every input, and the samples' seeds, in an open netCDF4 dataset."""
+    """Create a variable for every input, and the samples' seeds, in an open netCDF4 dataset.
+
+    Tables and lists stand there by their labels, with which readers can group samples; the
+    attribute ``choices`` (JSON) says what each label stands for.
+    """
     for column in table.columns:
-        values, text = column.values, column.values.dtype.kind == "U"
-        kind: Any = {"U": str, "b": "i1"}.get(values.dtype.kind, values.dtype)
+        values, text = column.values, column.in_words
+        kind: Any = str if text else {"b": "i1"}.get(values.dtype.kind, values.dtype)
         if column.dim and column.dim not in file.dimensions:
             file.createDimension(column.dim, values.shape[1])
         dims = ("sample", column.dim) if column.dim else ("sample",)
         packed = compression and not text
         options = {"compression": "zlib", "complevel": compression} if packed else {}
         variable = file.createVariable(column.name, kind, dims, **options)
-        variable.long_name = f"input {column.path}"
+        role = "input" if column.path else "label"
+        variable.long_name = f"{role} {column.path or column.name}"
         if not text:
             variable.units = column.units
         variable.setncatts(
-            {"path": column.path, "role": "input", "distribution": column.origin}
+            {"path": column.path, "role": role, "distribution": column.origin}
             | ({"dtype": "bool"} if values.dtype.kind == "b" else {})
         )
+        if values.dtype.kind == "O":
+            choices = {label_of(each): each for each in map(plain, values.ravel())}
+            variable.choices, values = json.dumps(choices), labels_of(values)
         variable[:] = values.astype(object if text else kind)
         if column.places and not table.moves_winches:
             variable.coordinates = _add_names(file, column, table)
@@ -104,7 +119,7 @@ def _add_names(file: Any, column: Column, table: Table) -> str:
 
 
 def read_inputs(file: Any) -> tuple[Column, ...]:
-    """The inputs in an open netCDF4 dataset: every variable over samples with a scene path."""
+    """The inputs and labels in an open netCDF4 dataset: what is over samples and says so."""
     file.set_auto_maskandscale(False)
     columns: list[Column] = []
     for name, variable in file.variables.items():
@@ -112,6 +127,10 @@ def read_inputs(file: Any) -> tuple[Column, ...]:
         if variable.dimensions[:1] == ("sample",) and "path" in says:
             values = np.asarray(variable[:])
             kind = says.get("dtype", str if values.dtype.kind == "O" else values.dtype)
+            if "choices" in says:
+                chosen = json.loads(says["choices"])
+                each = array_of([chosen[label] for label in values.ravel()])
+                values, kind = each.reshape(values.shape), object
             dim, origin = "".join(variable.dimensions[1:]), says.get("distribution", "")
             units = says.get("units", "1")
             named = says.get("coordinates")

@@ -1,7 +1,7 @@
 """The design of a campaign: which values every sample has, and which paths it may vary."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,11 +10,12 @@ import numpy as np
 from ringsim.choice import OneOf
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.overrides import field_at, place_of, pulleys_at, section_of, with_number
-from ringsim.refusal import InputError
+from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Design
-from ringsim.sampling.distributions.family import Distribution, Values
+from ringsim.sampling.distributions.family import Distribution
+from ringsim.sampling.values import Values, extremes_of, is_label, plain
 from ringsim.scene import Scene
 from ringsim.units import unit_at
 
@@ -26,6 +27,8 @@ FIXED = (
     "record",
 )  # fmt: skip
 """Paths that give a result its shape or its name: all samples of a campaign share them."""
+_NAMED_ALREADY = ("sample", "sample_seed", "reason", "log", "corner", "pulley")
+"""What files of campaigns hold beside inputs and outputs."""
 
 
 def draw(
@@ -44,33 +47,32 @@ def draw(
     states its error bars, none for 0.  InputError if the scene refuses a path or its values.
     """
     factors: dict[str, Distribution] = {}
-    for path, distribution in inputs.items():
-        refuse_fixed(base, path)
-        middle = distribution.quantile(np.array([0.5]))[0].item()
-        if distribution.each_section:
-            own = [f"{path}[{k + 1}]" for k in range(_each_of(base, path, middle))]
-        else:
-            base.with_values({path: middle})
-            own = [path]
-        drawn_already = {with_number(base, each) for each in factors}
-        for each in own:
-            if with_number(base, each) in drawn_already:
-                raise InputError(f"inputs: {each} is drawn twice: leave out one of its inputs")
-            factors[each] = distribution
+    written: set[str] = set()
+    for name, distribution in inputs.items():
+        places = _places(base, name, distribution)
+        for path in _paths_of(name, distribution):
+            own = {with_number(base, f"{path}{place}") for place in places}
+            if twice := own & written:
+                raise InputError(
+                    f"inputs: {min(twice)} is drawn twice: leave out one of its inputs"
+                )
+            written |= own
+        factors |= {f"{name}{place}": distribution for place in places}
     drawn = design.table(factors, correlations, seed=seed, folder=folder)
     samples = len(next(iter(drawn.values()))) if drawn else getattr(design, "samples", 1)
     columns: list[Column] = []
-    taken = {*VARIABLES, *COORDINATES}
-    for path in inputs or drawn:
-        refuse_fixed(base, path)
-        grouped = path in inputs and inputs[path].each_section
-        names = [p for p in drawn if p.startswith(f"{path}[")] if grouped else [path]
-        values = np.stack([drawn[p] for p in names], axis=1) if grouped else drawn[path]
-        column = _column(base, path, values, inputs.get(path))
-        if column.name in taken:
-            raise InputError(f"inputs: {path} would be named {column.name}, which is taken")
-        taken.add(column.name)
-        columns.append(column)
+    for name, distribution in inputs.items():
+        if distribution.each_section:
+            values = np.stack([drawn[p] for p in drawn if p.startswith(f"{name}[")], axis=1)
+        else:
+            values = drawn[name]
+        words = distribution.model_dump_json(exclude_none=True)
+        paths = _paths_of(name, distribution)
+        columns += [_column(base, path, values, words, design) for path in paths]
+    for name in () if inputs else drawn:
+        if not is_label(name):
+            refuse_fixed(base, name)
+        columns.append(_column(base, name, drawn[name], "listed in a file", design))
     if every := error_bars_every:
         path = "solver.error_bars"
         if any(column.path == path for column in columns):
@@ -81,13 +83,63 @@ def draw(
     sequences = (np.random.SeedSequence(seed, spawn_key=(k,)) for k in range(samples))
     states = [int(each.generate_state(1, np.uint64)[0]) >> 1 for each in sequences]
     table = Table(tuple(columns), np.array(states, dtype=np.int64))
-    _check_extremes(base, table)
+    taken, before = {*VARIABLES, *COORDINATES, *_NAMED_ALREADY}, list[str]()
+    for column in columns:
+        if column.name in taken:
+            where = column.path or f"label {column.name}"
+            raise InputError(f"inputs: {where} would be named {column.name}, which is taken")
+        if lost := first_inside(column.path, before):
+            raise InputError(
+                f"inputs: {column.path} would replace what {lost} has: put it before that"
+            )
+        taken.add(column.name)
+        before.append(column.path)
+    _check_extremes(base, table, design)
     return table
+
+
+def _paths_of(name: str, distribution: Distribution) -> tuple[str, ...]:
+    """The scene paths that take what is drawn for an input."""
+    shared = distribution.shared
+    if shared and (("." in name and name not in shared) or len(set(shared)) < len(shared)):
+        raise InputError(
+            f'inputs."{name}".shared = {show(shared)} must list each path once, also that of the '
+            "input, or the input must have a name without dots"
+        )
+    return shared or (name,)
+
+
+def _places(base: Scene, name: str, distribution: Distribution) -> list[str]:
+    """What follows the paths of an input, one factor each: "", or "[1]", "[2]", ..."""
+    middle = plain(distribution.quantile(np.array([0.5]))[0])
+    for path in (paths := _paths_of(name, distribution)):
+        refuse_fixed(base, path)
+    if not distribution.each_section:
+        base.with_values(dict.fromkeys(paths, middle))
+        return [""]
+    counts = {path: _each_of(base, path, middle) for path in paths}
+    if len(set(counts.values())) > 1:
+        told = ", ".join(f"{path} has {count}" for path, count in counts.items())
+        raise InputError(
+            f"inputs: {name} is one value for each place of lists that differ in length: {told}: "
+            "leave out each_section, or give each path an input of its own"
+        )
+    return [f"[{k + 1}]" for k in range(min(counts.values()))]
+
+
+def first_inside(path: str, others: Iterable[str]) -> str:
+    """The first path that leads into what ``path`` holds; empty if none does."""
+    return next((other for other in others if other.startswith((f"{path}.", f"{path}["))), "")
 
 
 def refuse_fixed(scene: Scene, path: str) -> None:
     """Refuse (InputError) a path whose value all samples of a campaign must share."""
     for fixed in (*FIXED, *scene.structure.shaping):
+        if fixed.startswith(f"{path}."):
+            raise InputError(
+                f"inputs: {path} cannot be drawn as a whole, because {fixed} shapes the result: "
+                f"draw the values in it by their own paths, {path}.NAME"
+            )
         if path == fixed or path.startswith((f"{fixed}.", f"{fixed}[")):
             raise InputError(
                 f"inputs: {path} must be the same for all samples, because it shapes the result: "
@@ -107,36 +159,44 @@ def _each_of(base: Scene, path: str, value: Any) -> int:
         raise InputError(told) from None
 
 
-def _column(base: Scene, path: str, values: Values, origin: Distribution | None) -> Column:
-    scene = base.with_values({path: values[0].tolist()})
-    dim, places = "", tuple[str, ...]()
+def _column(base: Scene, path: str, values: Values, words: str, design: Design) -> Column:
+    name = re.sub(r"\W+", "_", path).strip("_")
+    if is_label(path):
+        if values.dtype.kind != "U" or not name:
+            raise InputError(
+                f"design.file: column {path} is no scene path, and no label, because it holds no "
+                f"text: name a path ({known_or_nearest(path, Scene.model_fields)}), or write words "
+                f"like {path}-1"
+            )
+        return Column(name, "", "", "1", words, values)
+    try:
+        scene = base.with_values({path: plain(values[0])})
+    except InputError as error:
+        raise InputError(f"{design.where(0, path)}: {error}") from None
+    dim, names = "", tuple[str, ...]()
     if values.ndim == 2:
         dim = place_of(path, closed=scene.structure.closed) or f"place_{values.shape[1]}"
-        places = pulleys_at(scene, path)
-        if places and field_at(scene, path.partition(".friction")[0]).end == "both":
+        names = pulleys_at(scene, path)
+        if names and field_at(scene, path.partition(".friction")[0]).end == "both":
             dim = "pulley_of_two_winches"
-    name = re.sub(r"\W+", "_", path).strip("_")
-    words = "listed in a file" if origin is None else origin.model_dump_json(exclude_none=True)
     if values.dtype.kind in "iu" and isinstance(field_at(scene, path), float):
         values = values.astype(float)
-    return Column(name, path, dim, unit_at(scene, path), words, values, places)
+    return Column(name, path, dim, unit_at(scene, path), words, values, names)
 
 
-def _check_extremes(base: Scene, table: Table) -> None:
+def _check_extremes(base: Scene, table: Table, design: Design) -> None:
     """Build scenes with the least and the greatest value, and each word, of every input."""
     spans: set[int] = set()
     suspects: set[int] = {0}
     for column in table.columns:
-        flat = column.values.reshape(table.samples, -1)
-        if flat.dtype.kind in "iuf":
-            suspects |= {int(flat.min(axis=1).argmin()), int(flat.max(axis=1).argmax())}
-        else:
-            suspects |= {int(k) for k in np.unique(flat[:, 0], return_index=True)[1]}
+        suspects |= extremes_of(column.values) if column.path else set()
     for sample in sorted(suspects):
+        values = table.values_of(sample)
         try:
-            spans.add(base.with_values(table.values_of(sample)).spans)
+            spans.add(base.with_values(values).spans)
         except InputError as error:
-            raise InputError(f"sample {sample}: {error}; change or truncate the inputs") from None
+            path = max((path for path in values if path in str(error)), key=len, default="")
+            raise InputError(f"{design.where(sample, path)}: {error}; {design.cure}") from None
     if len(spans) > 1:
         raise InputError(
             f"inputs: cables of {min(spans)} and of {max(spans)} spans would not fit into one "

@@ -143,7 +143,7 @@ def test_columns_know_their_unit_and_a_plain_name(base):
     table = drawn(
         base,
         {"kind": "random", "samples": 2},
-        {"rods.young_modulus[2]": THREE["rods.young_modulus"], **THREE},
+        {**THREE, "rods.young_modulus[2]": THREE["rods.young_modulus"]},
     )
     found = {column.path: (column.name, column.units) for column in table.columns}
     assert found["rods.young_modulus[2]"] == ("rods_young_modulus_2", "Pa")

@@ -94,7 +94,9 @@ def test_discrete_values_occur_as_often_as_asked():
 
 
 def test_discrete_keeps_whole_numbers_words_and_switches():
-    for values, kind in (([1, 2], "i"), ([True, False], "b"), (["a", "bc"], "U")):
+    cases = (([1, 2], "i"), ([1, 2.5], "f"), ([True, False], "b"), (["a", "bc"], "U"),
+             ([5.0, "none"], "O"), ([{"kind": "a"}, []], "O"), ([[1], [2]], "O"))  # fmt: skip
+    for values, kind in cases:
         read = READ.validate_python({"kind": "discrete", "values": values})
         assert read.quantile(np.array([0.1, 0.9])).tolist() == values
         assert read.quantile(np.array([0.1])).dtype.kind == kind
@@ -111,6 +113,19 @@ def test_uniform_reaches_its_ends_exactly():
         ({"kind": "uniform", "low": 1.0, "high": 1.0}, "must be below"),
         ({"kind": "discrete", "values": []}, "at least one"),
         ({"kind": "discrete", "values": [1, 1]}, "differ"),
+        ({"kind": "discrete", "values": [{"kind": "a"}, {"kind": "a"}]}, "differ"),
+        (
+            {"kind": "discrete", "values": ["a", float("nan")]},
+            r"values.2. = nan must be",
+        ),
+        (
+            {
+                "kind": "truncated",
+                "low": 1.0,
+                "of": {"kind": "normal", **EXAMPLES["normal"], "shared": ["a.b"]},
+            },
+            "of.shared must be given beside kind",
+        ),
         ({"kind": "discrete", "values": [1, 2], "probabilities": [1.0]}, "one for each"),
         ({"kind": "discrete", "values": [1, 2], "probabilities": [0.5, 0.6]}, "add up to 1"),
         ({"kind": "truncated", "of": EXAMPLES["normal"] | {"kind": "normal"}}, "low, high or both"),

@@ -125,6 +125,32 @@ def test_kind_changes_and_keeps_the_common_fields() -> None:
     assert scene.rods.young_modulus == RING18.rods.young_modulus
 
 
+def test_kind_changes_and_leaves_out_what_only_the_old_one_has() -> None:
+    ring = load_scene("ring18-cable")
+    path = "cables.upper.winch.winding"
+    scene = changed(ring, f"{path}.kind=stall", f"{path}.max_tension=20.0")
+    assert scene.cables is not None
+    assert scene.cables.upper is not None
+    winding = scene.cables.upper.winch.winding
+    assert winding.model_dump(exclude_defaults=True) == {"speed": 0.12, "max_tension": 20.0}
+    # In the other order it is the same, but what is given is never left out.
+    assert changed(ring, f"{path}.max_tension=20.0", f"{path}.kind=stall") == scene
+    with pytest.raises(InputError, match=r"winding\.duration is not a known"):
+        changed(ring, f"{path}.duration=2.0", f"{path}.kind=stall", f"{path}.max_tension=20.0")
+
+
+def test_table_takes_the_place_of_the_whole_part() -> None:
+    scene = changed(RING18, 'stop={ kind = "spring-damper", stiffness = 50.0 }', "faults=[]")
+    assert scene.stop is not None
+    assert scene.stop.model_dump(exclude_defaults=True) == {"stiffness": 50.0}
+
+
+@pytest.mark.parametrize("value", ["{ kind = 'rigid'", "[1.0, 2.0", "{ kind = rigid }"])
+def test_broken_table_is_refused_as_such(value: str) -> None:
+    with pytest.raises(InputError, match=r"--set boom = .*no table or list as TOML writes them"):
+        parse_assignment(f"boom={value}")
+
+
 @pytest.mark.parametrize(
     "path",
     ["structure.sections", "structure.closed", "structure.opening_angle", "loads.force",

@@ -8,7 +8,8 @@ from pydantic import Field
 
 from ringsim.refusal import InputError
 from ringsim.sampling.correlation import Correlation, correlate
-from ringsim.sampling.distributions.family import Array, Distribution, Values
+from ringsim.sampling.distributions.family import Array, Distribution
+from ringsim.sampling.values import Values
 from ringsim.units import Model
 
 Samples = Annotated[int, Field(ge=1, le=10_000_000)]
@@ -21,15 +22,21 @@ class Design(Model):
 
     correlated: ClassVar[bool] = True
     """Whether factors may depend on each other."""
+    cure: ClassVar[str] = "change or truncate the inputs"
+    """What helps against samples that the scene refuses."""
 
     def points(self, factors: Factors, seed: int) -> Array:
         """Cumulative probabilities, shape (samples, factors); there is at least one factor."""
         raise NotImplementedError
 
+    def where(self, sample: int, path: str) -> str:
+        """Where a sample stands, in words; ``path``, or nothing, is the input that is at fault."""
+        return f"sample {sample}"
+
     def table(
         self, factors: Factors, correlations: Sequence[Correlation], *, seed: int, folder: Path
     ) -> dict[str, Values]:
-        """Values by path, each of shape (samples,).
+        """Values by path, each of shape (samples,), or (samples, k) for lists of k values.
 
         Files that the design names are looked up in ``folder``.  InputError if the correlations
         contradict each other, or if the design has none.

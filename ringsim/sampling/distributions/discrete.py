@@ -1,11 +1,14 @@
 """A finite set of values."""
 
-from typing import Annotated, Literal, Self
+import json
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from ringsim.sampling.distributions.family import Array, Distribution, Values
+from ringsim.refusal import show
+from ringsim.sampling.distributions.family import Array, Distribution
+from ringsim.sampling.values import Values, array_of, labels_of
 from ringsim.units import ListIn
 
 
@@ -18,17 +21,24 @@ class Discrete(Distribution):
     """
 
     kind: Literal["discrete"] = "discrete"
-    values: Annotated[
-        tuple[bool, ...] | tuple[int, ...] | tuple[float, ...] | tuple[str, ...], ListIn
-    ]
+    values: Annotated[tuple[Any, ...], ListIn]
+    """Numbers, words, true and false, whole tables or lists of them, mixed as the field allows."""
     probabilities: Annotated[tuple[Annotated[float, Field(gt=0.0)], ...] | None, ListIn] = None
 
     @model_validator(mode="after")
     def _fitting(self) -> Self:
         if not self.values:
             raise ValueError("values must hold at least one value")
-        if len(set(self.values)) < len(self.values):
-            raise ValueError(f"values = {list(self.values)} must differ from each other")
+        for number, value in enumerate(self.values, 1):
+            try:
+                json.dumps(value, allow_nan=False)  # as files will hold it
+            except (TypeError, ValueError):
+                raise ValueError(
+                    f"values[{number}] = {show(value)} must be a finite number, text, true or "
+                    "false, a table, or a list of these"
+                ) from None
+        if len(set(labels_of(array_of(self.values)).tolist())) < len(self.values):
+            raise ValueError(f"values = {show(self.values)} must differ from each other")
         if self.probabilities is not None:
             if len(self.probabilities) != len(self.values):
                 raise ValueError(
@@ -49,7 +59,7 @@ class Discrete(Distribution):
     def quantile(self, probability: Array) -> Values:
         """The value whose interval of cumulative probability holds the given one."""
         chosen = np.searchsorted(self._upper_ends()[:-1], probability, side="right")
-        values: Values = np.array(self.values)[chosen]
+        values: Values = array_of(self.values)[chosen]
         return values
 
     def levels(self, count: int) -> Array:

@@ -1,15 +1,14 @@
 """The family of distributions: each one maps probabilities to values of an input."""
 
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.units import Model
+from ringsim.sampling.values import Values
+from ringsim.units import ListIn, Model
 
 Array = NDArray[np.float64]
-Values = NDArray[Any]
-"""Numbers, words, or true and false."""
 
 
 class Distribution(Model):
@@ -17,6 +16,8 @@ class Distribution(Model):
 
     each_section: bool = False
     """Draw one independent value for every section instead of one for all."""
+    shared: Annotated[tuple[str, ...], ListIn] = ()
+    """Scene paths that all take the value drawn; the key of the input is then only its name."""
 
     def quantile(self, probability: Array) -> Values:
         """Values at cumulative probabilities in the open interval (0, 1), same shape."""

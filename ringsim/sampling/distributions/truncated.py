@@ -6,7 +6,8 @@ import numpy as np
 from pydantic import model_validator
 
 from ringsim.choice import OneOf
-from ringsim.sampling.distributions.family import Array, Continuous, Distribution, Values
+from ringsim.sampling.distributions.family import Array, Continuous, Distribution
+from ringsim.sampling.values import Values
 
 LEAST_MASS = 1e-6
 """Probability between the bounds, at least: less is a mistake in the bounds."""
@@ -30,8 +31,9 @@ class Truncated(Distribution):
     def _some_mass(self) -> Self:
         if self.low is None and self.high is None:
             raise ValueError("truncated needs low, high or both; without them use the kind in of")
-        if self.of.each_section:
-            raise ValueError("of.each_section must be given beside kind, not inside of")
+        for name in ("each_section", "shared"):
+            if getattr(self.of, name):
+                raise ValueError(f"of.{name} must be given beside kind, not inside of")
         below, above = self._ends()
         if above - below < LEAST_MASS:
             raise ValueError(
