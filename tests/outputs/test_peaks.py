@@ -140,7 +140,7 @@ design = { kind = "random", samples = 2 }
 
 [set]
 "solver.end_time" = 0.1
-'cables.lower.friction.coefficient["section 1 V"]' = 0.001
+'cables.upper.friction.coefficient["section 1 V"]' = 0.001
 
 [inputs]
 'cables.upper.friction.coefficient["section 2 V"]' = { kind = "uniform", low = 2e-4, high = 4e-4 }
@@ -170,7 +170,11 @@ def test_places_and_names_survive_a_campaign(tmp_path, monkeypatch) -> None:
     assert found.cables_upper_friction_coefficient_section_2_V.dims == ("sample",)
     # A sample again: the largest tension is that of the run with its inputs.
     values = {c.attrs["path"]: c[1].values.tolist() for c in found.values() if "path" in c.attrs}
-    run = simulate(load_scene("truss2").with_values({"solver.end_time": 0.1, **values}))
+    run = simulate(
+        load_scene("truss2").with_values(
+            {"solver.end_time": 0.1, "cables.upper.friction.coefficient[2]": 0.001, **values}
+        )
+    )
     assert run.peak_tension_span == found.peak_tension_span[1]
     assert run.peak_tension.item() == found.peak_tension[1].item()
     worst = int(np.argmax(found.peak_tension.values))
