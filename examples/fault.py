@@ -17,8 +17,10 @@ SOUND = ringsim.load_scene("truss2").with_values(
 )
 FAULTS = {
     "none": [],
-    "upper cable cut": [{"kind": "cut-cable", "cable": 1, "span": 2, "time": 1.0}],
-    "upper pulley jammed": [{"kind": "jammed-pulley", "cable": 1, "pulley": 3, "time": 1.0}],
+    "upper cable cut": [{"kind": "cut-cable", "span": "section 1 first hinge to V", "time": 1.0}],
+    "upper pulley jammed": [
+        {"kind": "jammed-pulley", "pulley": "section 1 second hinge", "time": 1.0}
+    ],
     "V-joint 1 stuck": [{"kind": "stuck-vjoint", "plane": "upper", "section": 1, "time": 1.0}],
 }
 

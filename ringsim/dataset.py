@@ -11,7 +11,7 @@ import xarray as xr
 
 from ringsim.files import require_place, whole, writing
 from ringsim.outputs import COORDINATES, VARIABLES
-from ringsim.outputs.family import axes, holds
+from ringsim.outputs.family import SPAN_NAME, axes, holds, span_names
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.variables import Fidelity, Outcome, Variable, flags_of
@@ -43,9 +43,13 @@ def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
             arrays[name].attrs["long_name"] = words
         elif "time" not in variable.dims and held.issuperset(variable.needs):
             shape = tuple(len(known.get(dim, ())) for dim in variable.dims)
-            arrays[name] = _array(variable, np.full(shape, np.nan))
+            missing = "" if variable.dtype == "str" else np.nan
+            arrays[name] = _array(variable, np.full(shape, missing))
     used = {dim for array in arrays.values() for dim in array.dims}
     coordinates = {n: _array(v, known[n]) for n, v in COORDINATES.items() if n in used & set(known)}
+    names = span_names(scene)
+    if [coordinates[dim].size for dim in SPAN_NAME.dims if dim in coordinates] == [*names.shape]:
+        coordinates[SPAN_NAME.name] = _array(SPAN_NAME, names)
     return xr.Dataset(arrays, coords=coordinates, attrs=_attributes(outcome, scene))
 
 

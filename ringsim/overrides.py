@@ -5,8 +5,14 @@ import re
 import tomllib
 from typing import Any
 
+from ringsim.cable.places import number_of, path_of
+from ringsim.choice import kinds_of
 from ringsim.refusal import InputError
+from ringsim.structures.family import Structure
 from ringsim.units import LEFT_OUT
+
+MOST_SECTIONS = 1000
+"""A table that asks for more is refused, and names of their pulleys would only fill the memory."""
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -44,33 +50,42 @@ def parse_value(text: str, where: str) -> Any:
     return table["value"] if len(table) == 1 else text
 
 
-def section_of(path: str) -> tuple[str, int | None]:
-    """Split ``a.b[k]`` into ``a.b`` and k; without ``[k]`` the second is None.
+def section_of(path: str) -> tuple[str, int | str | None]:
+    """Split ``a.b[k]`` into ``a.b`` and k, or the name of a pulley; without them None.
+
+    Shells may have taken the quotes of a name.
 
     >>> section_of("rods.young_modulus[3]"), section_of("loads.force")
     (('rods.young_modulus', 3), ('loads.force', None))
+    >>> section_of('cables.upper.friction.coefficient["section 6 V"]')
+    ('cables.upper.friction.coefficient', 'section 6 V')
     """
-    matched = re.fullmatch(r"(.*)\[([0-9]{1,6})\]", path, re.DOTALL)
-    return (matched[1], int(matched[2])) if matched else (path, None)
+    if matched := re.fullmatch(r"(.*)\[([0-9]{1,6})\]", path, re.DOTALL):
+        return matched[1], int(matched[2])
+    matched = re.fullmatch(r"(.*)\[(\"?)(\w[\w -]*)\2\]", path)
+    return (matched[1], matched[3]) if matched else (path, None)
 
 
 def field_at(record: Any, path: str) -> Any:
-    """The value of a record at a dotted path, one entry of a list at ``name[k]``."""
-    inner, section = section_of(path)
+    """The value of a scene at a dotted path, one entry of a list at ``name[k]``."""
+    inner, section = section_of(with_number(record, path))
     value = operator.attrgetter(inner)(record)
-    return value[section - 1] if section is not None and isinstance(value, tuple) else value
+    return value[section - 1] if isinstance(section, int) and isinstance(value, tuple) else value
 
 
-def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
+def set_path(table: dict[str, Any], path: str, value: Any) -> None:
     """Write ``value`` at ``path`` into nested tables, in place.
 
     A step through a part that is not there creates it.  A last step ``name[k]`` is the value of
-    section k, counted from 1; a field that had one value for all becomes a list of ``length``
-    first.  The value "none" (or None) removes a part, and puts the default back in any other field
-    but ``kind``, where "none" is a word like others.  InputError if the path is malformed or leads
-    through a value that is not a table.
+    section k, counted from 1, or of a pulley by its number or name; a field that had one value for
+    all becomes a list first.  The value "none" (or None) removes a part, and puts the default back
+    in any other field but ``kind``, where "none" is a word like others.  InputError if the path is
+    malformed or leads through a value that is not a table.
     """
-    inner, section = section_of(path)
+    scene = table
+    inner, section = section_of(path := with_number(table, path))
+    if isinstance(section, str):  # of something that has no names
+        inner = path
     *steps, name = inner.split(".")
     for step in steps:
         if not _NAME.fullmatch(step):
@@ -83,10 +98,12 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
     if not _NAME.fullmatch(name):
         raise InputError(f"{path}: {name!r} is not a field name, or one with its section: name[1]")
     old = table.get(name)
-    if section is not None:
+    if isinstance(section, int):
         if old is None:
             raise InputError(f"{path}: there is no {name} yet: give one value for all first")
-        values = list(old) if isinstance(old, (list, tuple)) else [old] * length
+        values = (
+            list(old) if isinstance(old, (list, tuple)) else [old] * (length_at(scene, inner) or 1)
+        )
         if not 1 <= section <= len(values):
             raise InputError(
                 f"{path}: there is no value {section}: choose one from 1 to {len(values)}"
@@ -99,3 +116,60 @@ def set_path(table: dict[str, Any], path: str, value: Any, length: int) -> None:
         table[name] = LEFT_OUT
     else:
         del table[name]
+
+
+def place_of(path: str, *, closed: bool) -> str | None:
+    """What a list at ``path`` has one value for: a section, corner or pulley; None if nothing."""
+    if path == "net.stiffness" and not closed:
+        return "corner"
+    if path.startswith("cables."):
+        return "pulley" if path.endswith(".coefficient") else None
+    return "section"
+
+
+def length_at(scene: Any, path: str) -> int | None:
+    """Values in a list at ``path``, also of tables; None: any number."""
+    place = place_of(path, closed=at_path(scene, "structure.closed") is not False)
+    sections = at_path(scene, "structure.sections")
+    if place == "pulley" or not isinstance(sections, int):
+        return len(pulleys_at(scene, path)) or None
+    return {"section": sections, "corner": sections + 1}.get(place or "")
+
+
+def points_in(scene: Any) -> tuple[str, ...]:
+    """What cables run along, also of tables; nothing where these are sure to be refused."""
+    kind = str(at_path(scene, "structure.kind") or "pantograph-ring")
+    structure: Any = kinds_of(Structure).get(kind)
+    if structure is None:
+        return ()
+    if (sections := at_path(scene, "structure.sections")) is None:
+        own = structure.model_fields.get("sections")  # a constant of the class if it is no field
+        sections = structure.sections if own is None else own.default
+    usable = type(sections) is int and 0 < sections <= MOST_SECTIONS
+    return tuple(structure.cable_points(sections)) if usable else ()
+
+
+def pulleys_at(scene: Any, path: str) -> tuple[str, ...]:
+    """Names of the pulleys that a list at ``path`` has values for, if it has."""
+    points = points_in(scene) if place_of(path, closed=True) == "pulley" else ()
+    end = at_path(scene, ".".join([*path.split(".")[:2], "end"]))
+    return path_of(points, end)[1:-1] if points else ()
+
+
+def with_number(scene: Any, path: str) -> str:
+    """A path with the number of a pulley instead of its name; InputError if it is unknown."""
+    inner, name = section_of(path)
+    names = pulleys_at(scene, inner) if isinstance(name, str) else ()
+    if not isinstance(name, str) or not names:
+        return path
+    try:
+        return f"{inner}[{number_of(name, names, path)}]"
+    except ValueError as error:
+        raise InputError(str(error)) from None
+
+
+def at_path(owner: Any, path: str) -> Any:
+    """What a dotted path leads to in a record or in nested tables; None if nothing."""
+    for step in path.split("."):
+        owner = owner.get(step) if isinstance(owner, dict) else getattr(owner, step, None)
+    return owner

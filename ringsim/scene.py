@@ -11,10 +11,11 @@ import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from ringsim.cable.faults.family import CableFault
-from ringsim.cable.records import Cable, Cables, pulleys_of
+from ringsim.cable.places import numbered, path_of, spans_of
+from ringsim.cable.records import Cable, Cables
 from ringsim.choice import OneOf
 from ringsim.files import parse_toml, read_text
-from ringsim.overrides import section_of, set_path
+from ringsim.overrides import at_path, length_at, points_in, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.faults.family import Fault
 from ringsim.parts.joints import Joints
@@ -57,7 +58,7 @@ class Scene(Model):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         for path, value in _lists(self):
-            wanted = _length_at(self, path)
+            wanted = length_at(self, path)
             if wanted not in (None, len(value)):
                 raise ValueError(
                     f"{path} has {len(value)} values, but the structure needs {wanted}: give "
@@ -93,22 +94,40 @@ class Scene(Model):
             )
         return self
 
+    @model_validator(mode="before")
+    @classmethod
+    def _without_names(cls, table: Any) -> Any:
+        return numbered(table, points_in(table)) if isinstance(table, dict) else table
+
+    def path_of(self, cable: Cable) -> tuple[str, ...]:
+        """Names of the points of a cable's path: its winch, pulleys, and end or other winch."""
+        return path_of(points_in(self), cable.end)
+
     def pulleys_of(self, cable: Cable) -> int:
         """Pulleys of one of the scene's cables: a second winch takes one more."""
-        return self.structure.pulleys + len(cable.winches) - 1
+        return len(self.path_of(cable)) - 2
+
+    @property
+    def span_names(self) -> dict[str, tuple[str, ...]]:
+        """Names of the spans of each plane's cable, from its winch on; none of one without."""
+        present = dict([] if self.cables is None else self.cables.present())
+        return {
+            name: spans_of(self.path_of(present[plane])) if plane in present else ()
+            for plane, name in enumerate(self.structure.planes)
+        }
 
     @property
     def spans(self) -> int:
         """Spans of the cable that has most of them; 0 without cables."""
-        present = [] if self.cables is None else self.cables.present()
-        return max((self.pulleys_of(cable) + 1 for _, cable in present), default=0)
+        return max(map(len, self.span_names.values()), default=0)
 
     def with_values(self, values: dict[str, Any]) -> "Scene":
         """A copy with the fields at dotted paths replaced in their order, validated again.
 
-        See :func:`ringsim.overrides.set_path` for ``name[k]`` and ``none``.  A table takes the
-        place of the whole part; a new ``kind`` keeps the fields that it has, and those given here.
-        InputError if a path or a value is refused.
+        See :func:`ringsim.overrides.set_path` for ``name[k]`` and ``none``; k may be the name of a
+        pulley: ``coefficient["section 6 V"]``.  A table takes the place of the whole part; a new
+        ``kind`` keeps the fields that it has, and those given here.  InputError if a path or a
+        value is refused.
 
         >>> scene = load_scene("ring18").with_values({"loads.force": 0.02, "boom": "none"})
         >>> scene.loads.force, scene.boom
@@ -118,7 +137,7 @@ class Scene(Model):
         """
         table = self.to_table()
         for path, value in copy.deepcopy(values).items():  # later paths may lead into its tables
-            set_path(table, path, value, _length_at(table, section_of(path)[0]) or 1)
+            set_path(table, path, value)
             if path.endswith(".kind"):
                 _take_kind(table, path.removesuffix(".kind"), values)
         return scene_from_table(table, source=f"scene {self.name}")
@@ -132,46 +151,18 @@ class Scene(Model):
         return tomli_w.dumps(self.to_table())
 
 
-def place_of(path: str, *, closed: bool) -> str | None:
-    """What a list at ``path`` has one value for: a section, corner or pulley; None if nothing."""
-    if path == "net.stiffness" and not closed:
-        return "corner"
-    if path.startswith("cables."):
-        return "pulley" if path.endswith(".coefficient") else None
-    return "section"
-
-
-def _length_at(scene: Scene | dict[str, Any], path: str) -> int | None:
-    """Values in a list at ``path``, also of tables that may still be refused; None: any number."""
-    sections = _at(scene, "structure.sections")
-    if not isinstance(sections, int):
-        return None
-    place = place_of(path, closed=_at(scene, "structure.closed") is not False)
-    pulleys = scene.structure.pulleys if isinstance(scene, Scene) else pulleys_of(sections)
-    both = _at(scene, ".".join([*path.split(".")[:2], "end"])) == "both"
-    lengths = {"section": sections, "corner": sections + 1, "pulley": pulleys + both}
-    return lengths.get(place or "")
-
-
 def _take_kind(table: dict[str, Any], path: str, given: Mapping[str, Any]) -> None:
     """Leave out what the part at ``path`` had and its kind has not, unless it is given, too."""
     inside: list[type[BaseModel]] = [Scene]
     for step in path.split("."):
         fields = [m.model_fields[step] for m in inside if step in m.model_fields]
         inside = [model for field in fields for model in models_in(field.annotation)]
-    part = _at(table, path)
+    part = at_path(table, path)
     for kind in inside:
         if "kind" in kind.model_fields and kind.model_fields["kind"].default == part["kind"]:
             for name in part.keys() - kind.model_fields.keys():
                 if f"{path}.{name}" not in given:
                     del part[name]
-
-
-def _at(owner: Any, path: str) -> Any:
-    """What a dotted path leads to in a record or in nested tables; None if nothing."""
-    for step in path.split("."):
-        owner = owner.get(step) if isinstance(owner, dict) else getattr(owner, step, None)
-    return owner
 
 
 def _check_faults(scene: Scene) -> None:

@@ -3,6 +3,9 @@
 import numpy as np
 import xarray as xr
 
+from ringsim.outputs import OUTPUTS
+from ringsim.outputs.summary import summary
+
 
 def budget_lines(campaign: xr.Dataset) -> list[str]:
     """Whether numerical or sampling error dominates the mean, a line for each output with bars.
@@ -57,3 +60,26 @@ def restart_lines(campaign: xr.Dataset) -> list[str]:
         f"{anew} of {campaign.sizes['sample']} samples were restarted with smaller steps "
         f"(restarts, step_used): {lost:.0%} of all {every:.0f} steps went to attempts that failed"
     ]
+
+
+def peak_lines(campaign: xr.Dataset) -> list[str]:
+    """The largest value of all samples that ended well, when and where, for outputs that tell it.
+
+    Places have no names where samples differ in the ends at which the winches are.
+    """
+    spans = {}
+    if "span_name" in campaign:
+        names = campaign.span_name.transpose("plane", "span").values.tolist()
+        spans = dict(zip(campaign.plane.values.tolist(), names, strict=True))
+    good, lines = campaign.isel(sample=np.flatnonzero(campaign.status == 0)), []
+    for output in OUTPUTS:
+        for variable in output.variables:
+            if variable.summary is None or variable.name not in good:
+                continue
+            known = good[variable.name].dropna("sample")
+            worst = good.sel(sample=known.idxmax()) if known.size else good
+            values = {str(n): each.values for n, each in worst.items() if not each.dims}
+            if output().told(values, spans):
+                told = " ".join(summary(values, spans)[variable.name].split())
+                lines.append(f"{variable.summary[0]} in sample {worst.sample.item()}: {told}")
+    return lines

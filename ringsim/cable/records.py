@@ -141,11 +141,6 @@ class Cable(Model):
         return (self.winch, self.far_winch or self.winch)[: 1 + (self.end == "both")]
 
 
-def pulleys_of(sections: int, *, winches: int = 1) -> int:
-    """Pulleys of a cable along so many sections, with one winch or with one at either end."""
-    return 3 * sections - 2 + winches
-
-
 class Cables(Model):
     """Driving cables along the ring, each with its own winch, friction and faults.
 

@@ -189,7 +189,9 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
             if left and not partly:
                 return left, failed, None
             try:
-                failed += write_merged(campaign.path, found, campaign.table, output, attributes)
+                failed += write_merged(
+                    campaign.path, found, campaign.table, campaign.scene, output, attributes
+                )
                 break
             except DamagedError:
                 if whole:

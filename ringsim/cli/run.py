@@ -64,6 +64,7 @@ def command(
     from ringsim.cli.progress import watched
     from ringsim.dataset import require_file, save, to_dataset
     from ringsim.outputs import VARIABLES
+    from ringsim.outputs.summary import summary
     from ringsim.simulation import FIDELITIES
 
     require_file(target)
@@ -73,16 +74,10 @@ def command(
     click.echo(f"{chosen.name}: {outcome.status.word}: {outcome.reason}")
     if anew := _restarted(values, chosen.solver):
         click.echo(f"  {anew}")
-    for name, variable in VARIABLES.items():
-        if variable.summary is None or (name == "total_steps" and not anew):
-            continue
-        number = float(values.get(name, np.nan))
-        if np.isfinite(number):
-            label, style = variable.summary
-            unit = {"degree": "deg", "1": ""}.get(variable.units, variable.units)
-            line = f"  {label:20s}{values[name].item():{style}} {unit}".rstrip()
-            bar = values.get(f"{name}_error")
-            click.echo(line if bar is None else f"{line} +- {bar.item():.2g}")
+    for name, told in summary(values, chosen.span_names).items():
+        label = (VARIABLES[name].summary or ("",))[0]
+        if anew or name != "total_steps":
+            click.echo(f"  {label:20s}{told}")
     dataset = to_dataset(outcome, chosen)
     # Replaced, not refused: to change a scene and run it again is what one does all day, and
     # scripts do it with one name.  Everything of a run can be computed again from its file.

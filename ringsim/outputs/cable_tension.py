@@ -5,7 +5,10 @@ import math
 import numpy as np
 
 from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.peaks import Peak
 from ringsim.parts.solver import TENSION_BEND
+
+PEAK = Peak("peak_tension", ("plane", "span"), "the largest tension")
 
 
 class CableTension(Output):
@@ -17,6 +20,7 @@ class CableTension(Output):
 
     rank = 40
     needs = ("cables",)
+    peak = PEAK
     limit = "tension"
     variables = (
         Variable("cable_tension", ("plane", "span", "time"), "N", "tension of a cable's span"),
@@ -31,7 +35,7 @@ class CableTension(Output):
             ),
             summary=("largest tension", "10.3f"),
         ),
-        Variable("peak_tension_time", (), "s", "time of the largest tension"),
+        *PEAK.variables,
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
@@ -52,6 +56,5 @@ class CableTension(Output):
             before, last = times <= run.until, np.array([run.until])
             times = np.append(times[before], last)
             values = np.append(values[before], series.at(last), axis=0)
-        largest = np.nanmax(values, axis=(1, 2))
-        peak = {"peak_tension": largest.max(), "peak_tension_time": times[np.argmax(largest)]}
+        peak = {"peak_tension": np.nanmax(values)} | PEAK.of(run, times, values)
         return super().reduce(run, series) | peak

@@ -7,15 +7,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.choice import kind_of
+from ringsim.outputs.peaks import Peak, SpanNames, Values
 from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
 from ringsim.variables import ErrorBar, Variable
 
-__all__ = ["Array", "ErrorBar", "Output", "Reading", "Run", "Series", "Values", "Variable"]
+__all__ = [
+    "Array",
+    "ErrorBar",
+    "Output",
+    "Reading",
+    "Run",
+    "Series",
+    "SpanNames",
+    "Values",
+    "Variable",
+]
 
-Values = dict[str, Any]
-"""Arrays and numbers by the names of their variables."""
 
 OUTPUTS: "list[type[Output]]" = []
 """All outputs, those of the smallest rank first."""
@@ -31,6 +40,9 @@ COORDINATES = {
 }
 """Dimensions of the variables; an output may declare more."""
 
+SPAN_NAME = Variable("span_name", ("plane", "span"), "1", "ends of the span", "str")
+"""Coordinate of every result that has spans; empty where a plane's cable has fewer."""
+
 
 class Output:
     """An output, or a few that are computed together; every run that needs it has its own."""
@@ -40,6 +52,8 @@ class Output:
     """Dimensions that no other output has; an engine gives their values to its ``Recorder``."""
     needs: ClassVar[tuple[str, ...]] = ()
     """What a scene must hold for it, see ``Variable``."""
+    peak: ClassVar[Peak | None] = None
+    """Variables that tell when and where the value in its summary was."""
     limit: ClassVar[str] = ""
     """Field of ``ringsim.parts.limits.Limits`` that its largest reading must not pass."""
     rank: ClassVar[int] = 50
@@ -71,6 +85,10 @@ class Output:
         if len(self.variables) == 2:
             values[self.variables[1].name] = np.abs(series.values).max()
         return values
+
+    def told(self, values: Values, span_names: SpanNames) -> str:
+        """When and where the value in its summary was, in words; empty if that is not known."""
+        return "" if self.peak is None else self.peak.told(values, span_names)
 
 
 def _declared(output: type[Output]) -> dict[str, Variable]:
@@ -109,3 +127,9 @@ def axes(scene: Scene) -> dict[str, NDArray[Any]]:
         "time": output_times(scene),
         "span": np.arange(1, scene.spans + 1),
     }
+
+
+def span_names(scene: Scene) -> NDArray[Any]:
+    """Values of ``SPAN_NAME``, shape (planes, spans)."""
+    rows = ([*names, *[""] * (scene.spans - len(names))] for names in scene.span_names.values())
+    return np.array(list(rows), dtype=str)

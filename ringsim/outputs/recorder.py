@@ -60,9 +60,10 @@ class Recorder:
             "newton_iterations": self.newton_iterations,
             "jacobians": self.jacobians,
         }
+        known = axes(self._scene) | dict(self._coordinates)
         run = Run(
             self._scene, Series(times, angles, grid), Series(times, rates, grid),
-            lock_times(times, angles, rates), counts,
+            lock_times(times, angles, rates), counts, known,
         )  # fmt: skip
 
         def series_of(output: Output) -> Series | None:
@@ -71,7 +72,7 @@ class Recorder:
             return None if unknown else Series(times, np.array(readings, dtype=float), grid)
 
         values = reduced(run, self._readings, series_of)
-        coordinates = spanned(values, axes(self._scene) | dict(self._coordinates))
+        coordinates = spanned(values, known)
         passed = overloads(self._scene, self._readings, series_of)
         return ended(self.status, self.fate, self.reason, passed, coordinates, values)
 

@@ -1,6 +1,11 @@
 """Stress of the rods."""
 
-from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Variable
+import numpy as np
+
+from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.peaks import Peak
+
+PEAK = Peak("peak_stress", ("rod", "section"), "the largest stress of a rod")
 
 
 class RodStress(Output):
@@ -8,6 +13,7 @@ class RodStress(Output):
 
     rank = 30
     needs = ("stress",)
+    peak = PEAK
     limit = "rod_stress"
     coordinates = (Variable("rod", ("rod",), "1", "rod half of a section", "str"),)
     variables = (
@@ -20,8 +26,14 @@ class RodStress(Output):
             error_bar=ErrorBar("largest stress", safety=1.1, of_one_element=0.03),
             summary=("largest rod stress", "10.3e"),
         ),
+        *PEAK.variables,
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
         """Shape (rod halves, sections), Pa."""
         return now.stress
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Interpolated, and the largest reading."""
+        values, peak = super().reduce(run, series), PEAK.of(run, series.times, series.values)
+        return values | peak | {"peak_rod_stress": np.nanmax(series.values)}

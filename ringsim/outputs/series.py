@@ -99,6 +99,8 @@ class Run:
     """When each V-joint reached 180 deg, shape (planes, sections), s; NaN if it did not."""
     counts: Mapping[str, int]
     """What the solver has counted, by variable."""
+    coordinates: Mapping[str, NDArray[Any]]
+    """Values of all dimensions."""
 
     @property
     def until(self) -> float:

@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.cable.places import CABLES
 from ringsim.sampling.values import Values, array_of, label_of, labels_of, plain
 
 
@@ -27,6 +28,8 @@ class Column:
     """The distribution, in words."""
     values: Values
     """Shape (samples,), or (samples, k) with a value for each place."""
+    places: tuple[str, ...] = ()
+    """Names of the k places, if they have some."""
 
     @property
     def in_words(self) -> bool:
@@ -45,6 +48,12 @@ class Table:
     def samples(self) -> int:
         """Number of samples."""
         return len(self.seeds)
+
+    @property
+    def moves_winches(self) -> bool:
+        """Whether samples count the pulleys of a cable from different ends."""
+        ends = [f"cables.{cable}.end" for cable in CABLES]
+        return any(f"{end}.".startswith(f"{c.path}.") for c in self.columns for end in ends)
 
     def values_of(self, sample: int) -> dict[str, Any]:
         """Values by path of one sample, as :meth:`Scene.with_values` takes them."""
@@ -91,10 +100,22 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
             choices = {label_of(each): each for each in map(plain, values.ravel())}
             variable.choices, values = json.dumps(choices), labels_of(values)
         variable[:] = values.astype(object if text else kind)
+        if column.places and not table.moves_winches:
+            variable.coordinates = _add_names(file, column, table)
     seeds = file.createVariable("sample_seed", "i8", ("sample",))
     seeds.long_name = "seed of the sample, from the campaign's seed and the sample's index"
     seeds.units = "1"
     seeds[:] = table.seeds
+
+
+def _add_names(file: Any, column: Column, table: Table) -> str:
+    """The coordinate with the names of a column's places; its own where columns differ in them."""
+    shared = len({each.places for each in table.columns if each.dim == column.dim}) == 1
+    name = f"{column.dim}_name" if shared else f"{column.name}_{column.dim}_name"
+    if name not in file.variables:
+        file.createVariable(name, str, (column.dim,))[:] = np.array(column.places, dtype=object)
+        file[name].long_name = f"place of the {column.dim.partition('_')[0]}"
+    return name
 
 
 def read_inputs(file: Any) -> tuple[Column, ...]:
@@ -112,5 +133,8 @@ def read_inputs(file: Any) -> tuple[Column, ...]:
                 values, kind = each.reshape(values.shape), object
             dim, origin = "".join(variable.dimensions[1:]), says.get("distribution", "")
             units = says.get("units", "1")
-            columns.append(Column(name, says["path"], dim, units, origin, values.astype(kind)))
+            named = says.get("coordinates")
+            places = tuple(file[named][:]) if named else ()
+            values = values.astype(kind)
+            columns.append(Column(name, says["path"], dim, units, origin, values, places))
     return tuple(columns)

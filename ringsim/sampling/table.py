@@ -9,14 +9,14 @@ import numpy as np
 
 from ringsim.choice import OneOf
 from ringsim.outputs import COORDINATES, VARIABLES
-from ringsim.overrides import field_at, section_of
+from ringsim.overrides import field_at, place_of, pulleys_at, section_of, with_number
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Design
 from ringsim.sampling.distributions.family import Distribution
 from ringsim.sampling.values import Values, extremes_of, is_label, plain
-from ringsim.scene import Scene, place_of
+from ringsim.scene import Scene
 from ringsim.units import unit_at
 
 AnyDistribution = Annotated[Distribution, OneOf()]
@@ -51,7 +51,7 @@ def draw(
     for name, distribution in inputs.items():
         places = _places(base, name, distribution)
         for path in _paths_of(name, distribution):
-            own = {f"{path}{place}" for place in places}
+            own = {with_number(base, f"{path}{place}") for place in places}
             if twice := own & written:
                 raise InputError(
                     f"inputs: {min(twice)} is drawn twice: leave out one of its inputs"
@@ -173,14 +173,15 @@ def _column(base: Scene, path: str, values: Values, words: str, design: Design) 
         scene = base.with_values({path: plain(values[0])})
     except InputError as error:
         raise InputError(f"{design.where(0, path)}: {error}") from None
-    dim = ""
+    dim, names = "", tuple[str, ...]()
     if values.ndim == 2:
         dim = place_of(path, closed=scene.structure.closed) or f"place_{values.shape[1]}"
-        if dim == "pulley" and values.shape[1] != scene.structure.pulleys:
+        names = pulleys_at(scene, path)
+        if names and field_at(scene, path.partition(".friction")[0]).end == "both":
             dim = "pulley_of_two_winches"
     if values.dtype.kind in "iu" and isinstance(field_at(scene, path), float):
         values = values.astype(float)
-    return Column(name, path, dim, unit_at(scene, path), words, values)
+    return Column(name, path, dim, unit_at(scene, path), words, values, names)
 
 
 def _check_extremes(base: Scene, table: Table, design: Design) -> None:

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from ringsim.files import whole
 from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.outputs.family import SPAN_NAME, span_names
 from ringsim.sampling.columns import Table, add_inputs
+from ringsim.scene import Scene
 from ringsim.storage import netcdf
 from ringsim.storage.journal import Survey
 from ringsim.storage.netcdf import PER_SAMPLE
@@ -29,10 +31,13 @@ def write_merged(
     folder: Path,
     found: Survey,
     table: Table,
+    scene: Scene,
     output: netcdf.OutputTable,
     attributes: Mapping[str, Any],
 ) -> int:
     """Write ``campaign.nc`` of what was found in a folder, whole or not at all.
+
+    The samples of ``table`` vary ``scene``, whose spans name those of all of them.
 
     Returns how many samples count as failed because their coordinates differ.  OSError or
     RuntimeError if the disk is full; an older file stays.
@@ -49,6 +54,10 @@ def write_merged(
         netcdf.add_coordinate(file, "sample", np.arange(table.samples))
         for name, values in axes.items():
             netcdf.add_coordinate(file, name, values)
+        names_of_spans = span_names(scene)
+        wide = [len(axes[dim]) for dim in SPAN_NAME.dims if dim in axes]
+        if wide == [*names_of_spans.shape] and not table.moves_winches:
+            netcdf.add_span_names(file, names_of_spans)
         add_inputs(file, table, compression=output.compression)
         for name, variable in wanted.items():
             digits = output.significant_digits.get(name)
@@ -91,7 +100,7 @@ def _copy(
             k, fit = result.sample - start, fits[found.form[result.sample]]
             for name, values in result.arrays().items() if fit else ():
                 if name in blocks:
-                    blocks[name][k] = values
+                    blocks[name][k] = values[()]  # of text a word, not an array
             blocks["status"][k] = result.status if fit else Status.ERROR
             blocks["cause"][k] = result.cause if fit else Cause.UNFIT
             blocks["reason"][k] = result.reason if fit else UNFIT

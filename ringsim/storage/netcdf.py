@@ -17,6 +17,7 @@ from pydantic import Field, model_validator
 
 from ringsim.files import whole
 from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.outputs.family import SPAN_NAME
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.sampling.columns import Table, add_inputs, read_inputs
 from ringsim.storage.result import MISSING_COUNT
@@ -72,6 +73,12 @@ def add_coordinate(file: Any, name: str, values: NDArray[Any]) -> None:
     if name == "sample":
         variable.standard_name = "realization"
     variable[:] = values.astype(object) if values.dtype.kind == "U" else values
+
+
+def add_span_names(file: Any, names: NDArray[Any]) -> None:
+    """Name the spans of an open netCDF4 dataset that has the dimensions, shape (planes, spans)."""
+    _create(file, SPAN_NAME, SPAN_NAME.dims)[:] = names.astype(object)
+    file.coordinates = SPAN_NAME.name
 
 
 def add_variable(

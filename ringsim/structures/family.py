@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.cable.places import points_of
 from ringsim.layout.layout import Layout
 from ringsim.units import Model
 
@@ -27,10 +28,6 @@ class Structure(Model):
             """Whether the last section meets the first."""
 
         @property
-        def pulleys(self) -> int:
-            """Of a cable with one winch."""
-
-        @property
         def coordinate(self) -> float:
             """Value of the coordinate at the start, rad."""
 
@@ -49,6 +46,11 @@ class Structure(Model):
     """Name of the rod whose bending strain is recorded, if any."""
     shaping: ClassVar[tuple[str, ...]] = ()
     """Scene paths that decide where results are given: all samples of a campaign share them."""
+
+    @classmethod
+    def cable_points(cls, sections: int) -> tuple[str, ...]:
+        """Names of what a cable runs along, from section 1 on."""
+        return points_of(sections)
 
     @property
     def push(self) -> float:

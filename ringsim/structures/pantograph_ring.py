@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ringsim.cable.records import pulleys_of
 from ringsim.choice import kind_of
 from ringsim.layout.bodies import Lump
 from ringsim.layout.draft import Draft
@@ -115,11 +114,6 @@ class PantographRing(Structure):
                 "neighbouring sections, which would coincide (set it to "
                 f"{LEAST_HINGE_OFFSET:g} for pulleys on one axis, or leave the cables out)"
             )
-
-    @property
-    def pulleys(self) -> int:
-        """Pulleys of a cable with one winch: two hinges and a V-joint a section, less its end."""
-        return pulleys_of(self.sections)
 
     @property
     def coordinate(self) -> float:

@@ -68,7 +68,6 @@ class PlanarTruss(Structure):
     planes: ClassVar[tuple[str, ...]] = ("upper",)
     sections: ClassVar[int] = 1
     closed: ClassVar[bool] = False
-    pulleys: ClassVar[int] = 1
     locks: ClassVar[bool] = False
     gauge: ClassVar[str] = "upper_beam"
     long_names: ClassVar[dict[str, str]] = {
@@ -121,6 +120,11 @@ class PlanarTruss(Structure):
                 "meet each other's ends"
             )
         return self
+
+    @classmethod
+    def cable_points(cls, sections: int) -> tuple[str, ...]:
+        """See ``Structure``."""
+        return "lower joint", "upper outer joint"
 
     def check(self, scene: Any) -> None:
         """See ``Structure``: parts of rings are refused, the cable is needed."""

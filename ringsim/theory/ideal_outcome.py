@@ -9,7 +9,7 @@ from scipy.interpolate import BPoly, CubicHermiteSpline
 
 from ringsim.layout.pose import Array
 from ringsim.outputs.asynchrony import Asynchrony
-from ringsim.outputs.cable_tension import CableTension
+from ringsim.outputs.cable_tension import PEAK, CableTension
 from ringsim.outputs.family import Output, Values, axes
 from ringsim.outputs.recorder import ended, outputs_of, overloads, reduced, spanned
 from ringsim.outputs.series import Reading, Run, Series, output_times
@@ -77,7 +77,7 @@ class _IdealRun:
         }
         angles, rates = self._series(lambda now: now.angles), self._series(lambda now: now.rates)
         locks = np.full(self._shape, course.lock_time)
-        self.run = Run(scene, angles, rates, locks, counts)
+        self.run = Run(scene, angles, rates, locks, counts, axes(scene))
 
     def series_of(self, output: Output) -> Series | None:
         """Readings at the ends of steps; of tensions at all points that are in balance."""
@@ -93,6 +93,7 @@ class _IdealRun:
         times, tensions = _readings(CableTension().read, self._balanced)
         counts = times <= self.run.until
         peak, moment = _top(times[counts], np.nanmax(tensions[counts], axis=(1, 2)))
+        where = PEAK.of(self.run, times[counts], tensions[counts])
         chains = [now.chain for now in self._balanced if now.chain]
         # Path less natural length of the rope at each cable's first winch, m; -1 if it is cut.
         stretch = [
@@ -101,7 +102,8 @@ class _IdealRun:
         ]
         slack = np.array([_time_below_zero(times, each) for each in np.transpose(stretch)])
         slack = self._balanced[0].by_plane(slack)
-        return {"peak_tension": peak, "peak_tension_time": moment, "slack_duration": slack}
+        top = {"peak_tension": peak, "peak_tension_time": moment}
+        return where | top | {"slack_duration": slack}
 
     def _series(self, read: _Reader) -> Series:
         def evaluate(where: Array) -> Array:

@@ -6,6 +6,7 @@ from click.testing import CliRunner
 
 from ringsim.cli import cli
 from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.outputs.family import SPAN_NAME
 
 
 def explain(*names: str) -> str:
@@ -14,7 +15,7 @@ def explain(*names: str) -> str:
 
 def test_every_variable_is_explained() -> None:
     lines = explain().splitlines()
-    assert [line.partition("(")[0] for line in lines] == [*COORDINATES, *VARIABLES]
+    assert [line.partition("(")[0] for line in lines] == [*COORDINATES, SPAN_NAME.name, *VARIABLES]
 
 
 def test_a_variable_has_units_meaning_and_needs() -> None:

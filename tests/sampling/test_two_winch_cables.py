@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import xarray as xr
 from pydantic import TypeAdapter
 
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Table
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import Scene, load_scene
+from ringsim.storage.netcdf import read_design, write_design
 
 
 def drawn(base: Scene, inputs: dict[str, object]) -> Table:
@@ -39,3 +41,27 @@ def test_coefficients_of_two_lengths_lie_in_two_dimensions() -> None:
     upper, lower = drawn(base, dict.fromkeys(paths, law)).columns
     assert (upper.dim, upper.values.shape) == ("pulley_of_two_winches", (8, 6))
     assert (lower.dim, lower.values.shape) == ("pulley", (8, 5))
+
+
+def test_names_of_pulleys_are_in_the_design(tmp_path) -> None:
+    law = {"kind": "uniform", "low": 2e-4, "high": 4e-4, "each_section": True}
+    base = load_scene("truss2").with_values({"cables.lower.end": "last"})
+    paths = [f"cables.{plane}.friction.coefficient" for plane in ("upper", "lower")]
+    table = drawn(base, dict.fromkeys(paths, law))
+    write_design(tmp_path, table, {"identity": "x", "scene": base.to_toml(), "solver": "none"})
+    upper, lower = read_design(tmp_path)[0].columns
+    assert [c.places for c in (upper, lower)] == [c.places for c in table.columns]
+    assert upper.places[0] == "section 1 first hinge"
+    assert lower.places[0] == "section 2 second hinge"
+    with xr.open_dataset(tmp_path / "design.nc") as found:
+        for column in (upper, lower):
+            names = found[f"{column.name}_pulley_name"]
+            assert names.values.tolist() == list(column.places)
+        assert "pulley_name" not in found.variables
+
+
+def test_a_pulley_by_name_and_by_number_is_drawn_once() -> None:
+    law = {"kind": "uniform", "low": 2e-4, "high": 4e-4}
+    path = "cables.upper.friction.coefficient"
+    with pytest.raises(InputError, match=r"coefficient\[5\] is drawn twice"):
+        drawn(load_scene("truss2"), {f"{path}[5]": law, f'{path}["section 2 V"]': law})

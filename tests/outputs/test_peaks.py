@@ -1,0 +1,209 @@
+"""When and where the largest values were: the place belongs to the value that is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+from ringsim.cli import cli
+from ringsim.outputs.asynchrony import Asynchrony
+from ringsim.outputs.cable_tension import CableTension
+from ringsim.outputs.family import axes
+from ringsim.outputs.rod_stress import RodStress
+from ringsim.outputs.series import Run, Series
+from ringsim.scene import load_scene
+from ringsim.simulation import FIDELITIES, simulate
+
+TRUSS = load_scene("truss2").with_values({"solver.end_time": 2.0, "record.interval": 0.5})
+TIMES = np.linspace(0.0, 2.0, 9)
+RODS = np.array([f"rod {k}" for k in range(8)])
+
+
+def run_of(angles, rates, until=np.nan) -> tuple[Run, Series]:
+    """A run of the truss with two planes and two sections."""
+    grid = np.arange(0.0, 2.25, 0.5)
+    series = Series(TIMES, angles, grid), Series(TIMES, rates, grid)
+    known = axes(TRUSS) | {"rod": RODS}
+    return Run(TRUSS, *series, np.full((2, 2), until), {}, known), series[0]
+
+
+STILL = run_of(np.ones((9, 2, 2)), np.zeros((9, 2, 2)))[0]
+
+
+@pytest.mark.parametrize("leads", [1.0, -1.0])
+def test_asynchrony_tells_who_and_when_between_steps(leads) -> None:
+    """Lower 1 departs from the others by sin(t)^2 (2 - t) deg, the step's ends are 0.25 s apart."""
+    angles, rates = np.ones((9, 2, 2)), np.zeros((9, 2, 2))
+    fall = np.radians(np.sin(TIMES) ** 2 * (2.0 - TIMES))
+    slope = np.radians(np.sin(2.0 * TIMES) * (2.0 - TIMES) - np.sin(TIMES) ** 2)
+    angles[:, 1, 0] += leads * fall
+    rates[:, 1, 0] += leads * slope
+    run, series = run_of(angles, rates)
+    found = Asynchrony().reduce(run, series)
+    fine = np.linspace(0.0, 2.0, 100_001)
+    truth = np.sin(fine) ** 2 * (2.0 - fine)
+    # An eighth of a step at most beside the maximum, where the curvature is 1.7 deg/s^2, and
+    # cubics on steps of h that err by h^4 / 384 of the fourth derivative, about 20.
+    assert found["asynchrony_max"] == pytest.approx(truth.max(), abs=4e-4)
+    assert found["asynchrony_max_time"] == pytest.approx(fine[truth.argmax()], abs=0.25 / 8)
+    who = "leader" if leads > 0.0 else "laggard"
+    assert found[f"asynchrony_{who}_plane"] == "lower"
+    assert found[f"asynchrony_{who}_section"] == 1
+    at = f"at {found['asynchrony_max_time']:.4g} s: "
+    words = "upper 1 behind lower 1" if leads > 0.0 else "lower 1 behind upper 1"
+    assert Asynchrony().told(found, {}) == at + words
+
+
+def test_asynchrony_at_an_output_time_has_that_time() -> None:
+    """A cubic that bulges between the eight points of a step, where an output time lies."""
+    times, grid = np.array([0.0, 1.0]), np.array([0.0, 0.46875])
+    angles, rates = np.zeros((2, 2, 2)), np.zeros((2, 2, 2))
+    rates[:, 0, 1] = 1.0, -0.75  # largest between 3/8 and 4/8
+    run = Run(
+        TRUSS, Series(times, angles, grid), Series(times, rates, grid),
+        np.full((2, 2), np.nan), {}, axes(TRUSS),
+    )  # fmt: skip
+    found = Asynchrony().reduce(run, run.angles)
+    assert found["asynchrony_max"] == found["asynchrony"][1]
+    assert found["asynchrony_max_time"] == grid[1]
+    assert (found["asynchrony_leader_plane"], found["asynchrony_leader_section"]) == ("upper", 2)
+
+
+def test_joints_that_open_alike_have_no_leader() -> None:
+    found = Asynchrony().reduce(STILL, STILL.angles)
+    assert found["asynchrony_max"] == 0.0
+    assert Asynchrony().told(found, {}) == ""
+
+
+def test_tension_tells_plane_and_span() -> None:
+    tensions = np.random.default_rng(3).uniform(1.0, 2.0, (9, 2, 6))
+    tensions[:, 0, 5] = np.nan  # of a cable with fewer spans
+    tensions[6, 1, 3] = 30.0
+    found = CableTension().reduce(STILL, Series(TIMES, tensions, STILL.angles.grid))
+    assert found["peak_tension"] == 30.0
+    assert found["peak_tension_time"] == TIMES[6]
+    assert (found["peak_tension_plane"], found["peak_tension_span"]) == ("lower", 4)
+    words = "at 1.5 s: lower, span 4 (section 1 second hinge to section 2 first hinge)"
+    assert CableTension().told(found, TRUSS.span_names) == words
+    assert CableTension().told(found, {}) == "at 1.5 s: lower, span 4"
+
+
+def test_tension_after_the_deployment_does_not_count() -> None:
+    tensions = np.zeros((9, 2, 6))
+    tensions[3, 0, 0], tensions[6, 1, 3] = 20.0, 30.0
+    run = run_of(np.ones((9, 2, 2)), np.zeros((9, 2, 2)), until=1.3)[0]
+    found = CableTension().reduce(run, Series(TIMES, tensions, run.angles.grid))
+    assert (found["peak_tension"], found["peak_tension_time"]) == (20.0, TIMES[3])
+    assert (found["peak_tension_plane"], found["peak_tension_span"]) == ("upper", 1)
+
+
+def test_stress_tells_rod_and_section() -> None:
+    stress = np.random.default_rng(4).uniform(1.0, 2.0, (9, 8, 2))
+    stress[2, 5, 1] = 3e6
+    found = RodStress().reduce(STILL, Series(TIMES, stress, STILL.angles.grid))
+    assert (found["peak_rod_stress"], found["peak_stress_time"]) == (3e6, TIMES[2])
+    assert RodStress().told(found, {}) == "at 0.5 s: rod 5, section 2"
+
+
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_a_run_tells_what_its_series_hold(fidelity, tmp_path) -> None:
+    """On output times much closer than steps the series come near to the peaks, and only there."""
+    full = fidelity == "full"
+    values = {"solver.end_time": 0.1, "record.interval": 2e-5, "record.stress": full}
+    run = simulate(load_scene("truss2").with_values(values), fidelity)
+    place = {"plane": run.peak_tension_plane.item(), "span": run.peak_tension_span.item()}
+    near = run.cable_tension.sel(place).sel(time=run.peak_tension_time, method="nearest")
+    # The ideal ring's is the top of a parabola through three points of its own series.
+    assert near.item() == pytest.approx(run.peak_tension.item(), rel=1e-3)
+    assert near.span_name.item() == TRUSS.span_names[place["plane"]][place["span"] - 1]
+    assert run.cable_tension.max().item() <= run.peak_tension.item() * (1.0 + 1e-3)
+    if full:
+        place = {"rod": run.peak_stress_rod.item(), "section": run.peak_stress_section.item()}
+        near = run.rod_stress.sel(place).sel(time=run.peak_stress_time, method="nearest")
+        assert near.item() == pytest.approx(run.peak_rod_stress.item(), rel=1e-3)
+        at = run.opening_angle.sel(time=run.asynchrony_max_time, method="nearest")
+        first, last = (
+            at.sel(plane=run[f"asynchrony_{who}_plane"], section=run[f"asynchrony_{who}_section"])
+            for who in ("leader", "laggard")
+        )
+        assert (first - last).item() == pytest.approx(run.asynchrony_max.item(), rel=1e-3)
+
+
+CAMPAIGN = """
+name = "two"
+scene = "truss2"
+design = { kind = "random", samples = 2 }
+
+[set]
+"solver.end_time" = 0.1
+'cables.upper.friction.coefficient["section 1 V"]' = 0.001
+
+[inputs]
+'cables.upper.friction.coefficient["section 2 V"]' = { kind = "uniform", low = 2e-4, high = 4e-4 }
+
+[inputs.cables.lower.friction.coefficient]
+kind = "uniform"
+low = 2e-4
+high = 4e-4
+each_section = true
+"""
+
+
+def test_places_and_names_survive_a_campaign(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("two.toml").write_text(CAMPAIGN, encoding="utf-8")
+    ended = CliRunner().invoke(cli, ["campaign", "two.toml", "--workers=1", "--out=out"])
+    assert ended.exit_code == 0, ended.output
+    with xr.open_dataset("out/campaign.nc") as found:
+        found.load()
+    assert found.peak_tension_plane.isin(["upper", "lower"]).all()
+    assert found.asynchrony_leader_section.isin([1, 2]).all()
+    assert found.span_name.dims == ("plane", "span")
+    for plane, names in TRUSS.span_names.items():
+        assert found.span_name.sel(plane=plane).values.tolist() == list(names)
+    drawn = found.cables_lower_friction_coefficient
+    assert drawn.pulley_name[[0, -1]].values.tolist() == ["section 1 first hinge", "section 2 V"]
+    assert found.cables_upper_friction_coefficient_section_2_V.dims == ("sample",)
+    # A sample again: the largest tension is that of the run with its inputs.
+    values = {c.attrs["path"]: c[1].values.tolist() for c in found.values() if "path" in c.attrs}
+    run = simulate(
+        load_scene("truss2").with_values(
+            {"solver.end_time": 0.1, "cables.upper.friction.coefficient[2]": 0.001, **values}
+        )
+    )
+    assert run.peak_tension_span == found.peak_tension_span[1]
+    assert run.peak_tension.item() == found.peak_tension[1].item()
+    worst = int(np.argmax(found.peak_tension.values))
+    span, plane = int(found.peak_tension_span[worst]), found.peak_tension_plane[worst].item()
+    line = (
+        f"  largest tension in sample {worst}: {found.peak_tension[worst]:.3f} N at "
+        f"{found.peak_tension_time[worst]:.4g} s: {plane}, span {span} "
+        f"({TRUSS.span_names[plane][span - 1]})"
+    )
+    assert line in ended.output.splitlines()
+
+
+def test_names_are_left_out_where_samples_differ_in_them(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = CAMPAIGN + ('[inputs.cables.upper.end]\nkind = "discrete"\nvalues = ["first", "last"]\n')
+    Path("two.toml").write_text(text, encoding="utf-8")
+    ended = CliRunner().invoke(cli, ["campaign", "two.toml", "--workers=1", "--out=out"])
+    assert ended.exit_code == 0, ended.output
+    with xr.open_dataset("out/campaign.nc") as found:
+        assert not {"span_name", "pulley_name"} & set(found.variables)
+        assert found.peak_tension_span.isin(found.span).all()
+    assert " span 1 (" not in ended.output
+
+
+def test_results_without_places_tell_none() -> None:
+    """Of an older file, or of a solver that does not know them: text is empty, numbers missing."""
+    values = {"peak_tension_time": 1.0, "peak_tension_plane": "", "peak_tension_span": np.nan}
+    assert CableTension().told(values, TRUSS.span_names) == ""
+    assert CableTension().told({"peak_tension": 1.0}, TRUSS.span_names) == ""
+    assert RodStress().told({"peak_stress_time": np.nan}, {}) == ""
+    assert Asynchrony().told({"asynchrony_max": 3.0, "asynchrony_leader_plane": ""}, {}) == ""
+    assert Asynchrony().told({"asynchrony_max": 3.0}, {}) == ""
