@@ -5,6 +5,33 @@ import xarray as xr
 
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.summary import summary
+from ringsim.variables import GOALS, Fate
+
+_NAMED = 6
+"""Samples that a line names at most."""
+
+
+def notes(campaign: xr.Dataset) -> list[str]:
+    """All lines but those of the error budget."""
+    parts = (outcome_lines, peak_lines, override_lines, restart_lines)
+    return [line for part in parts for line in part(campaign)]
+
+
+def outcome_lines(campaign: xr.Dataset) -> list[str]:
+    """What became of the antenna, a line for each outcome with its samples unless it deployed."""
+    fates, good = campaign["outcome"].to_numpy(), campaign["status"].to_numpy() == 0
+    lines = []
+    for fate in Fate:
+        own = np.flatnonzero(good & (fates == fate))
+        if not len(own) or fate == Fate.NONE:
+            continue
+        more = ", ..." if len(own) > _NAMED else ""
+        named = f" (sample{'s' * (len(own) > 1)} {', '.join(map(str, own[:_NAMED]))}{more})"
+        lines.append(
+            f"{fate.word.replace('_', ' ')}: {len(own)} of {len(fates)}"
+            f"{'' if fate in GOALS else named}"
+        )
+    return lines
 
 
 def budget_lines(campaign: xr.Dataset) -> list[str]:

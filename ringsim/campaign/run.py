@@ -10,12 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import (
-    budget_lines,
-    override_lines,
-    peak_lines,
-    restart_lines,
-)
+from ringsim.analysis.campaign_notes import budget_lines, notes
 from ringsim.campaign.folder import Folder, merge, open_folder
 from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
 from ringsim.execution.work import Limits, Scheduler, Work, longest_first, relative_cost
@@ -172,10 +167,10 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
         _tell(f"{path}: {campaign.table.samples} samples, {failed} failed")
         listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
         with xr.open_dataset(path) as dataset:
-            notes = peak_lines(dataset) + override_lines(dataset) + restart_lines(dataset)
+            lines = notes(dataset)
             if listed or campaign.scene.solver.error_bars:
-                notes += budget_lines(dataset)
-        for line in notes:
+                lines += budget_lines(dataset)
+        for line in lines:
             _tell(f"  {line}")
     if stop.reason and not stop.signalled:
         _tell(

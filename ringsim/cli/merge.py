@@ -3,7 +3,9 @@
 from pathlib import Path
 
 import click
+import xarray as xr
 
+from ringsim.analysis.campaign_notes import notes
 from ringsim.campaign.folder import merge, open_folder
 from ringsim.cli.options import FOLDER
 
@@ -19,3 +21,7 @@ def command(folder: Path) -> None:
     samples = campaign.table.samples
     left, failed, path = merge(campaign, execution="merged on its own", partly=True)
     click.echo(f"{path}: {samples} samples, {samples - left} done, {left} not run, {failed} failed")
+    if path is not None:
+        with xr.open_dataset(path) as dataset:
+            for line in notes(dataset):
+                click.echo(f"  {line}")

@@ -52,7 +52,7 @@ def test_settings_are_picked_and_told(tmp_path: Path) -> None:
         (["--accuracy", "0.05", "--fidelity", "ideal"], "leave out one"),
         (["--accuracy", "0.05", "--set", "solver.tolerance=1e-3"], "--accuracy chooses it"),
         (["--evidence", "none.toml"], "without --accuracy"),
-        (["--accuracy", "0.01", "--evidence", "none.toml"], "cannot be read"),
+        (["--accuracy", "0.01", "--evidence", "none.toml"], "there is no such file"),
         (["--accuracy", "7"], "--accuracy"),
     ],
 )

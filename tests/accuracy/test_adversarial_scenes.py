@@ -14,7 +14,7 @@ import pytest
 
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
-from ringsim.variables import Status
+from ringsim.variables import PLANES, Status
 
 SCENES = tomllib.loads((Path(__file__).parent / "adversarial_scenes.toml").read_text())
 TRUTHS = {
@@ -44,7 +44,13 @@ SHARE = {"deployment_time": 5e-4, "asynchrony_max": 0.05, "peak_tension": 0.03}
 
 def scene_of(name: str) -> Scene:
     entry = SCENES[name]
-    return load_scene(entry["scene"]).with_values(entry["values"])
+    scene = load_scene(entry["scene"]).with_values(entry["values"])
+    cables = [] if scene.cables is None else scene.cables.present()
+    # The truths are of winches that pull on until the last plane has locked.
+    pull = {f"cables.{PLANES[plane]}.winch.after_lock": "pull" for plane, _ in cables}
+    far = {path.replace(".winch.", ".far_winch."): "pull" for path in pull}
+    both = any(cable.far_winch is not None for _, cable in cables)
+    return scene.with_values(pull | far if both else pull)
 
 
 @pytest.mark.parametrize("name", TRUTHS)

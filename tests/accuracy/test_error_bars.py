@@ -20,7 +20,7 @@ from ringsim.stepping.constant_steps import ConstantSteps
 from ringsim.stepping.instant import Energies, Instant, Scales
 from ringsim.stepping.locks import StopContact
 from ringsim.stepping.motion_steps import MotionSteps
-from ringsim.variables import Outcome, Status
+from ringsim.variables import Fate, Outcome, Status
 
 TIMES = np.linspace(0.0, 4.0, 41)
 
@@ -48,6 +48,7 @@ def outcome(error: float, status: Status = Status.OK) -> Outcome:
         "asynchrony_max": np.array(5.0 * (1.0 + error)),
         "peak_tension": np.array(10.0 * (1.0 + error)),
         "final_time": np.array(4.0),
+        "outcome": np.array(int(Fate.NONE if status.failed else Fate.DEPLOYED)),
     }
     return Outcome(status, "", {"time": TIMES}, values)
 

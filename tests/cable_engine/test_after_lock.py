@@ -23,7 +23,7 @@ def uneven(after_lock: str, **values: Any) -> Outcome:
         "record__interval": 0.01,
         "both__winch__winding__speed": 0.05,
         "both__winch__after_lock": after_lock,
-        "limits__overrun": 40.0,
+        "limits__overrun": 15.0,
         "solver__tolerance": 1e-3,
     }
     scene = truss(**fields | values).with_values({"cables.upper.winch.winding.speed": 0.1})

@@ -52,7 +52,7 @@ def test_the_last_start_counts_unless_it_ran_out_of_its_smaller_steps(
 ) -> None:
     left = list(causes)
 
-    def ending(scene: Scene) -> Outcome:
+    def ending(scene: Scene, watch: object) -> Outcome:
         return Outcome(Status.DIVERGED, "so", {}, {"steps": np.array(1)}, left.pop(0))
 
     monkeypatch.setattr(simulation, "solve", ending)

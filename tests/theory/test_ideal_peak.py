@@ -13,7 +13,8 @@ SHORT = {"structure.sections": 4, "structure.opening_angle": 165.0, "boom": "non
 
 
 def test_what_winches_pull_at_a_locked_ring_does_not_count() -> None:
-    fine = SHORT | {"record.interval": 1e-3}
+    pull = {f"cables.{plane}.winch.after_lock": "pull" for plane in ("upper", "lower")}
+    fine = SHORT | {"record.interval": 1e-3} | pull
     found = run_ideal(load_scene("ring18-cable").with_values(fine))
     values, time = found.values, found.coordinates["time"]
     assert values["peak_tension_time"] <= values["deployment_time"] < values["final_time"]
