@@ -72,7 +72,7 @@ REFUSED = {
     "cables.upper.friction.coefficient[0]=0.003": "choose one from 1 to 5",
     "cables.upper.friction.coefficient=[0.001, 0.002]": "has 2 values, but the structure needs 5",
     "cables.upper.friction.coefficient[2]=0.01": "must be below pulley_radius = 0.01 m",
-    "cables.upper.friction={ kind = 'none', coefficient = 0.001 }": "coefficient is not a known key",
+    "cables.upper.friction={ kind = 'none', coefficient = 1e-3 }": "coefficient is not a known",
     "cables.upper.winch.winding.kind=ramp": "winding.duration is missing",
     "cables.uper.axial_stiffness=1e5": "did you mean upper?",
     "cables.upper.far_winch.winding={ kind = 'constant', speed = 0.02 }": 'needs end = "both"',

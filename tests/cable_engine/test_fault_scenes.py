@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from driven import outcome, truss
+from ringsim.stepping.rest import MOVED
 from ringsim.variables import Fate, Outcome
 
 STRIKES = 1.0
@@ -59,11 +61,13 @@ def test_a_cut_cable_pulls_nothing_and_the_other_goes_on() -> None:
 
 def test_both_cables_cut_leave_the_truss_to_its_friction() -> None:
     found = struck(*({"kind": "cut-cable", "cable": c, "span": 6} for c in (1, 2)), end=4.0)
-    assert found.fate is Fate.CUT_OFF
-    angle = found.values["opening_angle"]
-    rest = found.coordinates["time"] > 3.0
-    assert np.ptp(angle[..., rest], axis=-1).max() < 0.2
-    assert angle[..., -1].max() < 120.0
+    assert found.fate is Fate.STALLED, found.reason
+    angle, times = found.values["opening_angle"], found.coordinates["time"]
+    last = int(np.flatnonzero(times <= found.values["final_time"])[-1])
+    # It rests: what it has moved within the last tenth of the end time is less than it may.
+    window = (times > times[last] - 0.4) & (times <= times[last])
+    assert np.ptp(angle[..., window], axis=-1).max() < math.degrees(MOVED)
+    assert angle[..., last].max() < 120.0
 
 
 def test_a_stuck_joint_stays_and_the_rest_goes_on() -> None:
