@@ -1,5 +1,7 @@
 """How long cables were slack."""
 
+import math
+
 import numpy as np
 
 from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
@@ -12,7 +14,10 @@ class SlackDuration(Output):
     needs = ("cables",)
     variables = (
         Variable(
-            "slack_duration", ("plane",), "s", "time for which the cable is slack at its winch"
+            "slack_duration",
+            ("plane",),
+            "s",
+            "time for which the cable is slack at its winch, until its plane has locked",
         ),
     )
 
@@ -23,5 +28,6 @@ class SlackDuration(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """The sum of the steps, of which those that begin or end taut count half."""
-        slack, steps = series.values, np.diff(series.times)[:, None]
+        locked = np.nan_to_num(run.locks.max(axis=1), nan=math.inf)
+        slack, steps = series.values, np.diff(np.minimum(series.times[:, None], locked), axis=0)
         return {"slack_duration": np.sum(0.5 * steps * (slack[1:] + slack[:-1]), axis=0)}

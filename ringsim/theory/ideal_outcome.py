@@ -100,7 +100,8 @@ class _IdealRun:
             np.where(chain.ropes.alive, chain.paths - chain.natural, -1.0)[chain.ropes.of_end[:, 0]]
             for chain in chains
         ]
-        slack = np.array([_time_below_zero(times, each) for each in np.transpose(stretch)])
+        until = np.minimum(times, self.run.until)
+        slack = np.array([_time_below_zero(until, each) for each in np.transpose(stretch)])
         slack = self._balanced[0].by_plane(slack)
         top = {"peak_tension": peak, "peak_tension_time": moment}
         return where | top | {"slack_duration": slack}

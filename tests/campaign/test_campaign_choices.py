@@ -108,5 +108,5 @@ def test_choices_reach_the_runs_and_the_merged_file(bench):
     bench.run(*start, solver="")  # nothing is left to run
     assert "identical to the stored result" in bench.run("replay", "out", 1)
     more = bench.run(*start[:2], "--out", "out", solver="", code=2)
-    assert "this folder holds another campaign (its scene differs)" in more
+    assert "this folder holds another campaign (its scene differs: solver.tolerance" in more
     assert "is not in the range" in bench.run(*start[:2], "--samples", 0, code=2)
