@@ -1,0 +1,47 @@
+"""Every pair of a failing motor and a damage: sound numbers, and the outcome that physics wants."""
+
+import functools
+import sys
+from pathlib import Path
+
+import pytest
+
+from ringsim.scene import Scene
+from ringsim.simulation import run
+from ringsim.variables import Fate, Outcome, Status
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+from fault_matrix import cells, faulty, sound_scene
+
+CELLS = [(sections, *cell) for sections in (2, 6) for cell in cells()]
+
+
+@functools.cache
+def sound(sections: int) -> tuple[Scene, Outcome]:
+    scene = sound_scene(sections)
+    return scene, run(scene)
+
+
+@pytest.mark.parametrize(("sections", "motor", "damage", "plane"), CELLS)
+def test_every_pair_of_faults_is_an_outcome_and_no_failure(
+    sections: int, motor: str, damage: str, plane: str
+) -> None:
+    scene, whole = sound(sections)
+    assert whole.fate is Fate.DEPLOYED
+    length, peak = (float(whole.values[n]) for n in ("deployment_time", "peak_tension"))
+    found = run(faulty(scene, motor, damage, plane, length, peak))
+    assert found.status == Status.OK, found.reason
+    assert int(found.values["restarts"]) == 0
+    assert found.values["energy_error"] < 1e-3
+    stuck = damage == "stuck"
+    locked = int(found.values["locked_joints"])
+    assert found.fate is not Fate.NONE
+    assert (found.fate is Fate.DEPLOYED) <= (locked == 2 * sections)
+    if damage == "none" and motor in ("late", "weak"):
+        assert found.fate is Fate.DEPLOYED
+    if stuck or motor == "stopped":
+        assert found.fate is not Fate.DEPLOYED
+        assert locked < 2 * sections
+    if stuck:
+        # One held joint keeps its angle; its winch drives the others past their stops, or rests.
+        assert found.fate in (Fate.OVERLOADED, Fate.PARTLY_DEPLOYED, Fate.STALLED)
