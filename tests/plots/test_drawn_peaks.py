@@ -39,8 +39,13 @@ def planar() -> xr.Dataset:
 
 
 def highest(figure: Figure, label: str) -> float:
-    """Of all lines of the axes whose name begins so."""
-    rows = [axes for axes in figure.axes if axes.get_ylabel().startswith(label)]
+    """Of all lines of the axes whose name begins so, and of those beside them."""
+    named = [axes for axes in figure.axes if axes.get_ylabel().startswith(label)]
+    rows = [
+        axes
+        for axes in figure.axes
+        if any(axes in one.get_shared_y_axes().get_siblings(one) for one in named)
+    ]
     drawn = [line.get_ydata() for axes in rows for line in axes.lines if len(line.get_ydata()) > 2]
     return float(np.nanmax(np.concatenate(drawn)))
 
