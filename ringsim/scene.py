@@ -159,7 +159,7 @@ def _take_kind(table: dict[str, Any], path: str, given: Mapping[str, Any]) -> No
         inside = [model for field in fields for model in models_in(field.annotation)]
     part = at_path(table, path)
     for kind in inside:
-        if "kind" in kind.model_fields and kind.model_fields["kind"].default == part["kind"]:
+        if "kind" in kind.model_fields and kind.model_fields["kind"].default == part.get("kind"):
             for name in part.keys() - kind.model_fields.keys():
                 if f"{path}.{name}" not in given:
                     del part[name]
