@@ -86,7 +86,7 @@ def test_nothing_failed_nothing_runs(bench):
         (["--retry-failed", "--set", "record.interval=0.2"], "it shapes the result"),
         (["--retry-failed", "--set", "solver.tolerance=1.0"], "must be at most 0.1"),
         (["--retry-failed", "--set", "solver.tolerence=1e-4"], "did you mean tolerance?"),
-        (["--set", "solver.tolerance=1e-4"], "under [set] of listed.toml, or with"),
+        (["--set", "solver.tolerance=1e-4"], "its scene differs: solver.tolerance"),
     ],
 )  # fmt: skip
 def test_other_physics_is_refused(words, told, bench):
