@@ -26,7 +26,7 @@ class Endings:
         self.left, self.steps = list(statuses), steps
         self.solvers: list[Solver] = []
 
-    def __call__(self, scene):
+    def __call__(self, scene, watch):
         self.solvers.append(scene.solver)
         status = self.left.pop(0)
         values = {"steps": np.array(self.steps), "final_time": np.array(1.0)}
