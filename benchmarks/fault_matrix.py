@@ -27,9 +27,9 @@ SLOWEST = 3.0
 
 
 def sound_scene(sections: int) -> Scene:
-    """Rings of ``ring18-cable`` from 90 deg on; two sections are an arc."""
+    """Rings of ``ring18-cable`` from 120 deg on; two sections are an arc."""
     values: dict[str, Any] = {
-        "structure.sections": sections, "structure.opening_angle": 90.0, "boom": "none",
+        "structure.sections": sections, "structure.opening_angle": 120.0, "boom": "none",
         "solver.end_time": 10.0 + 0.9 * sections, "record.interval": 0.05,
     }  # fmt: skip
     if sections == 2:

@@ -28,7 +28,7 @@ from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.solver import Record, Solver
 from ringsim.parts.stop.family import Stop
 from ringsim.parts.stop.spring_damper import SpringDamperStop
-from ringsim.refusal import InputError, explain, known_or_nearest, models_in
+from ringsim.refusal import InputError, explain, known_or_nearest, models_in, show
 from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import ListIn, Model
@@ -136,7 +136,11 @@ class Scene(Model):
         (120000000000.0, 200000000000.0, 120000000000.0)
         """
         table = self.to_table()
-        for path, value in copy.deepcopy(values).items():  # later paths may lead into its tables
+        # Where winches are comes first: names of pulleys depend on it, numbers count from there.
+        ordered = sorted(copy.deepcopy(values).items(), key=lambda item: not _tells_end(item[0]))
+        for path, value in ordered:  # later paths may lead into its tables
+            if _tells_end(path):
+                _refuse_renumbering(table, path, value, values)
             set_path(table, path, value)
             if path.endswith(".kind"):
                 _take_kind(table, path.removesuffix(".kind"), values)
@@ -149,6 +153,32 @@ class Scene(Model):
     def to_toml(self) -> str:
         """The scene as TOML text; reading it back gives an equal scene."""
         return tomli_w.dumps(self.to_table())
+
+
+def _tells_end(path: str) -> bool:
+    """Whether a path says where the winches of a cable are."""
+    return path.startswith("cables.") and path.endswith(".end")
+
+
+def _refuse_renumbering(
+    table: dict[str, Any], path: str, value: Any, given: Mapping[str, Any]
+) -> None:
+    """InputError if pulleys that a scene has by number would be other ones from another end."""
+    cable = path.removesuffix(".end")
+    law = at_path(table, f"{cable}.friction") or {}
+    own = f"{cable}.friction.coefficient"
+    listed = isinstance(law.get("coefficient"), list) and not any(
+        one == own or own.startswith(f"{one}.") for one in given
+    )
+    placed = "faults" not in given and any(
+        "pulley" in fault or "span" in fault for fault in table.get("faults") or []
+    )
+    if at_path(table, path) != value and (listed or placed):
+        what = own if listed else "faults"
+        raise InputError(
+            f"{path} = {show(value)}: pulleys count from the winch, so that those of {what} would "
+            f"be others: give {what} anew, too"
+        )
 
 
 def _take_kind(table: dict[str, Any], path: str, given: Mapping[str, Any]) -> None:

@@ -172,3 +172,9 @@ class Outcome:
     def fate(self) -> Fate:
         """What the antenna did."""
         return Fate(int(self.values.get("outcome", Fate.NONE)))
+
+    @property
+    def reached_goal(self) -> bool:
+        """Whether the run did what runs are made for; limits that were passed do not matter."""
+        deployed = np.isfinite(float(self.values.get("deployment_time", np.nan)))
+        return self.fate in GOALS or (self.fate == Fate.OVERLOADED and bool(deployed))

@@ -1,14 +1,18 @@
 """What a merged campaign says about its numerics, in lines for people."""
 
+import textwrap
+
 import numpy as np
 import xarray as xr
 
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.summary import summary
-from ringsim.variables import GOALS, Fate
+from ringsim.variables import GOALS, Fate, Status
 
 _NAMED = 6
 """Samples that a line names at most."""
+_LONGEST = 200
+"""Characters of a reason that a line shows."""
 
 
 def notes(campaign: xr.Dataset) -> list[str]:
@@ -18,19 +22,27 @@ def notes(campaign: xr.Dataset) -> list[str]:
 
 
 def outcome_lines(campaign: xr.Dataset) -> list[str]:
-    """What became of the antenna, a line for each outcome with its samples unless it deployed."""
-    fates, good = campaign["outcome"].to_numpy(), campaign["status"].to_numpy() == 0
-    lines = []
+    """What became of the antenna, and which runs failed: a line an end, with the first reason."""
+    fates, status = campaign["outcome"].to_numpy(), campaign["status"].to_numpy()
+    good, lines = status == Status.OK, []
+    reasons = campaign["reason"].to_numpy() if "reason" in campaign else None
     for fate in Fate:
         own = np.flatnonzero(good & (fates == fate))
         if not len(own) or fate == Fate.NONE:
             continue
         more = ", ..." if len(own) > _NAMED else ""
         named = f" (sample{'s' * (len(own) > 1)} {', '.join(map(str, own[:_NAMED]))}{more})"
-        lines.append(
-            f"{fate.word.replace('_', ' ')}: {len(own)} of {len(fates)}"
-            f"{'' if fate in GOALS else named}"
-        )
+        if fate in GOALS:
+            named = ""
+        elif reasons is not None:
+            named += f": {textwrap.shorten(str(reasons[own[0]]), _LONGEST, placeholder=' ...')}"
+        lines.append(f"{fate.word.replace('_', ' ')}: {len(own)} of {len(fates)}{named}")
+    for code in Status:
+        own = np.flatnonzero(status == code)
+        if code.failed and len(own):
+            why = "" if reasons is None else f": {reasons[own[0]]}"
+            first = textwrap.shorten(f"first sample {own[0]}{why}", _LONGEST, placeholder=" ...")
+            lines.append(f"{code.word.replace('_', ' ')}: {len(own)} of {len(fates)}, {first}")
     return lines
 
 

@@ -58,15 +58,16 @@ def number_of(name: str, names: Sequence[str], where: str) -> int:
 def numbered(table: dict[str, Any], points: Sequence[str]) -> dict[str, Any]:
     """A scene's table with numbers and lists for the pulleys and spans that it names.
 
-    These are ``pulley`` and ``span`` of faults, and tables of coefficients: ``default`` and one
-    value for each named pulley.  ValueError if a name is unknown, or the default is missing.
+    These are ``cable``, ``pulley`` and ``span`` of faults, and tables of coefficients: ``default``
+    and one value for each named pulley.  ValueError if a name is unknown, or there is no default.
     """
     cables, faults = table.get("cables"), table.get("faults")
     known = cables if isinstance(cables, dict) else {}
-    paths, changed = [], dict(known)
+    paths, present, changed = [], [], dict(known)
     for name in CABLES if points else ():
         if not isinstance(cable := known.get(name), dict):
             continue
+        present.append(name)
         paths.append(path_of(points, cable.get("end", "first")))
         law = cable.get("friction")
         if isinstance(law, dict) and isinstance(law.get("coefficient"), dict):
@@ -75,7 +76,9 @@ def numbered(table: dict[str, Any], points: Sequence[str]) -> dict[str, Any]:
     if changed != known:
         table = table | {"cables": changed}
     if points and isinstance(faults, (list, tuple)):
-        table = table | {"faults": [_fault(fault, paths, k) for k, fault in enumerate(faults, 1)]}
+        table = table | {
+            "faults": [_fault(fault, present, paths, k) for k, fault in enumerate(faults, 1)]
+        }
     return table
 
 
@@ -89,11 +92,14 @@ def _listed(given: dict[str, Any], path: Sequence[str], where: str) -> list[Any]
     return values
 
 
-def _fault(fault: Any, paths: Sequence[Sequence[str]], number: int) -> Any:
+def _fault(fault: Any, present: Sequence[str], paths: Sequence[Sequence[str]], number: int) -> Any:
     """A fault with numbers; on a cable that is not there any will do, since that is refused."""
     if not isinstance(fault, dict):
         return fault
-    cable, made = fault.get("cable", 1), dict(fault)
+    made = dict(fault)
+    if fault.get("cable") in present:
+        made["cable"] = present.index(fault["cable"]) + 1
+    cable = made.get("cable", 1)
     path = paths[cable - 1] if cable in range(1, len(paths) + 1) else ()
     for key, names in (("pulley", path[1:-1]), ("span", spans_of(path))):
         if isinstance(name := fault.get(key), str):

@@ -74,17 +74,17 @@ class Winch(Model):
     def locked(self, time: float, tension: float) -> Self:
         """The winch after its plane has locked at a time (s), when it had this tension (N)."""
         speed = self.winding.usual_speed()
-        if self.after_lock == "pull" or not self.turns(time):
+        if self.after_lock == "pull" or (self.stop_time is not None and self.stop_time <= time):
             return self
-        if self.after_lock == "stop" or speed == 0.0:
-            return self.model_copy(update={"stop_time": time})
+        if self.after_lock == "stop" or speed == 0.0 or time < self.start_time:
+            return self.model_copy(update={"stop_time": max(time, self.start_time)})
         hold = StallWinding(speed=speed, max_tension=max(tension, LEAST_HELD), backdrivable=True)
         return self.model_copy(update={"winding": hold, "after_lock": "pull"})
 
     def drives(self, time: float, rate: float) -> bool:
         """Whether the drum turns at a time (s), at a rate (m/s), or will turn."""
-        if time < self.start_time or not self.turns(time):
-            return time < self.start_time
+        if not self.turns(time):
+            return time < self.start_time and self.start_time != self.stop_time
         if isinstance(self.winding, PrescribedWinding):
             return time - self.start_time < self.winding.rests_from()
         return abs(rate) > RESTING * self.winding.usual_speed()

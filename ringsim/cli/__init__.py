@@ -67,6 +67,10 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point of the command ``ringsim``."""
+    # Before numpy is loaded: its matrices are small here, and threads that wait for each other
+    # cost half as much again as the run.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     try:
         code = cli(standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:

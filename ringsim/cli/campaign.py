@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ringsim.campaign.folder import prepare_folder
+from ringsim.campaign.folder import open_folder, prepare_folder
 from ringsim.campaign.retry import FAILED, check_settings
 from ringsim.campaign.run import Choices, Share, run_campaign
 from ringsim.campaign.specification import SOLVERS, load_campaign
@@ -17,6 +17,7 @@ from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.work import Scheduler
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.refusal import InputError
+from ringsim.storage.netcdf import DESIGN
 from ringsim.variables import Status
 
 
@@ -69,6 +70,13 @@ def command(
             count = max(1, workers or size)
             for line in plan(campaign, folder, workers=count, share=share, solver=name):
                 click.echo(line)
+        elif retry_failed and (folder / DESIGN).exists():
+            begun = open_folder(folder).attributes["campaign_name"]
+            if begun != wanted.name:
+                raise InputError(
+                    f"{folder}: this folder holds the campaign {begun}, not {wanted.name}: choose "
+                    "its folder with --out"
+                )
         else:
             prepare_folder(campaign, folder, solver=name)
         again = FAILED if retry_failed else frozenset[Status]()

@@ -54,6 +54,7 @@ def _summary(scene: Scene) -> dict[str, str]:
         **scene.structure.describe(),
         **_layout(scene),
         **{name: _fields(part) for name, part in parts.items() if part is not None},
+        "faults": "; ".join(map(_fields, scene.faults)),
         "friction": ", ".join(friction),
         "left out": ", ".join(name for name, out in absent.items() if out) or "nothing",
         "solver": _fields(scene.solver),

@@ -71,7 +71,8 @@ def command(
     # Solved in seconds, the ideal ring needs no bar.
     outcome = FIDELITIES[fidelity](chosen) if fidelity != "full" else watched(chosen)
     values = outcome.values
-    click.echo(f"{chosen.name}: {outcome.status.word}: {outcome.reason}")
+    became = "" if outcome.status.failed else f", {outcome.fate.word.replace('_', ' ')}"
+    click.echo(f"{chosen.name}: {outcome.status.word}{became}: {outcome.reason}")
     if anew := _restarted(values, chosen.solver):
         click.echo(f"  {anew}")
     for name, told in summary(values, chosen.span_names).items():

@@ -208,11 +208,12 @@ class Integration:
             self._chain = cables.current(state.position, state.velocity, time)
         energies = self._energy.read(time, state, angles, rates, self._chain)
         gap = max(float(group.gaps(state).max()) for group in self._gaps)
-        tensions, driven = None, math.isfinite(self._built.faults.next_time)
+        tensions, stretch, driven = None, 0.0, math.isfinite(self._built.faults.next_time)
         if cables is not None and self._chain is not None:
             tensions = self._chain.tensions
+            stretch = float(np.max(self._chain.strains, where=self._chain.ropes.alive, initial=0.0))
             driven = driven or cables.winches.driving(time, self._chain)
-        return Instant(time, angles, rates, energies, gap, tensions, driven)
+        return Instant(time, angles, rates, energies, gap, tensions, stretch, driven)
 
 
 class _Predictor:

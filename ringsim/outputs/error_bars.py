@@ -8,7 +8,7 @@ states the factors of its bar (``ErrorBar``); docs/accuracy.md tells what they c
 import numpy as np
 
 from ringsim.outputs.family import VARIABLES, Array, ErrorBar
-from ringsim.variables import GOALS, Outcome
+from ringsim.variables import Outcome
 
 
 def error_bars(
@@ -31,7 +31,7 @@ def error_bars(
         ``NAME_error`` in the unit of NAME, of a function of time alone at every output time;
         empty if one of the runs did not reach its goal.
     """
-    if run.fate not in GOALS or other.fate not in GOALS:
+    if not (run.reached_goal and other.reached_goal):
         return {}
     return {
         f"{name}_error": bar(

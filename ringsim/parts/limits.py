@@ -11,13 +11,16 @@ from ringsim.units import Degree, Model, Stress, Tension
 class Limits(Model):
     """Bounds past which a run has the outcome "overloaded".
 
-    A V-joint driven past ``overrun`` ends the run: the model of joint and stop means nothing
+    A V-joint past ``overrun`` or a rope past ``rope_strain`` ends the run: the model means nothing
     beyond.  The other two are allowables: the run goes on and shows by how much they are passed.
     """
 
     overrun: Annotated[Degree, Field(gt=0.0, le=90.0)] = 10.0
-    """Angle by which a V-joint may be past its stop: impacts of rings that open as they should go
-    0.2 to 1 deg deep into the default stop, 35 N m hold it at 10 deg."""
+    """Angle by which a V-joint may be past its stop: rings that open as they should go 0.1 to
+    0.2 deg deep into the default stop, 35 N m hold it at 10 deg."""
+    rope_strain: Annotated[float, Field(gt=0.0, le=1.0)] = 0.25
+    """Largest strain of a rope: aramid breaks at 2 to 4 %, but models may have soft ropes.  It ends
+    the run: a winch that pulls at a jammed pulley next to it would reach any tension."""
     tension: Tension | None = None
     """Largest tension of any span of a cable, at any time of the run."""
     rod_stress: Stress | None = None

@@ -38,6 +38,8 @@ class Instant:
     """Largest distance of points that a joint holds together, m."""
     tensions: Array | None = None
     """Of all spans, N; None without cables."""
+    stretch: float = 0.0
+    """Largest strain of a rope."""
     driven: bool = False
     """Whether a winch turns or will turn on its rope, or a fault is still to come."""
 

@@ -65,8 +65,16 @@ class Locks:
         self.stowed |= self._away & (angles <= self._stowed_angle)
         self._away |= angles > self._stowed_angle + _NEAR
 
+    def ahead(self, angles: Array, moved: Array) -> Array:
+        """Way (rad) to the stop in the direction of each V-joint's motion; infinite behind it."""
+        way = np.where(moved > 0.0, math.pi - angles, angles - self._stowed_angle)
+        there = np.where(moved > 0.0, self.deployed, self.stowed | ~self._away) | (moved == 0.0)
+        return np.where(there, math.inf, way)
+
     def overrun(self, now: Instant) -> Overrun:
-        """The V-joint that is farthest past its stop."""
+        """The V-joint that is farthest past its stop; 0 where there are none."""
+        if not self.stops:
+            return Overrun()
         past: Array = np.maximum(now.angles - math.pi, self._stowed_angle - now.angles)
         plane, section = divmod(int(past.argmax()), past.shape[1])
         return Overrun(float(past[plane, section]), self._name(plane, section), now.time)

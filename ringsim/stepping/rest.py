@@ -1,5 +1,7 @@
 """Whether a structure has come to rest for good."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ringsim.stepping.instant import Array, Instant
@@ -10,6 +12,8 @@ left to their friction creep for hours."""
 WINDOW = 0.1
 """Time over which it is watched, over ``solver.end_time``: what creeps at that rate moves by less
 than 10 times ``MOVED``, 6 deg, in all the time that there is."""
+_MARGIN = 2.0
+"""On how far a V-joint creeps: it may have slowed down near a dead point and speed up again."""
 _STILL = 1e-12
 """Kinetic energy that is round-off, over the structure's reference energy."""
 
@@ -20,25 +24,32 @@ class Rest:
     A structure is at rest once no V-joint has moved by more than ``MOVED`` within a window in which
     no winch has turned, and none will and no fault is to come (``Instant.driven``), and in which
     its kinetic energy has not grown: one that its loads set in motion has hardly moved either.
+    Nor may a V-joint reach its stop in the time that is left if it goes on as it creeps.
     """
 
     def __init__(self, start: Instant, end_time: float, energy: float) -> None:
         """Begin to watch at this instant a run that ends at ``end_time`` (s), of a structure with a
         reference energy (J).
         """
-        self.window, self._still = WINDOW * end_time, _STILL * energy
+        self._end, self.window, self._still = end_time, WINDOW * end_time, _STILL * energy
         self._begin(start)
 
-    def reached(self, now: Instant) -> bool:
-        """Whether the structure is at rest by now; to be asked after every step."""
-        moved: Array = np.abs(now.angles - self._angles)
-        if now.driven or moved.max() > MOVED:
+    def reached(self, now: Instant, ahead: Callable[[Array, Array], Array]) -> bool:
+        """Whether the structure is at rest by now; to be asked after every step.
+
+        ``ahead`` tells how far (rad) each V-joint is from the stop that it moves to, infinite if
+        from none, by its opening angle and by how far it has moved, rad.
+        """
+        moved: Array = now.angles - self._angles
+        if now.driven or np.abs(moved).max() > MOVED:
             self._begin(now)
         late = now.time - self._since > 0.5 * self.window
         self._largest[late] = max(self._largest[late], now.energies.kinetic)
         if now.time - self._since < self.window:
             return False
-        if self._largest[True] <= max(self._largest[False], self._still):
+        creeping = np.abs(moved) / (now.time - self._since) * (self._end - now.time)
+        arrives = np.any(_MARGIN * creeping >= ahead(now.angles, moved))
+        if not arrives and self._largest[True] <= max(self._largest[False], self._still):
             return True
         self._begin(now)
         return False

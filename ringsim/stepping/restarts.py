@@ -8,7 +8,7 @@ import numpy as np
 
 from ringsim.parts.solver import Solver
 from ringsim.stepping.instant import Array
-from ringsim.variables import COUNTS, GOALS, TIMINGS, Cause, Outcome, Status
+from ringsim.variables import COUNTS, TIMINGS, Cause, Outcome, Status
 
 Solve = Callable[[Solver], Outcome]
 """Runs a scene with these settings; it never raises."""
@@ -37,7 +37,7 @@ def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Ou
         cause = first.cause if outcome.cause is Cause.STEP_LIMIT else outcome.cause
         reason = f"{outcome.reason} ({how}; start 1: {first.reason})"
         outcome = replace(outcome, reason=reason, cause=cause)
-    if solver.error_bars and outcome.fate in GOALS:
+    if solver.error_bars and outcome.reached_goal:
         outcome = _with_bars(outcome, solve, used, error_bars)
     tolerance = used.tolerance if used.step_control == "motion" else np.nan
     values = {"restarts": restarts, "step_used": used.step, "tolerance_used": tolerance}

@@ -19,9 +19,9 @@ from ringsim.stepping.repeats import EnergyImbalance, Indicator, TensionBend
 from ringsim.stepping.rest import MOVED, Rest
 from ringsim.variables import Cause, Fate, Reason, Status
 
-_TOLD = 0.2
-"""Share of ``limits.overrun`` from which a run tells how far a V-joint was past its stop: 2 deg by
-default, twice what the hardest impacts of the benchmarks' random rings reach."""
+TOLD = math.radians(2.0)
+"""Angle from which on a run tells how far a V-joint was past its stop: sound rings go 0.1 to
+0.2 deg deep into the default stop, 7 N m hold it at 2 deg."""
 _ROUND_OFF = 1e-12
 """Relative difference of two times that are the same."""
 
@@ -110,6 +110,7 @@ class RunControl:
             if math.isinf(self._settled_at):
                 self._note_lock(self._locks, before)
             self._note_overrun(self._locks)
+            self._note_strain(self._locks)
         if self.goes_on:
             self._note_end(before.time)
         if self.goes_on:
@@ -140,11 +141,7 @@ class RunControl:
             self.diverge(refused)
         self.reason += "".join(indicator.note() for indicator in self._indicators)
         past = self._farthest
-        if (
-            self.status == Status.OK
-            and past.angle > _TOLD * self._limits.farthest
-            and (self.fate != Fate.OVERLOADED)
-        ):
+        if self.status == Status.OK and past.angle > TOLD and self.fate != Fate.OVERLOADED:
             self.reason += (
                 f"; V-joint {past.joint} was up to {math.degrees(past.angle):.3g} deg past its "
                 f"stop, at {past.time:.6g} s (limits.overrun = {self._limits.overrun:g} deg)"
@@ -190,7 +187,11 @@ class RunControl:
             elif math.isinf(self._settled_at):
                 self._end(Fate.CUT_OFF, f"{end} was reached with {locks.missing()}")
             self.goes_on = False
-        elif locks is not None and math.isinf(self._settled_at) and self._rest.reached(self.now):
+        elif (
+            locks is not None
+            and math.isinf(self._settled_at)
+            and self._rest.reached(self.now, locks.ahead)
+        ):
             some = locks.deployed.any()
             self._end(
                 Fate.PARTLY_DEPLOYED if some else Fate.STALLED,
@@ -210,12 +211,21 @@ class RunControl:
         past = locks.overrun(self.now)
         self._farthest = max(self._farthest, past)
         if past.angle > self._limits.farthest:
-            stop = "its stop" if locks.stops else "180 deg, where the scene has no stop,"
             self._end(
                 Fate.OVERLOADED,
-                f"V-joint {past.joint} was driven {math.degrees(past.angle):.3g} deg past {stop} "
+                f"V-joint {past.joint} was driven {math.degrees(past.angle):.3g} deg past its stop "
                 f"at {past.time:.6g} s, more than limits.overrun = {self._limits.overrun:g} deg, "
                 f"with {locks.missing()}",
+            )
+
+    def _note_strain(self, locks: Locks) -> None:
+        """End the run where a rope is so long that none would hold."""
+        strain, most = self.now.stretch, self._limits.rope_strain
+        if strain > most and self.goes_on:
+            self._end(
+                Fate.OVERLOADED,
+                f"a rope was strained by {100.0 * strain:.3g} % at {self.now.time:.6g} s, more "
+                f"than limits.rope_strain = {most:g}, with {locks.missing()}",
             )
 
     def _end(self, fate: Fate, words: str) -> None:

@@ -63,7 +63,13 @@ class Result:
     def from_header(cls, header: bytes, body: bytes) -> "Result":
         """The result whose :meth:`header` is given."""
         table = json.loads(header)
-        codes = {"status": Status(table["status"]), "cause": Cause(table.get("cause", 0))}
+        # Older versions had a status 1, cut off by the end time, and causes that are outcomes now.
+        status, cause = table["status"], table.get("cause", 0)
+        known = cause in [each.value for each in Cause]
+        codes = {
+            "status": Status.OK if status == 1 else Status(status),
+            "cause": Cause(cause) if known else Cause.NONE,
+        }
         return cls(**table | codes, body=body)
 
     def arrays(self) -> dict[str, NDArray[Any]]:

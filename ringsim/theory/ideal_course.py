@@ -13,7 +13,10 @@ from scipy.integrate import solve_ivp
 
 from ringsim.cable.ropes import Ropes
 from ringsim.layout.pose import Array
+from ringsim.parts.limits import Limits
 from ringsim.scene import Scene
+from ringsim.stepping.rest import MOVED, WINDOW
+from ringsim.stepping.run_control import TOLD
 from ringsim.theory.ideal_motion import IdealMotion
 from ringsim.variables import Cause, Fate, Reason, Status
 
@@ -96,12 +99,43 @@ class Course:
             words = f"the ideal ring's solver gave up at {self._time:.6g} s: {error}"
             self.reason = Reason(Cause.STEP_LIMIT if too_long else Cause.NEWTON, words)
         if not self.reason:
-            self.fate = Fate.CUT_OFF
+            self.fate = Fate.STALLED if self._rests() else Fate.CUT_OFF
+            resting = ", at rest" if self.fate == Fate.STALLED else ""
             self.reason = Reason(
                 text=f"solver.end_time = {self._scene.solver.end_time:g} s was reached with 0 of "
-                f"{2 * self._scene.structure.sections} V-joints locked"
+                f"{2 * self._scene.structure.sections} V-joints locked{resting}"
             )
+        if self._scene.stop is not None and not self.status.failed:
+            self._note_overrun(self._scene.limits)
         return self
+
+    def _rests(self) -> bool:
+        """Whether the ring has come to rest; see ``ringsim.stepping.rest``."""
+        cables, rate = self.motion.cables, self.motion.mechanism.freedom
+        pull = self.motion.instant(self._time, self._state).pull
+        if cables is not None and pull is not None and cables.driving(self._time, pull.chain):
+            return False
+        begun = (1.0 - WINDOW) * self._time
+        last = [
+            state
+            for piece in self.pieces
+            for time, state in zip(piece.times, piece.states, strict=True)
+            if time >= begun
+        ]
+        moved = max(2.0 * abs(float(state[0] - self._state[0])) for state in last)
+        return moved < MOVED and abs(float(self._state[rate])) <= abs(float(last[0][rate]))
+
+    def _note_overrun(self, limits: Limits) -> None:
+        """Tell how far the V-joints went past their stops, and whether that was too far."""
+        folded = [float(state[0]) for piece in self.pieces for state in piece.states]
+        past = 2.0 * max(-min(folded), max(folded) - self._stowed)
+        if past > TOLD:
+            self.fate = Fate.OVERLOADED if past > limits.farthest else self.fate
+            more = "more than " if past > limits.farthest else ""
+            self.reason += (
+                f"; the V-joints were up to {math.degrees(past):.3g} deg past their stops "
+                f"({more}limits.overrun = {limits.overrun:g} deg)"
+            )
 
     def _begin(self) -> None:
         """Open a piece at the present state."""

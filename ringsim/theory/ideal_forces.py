@@ -162,8 +162,17 @@ class IdealCables:
         Of rods that do not give, rope held at a tension and rope held as it is are the same.
         """
         for place, winch in self._winches.items():
-            if winch.after_lock != "pull" and winch.turns(time):
-                self._winches[place] = winch.model_copy(update={"stop_time": time})
+            if winch.after_lock != "pull":
+                stop = winch.model_copy(update={"after_lock": "stop"})
+                self._winches[place] = stop.locked(time, 0.0)
+
+    def driving(self, time: float, chain: ChainState) -> bool:
+        """Whether a winch turns or will turn on a rope that is whole."""
+        whole = chain.ropes.alive[chain.ropes.of_end]
+        return any(
+            whole[place] and winch.drives(time, float(chain.wound_rate[place]))
+            for place, winch in self._winches.items()
+        )
 
     def pull(self, time: float, now: Configuration, motors: Array) -> Pull:
         """Evaluate the cables; ``time`` (s) is that of the winches' laws, ``motors`` the rope wound

@@ -140,7 +140,7 @@ def attempts(monkeypatch):
     def prepare(*endings: Outcome) -> list[Solver]:
         left, seen = list(endings), []
 
-        def attempt(scene: Scene, begin: tuple[float, float]) -> Outcome:
+        def attempt(scene: Scene, begin: tuple[float, float], watch: object) -> Outcome:
             seen.append(scene.solver)
             return left.pop(0)
 

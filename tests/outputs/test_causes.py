@@ -82,6 +82,12 @@ def test_a_journal_keeps_the_cause_and_older_ones_have_none() -> None:
     assert Result.from_header(json.dumps(older).encode(), b"").cause is Cause.NONE
 
 
+def test_journals_of_versions_that_had_a_status_unfinished_are_read() -> None:
+    older = json.loads(Result(3, Status.OK, "the end time was reached").header())
+    read = Result.from_header(json.dumps(older | {"status": 1, "cause": 1}).encode(), b"")
+    assert (read.status, read.cause) == (Status.OK, Cause.NONE)
+
+
 def test_a_reason_is_its_sentence() -> None:
     reason = Reason(Cause.NEWTON, "the solver gave up")
     assert reason == "the solver gave up"

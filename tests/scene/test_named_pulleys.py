@@ -132,3 +132,31 @@ def test_explain_tells_the_names() -> None:
     told = CliRunner().invoke(cli, ["explain", "cables.lower.friction.coefficient"])
     assert told.exit_code == 0
     assert 'cables.lower.friction.coefficient["section 6 V"] = VALUE' in told.output
+
+
+def test_names_do_not_depend_on_the_order_in_which_values_are_given() -> None:
+    named = 'cables.upper.friction.coefficient["section 2 V"]'
+    one, other = (
+        {named: 0.003, "cables.upper.end": "last"},
+        {"cables.upper.end": "last", named: 0.003},
+    )
+    scene = load_scene("truss2").with_values(one)
+    assert scene == load_scene("truss2").with_values(other)
+    # 5 pulleys from the winch at section 2: its second hinge is the first of them.
+    assert scene.cables.upper.friction.coefficient.index(0.003) == 1
+
+
+@pytest.mark.parametrize(
+    ("values", "what"),
+    [
+        ({'cables.upper.friction.coefficient["section 2 V"]': 0.003}, "friction.coefficient"),
+        ({"faults": [{"kind": "jammed-pulley", "time": 1.0, "pulley": "section 2 V"}]}, "faults"),
+    ],
+)
+def test_pulleys_that_would_become_others_are_refused(values: dict, what: str) -> None:
+    scene = load_scene("truss2").with_values(values)
+    with pytest.raises(InputError, match=f"those of .*{what} would be others"):
+        scene.with_values({"cables.upper.end": "last"})
+    assert scene.with_values(
+        {"cables.upper.end": "last"} | {"faults": [], "cables.upper.friction.coefficient": 0.001}
+    )

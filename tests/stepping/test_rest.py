@@ -13,8 +13,12 @@ END, BEGIN = 10.0, 1.0
 """End time of the run, s, and the angle from which the joints start, rad."""
 
 
-def rests_at(law: Callable[[float], tuple[float, float]], *, driven_until: float = 0.0) -> float:
-    """When six joints that move by a law (angle, rate) are found at rest, s; NaN if never."""
+def rests_at(
+    law: Callable[[float], tuple[float, float]], *, driven_until: float = 0.0, stop: float = math.pi
+) -> float:
+    """When six joints that move by a law (angle, rate) towards a stop (rad) are found at rest, s;
+    NaN if never.
+    """
 
     def at(time: float) -> Instant:
         angle, rate = law(time)
@@ -24,7 +28,7 @@ def rests_at(law: Callable[[float], tuple[float, float]], *, driven_until: float
 
     rest = Rest(at(0.0), END, 1.0)
     for time in np.arange(1, 501) * END / 500:
-        if rest.reached(at(float(time))):
+        if rest.reached(at(float(time)), lambda angles, moved: stop - angles):
             return float(time)
     return math.nan
 
@@ -64,3 +68,11 @@ def test_what_creeps_by_less_than_it_may_until_the_end_rests() -> None:
     slow, fast = 0.5 * MOVED / (WINDOW * END), 2.0 * MOVED / (WINDOW * END)
     assert rests_at(lambda t: (BEGIN + slow * t, slow)) == pytest.approx(WINDOW * END)
     assert math.isnan(rests_at(lambda t: (BEGIN + fast * t, fast)))
+
+
+def test_what_creeps_to_a_stop_that_it_will_reach_is_no_rest() -> None:
+    """Half of what a joint at rest may move by, a little way in front of its stop."""
+    slow = 0.5 * MOVED / (WINDOW * END)
+    near, far = BEGIN + 0.8 * slow * END, BEGIN + 3.0 * slow * END
+    assert math.isnan(rests_at(lambda t: (BEGIN + slow * t, slow), stop=near))
+    assert rests_at(lambda t: (BEGIN + slow * t, slow), stop=far) < END

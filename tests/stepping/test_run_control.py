@@ -278,13 +278,23 @@ def test_a_joint_past_its_limit_ends_a_sound_run_and_is_named() -> None:
     )
 
 
-def test_joints_past_180_deg_are_named_where_there_is_no_stop() -> None:
+def test_joints_go_past_180_deg_where_there_is_no_stop() -> None:
     motion = spread(Motion(parted), left=1)
     locks = Locks(motion.at(0.0).angles, None)
-    control = RunControl(Solver(end_time=20.0), SCALES, motion.at(0.0), locks)
+    control = RunControl(Solver(end_time=5.0), SCALES, motion.at(0.0), locks)
     follow(motion, control)
-    assert control.fate is Fate.OVERLOADED
-    assert "past 180 deg, where the scene has no stop," in control.reason
+    assert control.fate is Fate.CUT_OFF
+    assert "past" not in control.reason
+
+
+def test_a_rope_that_no_rope_would_survive_ends_a_sound_run() -> None:
+    motion, control = Motion(), control_of(Motion(), Solver(end_time=20.0))
+    at = motion.at
+    motion.at = lambda time: replace(at(time), stretch=0.2 * time)  # type: ignore[method-assign]
+    times = follow(motion, control)
+    assert (control.status, control.fate) == (Status.OK, Fate.OVERLOADED)
+    assert 1.25 < times[-1] < 1.6
+    assert "more than limits.rope_strain = 0.25, with 0 of 6 V-joints locked" in control.reason
 
 
 @pytest.mark.parametrize(

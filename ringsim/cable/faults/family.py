@@ -13,7 +13,7 @@ class CableFault(Fault):
     """Something that breaks at a given time and place."""
 
     cable: Annotated[int, Field(ge=1)] = 1
-    """Which cable of the scene, counted from 1: the upper one first."""
+    """Which cable of the scene, "upper" or "lower", or its number from 1: the upper one first."""
 
     def strike(self, ropes: Ropes, state: ChainState) -> Ropes:
         """The ropes after the fault, from those before it and the chain at that instant.
