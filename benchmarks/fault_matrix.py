@@ -31,9 +31,12 @@ def sound_scene(sections: int) -> Scene:
     values: dict[str, Any] = {
         "structure.sections": sections, "structure.opening_angle": 120.0, "boom": "none",
         "solver.end_time": 10.0 + 0.9 * sections, "record.interval": 0.05,
+        "solver.tolerance": 1e-3,
     }  # fmt: skip
     if sections == 2:
+        # Friction of the hinges lets the assemblies at the open ends come to rest, as in truss2.
         values |= {"structure.closed": False, "structure.polygon_sections": 18}
+        values["joints.hinge"] = {"viscous": 0.001}
     return load_scene("ring18-cable").with_values(values)
 
 
