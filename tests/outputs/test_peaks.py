@@ -189,7 +189,7 @@ def test_places_and_names_survive_a_campaign(tmp_path, monkeypatch) -> None:
 
 def test_names_are_left_out_where_samples_differ_in_them(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    text = CAMPAIGN + ('[inputs.cables.upper.end]\nkind = "discrete"\nvalues = ["first", "last"]\n')
+    text = CAMPAIGN + ('[inputs.cables.lower.end]\nkind = "discrete"\nvalues = ["first", "last"]\n')
     Path("two.toml").write_text(text, encoding="utf-8")
     ended = CliRunner().invoke(cli, ["campaign", "two.toml", "--workers=1", "--out=out"])
     assert ended.exit_code == 0, ended.output

@@ -152,7 +152,7 @@ def test_key_of_another_kind_is_told_from_a_misspelt_one() -> None:
     assert 'structure = { kind = "pantograph-ring" }' in line
     truss = "structure.kind=planar-truss"
     line = refused("check", "ring18", "--set", truss, "--set", "structure.sections=4")
-    assert '(kind = "pantograph-ring" has it, "planar-truss" has not' in line
+    assert 'has it, "planar-truss" has not' in line
 
 
 def test_changed_distribution_is_told_with_its_input(tmp_path: Path) -> None:
