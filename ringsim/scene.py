@@ -11,7 +11,7 @@ import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from ringsim.cable.faults.family import CableFault
-from ringsim.cable.places import numbered, path_of, spans_of
+from ringsim.cable.places import CABLES, numbered, path_of, spans_of
 from ringsim.cable.records import Cable, Cables
 from ringsim.choice import OneOf
 from ringsim.files import parse_toml, read_text
@@ -170,8 +170,10 @@ def _refuse_renumbering(
     listed = isinstance(law.get("coefficient"), list) and not any(
         one == own or own.startswith(f"{one}.") for one in given
     )
+    present = [f"cables.{name}" for name in CABLES if at_path(table, f"cables.{name}")]
     placed = "faults" not in given and any(
-        "pulley" in fault or "span" in fault for fault in table.get("faults") or []
+        ("pulley" in fault or "span" in fault) and present[fault["cable"] - 1] == cable
+        for fault in table.get("faults") or []
     )
     if at_path(table, path) != value and (listed or placed):
         what = own if listed else "faults"

@@ -79,6 +79,7 @@ class Winch(Model):
         if self.after_lock == "stop" or speed == 0.0 or time < self.start_time:
             return self.model_copy(update={"stop_time": max(time, self.start_time)})
         hold = StallWinding(speed=speed, max_tension=max(tension, LEAST_HELD), backdrivable=True)
+        # "pull": this law is what it does after the lock, and stays as it is.
         return self.model_copy(update={"winding": hold, "after_lock": "pull"})
 
     def drives(self, time: float, rate: float) -> bool:

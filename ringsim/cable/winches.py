@@ -14,13 +14,13 @@ follows the structure uses the path taken up so far in the step, S_0 - S, not th
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
 
-from ringsim.cable.records import Cable
+from ringsim.cable.records import Cable, Winch
 from ringsim.cable.ropes import Array, Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.winding.family import FeedbackWinding, WinchReading
@@ -78,6 +78,15 @@ class _Rope:
         return np.asarray(found + (total - found.sum()) / count)
 
 
+def driving(winches: Mapping[tuple[int, int], Winch], time: float, state: ChainState) -> bool:
+    """Whether any winch, by cable and end, turns or will turn on a rope that is whole."""
+    whole = state.ropes.alive[state.ropes.of_end]
+    return any(
+        whole[place] and winch.drives(time, float(state.wound_rate[place]))
+        for place, winch in winches.items()
+    )
+
+
 class Winches:
     """Rope wound and speeds at both ends of each cable."""
 
@@ -127,11 +136,7 @@ class Winches:
 
     def driving(self, time: float, state: ChainState) -> bool:
         """Whether any winch turns or will turn on a rope that is whole."""
-        whole = state.ropes.alive[state.ropes.of_end]
-        return any(
-            whole[place] and winch.drives(time, float(state.wound_rate[place]))
-            for place, winch in self._winches.items()
-        )
+        return driving(self._winches, time, state)
 
     def stiffness_left(self, time: float, ropes: Ropes, paths: Array, rates: Array) -> Array:
         """Share of a change of path that stretches the rope, not answered by its winches."""

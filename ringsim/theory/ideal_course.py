@@ -115,13 +115,11 @@ class Course:
         pull = self.motion.instant(self._time, self._state).pull
         if cables is not None and pull is not None and cables.driving(self._time, pull.chain):
             return False
-        begun = (1.0 - WINDOW) * self._time
-        last = [
-            state
-            for piece in self.pieces
-            for time, state in zip(piece.times, piece.states, strict=True)
-            if time >= begun
-        ]
+        # From the step's end at or before the window's begin on: a step may be longer than it.
+        times = np.concatenate([piece.times for piece in self.pieces])
+        states = [state for piece in self.pieces for state in piece.states]
+        begun = np.searchsorted(times, (1.0 - WINDOW) * self._time, side="right") - 1
+        last = states[begun:]
         moved = max(2.0 * abs(float(state[0] - self._state[0])) for state in last)
         return moved < MOVED and abs(float(self._state[rate])) <= abs(float(last[0][rate]))
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ringsim.cable.chain import Chain
 from ringsim.cable.state import ChainState
+from ringsim.cable.winches import driving
 from ringsim.cable.winding.family import FeedbackWinding
 from ringsim.layout.pose import Array, cross
 from ringsim.parts.joint_friction.family import JointFriction
@@ -168,11 +169,7 @@ class IdealCables:
 
     def driving(self, time: float, chain: ChainState) -> bool:
         """Whether a winch turns or will turn on a rope that is whole."""
-        whole = chain.ropes.alive[chain.ropes.of_end]
-        return any(
-            whole[place] and winch.drives(time, float(chain.wound_rate[place]))
-            for place, winch in self._winches.items()
-        )
+        return driving(self._winches, time, chain)
 
     def pull(self, time: float, now: Configuration, motors: Array) -> Pull:
         """Evaluate the cables; ``time`` (s) is that of the winches' laws, ``motors`` the rope wound

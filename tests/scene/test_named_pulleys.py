@@ -160,3 +160,10 @@ def test_pulleys_that_would_become_others_are_refused(values: dict, what: str) -
     assert scene.with_values(
         {"cables.upper.end": "last"} | {"faults": [], "cables.upper.friction.coefficient": 0.001}
     )
+
+
+def test_a_fault_of_the_other_cable_stays_where_it_is() -> None:
+    fault = {"kind": "jammed-pulley", "cable": "lower", "time": 1.0, "pulley": "section 2 V"}
+    scene = load_scene("truss2").with_values({"faults": [fault]})
+    turned = scene.with_values({"cables.upper.end": "last"})
+    assert turned.faults == scene.faults

@@ -210,3 +210,20 @@ def test_used_up_rope_is_said():
     outcome = run_ideal(scene)
     assert outcome.status == Status.SOLVER_FAILED
     assert "whole rope" in outcome.reason or "too small" in outcome.reason
+
+
+@pytest.mark.parametrize(
+    ("values", "fate"),
+    [
+        # Loads have just set the ring in motion, with steps as long as the window that is watched.
+        (
+            {"solver__end_time": 0.02, "solver__step": 0.02, "record__interval": 0.01},
+            Fate.CUT_OFF,
+        ),
+        ({"solver__end_time": 4.0, "cables": "none", "loads": "none", "net": "none"}, Fate.STALLED),
+    ],
+)
+def test_a_ring_that_its_loads_set_in_motion_is_not_at_rest(values, fate):
+    outcome = run_ideal(six(**values))
+    assert outcome.fate is fate, outcome.reason
+    assert (", at rest" in outcome.reason) is (fate is Fate.STALLED)
