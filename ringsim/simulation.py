@@ -16,6 +16,7 @@ from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene, load_scene
 from ringsim.stepping.restarts import run_with_restarts
 from ringsim.theory.ideal_fidelity import run_ideal, with_remark
+from ringsim.threads import one_thread
 from ringsim.variables import Cause, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["FIDELITIES", "run", "run_ideal", "simulate"]
 
 
+@one_thread()
 def run(scene: Scene, watch: Watch | None = None) -> Outcome:
     """Build and integrate a scene; one that fails or diverges starts anew with smaller steps.
 

@@ -18,6 +18,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.ideal_course import Course
 from ringsim.theory.ideal_outcome import to_outcome
+from ringsim.threads import one_thread
 from ringsim.variables import PLANES, Cause, Outcome, Status
 
 _LIGHT_HUB = 1e-3
@@ -72,6 +73,7 @@ def refuse_if_not_ideal(scene: Scene) -> None:
         )
 
 
+@one_thread()
 def run_ideal(scene: Scene) -> Outcome:
     """Integrate the ideal ring of a scene; it always ends with a status.
 
