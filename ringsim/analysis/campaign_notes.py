@@ -1,9 +1,12 @@
 """What a merged campaign says about its numerics, in lines for people."""
 
 import textwrap
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.summary import summary
@@ -23,9 +26,18 @@ def notes(campaign: xr.Dataset) -> list[str]:
 
 def outcome_lines(campaign: xr.Dataset) -> list[str]:
     """What became of the antenna, and which runs failed: a line an end, with the first reason."""
-    fates, status = campaign["outcome"].to_numpy(), campaign["status"].to_numpy()
-    good, lines = status == Status.OK, []
     reasons = campaign["reason"].to_numpy() if "reason" in campaign else None
+    return ending_lines(
+        campaign["outcome"].to_numpy(), campaign["status"].to_numpy(),
+        lambda sample: "" if reasons is None else str(reasons[sample]),
+    )  # fmt: skip
+
+
+def ending_lines(
+    fates: NDArray[Any], status: NDArray[Any], reason_of: Callable[[int], str]
+) -> list[str]:
+    """The same from codes of every sample and what finds the reason of one, "" if it is lost."""
+    good, lines = status == Status.OK, []
     for fate in Fate:
         own = np.flatnonzero(good & (fates == fate))
         if not len(own) or fate == Fate.NONE:
@@ -34,14 +46,15 @@ def outcome_lines(campaign: xr.Dataset) -> list[str]:
         named = f" (sample{'s' * (len(own) > 1)} {', '.join(map(str, own[:_NAMED]))}{more})"
         if fate in GOALS:
             named = ""
-        elif reasons is not None:
-            named += f": {textwrap.shorten(str(reasons[own[0]]), _LONGEST, placeholder=' ...')}"
+        elif why := reason_of(int(own[0])):
+            named += f": {textwrap.shorten(why, _LONGEST, placeholder=' ...')}"
         lines.append(f"{fate.word.replace('_', ' ')}: {len(own)} of {len(fates)}{named}")
     for code in Status:
         own = np.flatnonzero(status == code)
         if code.failed and len(own):
-            why = "" if reasons is None else f": {reasons[own[0]]}"
-            first = textwrap.shorten(f"first sample {own[0]}{why}", _LONGEST, placeholder=" ...")
+            why = reason_of(int(own[0]))
+            first = f"first sample {own[0]}{': ' if why else ''}{why}"
+            first = textwrap.shorten(first, _LONGEST, placeholder=" ...")
             lines.append(f"{code.word.replace('_', ' ')}: {len(own)} of {len(fates)}, {first}")
     return lines
 

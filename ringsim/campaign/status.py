@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.campaign.folder import Folder, opened_as
 from ringsim.campaign.run import Share
 from ringsim.campaign.specification import Campaign
@@ -43,12 +44,14 @@ def status_lines(campaign: Folder) -> list[str]:
     found, now = campaign.survey(), time.time()
     left = len(found.missing)
     counts = Counter(found.status.tolist())
-    words = {int(status): status.word for status in Status} | {NOT_RUN: "not_run"}
+    words = {int(Status.OK): Status.OK.word, NOT_RUN: "not_run"}
     lines = [
         f"{campaign.attributes['campaign_name']}: {campaign.table.samples - left} of "
         f"{campaign.table.samples} samples done, {left} left",
         *(f"  {words[code]:<14} {counts[code]}" for code in words if counts[code]),
     ]
+    endings = ending_lines(found.fate, found.status, lambda k: next(found.results([k])).reason)
+    lines += [f"  {line}" for line in endings]
     running, rate = dict[int, float](), 0.0
     for path in sorted(campaign.path.glob("progress-*.json")):
         told = None

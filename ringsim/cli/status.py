@@ -12,7 +12,8 @@ from ringsim.cli.options import FOLDER
 @click.command()
 @FOLDER
 def command(folder: Path) -> None:
-    """Tell how many samples of the campaign in FOLDER are done, failed, running and left.
+    """Tell how many samples of the campaign in FOLDER are done, failed, running and left, and what
+    the antenna did.
 
     It only reads, and may be called while the campaign runs.
     """

@@ -12,7 +12,7 @@ from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.storage.result import Result, pack, plain
-from ringsim.variables import Cause, Outcome, Status
+from ringsim.variables import Cause, Fate, Outcome, Status
 
 Run = Callable[[Scene], Outcome]
 LOG_CHARACTERS = 4000
@@ -34,11 +34,12 @@ def load_solver(name: str) -> Run:
 
 def solve(solver: Run, base: Scene, sample: int, values: dict[str, Any]) -> Result:
     """Run one sample of the scene ``base``, with its values by scene path."""
-    begin, log, form, body = time.monotonic(), "", "", b""
+    begin, log, form, body, fate = time.monotonic(), "", "", b"", Fate.NONE
     try:
         outcome = solver(base.with_values(values))
         form, body = pack(outcome.coordinates | outcome.values)
         status, reason, cause = Status(outcome.status), str(outcome.reason), outcome.cause
+        fate = outcome.fate
         if not status.failed and (fault := _not_finite(outcome)):
             status, reason, cause = Status.DIVERGED, fault, Cause.NOT_FINITE
     except MemoryError:
@@ -50,7 +51,9 @@ def solve(solver: Run, base: Scene, sample: int, values: dict[str, Any]) -> Resu
         cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
     reason, log = plain(" ".join(reason.split())[:1000]), plain(log[-LOG_CHARACTERS:])
     seconds = time.monotonic() - begin
-    return Result(sample, status, reason, cause, log, seconds, time.time(), form, body)
+    return Result(
+        sample, status, reason, cause, log, seconds, time.time(), form, body, fate=fate
+    )  # fmt: skip
 
 
 def _not_finite(outcome: Outcome) -> str:

@@ -20,7 +20,7 @@ from ringsim.storage.locks import GO_ON
 from ringsim.storage.netcdf import NOT_RUN
 from ringsim.storage.result import Result
 from ringsim.storage.verified import RECORD, Verified, forget, recall, remember
-from ringsim.variables import Status
+from ringsim.variables import Fate, Status
 
 FOLDER = "journals"
 _log = logging.getLogger(__name__)
@@ -133,6 +133,8 @@ class Survey:
     journals: list[Path]
     status: NDArray[np.int8]
     """Status of each sample, NOT_RUN where there is no result."""
+    fate: NDArray[np.int8]
+    """What the antenna did in each sample; NONE where nobody knows."""
     seconds: NDArray[np.float64]
     """Elapsed time of each sample, NaN where there is no result."""
     form: NDArray[np.int64]
@@ -203,6 +205,7 @@ def survey(folder: Path, campaign: str, samples: int) -> Survey:
     return Survey(
         campaign, journals,
         status=of_each(records["status"][best], NOT_RUN),
+        fate=of_each(records["fate"][best], Fate.NONE),
         seconds=of_each(records["seconds"][best], np.nan),
         form=of_each(np.unique(records["form"][best], return_inverse=True)[1], -1),
         owner=of_each(owner[best], -1), place=of_each(records["place"][best], -1),
@@ -223,7 +226,7 @@ def _verified(path: Path, campaign: str, before: Verified | None) -> Verified:
         if result is None:
             damaged += 1
         else:
-            number = result.sample, result.status, result.seconds, result.finished
-            new.append((place, *number, result.form))
+            codes = result.sample, result.status, result.fate
+            new.append((place, *codes, result.seconds, result.finished, result.form))
     records = np.concatenate([old.records, np.array(new, dtype=RECORD)])
     return Verified(records, now.st_size, now.st_mtime_ns, end, damaged)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.outputs import COORDINATES, VARIABLES
-from ringsim.variables import Cause, Status
+from ringsim.variables import Cause, Fate, Status
 
 MISSING_COUNT = -1
 """Stands for a missing whole number."""
@@ -45,6 +45,8 @@ class Result:
     """The arrays, see :func:`pack`."""
     overrides: dict[str, Any] = field(default_factory=dict)
     """Settings by scene path that it was run with instead of the campaign's."""
+    fate: Fate = Fate.NONE
+    """The variable ``outcome``, which is told while a campaign runs; NONE of older versions."""
 
     def header(self) -> bytes:
         """Everything but the body."""
@@ -69,6 +71,7 @@ class Result:
         codes = {
             "status": Status.OK if status == 1 else Status(status),
             "cause": Cause(cause) if known else Cause.NONE,
+            "fate": Fate(table.get("fate", Fate.NONE)),
         }
         return cls(**table | codes, body=body)
 

@@ -17,7 +17,7 @@ from ringsim.files import whole
 NAME = "journals-verified.npz"
 RECORD = np.dtype(
     [
-        ("place", "i8"), ("sample", "i8"), ("status", "i1"), ("seconds", "f8"),
+        ("place", "i8"), ("sample", "i8"), ("status", "i1"), ("fate", "i1"), ("seconds", "f8"),
         ("finished", "f8"), ("form", "U16"),
     ]
 )  # fmt: skip

@@ -10,7 +10,7 @@ import time
 import numpy as np
 
 from ringsim.scene import Scene
-from ringsim.variables import Outcome, Status
+from ringsim.variables import Fate, Outcome, Status
 
 
 def run(scene: Scene) -> Outcome:
@@ -41,6 +41,19 @@ def run(scene: Scene) -> Outcome:
             "steps": np.array(100),
             "wall_time": np.array(time.perf_counter() - begin),
         },
+    )
+
+
+def fated(scene: Scene) -> Outcome:
+    """Deploys below a force of 0.011 N, fails above 0.012 N, stalls between."""
+    outcome, force = run(scene), scene.loads.force
+    if force > 0.012:
+        return Outcome(Status.SOLVER_FAILED, "Newton does not converge: try a smaller step")
+    fate, why = (
+        (Fate.DEPLOYED, "all open") if force < 0.011 else (Fate.STALLED, "nothing drives it")
+    )
+    return Outcome(
+        Status.OK, why, outcome.coordinates, outcome.values | {"outcome": np.array(fate)}
     )
 
 

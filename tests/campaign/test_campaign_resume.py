@@ -137,3 +137,22 @@ def test_changed_scene_file_is_another_campaign(bench):
     printed = bench.run(*start, code=2)
     assert "this folder holds another campaign (its scene differs" in printed
     assert "differs: structure.half_bar = 0.28 instead of 0.2889)" in printed
+
+
+def test_status_tells_outcomes_as_the_end_of_the_campaign_does(bench):
+    """Also of a part, before anything is merged."""
+    file = bench.write_listed([30] * 8)
+    half = bench.run("campaign", file, "--out", "out", "--part", "1/2", solver="fake_solver:fated")
+    assert "deployed" not in half
+    assert not (bench.folder / "out" / "campaign.nc").exists()
+    told = bench.run("status", "out")
+    assert "deployed: 1 of 8\n" in told
+    assert "stalled: 2 of 8 (samples 2, 4): nothing drives it" in told
+    whole = bench.run("campaign", file, "--out", "out", solver="fake_solver:fated")
+    for line in (
+        "deployed: 2 of 8\n",
+        "stalled: 3 of 8 (samples 2, 3, 4): nothing drives it\n",
+        "solver failed: 3 of 8, first sample 5: Newton does not converge: try a smaller step\n",
+    ):
+        assert line in whole
+        assert line in bench.run("status", "out")

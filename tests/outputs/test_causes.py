@@ -12,7 +12,7 @@ from ringsim.execution.solve import solve
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.result import Result
-from ringsim.variables import Cause, Outcome, Reason, Status
+from ringsim.variables import Cause, Fate, Outcome, Reason, Status
 
 RING = load_scene("ring18").with_values(
     {"structure.sections": 3, "structure.aspect_ratio": 1.0, "net": "none", "loads.force": 0.03}
@@ -86,6 +86,14 @@ def test_journals_of_versions_that_had_a_status_unfinished_are_read() -> None:
     older = json.loads(Result(3, Status.OK, "the end time was reached").header())
     read = Result.from_header(json.dumps(older | {"status": 1, "cause": 1}).encode(), b"")
     assert (read.status, read.cause) == (Status.OK, Cause.NONE)
+
+
+def test_a_journal_keeps_the_outcome_and_older_ones_have_none() -> None:
+    result = Result(3, Status.OK, "all V-joints have reached 180 deg", fate=Fate.DEPLOYED)
+    assert Result.from_header(result.header(), b"").fate is Fate.DEPLOYED
+    older = json.loads(result.header())
+    del older["fate"]
+    assert Result.from_header(json.dumps(older).encode(), b"").fate is Fate.NONE
 
 
 def test_a_reason_is_its_sentence() -> None:
