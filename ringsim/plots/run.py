@@ -33,7 +33,7 @@ class _Picture(NamedTuple):
 PICTURES = (
     _Picture("opening_angles", opening_angles, ("opening_angle",), ring_only=True),
     _Picture("asynchrony", asynchrony, ("asynchrony", "opening_angle")),
-    _Picture("section_map", section_map, ("opening_angle",), ring_only=True),
+    _Picture("section_map", section_map, ("opening_angle", "asynchrony"), ring_only=True),
     _Picture("rod_stress", rod_stress, ("rod_stress",), ring_only=True),
     _Picture("ring", ring, ("opening_angle",), ring_only=True),
     _Picture("cables", cables, ("cable_tension",), ring_only=True),

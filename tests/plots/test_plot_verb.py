@@ -81,3 +81,28 @@ def test_files_that_hold_no_run_are_refused(file: Path, failed: xr.Dataset) -> N
         assert done.exit_code == EXIT_BAD_INPUT
         assert done.stderr.startswith(f"{path}: {words}")
         assert len(done.stderr.splitlines()) == 1
+
+
+SHORT = ("--set", "structure.sections=3", "--set", "boom=none", "--set", "solver.end_time=0.5")
+HINT = "stresses are drawn with --set record.stress=true"
+
+
+@pytest.mark.parametrize("more", [(), ("--set", "record.stress=true")], ids=["as it is", "stress"])
+def test_plotting_does_not_change_what_is_computed(tmp_path: Path, more: tuple[str, ...]) -> None:
+    for name, plot in (("plain", ()), ("drawn", ("--plot",))):
+        out = str(tmp_path / f"{name}.nc")
+        done = ringsim("run", "ring18", *SHORT, *more, *plot, "--out", out)
+        assert done.exit_code == EXIT_DONE, done.output
+        assert (done.output.splitlines()[-1] == HINT) == (bool(plot) and not more)
+    plain, drawn = (xr.load_dataset(tmp_path / f"{name}.nc") for name in ("plain", "drawn"))
+    timings = ["wall_time", "cpu_time"]
+    xr.testing.assert_equal(plain.drop_vars(timings), drawn.drop_vars(timings))
+    assert (tmp_path / "drawn-fig-rod_stress.png").exists() == bool(more)
+
+
+def test_what_has_no_stress_to_draw_is_not_told_how(tmp_path: Path) -> None:
+    out = str(tmp_path / "run.nc")
+    for more in (("--fidelity", "ideal"), ("--set", "rods.kind=ancf")):
+        done = ringsim("run", "ring18", *SHORT, *more, "--plot", "--out", out)
+        assert done.exit_code == EXIT_DONE, done.output
+        assert HINT not in done.output
