@@ -13,6 +13,7 @@ import pytest
 from ringsim.campaign.specification import load_campaign
 from ringsim.execution.work import longest_first, relative_cost
 from ringsim.refusal import InputError
+from ringsim.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
 GOOD = """
@@ -172,3 +173,34 @@ def test_file_opens_in_ncdump(bench):
     path = bench.folder / "out" / "campaign.nc"
     header = subprocess.run(["ncdump", "-h", path], capture_output=True, text=True, check=True)
     assert 'sample:standard_name = "realization"' in header.stdout
+
+
+OF_CABLE = "cables.upper.friction.coefficient"
+
+
+@pytest.mark.parametrize(
+    ("text", "others"),
+    [
+        (f'[set."{OF_CABLE}"]\n"section 6 V" = 0.002', None),
+        (f'[set]\n{OF_CABLE}."section 6 V" = 0.002', None),
+        (f'[set."{OF_CABLE}"]\n"section 6 V" = 0.002\ndefault = 0.001', 0.001),
+        (f'[set]\n"{OF_CABLE}" = {{ default = 0.001, "section 6 V" = 0.002 }}', 0.001),
+    ],
+)
+def test_named_pulleys_under_set_join_the_values_of_the_scene(tmp_path, text, others):
+    head = GOOD.partition("[set]")[0].replace("ring18", "ring18-cable")
+    scene = loaded(tmp_path, f"{head}{text}\n").scene
+    base = load_scene("ring18-cable")
+    expected = base if others is None else base.with_values({OF_CABLE: others})
+    assert scene == expected.with_values({f'{OF_CABLE}["section 6 V"]': 0.002})
+    assert scene != expected
+
+
+def test_an_unknown_pulley_under_set_is_refused_with_the_nearest(tmp_path):
+    head = GOOD.partition("[set]")[0].replace("ring18", "ring18-cable")
+    with pytest.raises(InputError) as refused:
+        loaded(tmp_path, f'{head}[set."{OF_CABLE}"]\n"section 6 W" = 0.002\n')
+    assert str(refused.value) == (
+        f'good.toml: set: {OF_CABLE}["section 6 W"]: there is no place of that name (did you mean '
+        '"section 6 V"?)'
+    )
