@@ -98,7 +98,7 @@ def run_ideal(scene: Scene) -> Outcome:
 
 
 def with_remark(outcome: Outcome, scene: Scene) -> Outcome:
-    """The outcome; its reason names every cable whose pulley friction is reduced.
+    """The outcome; its reason ends with the cables whose pulley friction is reduced, if any.
 
     A law with feedback finds its speed in the run, and a scene may set the slip speed, so this is
     judged afterwards, by the length wound until deployed; see ``ringsim.cable.regularisation``.
@@ -106,7 +106,7 @@ def with_remark(outcome: Outcome, scene: Scene) -> Outcome:
     values = outcome.values
     if scene.cables is None or outcome.status.failed or "wound_length" not in values:
         return outcome
-    times, reason = outcome.coordinates["time"], outcome.reason
+    times, faded = outcome.coordinates["time"], dict[str, tuple[float, float, float]]()
     before = ~(times > values.get("deployment_time", np.nan))
     for plane, cable in scene.cables.present():
         pulleys = scene.pulleys_of(cable)
@@ -116,10 +116,13 @@ def with_remark(outcome: Outcome, scene: Scene) -> Outcome:
         decay = -cable.friction.log_decay(right_angle, cable.pulley_radius).min(initial=0.0)
         excess = regularisation.excess(slip, speed, pulleys, float(decay))
         if speed > 0.0 and excess > regularisation.TOLERATED:
-            reason += (
-                f"; cables.{PLANES[plane]}.slip_speed = {slip:.2g} m/s is too fast for rope wound "
-                f"at {speed:.2g} m/s: pulley friction fades, and the smallest tension is up to "
-                f"{100.0 * excess:.0f} % too high (set it to at most "
-                f"{regularisation.slip_speed(speed, pulleys):.2g} m/s)"
-            )
-    return replace(outcome, reason=reason)
+            most = regularisation.slip_speed(speed, pulleys)
+            faded[f"cables.{PLANES[plane]}.slip_speed"] = slip, most, 100.0 * excess
+    if not faded:
+        return outcome
+    slips, bounds, excesses = zip(*faded.values(), strict=True)
+    remark = (
+        f"; pulley friction fades, tension up to {max(excesses):.0f} % too high: "
+        f"{' and '.join(faded)} = {max(slips):.2g} m/s must be at most {min(bounds):.2g} m/s"
+    )
+    return replace(outcome, reason=outcome.reason + remark)
