@@ -1,5 +1,7 @@
 """Values of inputs: numbers, words, whole tables and lists of them, in arrays and in words."""
 
+import json
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,6 +13,9 @@ from ringsim.scene import Scene
 
 Values = NDArray[Any]
 """Numbers, words, true and false; of dtype object where they are mixed, tables or lists."""
+
+_WORD = re.compile(r"(?!(true|false|inf|nan)$)[^\W\d_][\w .:/+-]*(?<! )")
+"""Texts that need no quotes in a label: others might read as several values, or as a number."""
 
 _ALIKE: tuple[tuple[type, ...], ...] = ((bool,), (int,), (int, float), (str,))
 
@@ -38,18 +43,33 @@ def plain(entry: Any) -> Any:
 def label_of(value: Any) -> str:
     """A value in a few words, the same ones for equal values and others for others.
 
-    >>> label_of({"kind": "stall", "max_tension": 20.0}), label_of([]), label_of(5.0)
-    ('stall(max_tension=20.0)', 'none', '5.0')
+    Lists of tables, as of faults, have no brackets: no field takes both a table and a list of one,
+    and an empty list is what "none" gives.
+
+    >>> label_of([{"kind": "stall", "max_tension": 20.0}]), label_of([]), label_of([5.0, "x"])
+    ('stall(max_tension=20.0)', 'none', '[5.0, x]')
     """
     match value:
+        case list() | tuple() if value and all(isinstance(each, dict) for each in value):
+            return ", ".join(map(_part, value))
+        case list() | tuple() if not value:
+            return "none"
+        case _:
+            return _part(value)
+
+
+def _part(value: Any) -> str:
+    match value:
         case dict():
-            fields = (f"{key}={label_of(each)}" for key, each in value.items() if key != "kind")
-            inside, kind = ", ".join(fields), str(value.get("kind", ""))
-            return f"{kind}({inside})" if inside or not kind else kind
+            parts = {key: _part(value[key]) for key in sorted(value)}
+            kind = parts.pop("kind", "")
+            return f"{kind}({', '.join(f'{_part(key)}={part}' for key, part in parts.items())})"
         case list() | tuple():
-            return ", ".join(map(label_of, value)) or "none"
+            return f"[{', '.join(map(_part, value))}]"
         case bool():
             return str(value).lower()
+        case str() if not _WORD.fullmatch(value):
+            return json.dumps(value)
         case _:
             return str(value)
 
