@@ -132,6 +132,8 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
             worst = good.sel(sample=known.idxmax()) if known.size else good
             values = {str(n): each.values for n, each in worst.items() if not each.dims}
             if output().told(values, spans):
+                # Series tell which places are alike.
+                values = {str(n): each.values for n, each in worst.variables.items()}
                 told = " ".join(summary(values, spans)[variable.name].split())
                 lines.append(f"{variable.summary[0]} in sample {worst.sample.item()}: {told}")
     return lines

@@ -73,7 +73,7 @@ def command(
     click.echo(f"{chosen.name}: {outcome.status.word}{became}: {outcome.reason}")
     if anew := _restarted(values, chosen.solver):
         click.echo(f"  {anew}")
-    for name, told in summary(values, chosen.span_names).items():
+    for name, told in summary(outcome.coordinates | values, chosen.span_names).items():
         label = (VARIABLES[name].summary or ("",))[0]
         if anew or name != "total_steps":
             click.echo(f"  {label:20s}{told}")

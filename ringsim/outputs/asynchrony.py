@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.outputs.family import Array, ErrorBar, Output, Run, Series, SpanNames, Values, Variable
+from ringsim.outputs.peaks import ties, with_ties
 
 _POINTS = 8
 """Points in each step at which the largest spread is looked for: a parabola rises above the largest
@@ -65,11 +66,13 @@ class Asynchrony(Output):
         known = str(values.get("asynchrony_leader_plane", ""))
         if not (known and values["asynchrony_max"] > 0.0):
             return ""
-        last, first = (
-            f"{values[f'asynchrony_{who}_plane']} {values[f'asynchrony_{who}_section']:.0f}"
-            for who in ("laggard", "leader")
-        )
-        return f"at {values['asynchrony_max_time']:.4g} s: {last} behind {first}"
+        time, size = (float(values[f"asynchrony_max{end}"]) for end in ("_time", ""))
+        joints, dims = list[str](), ("plane", "section")
+        for who in ("laggard", "leader"):
+            own = tuple(np.asarray(values[f"asynchrony_{who}_{dim}"]).item() for dim in dims)
+            first, more = with_ties(own, ties(values, "opening_angle", dims, own, time, size))
+            joints.append(f"{first} {own[1]:.0f}{more}")
+        return f"at {time:.4g} s: {' behind '.join(joints)}"
 
 
 class Spread(NamedTuple):

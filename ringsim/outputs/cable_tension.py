@@ -8,7 +8,7 @@ from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series
 from ringsim.outputs.peaks import Peak
 from ringsim.parts.solver import TENSION_BEND
 
-PEAK = Peak("peak_tension", ("plane", "span"), "the largest tension")
+PEAK = Peak("peak_tension", ("plane", "span"), "the largest tension", "cable_tension")
 
 
 class CableTension(Output):

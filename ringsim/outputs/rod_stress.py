@@ -5,7 +5,7 @@ import numpy as np
 from ringsim.outputs.family import Array, ErrorBar, Output, Reading, Run, Series, Values, Variable
 from ringsim.outputs.peaks import Peak
 
-PEAK = Peak("peak_stress", ("rod", "section"), "the largest stress of a rod")
+PEAK = Peak("peak_stress", ("rod", "section"), "the largest stress of a rod", "rod_stress")
 
 
 class RodStress(Output):

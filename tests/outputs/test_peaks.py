@@ -15,6 +15,7 @@ from ringsim.outputs.cable_tension import CableTension
 from ringsim.outputs.family import axes
 from ringsim.outputs.rod_stress import RodStress
 from ringsim.outputs.series import Run, Series
+from ringsim.outputs.summary import summary
 from ringsim.scene import load_scene
 from ringsim.simulation import FIDELITIES, simulate
 
@@ -107,6 +108,54 @@ def test_stress_tells_rod_and_section() -> None:
     found = RodStress().reduce(STILL, Series(TIMES, stress, STILL.angles.grid))
     assert (found["peak_rod_stress"], found["peak_stress_time"]) == (3e6, TIMES[2])
     assert RodStress().told(found, {}) == "at 0.5 s: rod 5, section 2"
+
+
+def test_planes_that_pull_alike_are_told_together() -> None:
+    """To round-off, up to the peak; the far winch's span of both planes is alike, too."""
+    tensions = np.random.default_rng(3).uniform(1.0, 2.0, (9, 1, 6)) * np.ones((1, 2, 1))
+    tensions[:, 1] *= 1.0 + 1e-10
+    tensions[4, :, 3] = 30.0, 30.0 * (1.0 + 1e-10)
+    words = "at 1 s: upper and lower, span 4"
+
+    def told() -> str:
+        series = Series(TIMES, tensions, STILL.angles.grid)
+        return CableTension().told(axes(TRUSS) | CableTension().reduce(STILL, series), {})
+
+    assert told() == words
+    tensions[6:, 0] += 5.0
+    assert told() == words
+    tensions[:, :, 0] = tensions[:, :, 3]
+    assert told() == "at 1 s: upper and lower, span 1 (and 2 more alike)"
+    tensions[:, 1] *= 1.0 + 1e-4
+    assert told() == "at 1 s: lower, span 1 (and 1 more alike)"
+
+
+def test_stresses_and_joints_that_are_alike_are_told_together() -> None:
+    stress = np.random.default_rng(4).uniform(1.0, 2.0, (9, 8, 2))
+    stress[2, 5, 1] = 3e6
+    stress[:, 6, 1] = stress[:, 5, 1]
+    found = RodStress().reduce(STILL, Series(TIMES, stress, STILL.angles.grid))
+    known = axes(TRUSS) | {"rod": RODS}
+    assert RodStress().told(known | found, {}) == "at 0.5 s: rod 5 and rod 6, section 2"
+    stress[:, 7, 1] = stress[:, 5, 1]
+    found = RodStress().reduce(STILL, Series(TIMES, stress, STILL.angles.grid))
+    assert RodStress().told(known | found, {}) == "at 0.5 s: rod 5, section 2 (and 2 more alike)"
+    shapes = np.radians([[0.0, 1.0], [0.0, 1.0 + 1e-8]])
+    motion = (np.asarray(each)[:, None, None] for each in (TIMES**2, 2.0 * TIMES))
+    run, series = run_of(*(shapes * each for each in motion))
+    values = axes(TRUSS) | {"opening_angle": np.degrees(run.angles.on_grid(run.rates.values))}
+    told = Asynchrony().told(values | Asynchrony().reduce(run, series), {})
+    assert told == "at 2 s: upper and lower 1 behind upper and lower 2"
+
+
+def test_the_summary_of_a_run_tells_both_planes() -> None:
+    """A ring without a boom is symmetric; only what is printed tells it."""
+    run = simulate(load_scene("truss2").with_values({"solver.end_time": 0.3, "boom": "none"}))
+    values = {str(name): each.values for name, each in run.variables.items()}
+    told = summary(values, TRUSS.span_names)
+    assert ": upper and lower, span 1 (winch to " in told["peak_tension"]
+    assert " behind upper and lower " in told["asynchrony_max"]
+    assert run.peak_tension_plane.item() in ("upper", "lower")
 
 
 @pytest.mark.parametrize("fidelity", FIDELITIES)
