@@ -151,19 +151,24 @@ def points_in(scene: Any) -> tuple[str, ...]:
 
 def pulleys_at(scene: Any, path: str) -> tuple[str, ...]:
     """Names of the pulleys that a list at ``path`` has values for, if it has."""
+    return _cable_at(scene, path)[1:-1]
+
+
+def _cable_at(scene: Any, path: str) -> tuple[str, ...]:
+    """Names of the points of the cable whose pulleys a list at ``path`` has values for."""
     points = points_in(scene) if place_of(path, closed=True) == "pulley" else ()
     end = at_path(scene, ".".join([*path.split(".")[:2], "end"]))
-    return path_of(points, end)[1:-1] if points else ()
+    return path_of(points, end) if points else ()
 
 
 def with_number(scene: Any, path: str) -> str:
     """A path with the number of a pulley instead of its name; InputError if it is unknown."""
     inner, name = section_of(path)
-    names = pulleys_at(scene, inner) if isinstance(name, str) else ()
-    if not isinstance(name, str) or not names:
+    cable = _cable_at(scene, inner) if isinstance(name, str) else ()
+    if not isinstance(name, str) or not cable:
         return path
     try:
-        return f"{inner}[{number_of(name, names, path)}]"
+        return f"{inner}[{number_of(name, cable[1:-1], path, cable[-1])}]"
     except ValueError as error:
         raise InputError(str(error)) from None
 

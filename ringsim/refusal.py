@@ -60,15 +60,18 @@ def explain(error: ValidationError, model: type[BaseModel], source: str) -> str:
 
 
 def known_or_nearest(key: str, known: Iterable[str]) -> str:
-    """The hint behind a refused name: the nearest known one, or all of them.
+    """The hint behind a refused name: the nearest known one, one that begins so, or all of them.
 
     >>> known_or_nearest("densty", ["density", "damping"])
     'did you mean density?'
+    >>> known_or_nearest("cut", ["cut-cable", "jammed-pulley"])
+    'did you mean cut-cable?'
     """
     names = list(known)
     if not names:
         return "it has no keys"
     close = difflib.get_close_matches(key.lower(), names, n=1, cutoff=0.6)
+    close += [name for name in names if key and name.startswith(key.lower())]
     return f"did you mean {close[0]}?" if close else f"known: {', '.join(names)}"
 
 

@@ -259,7 +259,9 @@ def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
         return scene_from_toml(builtin[name], source=f"scene {name}")
     path = beside.parent / name_or_path
     if not os.path.exists(path):  # Path.exists raises for names that are too long
-        hint = known_or_nearest(name, builtin)
+        near = f"{path}.toml"
+        found = os.path.exists(near)
+        hint = f"did you mean {near}?" if found else known_or_nearest(name, builtin)
         raise InputError(f"{path}: no such file, and no built-in scene of that name ({hint})")
     table = parse_toml(read_text(path), path.name)
     if key := next((key for key in ("design", "inputs") if key in table), ""):

@@ -45,10 +45,16 @@ def _short(before: str, name: str) -> str:
     return name.removeprefix(section) if before.startswith(section) else name
 
 
-def number_of(name: str, names: Sequence[str], where: str) -> int:
-    """Number, from 1, of a named pulley or span; ValueError with the nearest name if unknown."""
+def number_of(name: str, names: Sequence[str], where: str, end: str = "") -> int:
+    """Number, from 1, of a named pulley or span; ValueError with the nearest name if unknown, or if
+    it is that of the cable's ``end``.
+    """
     if name in names:
         return names.index(name) + 1
+    if name == end:
+        raise ValueError(
+            f'{where}: the cable is fixed there and has no pulley: the last is "{names[-1]}"'
+        )
     begun = [each for each in names if each.startswith(f"{name} ")]  # a span by its pulley
     near = begun or difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     hint = f'did you mean "{near[0]}"?' if near else f'the first is "{names[0]}"'
@@ -88,7 +94,7 @@ def _listed(given: dict[str, Any], path: Sequence[str], where: str) -> list[Any]
     values = [given["default"]] * (len(path) - 2)
     for name, value in given.items():
         if name != "default":
-            values[number_of(name, path[1:-1], f'{where}."{name}"') - 1] = value
+            values[number_of(name, path[1:-1], f'{where}."{name}"', path[-1]) - 1] = value
     return values
 
 
@@ -101,8 +107,8 @@ def _fault(fault: Any, present: Sequence[str], paths: Sequence[Sequence[str]], n
         made["cable"] = present.index(fault["cable"]) + 1
     cable = made.get("cable", 1)
     path = paths[cable - 1] if cable in range(1, len(paths) + 1) else ()
-    for key, names in (("pulley", path[1:-1]), ("span", spans_of(path))):
+    for key, names, end in (("pulley", path[1:-1], path[-1:]), ("span", spans_of(path), ())):
         if isinstance(name := fault.get(key), str):
             where = f'faults[{number}].{key} = "{name}"'
-            made[key] = number_of(name, names, where) if path else 1
+            made[key] = number_of(name, names, where, *end) if path else 1
     return made

@@ -1,5 +1,6 @@
 """The design of a campaign: which values every sample has, and which paths it may vary."""
 
+import contextlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -172,7 +173,7 @@ def _column(base: Scene, path: str, values: Values, words: str, design: Design) 
     try:
         scene = base.with_values({path: plain(values[0])})
     except InputError as error:
-        raise InputError(f"{design.where(0, path)}: {error}") from None
+        raise InputError(f"{design.where(0, path)}: {_named(base, [path], error)}") from None
     dim, names = "", tuple[str, ...]()
     if values.ndim == 2:
         dim = place_of(path, closed=scene.structure.closed) or f"place_{values.shape[1]}"
@@ -182,6 +183,18 @@ def _column(base: Scene, path: str, values: Values, words: str, design: Design) 
     if values.dtype.kind in "iu" and isinstance(field_at(scene, path), float):
         values = values.astype(float)
     return Column(name, path, dim, unit_at(scene, path), words, values, names)
+
+
+def _named(base: Scene, paths: Sequence[str], error: InputError) -> str:
+    """What an error says, with the paths that name a pulley instead of its number.
+
+    Unless samples have their winches at other ends: numbers count from there.
+    """
+    told = str(error)
+    for path in paths if not any(path.endswith(".end") for path in paths) else ():
+        with contextlib.suppress(InputError):
+            told = told.replace(with_number(base, path), path)
+    return told
 
 
 def _check_extremes(base: Scene, table: Table, design: Design) -> None:
@@ -195,8 +208,9 @@ def _check_extremes(base: Scene, table: Table, design: Design) -> None:
         try:
             spans.add(base.with_values(values).spans)
         except InputError as error:
-            path = max((path for path in values if path in str(error)), key=len, default="")
-            raise InputError(f"{design.where(sample, path)}: {error}; {design.cure}") from None
+            told = _named(base, list(values), error)
+            path = max((path for path in values if path in told), key=len, default="")
+            raise InputError(f"{design.where(sample, path)}: {told}; {design.cure}") from None
     if len(spans) > 1:
         raise InputError(
             f"inputs: cables of {min(spans)} and of {max(spans)} spans would not fit into one "

@@ -92,3 +92,17 @@ def test_bad_cells_are_named_in_one_line(text: str, words: str, tmp_path: Path) 
     with pytest.raises(InputError, match=words) as refusal:
         listed(tmp_path, text)
     assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("row", [1, 2])
+def test_a_refused_value_of_a_named_pulley_keeps_the_name(row: int, tmp_path: Path) -> None:
+    path = 'cables.upper.friction.coefficient["section 2 V"]'
+    cells = ["-0.002", "0.001"] if row == 1 else ["0.001", "-0.002"]
+    quoted = path.replace('"', '""')
+    (tmp_path / "c.csv").write_text("\n".join([f'"{quoted}"', *cells]))
+    with pytest.raises(InputError) as refused:
+        draw(load_scene("truss2"), {}, [], Listed(file="c.csv"), seed=0, folder=tmp_path)
+    assert str(refused.value).startswith(
+        f"c.csv: row {row} below the header, sample {row - 1}, column {path}: scene truss2: "
+        f"{path} = -0.002 m must be at least 0 m"
+    )

@@ -103,7 +103,17 @@ def test_faults_name_them() -> None:
          f'{COEFFICIENT}["section 2 W"]: there is no place of that name (did you mean '
          '"section 2 V"?)'),
         # Its end, which holds the cable.
-        ({f'{COEFFICIENT}["section 2 second hinge"]': 0.002}, "no place of that name"),
+        ({f'{COEFFICIENT}["section 2 second hinge"]': 0.002},
+         f'{COEFFICIENT}["section 2 second hinge"]: the cable is fixed there and has no pulley: '
+         'the last is "section 2 V"'),
+        ({COEFFICIENT: {"default": 1e-4, "section 2 second hinge": 0.002}},
+         f'{COEFFICIENT}."section 2 second hinge": the cable is fixed there'),
+        ({"cables.upper.end": "last", f'{COEFFICIENT}["section 1 first hinge"]': 0.002},
+         'fixed there and has no pulley: the last is "section 1 V"'),
+        ({"faults": [{"kind": "jammed-pulley", "time": 1.0, "pulley": "section 2 second hinge"}]},
+         'faults[1].pulley = "section 2 second hinge": the cable is fixed there'),
+        ({"faults": [{"kind": "cut", "time": 1.0}]},
+         'faults[1].kind = "cut" is not a kind of it (did you mean cut-cable?)'),
         ({f'{COEFFICIENT}["drum"]': 0.002}, 'the first is "section 1 first hinge"'),
         ({'rods.young_modulus["section 1"]': 1e11}, "or one with its section: name[1]"),
         ({COEFFICIENT: {"section 2 V": 0.002}}, "coefficient.default is missing: give it for all"),

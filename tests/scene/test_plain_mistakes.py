@@ -293,3 +293,13 @@ def test_a_run_on_a_terminal_shows_its_progress(tmp_path: Path) -> None:
         [sys.executable, "-m", "ringsim", *words], capture_output=True, text=True, check=True
     )
     assert quiet.stderr == ""
+
+
+def test_a_scene_file_without_its_ending_is_suggested(tmp_path: Path) -> None:
+    (tmp_path / "ring5.toml").write_text(load_scene("ring18").to_toml())
+    with pytest.raises(InputError) as refused:
+        load_scene(tmp_path / "ring5")
+    whole = tmp_path / "ring5"
+    assert str(refused.value) == (
+        f"{whole}: no such file, and no built-in scene of that name (did you mean {whole}.toml?)"
+    )
