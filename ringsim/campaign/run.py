@@ -13,7 +13,7 @@ import xarray as xr
 from ringsim.analysis.campaign_notes import budget_lines, notes
 from ringsim.campaign.folder import Folder, merge, open_folder
 from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
-from ringsim.execution.work import Limits, Scheduler, Work, longest_first, relative_cost
+from ringsim.execution.work import Allowance, Scheduler, Work, longest_first, relative_cost
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.refusal import InputError
 from ringsim.storage.journal import Journal
@@ -55,7 +55,7 @@ class Choices:
     """How a campaign is to be run this time."""
 
     scheduler: Scheduler
-    limits: Limits
+    allowance: Allowance
     max_failed: int | None = None
     """Failures that are tolerated, in the whole campaign; None for any number."""
     share: Share = Share()
@@ -97,7 +97,8 @@ def _run_missing(campaign: Folder, choices: Choices, stop: StopRequest) -> None:
     own = dict(choices.overrides)
     work = Work(
         solver=campaign.attributes["solver"], scene=campaign.scene.to_table(),
-        values_of=lambda sample: campaign.table.values_of(sample) | own, limits=choices.limits,
+        values_of=lambda sample: campaign.table.values_of(sample) | own,
+        allowance=choices.allowance,
         keep=lambda result: journal.append(replace(result, overrides=own)),
         stop=lambda: stop.reason,
     )  # fmt: skip

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, ValidationError
 
 from ringsim.choice import kinds_of
-from ringsim.execution.work import Limits
+from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
 from ringsim.overrides import place_of
 from ringsim.refusal import InputError, explain, show
@@ -69,7 +69,7 @@ class Specification(Model):
     """Distribution by scene path."""
     correlations: list[Correlation] = Field(default_factory=list)
     design: AnyDesign
-    limits: Limits = Limits()
+    limits: Allowance = Allowance()
     fidelity: Literal["full", "ideal"] = "full"
     """full: the flexible multibody model; ideal: rigid rods."""
     error_bars_every: Annotated[int, Field(ge=0)] = 0

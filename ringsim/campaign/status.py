@@ -112,7 +112,7 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver
         kept: list[Result] = []
         work = Work(
             solver=solver, scene=campaign.scene.to_table(), values_of=table.values_of,
-            limits=campaign.specification.limits, keep=kept.append, stop=lambda: "",
+            allowance=campaign.specification.limits, keep=kept.append, stop=lambda: "",
         )  # fmt: skip
         Local(1).run([trial], work)
         (result,) = kept

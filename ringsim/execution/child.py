@@ -43,7 +43,7 @@ def _serve(pipe: Connection, setup: dict[str, Any]) -> None:
     except InputError as error:
         pipe.send(str(error))
         return
-    _limit(resource.RLIMIT_DATA, int(setup["limits"].memory))
+    _limit(resource.RLIMIT_DATA, int(setup["allowance"].memory))
     _limit(resource.RLIMIT_FSIZE, _MOST_LOG_BYTES)
     _limit(resource.RLIMIT_CORE, 0)
     pipe.send("")
@@ -53,7 +53,7 @@ def _serve(pipe: Connection, setup: dict[str, Any]) -> None:
         _C.fflush(None)  # what did not fit into the log before
         os.ftruncate(1, 0)
         # Ends this process, should its parent be unable to look at it.
-        signal.setitimer(signal.ITIMER_REAL, 2.0 * setup["limits"].timeout + 60.0)
+        signal.setitimer(signal.ITIMER_REAL, 2.0 * setup["allowance"].timeout + 60.0)
         result = solve(solver, base, sample, values)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         _C.fflush(None)  # into the log of its own sample

@@ -22,7 +22,7 @@ class Local(Scheduler):
         queue = deque(samples)
         with ExitStack() as open_slots:
             slots = [
-                open_slots.enter_context(closing(Slot(work.solver, work.scene, work.limits)))
+                open_slots.enter_context(closing(Slot(work.solver, work.scene, work.allowance)))
                 for _ in range(min(self.workers, len(queue)))
             ]
             while not work.stop():

@@ -18,7 +18,7 @@ from typing import Any
 
 from ringsim.execution.scratch import scratch_folder
 from ringsim.execution.solve import LOG_CHARACTERS
-from ringsim.execution.work import Limits, Work
+from ringsim.execution.work import Allowance, Work
 from ringsim.refusal import InputError
 from ringsim.storage.result import Result, plain
 from ringsim.variables import Cause, Status
@@ -135,9 +135,9 @@ class Slot:
     pipe: Connection
     """What to wait on while a sample is running."""
 
-    def __init__(self, solver: str, scene: dict[str, Any], limits: Limits) -> None:
-        self._setup = {"solver": solver, "scene": scene, "limits": limits}
-        self._limits, self._deaths = limits, 0
+    def __init__(self, solver: str, scene: dict[str, Any], allowance: Allowance) -> None:
+        self._setup = {"solver": solver, "scene": scene, "allowance": allowance}
+        self._allowance, self._deaths = allowance, 0
         self._process: SolverProcess | None = None
         self.busy = False
         self._begin = self._deadline = self._look = 0.0
@@ -164,7 +164,7 @@ class Slot:
             if message:
                 raise InputError(str(message))
             process.ready = True
-            self._deadline = time.monotonic() + self._limits.timeout
+            self._deadline = time.monotonic() + self._allowance.timeout
         now = time.monotonic()
         if now < self._look:
             return None
@@ -176,10 +176,10 @@ class Slot:
         if now > self._deadline:
             _require_started(process)
             process.tell_where_it_is()
-            limit = f"limits.timeout = {self._limits.timeout:g} s"
+            limit = f"limits.timeout = {self._allowance.timeout:g} s"
             why = f"still running after {limit}: raise it, or raise solver.tolerance"
             return self._give_up(process, Status.TIMEOUT, why)
-        if process.memory() > self._limits.memory:
+        if process.memory() > self._allowance.memory:
             return self._give_up(process, Status.MEMORY)
         return None
 
@@ -203,7 +203,7 @@ class Slot:
 
     def _send(self) -> None:
         process = self._process
-        if process is None or process.runs >= self._limits.recycle:
+        if process is None or process.runs >= self._allowance.recycle:
             self.close()
             process = self._process = SolverProcess(self._setup)
             self.pipe = process.pipe
@@ -211,13 +211,13 @@ class Slot:
         process.runs += 1
         now = time.monotonic()
         self._look = now + TICK
-        self._deadline = now + (self._limits.timeout if process.ready else _START_SECONDS)
+        self._deadline = now + (self._allowance.timeout if process.ready else _START_SECONDS)
         process.send(self._run)
 
     def _with_log(self, result: Result, printed: str) -> Result:
         """The solver's own result, with what only this process knows."""
         if result.status is Status.MEMORY:
-            memory = f"limits.memory = {self._limits.memory:g} B"
+            memory = f"limits.memory = {self._allowance.memory:g} B"
             result = replace(result, reason=f"the run needed more than {memory}")
         if result.status.failed:
             result = replace(result, log=(printed + result.log)[-LOG_CHARACTERS:])

@@ -29,8 +29,8 @@ _ANCF = 2.7
 _T = TypeVar("_T")
 
 
-class Limits(Model):
-    """What one run may use before it is ended."""
+class Allowance(Model):
+    """What one run may use before it is ended: the table [limits] of a campaign."""
 
     timeout: Second = 3600.0
     """Elapsed time of one run."""
@@ -49,7 +49,7 @@ class Work:
     scene: dict[str, Any]
     values_of: Callable[[int], dict[str, Any]]
     """Inputs of a sample by scene path."""
-    limits: Limits
+    allowance: Allowance
     keep: Callable[[Result], None]
     """Stores a result; called in the process that supervised the run."""
     stop: Callable[[], str]

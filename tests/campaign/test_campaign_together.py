@@ -16,7 +16,7 @@ from campaign_bench import START, assert_same, finished, lose, opened, ranks_of
 from ringsim.campaign.folder import merge, open_folder
 from ringsim.campaign.run import Choices, run_campaign
 from ringsim.execution.local import Serial
-from ringsim.execution.work import Limits
+from ringsim.execution.work import Allowance
 from ringsim.storage.locks import locked
 
 
@@ -60,7 +60,7 @@ class SignalledAtTheEnd(Serial):
 def test_signal_after_the_last_sample_is_no_failure(copied, whole):
     out = copied.folder / "out"
     lose(copied, range(4))
-    assert run_campaign(out, Choices(SignalledAtTheEnd(), Limits())) == 0
+    assert run_campaign(out, Choices(SignalledAtTheEnd(), Allowance())) == 0
     assert_same(copied, whole)
 
 

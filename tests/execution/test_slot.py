@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from ringsim.execution.slot import Slot
-from ringsim.execution.work import Limits
+from ringsim.execution.work import Allowance
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 from ringsim.variables import Status
@@ -27,8 +27,8 @@ def slots(monkeypatch):
     monkeypatch.syspath_prepend(str(HERE))
     made = []
 
-    def make(solver="slot_solver:run", *, limits=None):
-        made.append(Slot(solver, BASE.to_table(), limits or Limits()))
+    def make(solver="slot_solver:run", *, allowance=None):
+        made.append(Slot(solver, BASE.to_table(), allowance or Allowance()))
         return made[-1]
 
     yield make
@@ -63,7 +63,7 @@ def test_process_is_kept_for_the_next_sample(slots):
 
 
 def test_process_is_replaced_after_its_share_of_runs(slots):
-    slot = slots(limits=Limits(recycle=2))
+    slot = slots(allowance=Allowance(recycle=2))
     processes = [process_of(result_of(slot)) for _ in range(5)]
     assert processes[0] == processes[1] != processes[2] == processes[3] != processes[4]
 
@@ -80,7 +80,7 @@ def test_process_killed_by_somebody_else_runs_its_sample_again(slots):
 
 def test_run_that_was_suspended_with_its_supervisor_is_no_hang(slots):
     """As by a batch system: nobody ran, so the time does not count."""
-    slot = slots("slot_solver:sleep", limits=Limits(timeout=1.0))
+    slot = slots("slot_solver:sleep", allowance=Allowance(timeout=1.0))
     process = process_of(result_of(slot))
     slot.submit(1, {})
     slot.poll()
@@ -130,7 +130,7 @@ def test_runs_have_a_folder_of_their_own(slots):
 
 
 def test_hang_that_holds_the_interpreter_is_ended(slots):
-    slot = slots("slot_solver:hold_the_lock", limits=Limits(timeout=1.0))
+    slot = slots("slot_solver:hold_the_lock", allowance=Allowance(timeout=1.0))
     result = result_of(slot)
     assert result.status is Status.TIMEOUT
     assert "hold_the_lock" in result.log
@@ -141,9 +141,9 @@ def test_solver_process_ends_with_its_parent():
         """
         import os, sys, time
         from ringsim.execution.slot import Slot
-        from ringsim.execution.work import Limits
+        from ringsim.execution.work import Allowance
         from ringsim.scene import load_scene
-        slot = Slot("slot_solver:sleep", load_scene("ring18").to_table(), Limits())
+        slot = Slot("slot_solver:sleep", load_scene("ring18").to_table(), Allowance())
         slot.submit(0, {})
         while slot.poll() is None:
             pass
