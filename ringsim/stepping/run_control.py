@@ -26,6 +26,14 @@ _ROUND_OFF = 1e-12
 """Relative difference of two times that are the same."""
 
 
+def overstrained(strain: float, time: float, limits: Limits, missing: str) -> str:
+    """Why a run ends at a time (s) where a rope is longer than ``limits`` allow."""
+    return (
+        f"a rope was strained by {100.0 * strain:.3g} % at {time:.6g} s, more than "
+        f"limits.rope_strain = {limits.rope_strain:g}, with {missing}"
+    )
+
+
 class RunControl:
     """Steps, care and guard of one run.
 
@@ -220,13 +228,10 @@ class RunControl:
 
     def _note_strain(self, locks: Locks) -> None:
         """End the run where a rope is so long that none would hold."""
-        strain, most = self.now.stretch, self._limits.rope_strain
-        if strain > most and self.goes_on:
-            self._end(
-                Fate.OVERLOADED,
-                f"a rope was strained by {100.0 * strain:.3g} % at {self.now.time:.6g} s, more "
-                f"than limits.rope_strain = {most:g}, with {locks.missing()}",
-            )
+        strain, time = self.now.stretch, self.now.time
+        if strain > self._limits.rope_strain and self.goes_on:
+            words = overstrained(strain, time, self._limits, locks.missing())
+            self._end(Fate.OVERLOADED, words)
 
     def _end(self, fate: Fate, words: str) -> None:
         """End a run whose numbers hold."""

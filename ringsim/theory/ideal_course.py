@@ -16,7 +16,7 @@ from ringsim.layout.pose import Array
 from ringsim.parts.limits import Limits
 from ringsim.scene import Scene
 from ringsim.stepping.rest import MOVED, WINDOW
-from ringsim.stepping.run_control import TOLD
+from ringsim.stepping.run_control import TOLD, overstrained
 from ringsim.theory.ideal_motion import IdealMotion
 from ringsim.variables import Cause, Fate, Reason, Status
 
@@ -32,6 +32,8 @@ MOST_CONTACTS = 1000
 _COLLOCATION = np.array([4.0 - math.sqrt(6.0), 4.0 + math.sqrt(6.0)]) / 10.0
 """Points of Radau IIA within a step."""
 _ALIKE = 1e-13
+_ROUND_OFF = 1e-9
+"""Strain below a limit at which it counts as passed: steps end where it is passed."""
 
 
 @dataclass
@@ -62,6 +64,19 @@ class _Crossing:
         return float(state[0]) - self.level
 
 
+@dataclass
+class _Strained:
+    """An event of scipy: a rope becomes longer than the scene's limit."""
+
+    motion: IdealMotion
+    limit: float
+    terminal: ClassVar = True
+    direction: ClassVar = 1.0
+
+    def __call__(self, time: float, state: Array) -> float:
+        return self.motion.instant(time, state).stretch - self.limit
+
+
 class Course:
     """One run of a scene's ideal ring.
 
@@ -76,6 +91,8 @@ class Course:
         self.evaluations, self.jacobians = 0, 0
         self._time, self._state = 0.0, self.motion.start()
         self._end, self._contacts = scene.solver.end_time, 0
+        roped = self.motion.cables is not None
+        self._strained = [_Strained(self.motion, scene.limits.rope_strain)] if roped else []
         self._stowed = 0.5 * (math.pi if scene.stop is None else scene.stop.most_folded)
 
     def run(self) -> "Course":
@@ -161,8 +178,11 @@ class Course:
         phi = float(self._state[0])
         stops = [self._stowed] if self.motion.latched else [self._stowed, 0.0]
         levels = [stop + math.copysign(BEYOND, stop - phi) for stop in stops]
-        found = self._solve(target, levels if self._contacts < MOST_CONTACTS else [])
-        crossed = [k for k, times in enumerate(found.t_events or []) if len(times)]
+        levels = levels if self._contacts < MOST_CONTACTS else []
+        found = self._solve(target, levels)
+        # Behind the levels comes the strain of ropes, with which the run ends.
+        events = (found.t_events or [])[: len(levels)]
+        crossed = [k for k, times in enumerate(events) if len(times)]
         if crossed:
             self._contacts += 1
             self._file_steps(found, len(found.t) - 2)
@@ -175,7 +195,7 @@ class Course:
                 found.y[:, -1] += late * rates
         self._file_steps(found, len(found.t) - 1)
         if found.status < 0:
-            raise ValueError(self.motion.refusal or self._cause())
+            raise ValueError(self.motion.refusal or "the step became too small")
 
     def _solve(self, target: float, levels: list[float]) -> Any:
         self.jacobians += 1
@@ -183,7 +203,7 @@ class Course:
             self._rates, (self._time, target), self._state, method="Radau", jac=self._jacobian,
             max_step=self._scene.solver.step, rtol=RELATIVE,
             atol=self.motion.tolerances(RELATIVE), dense_output=True,
-            events=[_Crossing(level) for level in levels],
+            events=[*(_Crossing(level) for level in levels), *self._strained],
         )  # fmt: skip
 
     def _rates(self, time: float, state: Array) -> Array:
@@ -198,6 +218,13 @@ class Course:
         return self.motion.jacobian(time, state)
 
     def _judge(self) -> None:
+        if any(event(self._time, self._state) > -_ROUND_OFF for event in self._strained):
+            count = 2 * self._scene.structure.sections
+            missing = f"{0 if math.isnan(self.lock_time) else count} of {count} V-joints locked"
+            strain = self.motion.instant(self._time, self._state).stretch
+            words = overstrained(strain, self._time, self._scene.limits, missing)
+            self.fate, self.reason, self._end = Fate.OVERLOADED, Reason(text=words), self._time
+            return
         phi, rate = float(self._state[0]), float(self._state[self.motion.mechanism.freedom])
         stop = self._scene.stop
         if math.isnan(self.lock_time) and phi <= 0.0 and rate < 0.0:
@@ -217,10 +244,3 @@ class Course:
     def _settle(self, time: float) -> None:
         settling = 0.0 if self._scene.stop is None else self._scene.solver.settling_time
         self._end = min(self._end, max(time, 0.0) + settling)
-
-    def _cause(self) -> str:
-        """Why steps became too small: a rope at twice its natural length has been wound up."""
-        pull = self.motion.instant(self._time, self._state).pull
-        if pull is not None and pull.chain.strains.max() > 1.0:
-            return "a winch has wound up its whole rope (limit its winding law, or stop it)"
-        return "the step became too small"

@@ -41,6 +41,14 @@ class IdealState(NamedTuple):
     pull: Pull | None
 
     @property
+    def stretch(self) -> float:
+        """Largest strain of a rope that is not cut; 0 without cables."""
+        if self.pull is None:
+            return 0.0
+        chain = self.pull.chain
+        return float(np.max(chain.strains, where=chain.ropes.alive, initial=0.0))
+
+    @property
     def elastic(self) -> float:
         """Energy stored in net, stops and cables, J."""
         return self.acting.elastic + (0.0 if self.pull is None else self.pull.elastic)

@@ -1,0 +1,38 @@
+"""Both fidelities end where a rope would not hold."""
+
+from __future__ import annotations
+
+import pytest
+
+from ringsim.scene import load_scene
+from ringsim.simulation import FIDELITIES, simulate
+from ringsim.variables import Fate, Status
+
+JAMMED_AT, SPEED = 1.0, 0.01
+JAMS = [
+    {"kind": "jammed-pulley", "cable": cable, "pulley": 1, "time": JAMMED_AT} for cable in (1, 2)
+]
+
+
+@pytest.mark.parametrize("limit", [0.25, 0.1])
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_a_winch_that_pulls_at_a_jam_ends_the_run_where_the_rope_would_break(
+    fidelity: str, limit: float
+) -> None:
+    """The rope between winch and jam keeps its path, so that its strain is the rope wound since
+    over the rope that is left there; what it had at the jam, 2 N of 1e5 N, does not count."""
+    values = {"faults": JAMS, "solver.end_time": 20.0, "limits.rope_strain": limit}
+    scene = load_scene("truss2").with_values(values)
+    run = simulate(scene, fidelity)
+    assert (int(run.status), int(run.outcome)) == (Status.OK, Fate.OVERLOADED)
+    assert run.attrs["reason"].endswith(
+        f" s, more than limits.rope_strain = {limit:g}, with 0 of 4 V-joints locked"
+    )
+    # EA e at the end, within a step of the full model, where the ideal ring ends to round-off.
+    late = SPEED * 0.1 / 0.06 if fidelity == "full" else 1e-9
+    assert limit * 1e5 <= run.peak_tension.item() * (1.0 + 1e-9)
+    assert run.peak_tension.item() <= (limit + late) * 1e5
+    # A span of length l is strained by v t / (l - v t).
+    wound = SPEED * (run.final_time.item() - JAMMED_AT)
+    length = wound * (1.0 + limit) / limit
+    assert length == pytest.approx(scene.cables.winch_distance, rel=0.01)
