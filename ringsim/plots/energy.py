@@ -22,7 +22,7 @@ def energy(dataset: xr.Dataset) -> Figure:
     Below them is their imbalance, each in a unit of its own size; ``energy_error`` is stated where
     it is known.
     """
-    figure = Figure(figsize=(8.0, 5.8))
+    figure = Figure(figsize=(8.0, 6.3))
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(5, 2))
     factor, units = style.readable_units(*(dataset[name] for name in _LOOKS))
     for name, (colour, dashes) in _LOOKS.items():
@@ -30,7 +30,8 @@ def energy(dataset: xr.Dataset) -> Figure:
         line.set(linestyle=dashes, label=dataset[name].attrs["long_name"])
     upper.margins(y=0.08)
     upper.set_ylabel(f"Energy ({units})")
-    upper.legend(loc="best")
+    # Beside the curves: between them there need not be room.
+    figure.legend(handles=upper.lines, loc="outside lower center", ncols=2)
     lack = imbalance(dataset)
     factor, units = style.readable_units(lack)
     lower.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1.2)

@@ -12,7 +12,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from ringsim.outputs.family import Array
-from ringsim.plots import style
+from ringsim.plots import free_labels, style
 
 
 class Peak(NamedTuple):
@@ -66,15 +66,15 @@ def label_of(dataset: xr.Dataset, name: str, nearby: xr.DataArray) -> Any:
 
 
 def mark(axes: Axes, peak: Peak, units: str, place: str, factor: float = 1.0) -> None:
-    """A dot at a peak, and its value, time and place in words in the corner away from it."""
+    """A dot at a peak, and its value, time and place in words away from it and from curves."""
     if not math.isfinite(peak.value):
         return
     height = factor * peak.value
     axes.plot(peak.time, height, "o", color=style.VERMILLION, markersize=6, zorder=4, clip_on=False)
     early = peak.time < 0.5 * sum(axes.get_xlim())
-    axes.text(
+    free_labels.free(axes.text(
         0.98 if early else 0.02, 0.95 if early else 0.82,
         f"largest: {height:.3g} {units} at {peak.time:.4g} s\n{place}", transform=axes.transAxes,
         va="top", ha="right" if early else "left", color=style.VERMILLION, bbox=style.PAPER,
         zorder=5,
-    )  # fmt: skip
+    ))  # fmt: skip

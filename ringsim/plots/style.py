@@ -15,6 +15,7 @@ from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from ringsim.plots import free_labels
 from ringsim.variables import Fate, Status
 
 INK, GREY, PALE = "#222222", "#6e6e6e", "#e4e4e4"
@@ -102,7 +103,10 @@ def ending(dataset: xr.Dataset) -> str:
 
 
 def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: float = 8.0) -> None:
-    """Subject and scene above the figure, how the run ended above its first axes."""
+    """Subject and scene above the figure, how the run ended above its first axes.
+
+    Called when all is drawn: words inside the axes then move away from the curves.
+    """
     inches = figure.get_size_inches()[0]
     words, width = f"{subject}: {scene_title(dataset)}".rstrip(": "), int(10.3 * inches)
     lines = len(textwrap.wrap(words, width))
@@ -111,6 +115,7 @@ def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: flo
     title(figure, textwrap.fill(words, next(fitting, width)))
     end = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
     axes.set_title("\n".join(end), pad=pad)
+    free_labels.settle(figure)
 
 
 def scene_title(dataset: xr.Dataset) -> str:
@@ -185,10 +190,10 @@ def plain_numbers(axis: Axis) -> None:
 
 
 def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
-    """A bold name in the upper left corner of the frame."""
-    axes.text(
+    """A bold name in the upper left corner of the frame, or where it covers no curve."""
+    free_labels.free(axes.text(
         0.02, height, text, transform=axes.transAxes, va="top", weight="bold", zorder=5, bbox=PAPER
-    )
+    ))  # fmt: skip
 
 
 @styled
