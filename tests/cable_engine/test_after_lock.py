@@ -26,7 +26,7 @@ def uneven_scene(after_lock: str, **values: Any) -> Scene:
         "both__winch__winding__speed": 0.05,
         "both__winch__after_lock": after_lock,
         "limits__overrun": 15.0,
-        "solver__tolerance": 1e-3,
+        "solver__tolerance": 5e-4,
     }
     return truss(**fields | values).with_values({"cables.upper.winch.winding.speed": 0.1})
 
