@@ -1,0 +1,73 @@
+"""Solving for all unknowns: fronts, one for each part and each block of bodies.
+
+A front is a small dense matrix.  Its first ``gone`` unknowns occur in no other front that is left,
+so they are eliminated there; what that leaves of the others (the Schur complement) is added to the
+parent front (the multifrontal method: Duff and Reid, ACM Transactions on Mathematical Software 9,
+1983).  Parts come first, then the blocks in their order; a closed ring's fronts carry the last block
+along.  The work grows linearly with the sections.
+"""
+
+from ringsim.frame.vectors import compiled
+
+LEAST_PIVOT = 1e-9
+"""Pivot over the largest entry of its row in the front as assembled.  Elimination without exchange
+loses as many digits; Newton renews what they spoil, but not without end."""
+
+
+@compiled
+def factor(mesh, fronts):
+    """Eliminate all fronts, shape (n, most, most), in place; False where a pivot is too small."""
+    sound = True
+    for number in range(len(mesh.gone)):
+        a, gone, size = fronts[number], mesh.gone[number], mesh.size[number]
+        for spot in mesh.fixed:
+            for k in range(gone):
+                if mesh.spots[number, k] == spot:
+                    a[k, :size] = 0.0
+                    a[:size, k] = 0.0
+                    a[k, k] = 1.0
+        for k in range(gone):
+            pivot = a[k, k]
+            largest = 0.0
+            for j in range(k, size):
+                largest = max(largest, abs(a[k, j]))
+            sound &= abs(pivot) > LEAST_PIVOT * largest
+            for i in range(k + 1, size):
+                share = a[i, k] / pivot
+                a[i, k] = share
+                if share != 0.0:
+                    for j in range(k + 1, size):
+                        a[i, j] -= share * a[k, j]
+        if gone < size:
+            other = fronts[mesh.parent[number]]
+            for i in range(gone, size):
+                row = mesh.up[number, i]
+                for j in range(gone, size):
+                    other[row, mesh.up[number, j]] += a[i, j]
+    return sound
+
+
+@compiled
+def solve(mesh, fronts, x):
+    """Replace right-hand sides ``x``, shape (n, unknowns), by solutions with factored fronts."""
+    y = x[0, :0].copy()
+    for row in range(len(x)):
+        y = x[row]
+        for spot in mesh.fixed:
+            y[spot] = 0.0
+        for number in range(len(mesh.gone)):
+            a, spots = fronts[number], mesh.spots[number]
+            for k in range(mesh.gone[number]):
+                value = y[spots[k]]
+                if value != 0.0:
+                    for i in range(k + 1, mesh.size[number]):
+                        y[spots[i]] -= a[i, k] * value
+        for spot in mesh.fixed:
+            y[spot] = 0.0
+        for number in range(len(mesh.gone) - 1, -1, -1):
+            a, spots = fronts[number], mesh.spots[number]
+            for k in range(mesh.gone[number] - 1, -1, -1):
+                value = y[spots[k]]
+                for j in range(k + 1, mesh.size[number]):
+                    value -= a[k, j] * y[spots[j]]
+                y[spots[k]] = value / a[k, k]

@@ -1,0 +1,253 @@
+"""Forces and tangent of all rods and masses, compiled."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ringsim.frame.element import carried, element_tangent, middle, scaled
+from ringsim.frame.vectors import (
+    compiled,
+    cross,
+    dot,
+    matrix,
+    minus,
+    mul,
+    plus,
+    put,
+    store,
+    times,
+    turn,
+    turned,
+    turned_about_z,
+    vector,
+)
+from ringsim.layout.pose import Array
+
+
+class Pose(NamedTuple):
+    """Places (f, 3), m, and axes (f, 3, 3) of all frames, and all joint angles (a,), rad."""
+
+    place: Array
+    axes: Array
+    angle: Array
+
+
+class Strains(NamedTuple):
+    """Strains u (m) and psi (rad) of all elements at a state, shape (e, 6); ``before`` and
+    ``lead`` (1/s) give their rates, lead * strain + before.
+    """
+
+    now: Array
+    before: Array
+    lead: float
+
+
+@compiled
+def move(mesh, pose, step):
+    """Move a pose by changes of all unknowns, shape (unknowns,); in place."""
+    for f in range(len(pose.place)):
+        k = mesh.home[f]
+        put(pose.place[f], (step[k], step[k + 1], step[k + 2]))
+        by = turned((step[k + 3], step[k + 4], step[k + 5]))
+        store(pose.axes[f], mul(by, matrix(pose.axes[f])))
+    for n in range(len(pose.angle)):
+        pose.angle[n] += step[mesh.angle_home[n]]
+
+
+@compiled
+def straighten(pose):
+    """Take what round-off has done to the axes out: R (3 - R^T R) / 2; returns the largest."""
+    worst = 0.0
+    for f in range(len(pose.axes)):
+        r = pose.axes[f]
+        square = r.T @ r
+        for i in range(3):
+            for j in range(3):
+                worst = max(worst, abs(square[i, j] - (i == j)))
+        r[:] = 1.5 * r - 0.5 * (r @ square)
+    return worst
+
+
+@compiled
+def place_points(mesh, pose, out):
+    """Places of all points with mass, shape (p, 3)."""
+    for n in range(len(mesh.point_frame)):
+        f = mesh.point_frame[n]
+        arm = turn(matrix(pose.axes[f]), vector(mesh.point_arm[n]))
+        out[n, 0] = pose.place[f, 0] + arm[0]
+        out[n, 1] = pose.place[f, 1] + arm[1]
+        out[n, 2] = pose.place[f, 2] + arm[2]
+
+
+@compiled
+def end_axes(mesh, pose, e, side):
+    """Axes of an end of an element."""
+    own = mul(matrix(pose.axes[mesh.frame[e, side]]), matrix(mesh.axes[e, side]))
+    angle = mesh.angle[e, side]
+    return own if angle < 0 else mul(own, turned_about_z(pose.angle[angle]))
+
+
+@compiled
+def strains_of(mesh, pose, points, out):
+    """Strains of all elements, shape (e, 6)."""
+    for e in range(len(mesh.length)):
+        d = minus(vector(points[mesh.point[e, 1]]), vector(points[mesh.point[e, 0]]))
+        r1, r2 = end_axes(mesh, pose, e, 0), end_axes(mesh, pose, e, 1)
+        _, u, psi = middle(r1, r2, d, mesh.length[e])
+        for k in range(3):
+            out[e, k], out[e, 3 + k] = u[k], psi[k]
+
+
+@compiled
+def _loaded(mesh, pose, points, strains, e):
+    """What an element holds: axes of its ends and middle, d, psi, n, w, m; keeps its strains."""
+    r1, r2 = end_axes(mesh, pose, e, 0), end_axes(mesh, pose, e, 1)
+    d = minus(vector(points[mesh.point[e, 1]]), vector(points[mesh.point[e, 0]]))
+    axes, u, psi = middle(r1, r2, d, mesh.length[e])
+    for k in range(3):
+        strains.now[e, k], strains.now[e, 3 + k] = u[k], psi[k]
+    du = plus(times(strains.lead, u), vector(strains.before[e, :3]))
+    dpsi = plus(times(strains.lead, psi), vector(strains.before[e, 3:]))
+    force = scaled(vector(mesh.stiffness[e, :3]), u, du, mesh.tau)
+    moment = scaled(vector(mesh.stiffness[e, 3:]), psi, dpsi, mesh.tau)
+    n, w, m = carried(axes, d, force, moment, psi)
+    return r1, r2, axes, d, psi, n, w, m
+
+
+@compiled
+def _pulls(mesh, accelerations, e, n, w, m):
+    """Forces and moments on an element's ends, with those of inertia."""
+    a1 = vector(accelerations[mesh.point[e, 0]])
+    a2 = vector(accelerations[mesh.point[e, 1]])
+    sixth = mesh.mass[e] / 6.0
+    f1 = minus(times(sixth, plus(times(2.0, a1), a2)), n)
+    f2 = plus(times(sixth, plus(times(2.0, a2), a1)), n)
+    half = times(0.5, w)
+    return f1, minus(times(-1.0, m), half), f2, minus(m, half)
+
+
+@compiled
+def add_forces(mesh, pose, points, accelerations, strains, g):
+    """Add forces of elastic rods and of inertia on all unknowns, shape (unknowns,)."""
+    for e in range(len(mesh.length)):
+        r1, r2, _, _, _, n, w, m = _loaded(mesh, pose, points, strains, e)
+        f1, m1, f2, m2 = _pulls(mesh, accelerations, e, n, w, m)
+        for side in range(2):
+            force, moment, axes = (f1, m1, r1) if side == 0 else (f2, m2, r2)
+            f = mesh.frame[e, side]
+            k = mesh.home[f]
+            arm = minus(vector(points[mesh.point[e, side]]), vector(pose.place[f]))
+            put(g[k : k + 3], force)
+            put(g[k + 3 : k + 6], plus(moment, cross(arm, force)))
+            if mesh.angle[e, side] >= 0:
+                z = (axes[2], axes[5], axes[8])
+                g[mesh.angle_home[mesh.angle[e, side]]] += dot(z, moment)
+    for p in range(len(mesh.point_mass)):
+        if mesh.point_mass[p] > 0.0:
+            f = mesh.point_frame[p]
+            k = mesh.home[f]
+            force = times(mesh.point_mass[p], vector(accelerations[p]))
+            arm = minus(vector(points[p]), vector(pose.place[f]))
+            put(g[k : k + 3], force)
+            put(g[k + 3 : k + 6], cross(arm, force))
+
+
+@compiled
+def add_tangent(mesh, pose, points, accelerations, strains, by_place, fronts):
+    """Add the derivative of ``add_forces`` to the fronts; ``by_place`` is that of accelerations
+    after places, 1/s^2.
+    """
+    k12, rows, h = np.zeros((12, 12)), np.zeros((12, 14)), np.zeros((14, 14))
+    more = 1.0 + mesh.tau * strains.lead
+    for e in range(len(mesh.length)):
+        r1, r2, axes, d, psi, n, w, m = _loaded(mesh, pose, points, strains, e)
+        f1, m1, f2, m2 = _pulls(mesh, accelerations, e, n, w, m)
+        k12[:] = 0.0
+        ku = times(more, vector(mesh.stiffness[e, :3]))
+        kp = times(more, vector(mesh.stiffness[e, 3:]))
+        element_tangent(axes, d, n, w, m, psi, ku, kp, k12)
+        sixth = by_place * mesh.mass[e] / 6.0
+        for k in range(3):
+            k12[k, k] += 2.0 * sixth
+            k12[k, 6 + k] += sixth
+            k12[6 + k, k] += sixth
+            k12[6 + k, 6 + k] += 2.0 * sixth
+        for side in range(2):
+            x, phi, own = 6 * side, 6 * side + 3, 7 * side
+            end = r1 if side == 0 else r2
+            a = minus(
+                vector(points[mesh.point[e, side]]), vector(pose.place[mesh.frame[e, side]])
+            )
+            z = (end[2], end[5], end[8])
+            for i in range(12):
+                # d x = d X - a x d phi, and the force's row times that: f . (d phi x a).
+                f = (k12[i, x], k12[i, x + 1], k12[i, x + 2])
+                t = (k12[i, phi], k12[i, phi + 1], k12[i, phi + 2])
+                swung = cross(a, f)
+                for j in range(3):
+                    rows[i, own + j] = f[j]
+                    rows[i, own + 3 + j] = t[j] + swung[j]
+                rows[i, own + 6] = dot(t, z)
+        for side in range(2):
+            x, phi, own = 6 * side, 6 * side + 3, 7 * side
+            end = r1 if side == 0 else r2
+            f = f1 if side == 0 else f2
+            moment = m1 if side == 0 else m2
+            a = minus(
+                vector(points[mesh.point[e, side]]), vector(pose.place[mesh.frame[e, side]])
+            )
+            z = (end[2], end[5], end[8])
+            for j in range(14):
+                force = (rows[x, j], rows[x + 1, j], rows[x + 2, j])
+                torque = (rows[phi, j], rows[phi + 1, j], rows[phi + 2, j])
+                swung = cross(a, force)
+                for i in range(3):
+                    h[own + i, j] = force[i]
+                    h[own + 3 + i, j] = torque[i] + swung[i]
+                h[own + 6, j] = dot(z, torque)
+            # The arm and the joint's axis turn with the frame under constant force and moment:
+            # (d phi x a) x f = (a f^T - (f . a)) d phi, (d phi x z) . m = (z x m) . d phi.
+            along, sideways = dot(f, a), cross(z, moment)
+            for i in range(3):
+                for j in range(3):
+                    h[own + 3 + i, own + 3 + j] += a[i] * f[j]
+                h[own + 3 + i, own + 3 + i] -= along
+                h[own + 6, own + 3 + i] += sideways[i]
+        front = fronts[mesh.part[e]]
+        for i in range(14):
+            row = mesh.local[e, i]
+            if row >= 0:
+                for j in range(14):
+                    column = mesh.local[e, j]
+                    if column >= 0:
+                        front[row, column] += h[i, j]
+    # Points with mass of their own: those of frames in parts have no arm.
+    for p in range(len(mesh.point_mass)):
+        if mesh.point_mass[p] == 0.0:
+            continue
+        f, mass = mesh.point_frame[p], by_place * mesh.point_mass[p]
+        front, first = fronts[mesh.frame_local[f, 0]], mesh.frame_local[f, 1]
+        a = minus(vector(points[p]), vector(pose.place[f]))
+        force = times(mesh.point_mass[p], vector(accelerations[p]))
+        along, square = dot(force, a), dot(a, a)
+        s = (0.0, -a[2], a[1], a[2], 0.0, -a[0], -a[1], a[0], 0.0)
+        for i in range(3):
+            front[first + i, first + i] += mass
+            front[first + 3 + i, first + 3 + i] += mass * square - along
+            for j in range(3):
+                front[first + i, first + 3 + j] -= mass * s[3 * i + j]
+                front[first + 3 + i, first + j] += mass * s[3 * i + j]
+                front[first + 3 + i, first + 3 + j] += a[i] * force[j] - mass * a[i] * a[j]
+
+
+@compiled
+def kinetic_energy(mesh, velocities):
+    """Of rods and points, J; velocities of the points, shape (p, 3), m/s."""
+    found = 0.0
+    for e in range(len(mesh.mass)):
+        v1, v2 = vector(velocities[mesh.point[e, 0]]), vector(velocities[mesh.point[e, 1]])
+        found += mesh.mass[e] / 6.0 * (dot(v1, v1) + dot(v1, v2) + dot(v2, v2))
+    for p in range(len(mesh.point_mass)):
+        v = vector(velocities[p])
+        found += 0.5 * mesh.point_mass[p] * dot(v, v)
+    return found

@@ -1,0 +1,168 @@
+"""Points of the cables' paths on frames, compiled.
+
+A point stands at X + R (arm + C Rz(share theta) b) of a frame X, R: a pulley on a hinge assembly
+has b = 0, one on a bar half turns with its joint (share 1, or 0 on the half that is the frame), and
+a block on the bisector of two halves turns half as far, b = (0, -sense h, 0): the bisector of
+``ringsim.engine.cable_path`` for relative turns of the halves below three quarters of a turn.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ringsim.cable.ropes import Ropes
+from ringsim.cable.sheaves import BlockSheave, Sheave
+from ringsim.frame.kernels import Pose
+from ringsim.frame.mesh import Indices, Mesh, Skeleton
+from ringsim.frame.vectors import (
+    compiled,
+    cross,
+    dot,
+    matrix,
+    mul,
+    plus,
+    put,
+    times,
+    turn,
+    turned_about_z,
+    vector,
+)
+from ringsim.layout.pose import Array
+
+
+class Lines(NamedTuple):
+    """Points of all paths, of every one: frame, arm, axes C, b, angle (-1: none) and share.
+
+    ``span`` are the spans between different frames, ``near`` their first points (the other is the
+    next), ``front`` and ``local`` where their unknowns are (X, phi, angle of both points).
+    """
+
+    frame: Indices
+    arm: Array
+    axes: Array
+    swung: Array
+    angle: Indices
+    share: Array
+    span: Indices
+    near: Indices
+    front: Indices
+    local: Indices
+
+
+def lines_of(skeleton: Skeleton, mesh: Mesh, paths: Sequence[Sequence[Sheave]], ropes: Ropes) -> Lines:
+    """The points of paths of a layout."""
+    found = [_point(skeleton, sheave) for path in paths for sheave in path]
+    frame, arm, axes, swung, angle, share = (np.array(each) for each in zip(*found, strict=True))
+    spans, fronts, local = [], [], []
+    for span, near in enumerate(ropes.near.tolist()):
+        ends = near, near + 1
+        if frame[near] == frame[near + 1]:
+            continue
+        inner = [int(frame[k]) for k in ends if frame[k] >= len(skeleton.layout.bodies)]
+        front = int(mesh.frame_local[inner[0], 0])
+        where = {int(spot): k for k, spot in enumerate(mesh.spots[front, : mesh.size[front]])}
+        row = []
+        for k in ends:
+            row += [where[int(mesh.home[frame[k]]) + i] for i in range(6)]
+            row.append(where[int(mesh.angle_home[angle[k]])] if angle[k] >= 0 else -1)
+        spans.append(span)
+        fronts.append(front)
+        local.append(row)
+    return Lines(
+        frame, arm, axes, swung, angle, share, np.array(spans), ropes.near[spans],
+        np.array(fronts), np.array(local),
+    )  # fmt: skip
+
+
+def _point(skeleton: Skeleton, sheave: Sheave) -> tuple[int, Array, Array, Array, int, float]:
+    none = np.zeros(3)
+    if isinstance(sheave, BlockSheave):
+        first, second = (skeleton.end_of(mount) for mount in sheave.nodes)
+        swung = np.array([0.0, -sheave.sense * sheave.offset, 0.0])
+        turning = second if first.angle < 0 else first
+        return first.frame, first.arm, turning.axes, swung, turning.angle, 0.5
+    end = skeleton.end_of(sheave.node)
+    if end.angle < 0:
+        return end.frame, end.arm + end.axes @ sheave.arm, np.eye(3), none, -1, 0.0
+    return end.frame, end.arm, end.axes, sheave.arm, end.angle, 1.0
+
+
+@compiled
+def _arms(lines, pose, n):
+    """Arm of a point that turns with its frame, the part that turns with its angle, and the axis."""
+    axes = matrix(pose.axes[lines.frame[n]])
+    arm, swung, axis = turn(axes, vector(lines.arm[n])), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if lines.angle[n] >= 0:
+        own = mul(axes, matrix(lines.axes[n]))
+        turned = turned_about_z(lines.share[n] * pose.angle[lines.angle[n]])
+        swung = turn(mul(own, turned), vector(lines.swung[n]))
+        axis = times(lines.share[n], (own[2], own[5], own[8]))
+    return plus(arm, swung), swung, axis
+
+
+@compiled
+def place_lines(lines, pose, out):
+    """Places of all points, shape (points, 3), m."""
+    for n in range(len(lines.frame)):
+        arm, _, _ = _arms(lines, pose, n)
+        for k in range(3):
+            out[n, k] = pose.place[lines.frame[n], k] + arm[k]
+
+
+@compiled
+def pull_lines(lines, mesh, pose, forces, out):
+    """Add what forces on all points, shape (n, points, 3), do to the unknowns: (n, unknowns)."""
+    for n in range(len(lines.frame)):
+        arm, swung, axis = _arms(lines, pose, n)
+        k = mesh.home[lines.frame[n]]
+        for row in range(len(forces)):
+            force = vector(forces[row, n])
+            put(out[row, k : k + 3], force)
+            put(out[row, k + 3 : k + 6], cross(arm, force))
+            if lines.angle[n] >= 0:
+                out[row, mesh.angle_home[lines.angle[n]]] += dot(axis, cross(swung, force))
+
+
+@compiled
+def add_line_tangent(lines, pose, tensions, directions, by_direction, fronts):
+    """Add how the pulls turn with the spans, (spans, 3, 3) in N/m, and with the arms, to fronts."""
+    legs = np.zeros((3, 14))
+    for s in range(len(lines.span)):
+        span, front = lines.span[s], fronts[lines.front[s]]
+        for side in range(2):
+            n, own, sign = lines.near[s] + side, 7 * side, 2.0 * side - 1.0
+            a, b, z = _arms(lines, pose, n)
+            swing = cross(z, b)
+            for i in range(3):
+                for j in range(6):
+                    legs[i, own + j] = 0.0
+                legs[i, own + i] = sign
+                legs[i, own + 6] = sign * swing[i]
+            legs[0, own + 4], legs[0, own + 5] = sign * a[2], -sign * a[1]
+            legs[1, own + 3], legs[1, own + 5] = -sign * a[2], sign * a[0]
+            legs[2, own + 3], legs[2, own + 4] = sign * a[1], -sign * a[0]
+            # Arms turn under a constant force f that resists: as for the ends of elements.
+            f = times(sign * tensions[span], vector(directions[span]))
+            along, b_along, z_along = dot(f, a), dot(f, b), dot(f, z)
+            lifted = cross(swing, f)
+            local = lines.local[s]
+            for i in range(3):
+                row = local[own + 3 + i]
+                for j in range(3):
+                    front[row, local[own + 3 + j]] += a[i] * f[j]
+                front[row, row] -= along
+                if local[own + 6] >= 0:
+                    k = local[own + 6]
+                    front[row, k] += lifted[i]
+                    front[k, row] += z_along * b[i] - b_along * z[i]
+            if local[own + 6] >= 0:
+                front[local[own + 6], local[own + 6]] += dot(z, cross(swing, f))
+        pulled = by_direction[span] @ legs
+        h = legs.T @ pulled
+        for i in range(14):
+            row = lines.local[s, i]
+            if row >= 0:
+                for j in range(14):
+                    if lines.local[s, j] >= 0:
+                        front[row, lines.local[s, j]] += h[i, j]
