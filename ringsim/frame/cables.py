@@ -19,9 +19,9 @@ from ringsim.frame.lines import add_line_tangent, lines_of, place_lines, pull_li
 from ringsim.frame.mesh import Mesh, Skeleton
 from ringsim.layout.pose import Array
 
-_SLIGHT = 0.02
-"""Change of tension with a place of the path that a pulley causes, over the largest T / L of the
-rope, below which Newton's tangent does without it."""
+_STEADY = 0.9999
+"""Share of the full friction from which a pulley is left out of Newton's tangent: it no longer
+changes with the rope's speed."""
 
 
 class FrameCables:
@@ -78,8 +78,8 @@ class FrameCables:
         left = np.ones(len(state.natural))
         if self.winches.answering:
             left = self.winches.stiffness_left(time, self.ropes, state.paths, state.path_rates)
+        near, directions = self.ropes.near, np.zeros((self.ropes.spans, 3, 3))
         columns, rows = [], []
-        directions = np.zeros((self.ropes.spans, 3, 3))
         for rope in range(len(state.natural)):
             tangent = rope_tangent(state, rates, rope)
             spans = tangent.spans
@@ -87,27 +87,26 @@ class FrameCables:
             if not state.ropes.alive[rope]:
                 continue
             mean = left[rope] * tangent.mean_by_place + by_place * tangent.mean_by_velocity
-            columns.append(self._on_spans(spans, state.shares[spans, None] * state.directions[spans]))
-            rows.append(self._on_spans(spans, mean))
-            logs, by_difference, by_velocity = decay_factors(state, tangent, rope)
-            change = by_difference + by_place * by_velocity
-            stiffest = float(np.max(state.tensions[spans] / state.lengths[spans]))
-            felt = np.abs(logs).max(axis=0) * np.abs(change).max(axis=(1, 2))
-            for k in np.flatnonzero(felt > _SLIGHT * max(stiffest, 1.0)):
-                columns.append(self._on_spans(spans, logs[:, k, None] * state.directions[spans]))
-                rows.append(self._on_spans(spans, change[k]))
+            tensions, by_difference = state.shares[spans][None], mean[None]
+            turning = np.abs(state.exponents[state.ropes.inner(rope)]) < _STEADY
+            if turning.any():
+                logs, by_place_, by_velocity = decay_factors(state, tangent, rope)
+                own = np.append(np.flatnonzero(turning), len(turning))
+                tensions = np.vstack([tensions, logs.T[own]])
+                change = by_place_[own] + by_place * by_velocity[own]
+                by_difference = np.concatenate([by_difference, change])
+            each = np.stack([tensions[:, :, None] * state.directions[spans], by_difference])
+            found = np.zeros((2, len(tensions), self.points, 3))
+            found[:, :, near[spans]] -= each
+            found[:, :, near[spans] + 1] += each
+            columns.append(found[0])
+            rows.append(found[1])
         add_line_tangent(
             self._lines, pose, state.tensions, state.directions, directions, fronts
         )
-        out = np.zeros((2 * len(columns), self._mesh.unknowns))
-        if columns:
-            pull_lines(self._lines, self._mesh, pose, np.array(columns + rows), out)
-        return out[: len(columns)], out[len(columns) :]
-
-    def _on_spans(self, spans: slice, each: Array) -> Array:
-        """Vectors of a rope's spans as differences at the paths' points, shape (points, 3)."""
-        found = np.zeros((self.points, 3))
-        near = self.ropes.near[spans]
-        found[near] -= each
-        found[near + 1] += each
-        return found
+        if not columns:
+            return (np.zeros((0, self._mesh.unknowns)),) * 2
+        forces = np.concatenate(columns + rows)
+        out = np.zeros((len(forces), self._mesh.unknowns))
+        pull_lines(self._lines, self._mesh, pose, forces, out)
+        return out[: len(out) // 2], out[len(out) // 2 :]

@@ -49,25 +49,50 @@ def factor(mesh, fronts):
 
 @compiled
 def solve(mesh, fronts, x):
-    """Replace right-hand sides ``x``, shape (n, unknowns), by solutions with factored fronts."""
-    y = x[0, :0].copy()
-    for row in range(len(x)):
-        y = x[row]
-        for spot in mesh.fixed:
-            y[spot] = 0.0
-        for number in range(len(mesh.gone)):
-            a, spots = fronts[number], mesh.spots[number]
-            for k in range(mesh.gone[number]):
-                value = y[spots[k]]
-                if value != 0.0:
-                    for i in range(k + 1, mesh.size[number]):
-                        y[spots[i]] -= a[i, k] * value
-        for spot in mesh.fixed:
-            y[spot] = 0.0
-        for number in range(len(mesh.gone) - 1, -1, -1):
-            a, spots = fronts[number], mesh.spots[number]
-            for k in range(mesh.gone[number] - 1, -1, -1):
-                value = y[spots[k]]
-                for j in range(k + 1, mesh.size[number]):
-                    value -= a[k, j] * y[spots[j]]
-                y[spots[k]] = value / a[k, k]
+    """Replace right-hand sides ``x``, shape (unknowns, n), by solutions with factored fronts."""
+    columns = x.shape[1]
+    for number in range(len(mesh.gone)):
+        a, spots = fronts[number], mesh.spots[number]
+        for k in range(mesh.gone[number]):
+            pivot = spots[k]
+            for spot in mesh.fixed:
+                if spot == pivot:
+                    x[pivot] = 0.0
+            for i in range(k + 1, mesh.size[number]):
+                share, row = a[i, k], spots[i]
+                if share != 0.0:
+                    for c in range(columns):
+                        x[row, c] -= share * x[pivot, c]
+    for number in range(len(mesh.gone) - 1, -1, -1):
+        a, spots = fronts[number], mesh.spots[number]
+        for k in range(mesh.gone[number] - 1, -1, -1):
+            pivot = spots[k]
+            for j in range(k + 1, mesh.size[number]):
+                share, row = a[k, j], spots[j]
+                if share != 0.0:
+                    for c in range(columns):
+                        x[pivot, c] -= share * x[row, c]
+            for c in range(columns):
+                x[pivot, c] /= a[k, k]
+
+
+@compiled
+def solve_one(mesh, fronts, x):
+    """``solve`` for one right-hand side, shape (unknowns,)."""
+    for number in range(len(mesh.gone)):
+        a, spots = fronts[number], mesh.spots[number]
+        for k in range(mesh.gone[number]):
+            value = x[spots[k]]
+            for spot in mesh.fixed:
+                if spot == spots[k]:
+                    x[spot] = value = 0.0
+            if value != 0.0:
+                for i in range(k + 1, mesh.size[number]):
+                    x[spots[i]] -= a[i, k] * value
+    for number in range(len(mesh.gone) - 1, -1, -1):
+        a, spots = fronts[number], mesh.spots[number]
+        for k in range(mesh.gone[number] - 1, -1, -1):
+            value = x[spots[k]]
+            for j in range(k + 1, mesh.size[number]):
+                value -= a[k, j] * x[spots[j]]
+            x[spots[k]] = value / a[k, k]

@@ -27,6 +27,10 @@ _MOST = 25
 _FALL = 0.3
 """Ratio of successive residuals above which the tangent is renewed: one more iteration costs a
 third of a tangent."""
+_DESCENT = 0.9
+"""Ratio of successive residuals above which half the change is tried, and half of that ..."""
+_SMALLEST_SHARE = 0.1
+"""... down to a sixteenth: by then the tangent of the other side is better."""
 _SHORTEST = 1e-9
 """Step (s) below which a run is given up, as of the full model."""
 
@@ -139,7 +143,11 @@ class Integration:
         return Strains(after.strains, rest, lead)
 
     def _newton(self, time: float, step: float, after: State) -> None:
-        model, factored, last = self._model, None, math.inf
+        """Newton's method with a line search, in place: where forces bend sharply, as of stops and
+        of pulleys whose friction turns round, a whole step may lead as far to the other side.
+        """
+        model, factored, last, share = self._model, None, math.inf, 1.0
+        begun, change, fresh = after.stand(), np.zeros(0), False
         for _ in range(_MOST):
             try:
                 g = model.residual(time, step, self._now, after, self._strains)
@@ -151,13 +159,20 @@ class Integration:
             if norm <= model.tolerance:
                 return
             self.newton_iterations += 1
-            if factored is None or norm > _FALL * last:
+            if fresh and norm > _DESCENT * last and share > _SMALLEST_SHARE:
+                share *= 0.5
+                after.take(begun)
+                self._move(after, share * change)
+                continue
+            fresh = factored is None or norm > _FALL * last
+            if factored is None or fresh:
                 factored = model.tangent(time, step, after, self._strains)
                 self.tangents += 1
                 if not factored.sound:
                     raise _NoStep("a pivot of the tangent is too small")
-            last = norm
-            self._move(after, factored.solve(g))
+            last, share, begun = norm, 1.0, after.stand()
+            change = factored.solve(g)
+            self._move(after, change)
         raise _NoStep(
             f"Newton's residual is {norm:.3g} N after {_MOST} iterations, step {step:.3g} s"
         )

@@ -6,7 +6,7 @@ import numpy as np
 
 from ringsim.cable.state import ChainState
 from ringsim.frame.cables import FrameCables
-from ringsim.frame.elimination import factor, solve
+from ringsim.frame.elimination import factor, solve, solve_one
 from ringsim.frame.following import Coefficients, Followed, follow
 from ringsim.frame.kernels import Pose, Strains, add_forces, add_tangent, place_points
 from ringsim.frame.laws import JointLaws, Openings
@@ -30,6 +30,15 @@ class State:
     def __init__(self, pose: Pose, hub: Array, strains: Array, followed: Followed) -> None:
         self.pose, self.hub, self.strains, self.followed = pose, hub, strains, followed
         self.chain: ChainState | None = None
+
+    def stand(self) -> tuple[Array, ...]:
+        """Copies of all places."""
+        return tuple(each.copy() for each in (*self.pose, self.hub))
+
+    def take(self, places: tuple[Array, ...]) -> None:
+        """Go back to places of ``stand``."""
+        for each, place in zip((*self.pose, self.hub), places, strict=True):
+            each[:] = place
 
     def copy(self) -> "State":
         """Arrays of its own."""
@@ -224,20 +233,21 @@ class Factored:
         self._mesh, self._fronts, self._rows = model.mesh, fronts, rows
         self._hub = model.strings is not None
         self.sound = bool(factor(model.mesh, fronts))
-        self._reached = columns.copy()
-        solve(model.mesh, fronts, self._reached)
-        self._corner = corner - rows @ self._reached.T
+        self._reached = columns.T.copy()
+        if len(columns):
+            solve(model.mesh, fronts, self._reached)
+        self._corner = corner - rows @ self._reached
 
     def solve(self, g: Array) -> Array:
         """The change of all unknowns that takes a residual g to zero."""
         unknowns = self._mesh.unknowns
-        x = -g[None, :unknowns].copy()
-        solve(self._mesh, self._fronts, x)
+        x = -g[:unknowns]
+        solve_one(self._mesh, self._fronts, x)
         if not len(self._corner):
-            return np.asarray(x[0])
+            return np.asarray(x)
         right = np.zeros(len(self._corner))
         if self._hub:
             right[-3:] = -g[-3:]
-        z = np.linalg.solve(self._corner, right - self._rows @ x[0])
-        found = x[0] - z @ self._reached
-        return np.concatenate([found, z[-3:]]) if self._hub else found
+        z = np.linalg.solve(self._corner, right - self._rows @ x)
+        x -= self._reached @ z
+        return np.concatenate([x, z[-3:]]) if self._hub else x
