@@ -10,6 +10,7 @@ from ringsim.cable.faults.family import CableFault
 from ringsim.cable.state import work_between
 from ringsim.frame.kernels import Strains, kinetic_energy, move, straighten
 from ringsim.frame.model import FrameModel, State
+from ringsim.frame.stresses import StressMeter
 from ringsim.frame.vectors import matrix, mul, rotation_vector, transposed
 from ringsim.layout.pose import Array
 from ringsim.outputs.recorder import Recorder
@@ -69,6 +70,7 @@ class Integration:
         )
         coordinates = {"rod": np.array(list(model.layout.halves()))}
         self.history = Recorder(scene, coordinates)
+        self._stress = StressMeter(model.mesh, model.layout) if scene.record.stress else None
         self.newton_iterations = self.tangents = 0
         self._drift = 0.0
         self._lossy: tuple[Array, ...] | None = None
@@ -255,8 +257,7 @@ class Integration:
                 **vars(now),
                 chain=chain,
                 planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
-                stress=self._model.stresses(self._now, self._strains)
-                if self._scene.record.stress else None,
+                stress=None if self._stress is None else self._stress.read(self._strains),
                 strain=None,
             )
         )
@@ -270,7 +271,7 @@ class Integration:
         kinetic = kinetic_energy(mesh, model.part(rate, 0))
         elastic = 0.5 * float(np.sum(mesh.stiffness * state.strains**2))
         torques = model.laws.torques(state.pose.angle, model.part(rate, 2))
-        elastic += torques.stored
+        elastic += torques.stored + sum(slide.stored(state.pose) for slide in model.slides)
         pushing, moved = [torques.lost], [state.pose.angle]
         if model.strings is not None:
             _, stored, lost, lengths = model.strings.pulls(*model._net_at(state))
@@ -304,7 +305,7 @@ class Integration:
             self._lossy = self._passing
         work = sum(float(force @ (state.pose.place[f] - self._reference[f])) for f, force in model.loaded)
         energies = Energies(float(kinetic), elastic, work, lost, driven)
-        gap = max((slide.gap(state.pose) for slide in model.slides), default=0.0)
+        gap = max((slide.size(state.pose) for slide in model.slides), default=0.0)
         return Instant(time, angles, rates, energies, gap, tensions, stretch, moving)
 
 

@@ -119,9 +119,9 @@ def _pulls(mesh, accelerations, e, n, w, m):
     """Forces and moments on an element's ends, with those of inertia."""
     a1 = vector(accelerations[mesh.point[e, 0]])
     a2 = vector(accelerations[mesh.point[e, 1]])
-    sixth = mesh.mass[e] / 6.0
-    f1 = minus(times(sixth, plus(times(2.0, a1), a2)), n)
-    f2 = plus(times(sixth, plus(times(2.0, a2), a1)), n)
+    own, other = mesh.mass[e, 0], mesh.mass[e, 1]
+    f1 = minus(plus(times(own, a1), times(other, a2)), n)
+    f2 = plus(plus(times(own, a2), times(other, a1)), n)
     half = times(0.5, w)
     return f1, minus(times(-1.0, m), half), f2, minus(m, half)
 
@@ -166,12 +166,11 @@ def add_tangent(mesh, pose, points, accelerations, strains, by_place, fronts):
         ku = times(more, vector(mesh.stiffness[e, :3]))
         kp = times(more, vector(mesh.stiffness[e, 3:]))
         element_tangent(axes, d, n, w, m, psi, ku, kp, k12)
-        sixth = by_place * mesh.mass[e] / 6.0
         for k in range(3):
-            k12[k, k] += 2.0 * sixth
-            k12[k, 6 + k] += sixth
-            k12[6 + k, k] += sixth
-            k12[6 + k, 6 + k] += 2.0 * sixth
+            k12[k, k] += by_place * mesh.mass[e, 0]
+            k12[k, 6 + k] += by_place * mesh.mass[e, 1]
+            k12[6 + k, k] += by_place * mesh.mass[e, 1]
+            k12[6 + k, 6 + k] += by_place * mesh.mass[e, 0]
         for side in range(2):
             x, phi, own = 6 * side, 6 * side + 3, 7 * side
             end = r1 if side == 0 else r2
@@ -246,7 +245,7 @@ def kinetic_energy(mesh, velocities):
     found = 0.0
     for e in range(len(mesh.mass)):
         v1, v2 = vector(velocities[mesh.point[e, 0]]), vector(velocities[mesh.point[e, 1]])
-        found += mesh.mass[e] / 6.0 * (dot(v1, v1) + dot(v1, v2) + dot(v2, v2))
+        found += 0.5 * mesh.mass[e, 0] * (dot(v1, v1) + dot(v2, v2)) + mesh.mass[e, 1] * dot(v1, v2)
     for p in range(len(mesh.point_mass)):
         v = vector(velocities[p])
         found += 0.5 * mesh.point_mass[p] * dot(v, v)

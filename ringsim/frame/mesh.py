@@ -11,6 +11,8 @@ neighbours: its inner unknowns are eliminated by themselves (``ringsim.frame.eli
 """
 
 from collections import defaultdict
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,9 +20,10 @@ from numpy.typing import NDArray
 
 from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod
 from ringsim.layout.joints import Joint
-from ringsim.layout.layout import Layout
-from ringsim.layout.pose import Array
+from ringsim.layout.layout import BoomBeam, Layout
+from ringsim.layout.pose import Array, Pose
 from ringsim.parts.rods.family import Rods
+from ringsim.parts.tube import Tube
 from ringsim.refusal import InputError
 
 Indices = NDArray[np.int64]
@@ -37,6 +40,18 @@ class End(NamedTuple):
     angle: int
 
 
+class Element(NamedTuple):
+    """An elastic element between two ends; length (m), stiffness of u (N/m) and psi (N m), shape
+    (6,), and what ``inertia_of`` gives.
+    """
+
+    first: End
+    second: End
+    length: float
+    stiffness: Array
+    mass: Array
+
+
 class Angle(NamedTuple):
     """A joint's angle: joint, sense of the joint's own rate, and value at the start, rad."""
 
@@ -49,7 +64,7 @@ class Mesh(NamedTuple):
     """Arrays of what does not change in a run; e elements, f frames, a angles, p points.
 
     Of the ends of elements: frame, angle (-1: none), place and axes in the frame, number of the
-    point there; lengths (m), stiffness of u and psi, shape (e, 6), and masses (kg) of elements.
+    point there; lengths (m), stiffness of u and psi, shape (e, 6), and masses (``inertia_of``).
     Points with mass: frame, place in it and mass beside that of the elements.  ``home`` and
     ``inner_home`` are the unknowns of frames (the first of six) and angles; ``part`` that of each
     element, ``local`` its unknowns (x, phi, angle by end) among the part's, -1 for none.
@@ -99,6 +114,7 @@ class Skeleton:
         self.angle_rates: list[float] = []
         self.fixed: list[int] = []
         self.slides: list[tuple[int, int]] = []
+        self.beam: list[End] = []
         self._ends: dict[tuple[int, int], End] = {}
         self.angle_of: dict[int, int] = {}
         revolutes = [(n, j) for n, j in enumerate(layout.joints) if j.kind == "revolute"]
@@ -118,11 +134,34 @@ class Skeleton:
         if key not in self._ends:
             part = self.layout.rods[rod]
             pose = part.station(part.stations[station])
-            self.places.append(pose.place)
-            self.axes.append(pose.axes)
-            self.rates.append((pose.rate, pose.turn))
+            self._frame(pose)
             self._ends[key] = End(len(self.places) - 1, np.zeros(3), np.eye(3), -1)
         return self._ends[key]
+
+    def add_beam(self, beam: BoomBeam) -> list[Element]:
+        """The elements of a flexible boom, from its clamped top down; ``beam`` are their nodes."""
+        boom, body = beam.record, self.layout.bodies[beam.top.body]
+        # x along the boom, downwards.
+        axes = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+        length = boom.length / boom.elements
+        self.beam = [End(beam.top.body, beam.top.arm, body.pose.axes.T @ axes, -1)]
+        place, rate = body.pose.at(beam.top.arm)
+        top = Pose(place, axes, rate, body.pose.turn)
+        for k in range(1, boom.elements + 1):
+            place, rate = top.at(np.array([k * length, 0.0, 0.0]))
+            self._frame(Pose(place, axes, rate, top.turn))
+            self.beam.append(End(len(self.places) - 1, np.zeros(3), np.eye(3), -1))
+        young, area, second = boom.young_modulus, boom.tube.area, boom.tube.second_moment
+        # Nothing twists a boom along which a body slides freely: any torsional stiffness will do.
+        bending, across = young * second, 12.0 * young * second / length**2
+        stiffness = np.array([young * area, across, across, bending, bending, bending]) / length
+        mass = inertia_of(boom.density, boom.tube, length)
+        return [Element(*pair, length, stiffness, mass) for pair in pairwise(self.beam)]
+
+    def _frame(self, pose: Pose) -> None:
+        self.places.append(pose.place)
+        self.axes.append(pose.axes)
+        self.rates.append((pose.rate, pose.turn))
 
     def end_of(self, mount: Mount) -> End:
         """The node that carries a mount on a rod or a body."""
@@ -187,9 +226,13 @@ _FRAME = 'fidelity = "frame" does not represent'
 _CURE = 'choose fidelity = "full"'
 
 
-def mesh_of(skeleton: Skeleton, rods: Rods, extra: list[tuple[End, End, float, Array, float]]) -> Mesh:
-    """The arrays of a skeleton; ``extra`` elements beside those of its rods (ends, length,
-    stiffness, mass) are of a flexible boom.
+def mesh_of(
+    skeleton: Skeleton,
+    rods: Rods,
+    boom: Sequence[Element] = (),
+    touching: Sequence[int] = (),
+) -> Mesh:
+    """The arrays of a skeleton, with elements of a boom, which bodies ``touching`` it hold.
 
     Raises
     ------
@@ -201,9 +244,9 @@ def mesh_of(skeleton: Skeleton, rods: Rods, extra: list[tuple[End, End, float, A
     for number, rod in enumerate(layout.rods):
         for k, length in enumerate(rod.lengths.tolist()):
             ends = skeleton.end(number, k), skeleton.end(number, k + 1)
-            mass = rod.density * rod.tube.area * length
-            elements.append((*ends, length, stiffness_of(rod, rods, length), mass))
-    elements += extra
+            mass = inertia_of(rod.density, rod.tube, length)
+            elements.append(Element(*ends, length, stiffness_of(rod, rods, length), mass))
+    elements += boom
     corners = np.array(layout.corners).T
     width, blocks = 6 * corners.shape[1], len(corners)
     bodies, frames = len(layout.bodies), len(skeleton.places)
@@ -238,6 +281,8 @@ def mesh_of(skeleton: Skeleton, rods: Rods, extra: list[tuple[End, End, float, A
             raise InputError(f"{_FRAME} rods without joints between two bodies: {_CURE}")
         part[n] = numbers[find(held[0])]
         touched[int(part[n])] |= {end.frame for end in (first, second) if end.frame < bodies}
+    for body in touching:
+        touched[int(part[-1])].add(body)
     home, angle_home = np.zeros(frames, dtype=np.int64), np.zeros(len(skeleton.angles), dtype=np.int64)
     first_of, inner_of_part, place = [], [], 0
     for own in members.values():
@@ -343,6 +388,17 @@ def stiffness_of(rod, rods: Rods, length: float) -> Array:
     return np.array(
         [young * area, across, across, 2.0 * shear * second, bending, bending]
     ) / length
+
+
+def inertia_of(density: float, tube: Tube, length: float) -> Array:
+    """Masses m_own, m_other of a rod between its end points, shape (2,), kg: an end's inertia force
+    is m_own times its acceleration and m_other times that of the other end.
+
+    (m / 6) (2, 1) is a thin rod, which moves linearly between its ends, and (mu, -mu) with
+    mu L^2 = rho I L the inertia of its sections when it turns; that about its own axis is left out.
+    """
+    sixth, sections = density * tube.area * length / 6.0, density * tube.second_moment / length
+    return np.array([2.0 * sixth + sections, sixth - sections])
 
 
 def tetrahedron(mass: float, centre: Array, inertia: Array) -> Array:

@@ -12,7 +12,7 @@ from ringsim.frame.kernels import Pose, Strains, add_forces, add_tangent, place_
 from ringsim.frame.laws import JointLaws, Openings
 from ringsim.frame.mesh import Skeleton, mesh_of
 from ringsim.frame.net import Strings
-from ringsim.frame.slide import STIFFNESS, Slide
+from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
 from ringsim.layout.layout import layout_of
 from ringsim.layout.pose import Array, cross
 from ringsim.scene import Scene
@@ -60,7 +60,10 @@ class FrameModel:
     def __init__(self, scene: Scene) -> None:
         self.scene, self.layout = scene, layout_of(scene)
         self.skeleton = skeleton = Skeleton(self.layout)
-        self.mesh = mesh = mesh_of(skeleton, scene.rods, [])
+        beam = self.layout.boom
+        boom = [] if beam is None else skeleton.add_beam(beam)
+        touching = [] if beam is None else [beam.low.body]
+        self.mesh = mesh = mesh_of(skeleton, scene.rods, boom, touching)
         self.openings = Openings.of(skeleton)
         self.laws = JointLaws(scene, skeleton, self.openings)
         self.strings = None if self.layout.net is None else Strings(self.layout.net)
@@ -72,7 +75,14 @@ class FrameModel:
         if scene.cables is not None:
             self.cables = FrameCables(scene.cables, skeleton, mesh, pose)
         stiffest = float(mesh.stiffness[:, 0].max())
-        self.slides = [Slide(mesh, *pair, STIFFNESS * stiffest) for pair in skeleton.slides]
+        self.slides: list[Slide] = [
+            RigidSlide(mesh, *pair, STIFFNESS * stiffest) for pair in skeleton.slides
+        ]
+        if beam is not None:
+            nodes = [(end.frame, end.axes) for end in skeleton.beam]
+            self.slides.append(
+                BeamSlide(mesh, nodes, boom[0].length, beam.low.body, STIFFNESS * stiffest)
+            )
         self.size = mesh.unknowns + (0 if self.strings is None else 3)
         self.loads = np.zeros(self.size)
         self.loaded: list[tuple[int, Array]] = []
