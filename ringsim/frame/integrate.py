@@ -77,10 +77,6 @@ class Integration:
         ropes = None
         if model.cables is not None:
             ropes = model.cables.ropes.content
-            followed = model.start.followed
-            self._now.chain = model.cables.state(
-                0.0, model.part(followed.place, 1), model.part(followed.rate, 1)
-            )
         self._control = RunControl(
             scene.solver,
             scales_of(scene, model.layout, ropes),
@@ -242,11 +238,6 @@ class Integration:
                 elif isinstance(fault, CableFault) and self._model.cables is not None:
                     assert self._now.chain is not None
                     self._model.cables.strike(fault, self._now.chain)
-                    followed = self._now.followed
-                    self._now.chain = self._model.cables.state(
-                        now.time, self._model.part(followed.place, 1),
-                        self._model.part(followed.rate, 1),
-                    )  # fmt: skip
             after = self._measure(now.time, self._now, self._now, self._strains)
             lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
             energies = after.energies._replace(lost=lost, driven=now.energies.driven)
@@ -291,7 +282,9 @@ class Integration:
             lost = 0.5 * float((forces + old_forces) @ (places - old_places))
         tensions, stretch = None, 0.0
         moving = bool(self._faults)
-        if state.chain is not None and model.cables is not None:
+        if model.cables is not None:
+            place = state.followed.place
+            state.chain = model.cables.state(time, model.part(place, 1), model.part(rate, 1))
             elastic += float(state.chain.elastic_energy.sum())
             if state is not before and before.chain is not None:
                 driven, rubbed = work_between(before.chain, state.chain)

@@ -140,8 +140,9 @@ class FrameModel:
             inner[spots] += pulls
             g[-3:] += self.strings.hub_mass * self.part(acceleration, 4)[0] - pulls.sum(axis=0)
         if self.cables is not None:
-            now.chain = self.cables.state(time, self.part(place, 1), self.part(rate, 1))
-            self.cables.pull(now.pose, now.chain, inner)
+            self._pulled = self.cables.pull(
+                time, now.pose, self.part(place, 1), self.part(rate, 1), inner
+            )
         inner[self.mesh.fixed] = 0.0
         return g
 
@@ -168,9 +169,9 @@ class FrameModel:
         for slide in self.slides:
             slide.add_tangent(now.pose, fronts)
         columns = rows = np.zeros((0, mesh.unknowns))
-        if self.cables is not None and now.chain is not None:
+        if self.cables is not None:
             columns, rows = self.cables.add_tangent(
-                time, now.pose, now.chain, self.part(rate, 1), by_rate, fronts
+                time, now.pose, *self._pulled, self.part(rate, 1), by_rate, fronts
             )
         corner = -np.eye(len(columns))
         if self.strings is not None:
