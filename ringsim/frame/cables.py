@@ -34,6 +34,7 @@ from ringsim.frame.lines import (
 from ringsim.frame.mesh import Mesh, Skeleton
 from ringsim.layout.pose import Array
 
+
 class FrameCables:
     """The cables of a scene on the frames of a mesh.
 

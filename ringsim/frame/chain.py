@@ -11,7 +11,7 @@ import numpy as np
 
 from ringsim.cable.ropes import Ropes
 from ringsim.frame.mesh import Indices
-from ringsim.frame.vectors import compiled, dot, minus, plus, times, vector
+from ringsim.frame.vectors import Vector, compiled, dot, minus, plus, times, vector
 from ringsim.layout.pose import Array
 
 STEADY = 0.9999
@@ -78,7 +78,7 @@ class Spans(NamedTuple):
 
 
 @compiled
-def measure(table, behind, places, rates, spans):
+def measure(table: RopeTable, behind: Indices, places: Array, rates: Array, spans: Spans) -> None:
     """Lengths, rates, directions and angles of places and rates of the points, (points, 3)."""
     for i in range(len(spans.length)):
         k = table.near[i]
@@ -91,13 +91,11 @@ def measure(table, behind, places, rates, spans):
     for j in range(len(behind)):
         before, after = vector(spans.unit[behind[j] - 1]), vector(spans.unit[behind[j]])
         both, apart = plus(before, after), minus(after, before)
-        spans.angle[j] = 2.0 * math.atan2(
-            math.sqrt(dot(both, both)), math.sqrt(dot(apart, apart))
-        )
+        spans.angle[j] = 2.0 * math.atan2(math.sqrt(dot(both, both)), math.sqrt(dot(apart, apart)))
 
 
 @compiled
-def tighten(table, drums, log_decays, spans):
+def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> None:
     """Tensions of all spans."""
     for rope in range(len(table.starts)):
         first, last = table.starts[rope], table.ends[rope]
@@ -133,22 +131,24 @@ def tighten(table, drums, log_decays, spans):
 
 
 @compiled
-def _force(table, rope, path, path_rate, natural, winding):
+def _force(
+    table: RopeTable, rope: int, path: float, path_rate: float, natural: float, winding: float
+) -> float:
     """Elastic and viscous force of a rope before slack."""
     strain_rate = (path_rate + path / natural * winding) / natural
-    return table.material[rope, 0] * (
-        path / natural - 1.0 + table.material[rope, 1] * strain_rate
-    )
+    return table.material[rope, 0] * (path / natural - 1.0 + table.material[rope, 1] * strain_rate)
 
 
 @compiled
-def _tension(table, rope, path, path_rate, natural, winding):
+def _tension(
+    table: RopeTable, rope: int, path: float, path_rate: float, natural: float, winding: float
+) -> float:
     force, width = _force(table, rope, path, path_rate, natural, winding), table.material[rope, 2]
     return max(force, 0.0) + width * math.log1p(math.exp(max(-abs(force) / width, -200.0)))
 
 
 @compiled
-def turning_pulleys(table, spans):
+def turning_pulleys(table: RopeTable, spans: Spans) -> int:
     """Number of pulleys of whole ropes whose friction changes with speed, and ropes with one."""
     count = 0
     for rope in range(len(table.starts)):
@@ -161,7 +161,17 @@ def turning_pulleys(table, spans):
 
 
 @compiled
-def border(table, drums, log_decays, log_slopes, spans, velocities, left, by_velocity, out):
+def border(
+    table: RopeTable,
+    drums: Drums,
+    log_decays: Array,
+    log_slopes: Array,
+    spans: Spans,
+    velocities: Array,
+    left: Array,
+    by_velocity: float,
+    out: Array,
+) -> None:
     """Changes of tension in factors: pulls on all points and what they change with, (2, k, p, 3)."""
     n = len(spans.length)
     swing = np.empty((n, 3))
@@ -210,7 +220,8 @@ def border(table, drums, log_decays, log_slopes, spans, velocities, left, by_vel
                 here = 1.0 if i >= b else 0.0
                 by_rate = -ratio * felt * (here - share)
                 by_length = felt * (
-                    steadily / path * (here - share) + ratio / path * (part_rate - share * path_rate)
+                    steadily / path * (here - share)
+                    + ratio / path * (part_rate - share * path_rate)
                 )
                 change = plus(
                     times(by_length + by_velocity * by_rate, unit), times(by_rate, vector(swing[i]))
@@ -237,7 +248,7 @@ def border(table, drums, log_decays, log_slopes, spans, velocities, left, by_vel
 
 
 @compiled
-def _pair(out, row, near, pull, change):
+def _pair(out: Array, row: int, near: int, pull: Vector, change: Vector) -> None:
     """Add a span's pull and change to those of its points."""
     for c in range(3):
         out[0, row, near, c] -= pull[c]

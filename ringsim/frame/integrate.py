@@ -8,10 +8,9 @@ import numpy as np
 
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.state import work_between
-from ringsim.frame.kernels import Strains, kinetic_energy, move, straighten
+from ringsim.frame.kernels import Strains, kinetic_energy, move, moved_between, straighten
 from ringsim.frame.model import FrameModel, State
 from ringsim.frame.stresses import StressMeter
-from ringsim.frame.vectors import matrix, mul, rotation_vector, transposed
 from ringsim.layout.pose import Array
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
@@ -21,7 +20,7 @@ from ringsim.stepping.instant import Energies, Instant
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
 from ringsim.theory.scales import scales_of
-from ringsim.variables import Cause, Outcome, Reason
+from ringsim.variables import Outcome
 
 _MOST = 25
 """Newton iterations a step at most, as of the full model."""
@@ -64,7 +63,9 @@ class Integration:
         self._kept = (np.zeros((elements, 6)),) * 2
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
         self._reference = model.start.pose.place.copy()
-        angles, _ = model.openings.read(model.start.pose.angle, np.zeros_like(model.start.pose.angle))
+        angles, _ = model.openings.read(
+            model.start.pose.angle, np.zeros_like(model.start.pose.angle)
+        )
         self._locks = (
             Locks(angles, stowed, scene.structure.planes) if scene.structure.locks else None
         )
@@ -214,13 +215,8 @@ class Integration:
 
     def _between(self, before: State, after: State) -> Array:
         """Changes of all unknowns."""
-        mesh, found = self._model.mesh, np.zeros(self._model.size)
-        moved = after.pose.place - before.pose.place
-        turned = _turns(before.pose.axes, after.pose.axes)
-        for k in range(3):
-            found[mesh.home + k] = moved[:, k]
-            found[mesh.home + 3 + k] = turned[:, k]
-        found[mesh.angle_home] = after.pose.angle - before.pose.angle
+        found = np.zeros(self._model.size)
+        moved_between(self._model.mesh, before.pose, after.pose, found)
         if self._model.strings is not None:
             found[-3:] = after.hub - before.hub
         return found
@@ -296,13 +292,9 @@ class Integration:
         self._passing = forces, places
         if state is before:
             self._lossy = self._passing
-        work = sum(float(force @ (state.pose.place[f] - self._reference[f])) for f, force in model.loaded)
+        work = sum(
+            float(force @ (state.pose.place[f] - self._reference[f])) for f, force in model.loaded
+        )
         energies = Energies(float(kinetic), elastic, work, lost, driven)
         gap = max((slide.size(state.pose) for slide in model.slides), default=0.0)
         return Instant(time, angles, rates, energies, gap, tensions, stretch, moving)
-
-
-def _turns(before: Array, after: Array) -> Array:
-    return np.array(
-        [rotation_vector(mul(matrix(b), transposed(matrix(a)))) for a, b in zip(before, after, strict=True)]
-    )

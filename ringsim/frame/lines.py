@@ -13,9 +13,11 @@ import numpy as np
 
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.sheaves import BlockSheave, Sheave
+from ringsim.frame.chain import Spans
 from ringsim.frame.kernels import Pose
 from ringsim.frame.mesh import Indices, Mesh, Skeleton
 from ringsim.frame.vectors import (
+    Vector,
     compiled,
     cross,
     dot,
@@ -51,7 +53,9 @@ class Lines(NamedTuple):
     local: Indices
 
 
-def lines_of(skeleton: Skeleton, mesh: Mesh, paths: Sequence[Sequence[Sheave]], ropes: Ropes) -> Lines:
+def lines_of(
+    skeleton: Skeleton, mesh: Mesh, paths: Sequence[Sequence[Sheave]], ropes: Ropes
+) -> Lines:
     """The points of paths of a layout."""
     found = [_point(skeleton, sheave) for path in paths for sheave in path]
     frame, arm, axes, swung, angle, share = (np.array(each) for each in zip(*found, strict=True))
@@ -90,7 +94,7 @@ def _point(skeleton: Skeleton, sheave: Sheave) -> tuple[int, Array, Array, Array
 
 
 @compiled
-def _arms(lines, pose, n):
+def _arms(lines: Lines, pose: Pose, n: int) -> tuple[Vector, Vector, Vector]:
     """Arm of a point that turns with its frame, the part that turns with its angle, and the axis."""
     axes = matrix(pose.axes[lines.frame[n]])
     arm, swung, axis = turn(axes, vector(lines.arm[n])), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -103,7 +107,7 @@ def _arms(lines, pose, n):
 
 
 @compiled
-def place_lines(lines, pose, out):
+def place_lines(lines: Lines, pose: Pose, out: Array) -> None:
     """Places of all points, shape (points, 3), m."""
     for n in range(len(lines.frame)):
         arm, _, _ = _arms(lines, pose, n)
@@ -112,7 +116,7 @@ def place_lines(lines, pose, out):
 
 
 @compiled
-def pull_lines(lines, mesh, pose, forces, out):
+def pull_lines(lines: Lines, mesh: Mesh, pose: Pose, forces: Array, out: Array) -> None:
     """Add what forces on all points, shape (n, points, 3), do to the unknowns: (n, unknowns)."""
     for n in range(len(lines.frame)):
         arm, swung, axis = _arms(lines, pose, n)
@@ -126,7 +130,7 @@ def pull_lines(lines, mesh, pose, forces, out):
 
 
 @compiled
-def pull_spans(lines, mesh, pose, spans, g):
+def pull_spans(lines: Lines, mesh: Mesh, pose: Pose, spans: Spans, g: Array) -> None:
     """Add what resists the pull of spans between frames to the unknowns, shape (unknowns,)."""
     for s in range(len(lines.span)):
         span = lines.span[s]
@@ -143,7 +147,7 @@ def pull_spans(lines, mesh, pose, spans, g):
 
 
 @compiled
-def add_line_tangent(lines, pose, spans, fronts):
+def add_line_tangent(lines: Lines, pose: Pose, spans: Spans, fronts: Array) -> None:
     """Add how the pulls of spans between frames turn with the spans and the arms to the fronts."""
     legs, pulled = np.zeros((3, 14)), np.zeros((3, 14))
     for s in range(len(lines.span)):

@@ -118,7 +118,9 @@ class FrameModel:
             self.part(place, 3)[:] = pose.place[self.strings.bodies]
             self.part(place, 4)[0] = state.hub
 
-    def residual(self, time: float, step: float, start: State, now: State, strains: Strains) -> Array:
+    def residual(
+        self, time: float, step: float, start: State, now: State, strains: Strains
+    ) -> Array:
         """Forces out of balance on all unknowns, shape (size,); ValueError if the cables have no
         answer.
         """
@@ -235,7 +237,7 @@ class FrameModel:
 class Factored:
     """The tangent K of the unknowns with its border:
 
-        K x + columns^T z = r,   rows x + corner z = r_z.
+    K x + columns^T z = r,   rows x + corner z = r_z.
     """
 
     def __init__(
