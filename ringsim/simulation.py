@@ -3,7 +3,6 @@
 Engines are imported by whoever runs them: each costs a second, and its own libraries.
 """
 
-import contextlib
 import time
 import traceback
 from collections.abc import Callable
@@ -84,18 +83,18 @@ def prepare_run_frame(scene: Scene) -> None:
     choose_folder()
     from ringsim.frame.integrate import solve
 
-    class Enough(Exception):
-        """Everything is compiled."""
-
     left = iter(range(_COMPILING_STEPS))
 
     def watch(now: Instant) -> None:
-        if next(left, None) is None:
-            raise Enough
+        next(left)  # raises StopIteration
 
     def compiling() -> None:
-        with contextlib.suppress(Enough):
+        try:
             solve(scene, watch)
+        except InputError:
+            raise
+        except Exception:  # its end; what breaks here breaks in the run, too, which tells of it
+            return
 
     compile_once((sorted(holds(scene)), kind_of(scene.rods)), compiling)
 

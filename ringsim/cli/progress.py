@@ -13,8 +13,9 @@ from ringsim.variables import Outcome
 
 
 def watched(run: Callable[[Scene, Watch | None], Outcome], scene: Scene) -> Outcome:
-    """Run a scene by ``run``; where stderr is a terminal a bar counts its time up to ``solver.end_time``, and
-    the V-joints that have locked.  A run that starts anew starts its bar anew.
+    """Run a scene by ``run``; where stderr is a terminal a bar counts its time up to
+    ``solver.end_time``, and the V-joints that have locked.  A run that starts anew starts its bar
+    anew.
     """
     most = 0
     with tqdm(

@@ -22,7 +22,9 @@ class Local(Scheduler):
         queue = deque(samples)
         with ExitStack() as open_slots:
             slots = [
-                open_slots.enter_context(closing(Slot(work.solver, work.scene, work.limits)))
+                open_slots.enter_context(
+                    closing(Slot(work.solver, work.scene, work.limits, work.judge))
+                )
                 for _ in range(min(self.workers, len(queue)))
             ]
             while not work.stop():
@@ -47,7 +49,8 @@ class Serial(Scheduler):
             if work.stop():
                 break
             work.started(sample)
-            result = solve(solver, base, sample, work.values_of(sample))
+            chosen = solver if sample >= 0 else load_solver(work.judge)
+            result = solve(chosen, base, sample, work.values_of(sample))
             work.keep(result)
             work.finished(result)
         return work.stop()
