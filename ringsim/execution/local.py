@@ -21,12 +21,11 @@ class Local(Scheduler):
         """See :meth:`Scheduler.run`."""
         queue = deque(samples)
         with ExitStack() as open_slots:
-            slots = [
-                open_slots.enter_context(
-                    closing(Slot(work.solver, work.scene, work.limits, work.judge))
-                )
+            made = (
+                Slot(work.solver, work.scene, work.limits, work.judge)
                 for _ in range(min(self.workers, len(queue)))
-            ]
+            )
+            slots = [open_slots.enter_context(closing(slot)) for slot in made]
             while not work.stop():
                 for slot in slots:
                     slot.serve(queue, work)
