@@ -21,12 +21,13 @@ _NAMED = 6
 
 def compared() -> dict[str, Variable]:
     """The numbers by which engines are compared: all that tell of the antenna, no places."""
+    places = COORDINATES.keys() - {"time"}
     return {
         each.name: each
         for output in OUTPUTS if output.of_antenna
         for each in output.variables
         if not each.dims and each.flags is None and each.dtype != "str"
-        and each.name.rpartition("_")[2] not in COORDINATES
+        and each.name.rpartition("_")[2] not in places
     }  # fmt: skip
 
 
