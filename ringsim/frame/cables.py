@@ -31,7 +31,9 @@ from ringsim.frame.lines import (
     pull_lines,
     pull_spans,
 )
-from ringsim.frame.mesh import Mesh, Skeleton
+from ringsim.frame.mesh import Mesh
+from ringsim.frame.parts import Parts
+from ringsim.frame.skeleton import Skeleton
 from ringsim.layout.pose import Array
 
 
@@ -46,7 +48,7 @@ class FrameCables:
         Number of points of all paths.
     """
 
-    def __init__(self, cables: Cables, skeleton: Skeleton, mesh: Mesh, pose: Pose) -> None:
+    def __init__(self, cables: Cables, skeleton: Skeleton, mesh: Mesh, parts: Parts) -> None:
         self.present = cables.present()
         own, paths = [cable for _, cable in self.present], skeleton.layout.paths
         self._chain = Chain(own, [len(path) for path in paths])
@@ -54,7 +56,7 @@ class FrameCables:
         self.points = sum(len(path) for path in paths)
         start = np.array([skeleton.layout.sheave(s)[0] for path in paths for s in path])
         self.ropes = self._chain.start(start)
-        self._lines = lines_of(skeleton, mesh, paths, self.ropes)
+        self._lines = lines_of(skeleton, parts, paths, self.ropes)
         self._retable()
 
     def place(self, pose: Pose, out: Array) -> None:

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.frame.mesh import Indices, Skeleton
+from ringsim.frame.parts import Indices
+from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.layout.joints import JointOpening
 from ringsim.layout.pose import Array
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
@@ -39,15 +40,11 @@ class Openings(NamedTuple):
     def of(cls, skeleton: Skeleton) -> "Openings":
         """Those of a layout."""
         found = [
-            [(skeleton.angle_of[one.joint], one.sense) for one in plane]
+            [(skeleton.angle_of[o.joint], o.sense) for o in plane if isinstance(o, JointOpening)]
             for plane in skeleton.layout.openings
-            if all(isinstance(one, JointOpening) for one in plane)
         ]
-        if len(found) != len(skeleton.layout.openings):
-            raise InputError(
-                'fidelity = "frame" does not represent openings without joints: '
-                'choose fidelity = "full"'
-            )
+        if not all(found):
+            raise InputError(f"{NOT_HERE} openings without joints: {CURE}")
         table = np.array(found)
         return cls(table[..., 0].astype(np.int64), table[..., 1])
 

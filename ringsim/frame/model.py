@@ -8,10 +8,11 @@ from ringsim.cable.state import ChainState
 from ringsim.frame.cables import FrameCables
 from ringsim.frame.elimination import factor, solve, solve_one
 from ringsim.frame.following import Coefficients, Followed, follow
-from ringsim.frame.kernels import Pose, Strains, add_forces, add_tangent, place_points
+from ringsim.frame.kernels import Pose, Strains, add_forces, add_tangent, move, place_points
 from ringsim.frame.laws import JointLaws, Openings
-from ringsim.frame.mesh import Skeleton, mesh_of
+from ringsim.frame.mesh import mesh_of
 from ringsim.frame.net import Strings
+from ringsim.frame.skeleton import Skeleton
 from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
 from ringsim.layout.layout import layout_of
 from ringsim.layout.pose import Array, cross
@@ -19,12 +20,16 @@ from ringsim.scene import Scene
 from ringsim.theory.one_coordinate import OneCoordinate
 from ringsim.theory.scales import residual_tolerance
 
+POINTS, LINES, ANGLES, ENDS, HUB = range(5)
+"""Followed coordinates: points with mass, points of the cables, joint angles, the ends of the net's
+strings and its hub."""
+
 
 class State:
     """Where everything stands and how it moves.
 
-    ``followed`` are the coordinates of points with mass, of the cables' points and the hub, and
-    the joint angles, behind one another; the properties are views of these.
+    ``followed`` are all coordinates that ``FrameModel.part`` tells apart; ``chain`` the cables of a
+    state that a step has led to.
     """
 
     def __init__(self, pose: Pose, hub: Array, strains: Array, followed: Followed) -> None:
@@ -63,7 +68,8 @@ class FrameModel:
         beam = self.layout.boom
         boom = [] if beam is None else skeleton.add_beam(beam)
         touching = [] if beam is None else [beam.low.body]
-        self.mesh = mesh = mesh_of(skeleton, scene.rods, boom, touching)
+        self.mesh, parts = mesh_of(skeleton, scene.rods, boom, touching)
+        mesh = self.mesh
         self.openings = Openings.of(skeleton)
         self.laws = JointLaws(scene, skeleton, self.openings)
         self.strings = None if self.layout.net is None else Strings(self.layout.net)
@@ -73,7 +79,7 @@ class FrameModel:
         pose = Pose(np.array(skeleton.places), np.array(skeleton.axes), angle)
         self.cables = None
         if scene.cables is not None:
-            self.cables = FrameCables(scene.cables, skeleton, mesh, pose)
+            self.cables = FrameCables(scene.cables, skeleton, mesh, parts)
         stiffest = float(mesh.stiffness[:, 0].max())
         self.slides: list[Slide] = [
             RigidSlide(mesh, *pair, STIFFNESS * stiffest) for pair in skeleton.slides
@@ -85,11 +91,11 @@ class FrameModel:
             )
         self.size = mesh.unknowns + (0 if self.strings is None else 3)
         self.loads = np.zeros(self.size)
-        self.loaded: list[tuple[int, Array]] = []
+        self._loaded: list[tuple[int, Array, Array]] = []
         for number, force in self.layout.forces:
             end = skeleton.end_of(self.layout.joints[number].first)
             self.loads[mesh.home[end.frame] : mesh.home[end.frame] + 3] += force
-            self.loaded.append((end.frame, force))
+            self._loaded.append((end.frame, pose.place[end.frame].copy(), force))
         self.tolerance = residual_tolerance(
             scene, self.layout, 4.0 * float(np.finfo(float).eps) * math.sqrt(self.size)
         )
@@ -97,26 +103,36 @@ class FrameModel:
         ends = 0 if self.strings is None else len(self.strings.bodies)
         self._cuts = np.cumsum([0, points, 3 * lines, len(angle), 3 * ends, 3 * (ends > 0)])
         self.start = self._started(pose)
-        self.forced = self.start.followed.place[:0]
         self._fronts = np.zeros((len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]))
 
     def part(self, values: Array, which: int) -> Array:
-        """Of the followed coordinates: points 0, cables' points 1, angles 2, strings' ends 3, hub
-        4; a view, shape (n, 3) or (angles,).
+        """Of followed coordinates those of POINTS, LINES, ANGLES, ENDS or HUB: a view, shape
+        (n, 3) or (angles,).
         """
         own = values[self._cuts[which] : self._cuts[which + 1]]
-        return own if which == 2 else own.reshape(-1, 3)
+        return own if which == ANGLES else own.reshape(-1, 3)
+
+    def work(self, pose: Pose) -> float:
+        """Of the loads since the start, J."""
+        done = (force @ (pose.place[f] - start) for f, start, force in self._loaded)
+        return float(sum(done))
+
+    def gap(self, pose: Pose) -> float:
+        """Largest distance of a body from the boom that it slides along, m; revolutes cannot come
+        apart.
+        """
+        return max((slide.size(pose) for slide in self.slides), default=0.0)
 
     def place(self, state: State) -> None:
         """Places of all followed coordinates at the state's pose."""
         place, pose = state.followed.place, state.pose
-        place_points(self.mesh, pose, self.part(place, 0))
+        place_points(self.mesh, pose, self.part(place, POINTS))
         if self.cables is not None:
-            self.cables.place(pose, self.part(place, 1))
-        self.part(place, 2)[:] = pose.angle
+            self.cables.place(pose, self.part(place, LINES))
+        self.part(place, ANGLES)[:] = pose.angle
         if self.strings is not None:
-            self.part(place, 3)[:] = pose.place[self.strings.bodies]
-            self.part(place, 4)[0] = state.hub
+            self.part(place, ENDS)[:] = pose.place[self.strings.bodies]
+            self.part(place, HUB)[0] = state.hub
 
     def residual(
         self, time: float, step: float, start: State, now: State, strains: Strains
@@ -130,28 +146,34 @@ class FrameModel:
         g = -self.loads
         inner = g[: self.mesh.unknowns]
         add_forces(
-            self.mesh, now.pose, self.part(place, 0), self.part(acceleration, 0), strains, inner
+            self.mesh,
+            now.pose,
+            self.part(place, POINTS),
+            self.part(acceleration, POINTS),
+            strains,
+            inner,
         )
-        torques = self.laws.torques(now.pose.angle, self.part(rate, 2))
+        torques = self.laws.torques(now.pose.angle, self.part(rate, ANGLES))
         inner[self.mesh.angle_home] += torques.total
         for slide in self.slides:
             slide.hold(now.pose, inner)
         if self.strings is not None:
-            pulls = self.strings.pulls(*self._net_at(now))[0]
+            pulls = self.strings.pulls(*self.net_at(now))[0]
             spots = self.mesh.home[self.strings.bodies][:, None] + np.arange(3)
             inner[spots] += pulls
-            g[-3:] += self.strings.hub_mass * self.part(acceleration, 4)[0] - pulls.sum(axis=0)
+            g[-3:] += self.strings.hub_mass * self.part(acceleration, HUB)[0] - pulls.sum(axis=0)
         if self.cables is not None:
             self._pulled = self.cables.pull(
-                time, now.pose, self.part(place, 1), self.part(rate, 1), inner
+                time, now.pose, self.part(place, LINES), self.part(rate, LINES), inner
             )
         inner[self.mesh.fixed] = 0.0
         return g
 
-    def _net_at(self, now: State) -> tuple[Array, Array, Array, Array]:
+    def net_at(self, now: State) -> tuple[Array, Array, Array, Array]:
+        """Places and rates of the strings' ends, (n, 3), and of the hub, (3,)."""
         place, rate = now.followed.place, now.followed.rate
         return (
-            self.part(place, 3), self.part(rate, 3), self.part(place, 4)[0], self.part(rate, 4)[0]
+            self.part(place, ENDS), self.part(rate, ENDS), self.part(place, HUB)[0], self.part(rate, HUB)[0]
         )  # fmt: skip
 
     def tangent(self, time: float, step: float, now: State, strains: Strains) -> "Factored":
@@ -162,10 +184,10 @@ class FrameModel:
         fronts = self._fronts
         fronts[:] = 0.0
         add_tangent(
-            mesh, now.pose, self.part(place, 0), self.part(acceleration, 0), strains, by_place,
+            mesh, now.pose, self.part(place, POINTS), self.part(acceleration, POINTS), strains, by_place,
             fronts,
         )  # fmt: skip
-        slopes = self.laws.slopes(now.pose.angle, self.part(rate, 2), by_rate)
+        slopes = self.laws.slopes(now.pose.angle, self.part(rate, ANGLES), by_rate)
         front, spot = mesh.angle_local.T
         fronts[front, spot, spot] += slopes
         for slide in self.slides:
@@ -173,11 +195,11 @@ class FrameModel:
         columns = rows = np.zeros((0, mesh.unknowns))
         if self.cables is not None:
             columns, rows = self.cables.add_tangent(
-                time, now.pose, *self._pulled, self.part(rate, 1), by_rate, fronts
+                time, now.pose, *self._pulled, self.part(rate, LINES), by_rate, fronts
             )
         corner = -np.eye(len(columns))
         if self.strings is not None:
-            blocks = self.strings.tangents(*self._net_at(now), by_rate)
+            blocks = self.strings.tangents(*self.net_at(now), by_rate)
             front, first = mesh.frame_local[self.strings.bodies].T
             reach = np.arange(3)
             spots = first[:, None] + reach
@@ -217,8 +239,6 @@ class FrameModel:
         self.place(state)
         # Accelerations of the points: differences of places along the motion.
         ahead, behind = state.copy(), state.copy()
-        from ringsim.frame.kernels import move
-
         small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)
         move(self.mesh, ahead.pose, small * self.first[: self.mesh.unknowns])
         move(self.mesh, behind.pose, -small * self.first[: self.mesh.unknowns])

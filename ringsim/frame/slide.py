@@ -11,7 +11,7 @@ from ringsim.frame.vectors import compiled, cross, dot, minus, vector
 from ringsim.layout.pose import Array, skew
 
 STIFFNESS = 100.0
-"""Over that of the stiffest rod along its axis, EA / L: the gap is a hundredth of what rods give."""
+"""Over that of the stiffest rod along its axis, EA / L: it gives a hundredth of what rods do."""
 
 
 class Gap(NamedTuple):
