@@ -136,9 +136,8 @@ def _force(
 ) -> float:
     """Elastic and viscous force of a rope before slack."""
     strain_rate = (path_rate + path / natural * winding) / natural
-    force: float = table.material[rope, 0] * (
-        path / natural - 1.0 + table.material[rope, 1] * strain_rate
-    )
+    stretch: float = path / natural - 1.0 + table.material[rope, 1] * strain_rate
+    return stretch * float(table.material[rope, 0])
 
 
 @compiled

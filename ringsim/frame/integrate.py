@@ -171,7 +171,7 @@ class Integration:
             state.hub += by[-3:]
 
     def _guess(self, step: float) -> Array:
-        """Change of all unknowns over a step: the mean rates of the last two steps, extrapolated."""
+        """Change of all unknowns over a step: mean rates of the last two steps, extrapolated."""
         if not self._moves:
             return 0.5 * step**2 * self._model.first
         last, rate = self._moves[-1]

@@ -18,7 +18,7 @@ class EnergyMeter:
     def __init__(self, model: FrameModel) -> None:
         self._model = model
         self._kept: tuple[Array, Array, ChainState | None] | None = None
-        self._last = self._kept
+        self._last: tuple[Array, Array, ChainState | None] | None = None
 
     def read(self, state: State, strains: Strains) -> Energies:
         """Energies of a state with its strains and, if there are cables, its chain."""

@@ -143,16 +143,10 @@ class FrameModel:
         self.place(now)
         follow(self.coefficients, step, start.followed, now.followed)
         place, rate, acceleration, _ = now.followed
+        points, pushed = self.part(place, POINTS), self.part(acceleration, POINTS)
         g = -self.loads
         inner = g[: self.mesh.unknowns]
-        add_forces(
-            self.mesh,
-            now.pose,
-            self.part(place, POINTS),
-            self.part(acceleration, POINTS),
-            strains,
-            inner,
-        )
+        add_forces(self.mesh, now.pose, points, pushed, strains, inner)
         torques = self.laws.torques(now.pose.angle, self.part(rate, ANGLES))
         inner[self.mesh.angle_home] += torques.total
         for slide in self.slides:
@@ -171,10 +165,11 @@ class FrameModel:
 
     def net_at(self, now: State) -> tuple[Array, Array, Array, Array]:
         """Places and rates of the strings' ends, (n, 3), and of the hub, (3,)."""
-        place, rate = now.followed.place, now.followed.rate
-        return (
-            self.part(place, ENDS), self.part(rate, ENDS), self.part(place, HUB)[0], self.part(rate, HUB)[0]
-        )  # fmt: skip
+        place, rate = (
+            (self.part(each, ENDS), self.part(each, HUB)[0])
+            for each in (now.followed.place, now.followed.rate)
+        )
+        return place[0], rate[0], place[1], rate[1]
 
     def tangent(self, time: float, step: float, now: State, strains: Strains) -> "Factored":
         """The residual's derivative after the unknowns, factored."""
@@ -183,10 +178,8 @@ class FrameModel:
         by_place = self.coefficients.acceleration_by_place(step)
         fronts = self._fronts
         fronts[:] = 0.0
-        add_tangent(
-            mesh, now.pose, self.part(place, POINTS), self.part(acceleration, POINTS), strains, by_place,
-            fronts,
-        )  # fmt: skip
+        points, pushed = self.part(place, POINTS), self.part(acceleration, POINTS)
+        add_tangent(mesh, now.pose, points, pushed, strains, by_place, fronts)
         slopes = self.laws.slopes(now.pose.angle, self.part(rate, ANGLES), by_rate)
         front, spot = mesh.angle_local.T
         fronts[front, spot, spot] += slopes
