@@ -27,7 +27,6 @@ from ringsim.frame.kernels import Pose
 from ringsim.frame.lines import (
     add_line_tangent,
     lines_of,
-    place_lines,
     pull_lines,
     pull_spans,
 )
@@ -44,8 +43,8 @@ class FrameCables:
     ----------
     present, winches, ropes
         As of ``ringsim.engine.cables.CableDrive``.
-    points
-        Number of points of all paths.
+    lines, points
+        What the paths run over; number of their points.
     """
 
     def __init__(self, cables: Cables, skeleton: Skeleton, mesh: Mesh, parts: Parts) -> None:
@@ -56,12 +55,8 @@ class FrameCables:
         self.points = sum(len(path) for path in paths)
         start = np.array([skeleton.layout.sheave(s)[0] for path in paths for s in path])
         self.ropes = self._chain.start(start)
-        self._lines = lines_of(skeleton, parts, paths, self.ropes)
+        self.lines = lines_of(skeleton, parts, paths, self.ropes)
         self._retable()
-
-    def place(self, pose: Pose, out: Array) -> None:
-        """Places of all points, shape (points, 3), m."""
-        place_lines(self._lines, pose, out)
 
     def state(self, time: float, places: Array, rates: Array) -> ChainState:
         """The chain at places and rates of all points; ValueError if it has no answer."""
@@ -97,7 +92,7 @@ class FrameCables:
         drums = Drums(natural, ropes.per_rope(wound_rate), inflow)
         log_decays = self._chain.log_decays(spans.angle)
         tighten(table, drums, log_decays, spans)
-        pull_spans(self._lines, self._mesh, pose, spans, g)
+        pull_spans(self.lines, self._mesh, pose, spans, g)
         return drums, log_decays
 
     def add_tangent(
@@ -117,9 +112,9 @@ class FrameCables:
         factors = np.zeros((2, turning_pulleys(table, spans), self.points, 3))
         log_slopes = self._chain.log_slopes(spans.angle)
         border(table, drums, log_decays, log_slopes, spans, rates, left, by_place, factors)
-        add_line_tangent(self._lines, pose, spans, fronts)
+        add_line_tangent(self.lines, pose, spans, fronts)
         out = np.zeros((2 * factors.shape[1], self._mesh.unknowns))
-        pull_lines(self._lines, self._mesh, pose, factors.reshape(-1, self.points, 3), out)
+        pull_lines(self.lines, self._mesh, pose, factors.reshape(-1, self.points, 3), out)
         return out[: len(out) // 2], out[len(out) // 2 :]
 
     def _retable(self) -> None:

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ringsim.cable.faults.family import CableFault
+from ringsim.frame.balance import ANGLES, LINES
 from ringsim.frame.kernels import Strains, move, moved_between, straighten
 from ringsim.frame.meter import EnergyMeter
-from ringsim.frame.model import ANGLES, LINES, FrameModel, State
+from ringsim.frame.model import FrameModel, State
 from ringsim.frame.stresses import StressMeter
 from ringsim.layout.pose import Array
 from ringsim.outputs.recorder import Recorder

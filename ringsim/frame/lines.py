@@ -78,6 +78,15 @@ def lines_of(
     )  # fmt: skip
 
 
+def no_lines() -> Lines:
+    """Of a scene without cables."""
+    three, whole, one = np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0)
+    return Lines(
+        whole, three, np.zeros((0, 3, 3)), three, whole, one, whole, whole, whole,
+        np.zeros((0, 14), dtype=np.int64),
+    )  # fmt: skip
+
+
 def _point(skeleton: Skeleton, sheave: Sheave) -> tuple[int, Array, Array, Array, int, float]:
     none = np.zeros(3)
     if isinstance(sheave, BlockSheave):
