@@ -6,6 +6,8 @@ tension, one for its share along the path, and one for every pulley whose fricti
 that it enters as a border of the system, not as its entries.
 """
 
+import math
+
 import numpy as np
 
 from ringsim.cable.chain import Chain
@@ -56,6 +58,7 @@ class FrameCables:
         start = np.array([skeleton.layout.sheave(s)[0] for path in paths for s in path])
         self.ropes = self._chain.start(start)
         self.lines = lines_of(skeleton, parts, paths, self.ropes)
+        self._drums_at, self._drums = math.nan, Drums(*np.zeros((3, 0)))
         self._retable()
 
     def state(self, time: float, places: Array, rates: Array) -> ChainState:
@@ -80,20 +83,27 @@ class FrameCables:
         """
         ropes, spans, table = self.ropes, self._spans, self._table
         measure(table, ropes.behind, places, rates, spans)
-        path = path_rate = None
-        if self.winches.answering:
-            path, path_rate = ropes.along(spans.length), ropes.along(spans.rate)
-        wound, wound_rate = self.winches.at(time, ropes, path, path_rate)
-        natural = ropes.content - ropes.per_rope(wound)
-        if not (natural.min() > 0.0 and spans.length.min() > SHORTEST):
+        # Winches that do not answer to their ropes turn alike in all iterations of a step.
+        if self.winches.answering or time != self._drums_at:
+            self._drums, self._drums_at = self._turned(time), time
+        drums = self._drums
+        if not (drums.natural.min() > 0.0 and spans.length.min() > SHORTEST):
             self.state(time, places, rates)  # says what is wrong
-        inflow = np.zeros(len(natural))
-        inflow[ropes.of_end[:, 1]] = -wound_rate[:, 1]
-        drums = Drums(natural, ropes.per_rope(wound_rate), inflow)
         log_decays = self._chain.log_decays(spans.angle)
         tighten(table, drums, log_decays, spans)
         pull_spans(self.lines, self._mesh, pose, spans, g)
         return drums, log_decays
+
+    def _turned(self, time: float) -> Drums:
+        """What the winches have done by a time (s), for spans that have been measured."""
+        ropes, spans, path, path_rate = self.ropes, self._spans, None, None
+        if self.winches.answering:
+            path, path_rate = ropes.along(spans.length), ropes.along(spans.rate)
+        wound, wound_rate = self.winches.at(time, ropes, path, path_rate)
+        inflow = np.zeros(len(ropes.starts))
+        inflow[ropes.of_end[:, 1]] = -wound_rate[:, 1]
+        natural = ropes.content - ropes.per_rope(wound)
+        return Drums(natural, ropes.per_rope(wound_rate), inflow)
 
     def add_tangent(
         self, time: float, pose: Pose, drums: Drums, log_decays: Array, rates: Array,
@@ -121,3 +131,4 @@ class FrameCables:
         chain = self._chain
         self._table = RopeTable.of(self.ropes, chain.material, chain.slip_speed)
         self._spans = Spans.empty(self.ropes)
+        self._drums_at = math.nan
