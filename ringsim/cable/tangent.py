@@ -85,9 +85,7 @@ def decay_tangent(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[A
     return decay, drag
 
 
-def decay_factors(
-    state: ChainState, tangent: RopeTangent, rope: int
-) -> tuple[Array, Array, Array]:
+def decay_factors(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[Array, Array, Array]:
     """The decay part of one rope in factors: changes of tension (N) with the logarithms of the
     decays at its pulleys and, last, with that of the path, shape (n, k), and derivatives of these
     logarithms after differences of points (1/m) and of velocities (s/m), shape (k, n, 3) each.

@@ -11,17 +11,28 @@ import numpy as np
 from ringsim.cable.chain import Chain
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.records import Cables
+from ringsim.cable.ropes import SHORTEST
 from ringsim.cable.state import ChainState
-from ringsim.cable.tangent import decay_factors, rope_tangent
 from ringsim.cable.winches import Winches
+from ringsim.frame.chain import (
+    Drums,
+    RopeTable,
+    Spans,
+    border,
+    measure,
+    tighten,
+    turning_pulleys,
+)
 from ringsim.frame.kernels import Pose
-from ringsim.frame.lines import add_line_tangent, lines_of, place_lines, pull_lines
+from ringsim.frame.lines import (
+    add_line_tangent,
+    lines_of,
+    place_lines,
+    pull_lines,
+    pull_spans,
+)
 from ringsim.frame.mesh import Mesh, Skeleton
 from ringsim.layout.pose import Array
-
-_STEADY = 0.9999
-"""Share of the full friction from which a pulley is left out of Newton's tangent: it no longer
-changes with the rope's speed."""
 
 
 class FrameCables:
@@ -44,6 +55,7 @@ class FrameCables:
         start = np.array([skeleton.layout.sheave(s)[0] for path in paths for s in path])
         self.ropes = self._chain.start(start)
         self._lines = lines_of(skeleton, mesh, paths, self.ropes)
+        self._retable()
 
     def place(self, pose: Pose, out: Array) -> None:
         """Places of all points, shape (points, 3), m."""
@@ -61,52 +73,54 @@ class FrameCables:
     def strike(self, fault: CableFault, state: ChainState) -> None:
         """Let a fault change the ropes."""
         self.ropes = fault.strike(self.ropes, state)
+        self._retable()
 
-    def pull(self, pose: Pose, state: ChainState, g: Array) -> None:
-        """Add what resists the cables' pull to the residual, shape (unknowns,)."""
-        pull_lines(self._lines, self._mesh, pose, -state.point_forces[None], g[None])
+    def pull(
+        self, time: float, pose: Pose, places: Array, rates: Array, g: Array
+    ) -> tuple[Drums, Array]:
+        """Add what resists the cables' pull to the residual, shape (unknowns,); ValueError if the
+        chain has no answer.  Returns what the tangent needs, with the logarithms of the decays.
+        """
+        ropes, spans, table = self.ropes, self._spans, self._table
+        measure(table, ropes.behind, places, rates, spans)
+        path = path_rate = None
+        if self.winches.answering:
+            path, path_rate = ropes.along(spans.length), ropes.along(spans.rate)
+        wound, wound_rate = self.winches.at(time, ropes, path, path_rate)
+        natural = ropes.content - ropes.per_rope(wound)
+        if not (natural.min() > 0.0 and spans.length.min() > SHORTEST):
+            self.state(time, places, rates)  # says what is wrong
+        inflow = np.zeros(len(natural))
+        inflow[ropes.of_end[:, 1]] = -wound_rate[:, 1]
+        drums = Drums(natural, ropes.per_rope(wound_rate), inflow)
+        log_decays = self._chain.log_decays(spans.angle)
+        tighten(table, drums, log_decays, spans)
+        pull_spans(self._lines, self._mesh, pose, spans, g)
+        return drums, log_decays
 
     def add_tangent(
-        self, time: float, pose: Pose, state: ChainState, rates: Array, by_place: float,
-        fronts: Array,
+        self, time: float, pose: Pose, drums: Drums, log_decays: Array, rates: Array,
+        by_place: float, fronts: Array,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Add to the fronts; columns and rows of the border, shape (k, unknowns) each.
+        """Add to the fronts, for the state of the last ``pull``; columns and rows of the border,
+        shape (k, unknowns) each.
 
         ``by_place`` is the derivative of the points' rates after their places, 1/s.  The residual
         changes by the sum of the columns times what the rows say.
         """
-        left = np.ones(len(state.natural))
+        spans, table, left = self._spans, self._table, np.ones(len(drums.natural))
         if self.winches.answering:
-            left = self.winches.stiffness_left(time, self.ropes, state.paths, state.path_rates)
-        near, directions = self.ropes.near, np.zeros((self.ropes.spans, 3, 3))
-        columns, rows = [], []
-        for rope in range(len(state.natural)):
-            tangent = rope_tangent(state, rates, rope)
-            spans = tangent.spans
-            directions[spans] = tangent.by_direction
-            if not state.ropes.alive[rope]:
-                continue
-            mean = left[rope] * tangent.mean_by_place + by_place * tangent.mean_by_velocity
-            tensions, by_difference = state.shares[spans][None], mean[None]
-            turning = np.abs(state.exponents[state.ropes.inner(rope)]) < _STEADY
-            if turning.any():
-                logs, by_place_, by_velocity = decay_factors(state, tangent, rope)
-                own = np.append(np.flatnonzero(turning), len(turning))
-                tensions = np.vstack([tensions, logs.T[own]])
-                change = by_place_[own] + by_place * by_velocity[own]
-                by_difference = np.concatenate([by_difference, change])
-            each = np.stack([tensions[:, :, None] * state.directions[spans], by_difference])
-            found = np.zeros((2, len(tensions), self.points, 3))
-            found[:, :, near[spans]] -= each
-            found[:, :, near[spans] + 1] += each
-            columns.append(found[0])
-            rows.append(found[1])
-        add_line_tangent(
-            self._lines, pose, state.tensions, state.directions, directions, fronts
-        )
-        if not columns:
-            return (np.zeros((0, self._mesh.unknowns)),) * 2
-        forces = np.concatenate(columns + rows)
-        out = np.zeros((len(forces), self._mesh.unknowns))
-        pull_lines(self._lines, self._mesh, pose, forces, out)
+            path, path_rate = self.ropes.along(spans.length), self.ropes.along(spans.rate)
+            left = self.winches.stiffness_left(time, self.ropes, path, path_rate)
+        factors = np.zeros((2, turning_pulleys(table, spans), self.points, 3))
+        log_slopes = self._chain.log_slopes(spans.angle)
+        border(table, drums, log_decays, log_slopes, spans, rates, left, by_place, factors)
+        add_line_tangent(self._lines, pose, spans, fronts)
+        out = np.zeros((2 * factors.shape[1], self._mesh.unknowns))
+        pull_lines(self._lines, self._mesh, pose, factors.reshape(-1, self.points, 3), out)
         return out[: len(out) // 2], out[len(out) // 2 :]
+
+    def _retable(self) -> None:
+        chain = self._chain
+        self._table = RopeTable.of(self.ropes, chain.material, chain.slip_speed)
+        self._spans = Spans.empty(self.ropes)

@@ -27,13 +27,13 @@ rigid motion.  The tangent leaves out how Z and e change, of second order in psi
 import math
 
 from ringsim.frame.vectors import (
+    Matrix,
+    Vector,
     across,
     add,
     compiled,
     cross,
     dot,
-    matrix,
-    minus,
     mul,
     plus,
     rotation_vector,
@@ -46,13 +46,14 @@ from ringsim.frame.vectors import (
     turn_back,
     turned,
 )
+from ringsim.layout.pose import Array
 
 _SMALL = 1e-3
 """Bending (rad) below which the coefficients c and e are taken by series."""
 
 
 @compiled
-def coefficients(psi):
+def coefficients(psi: Vector) -> tuple[float, float]:
     """C and e of the variations."""
     square = dot(psi, psi)
     if square < _SMALL * _SMALL:
@@ -63,7 +64,7 @@ def coefficients(psi):
 
 
 @compiled
-def middle(r1, r2, d, length):
+def middle(r1: Matrix, r2: Matrix, d: Vector, length: float) -> tuple[Matrix, Vector, Vector]:
     """Axes of the middle and the strains u and psi there."""
     psi = rotation_vector(mul(transposed(r1), r2))
     axes = mul(r1, turned(times(0.5, psi)))
@@ -72,7 +73,7 @@ def middle(r1, r2, d, length):
 
 
 @compiled
-def scaled(stiffness, strain, rate, tau):
+def scaled(stiffness: Vector, strain: Vector, rate: Vector, tau: float) -> Vector:
     """Force of three strains (N or N m): elastic and viscous."""
     return (
         stiffness[0] * (strain[0] + tau * rate[0]),
@@ -82,7 +83,9 @@ def scaled(stiffness, strain, rate, tau):
 
 
 @compiled
-def carried(axes, d, force, moment, psi):
+def carried(
+    axes: Matrix, d: Vector, force: Vector, moment: Vector, psi: Vector
+) -> tuple[Vector, Vector, Vector]:
     """Spatial n, w and m of the force and moment in the middle's axes."""
     c, e = coefficients(psi)
     n = turn(axes, force)
@@ -92,7 +95,17 @@ def carried(axes, d, force, moment, psi):
 
 
 @compiled
-def element_tangent(axes, d, n, w, m, psi, ku, kp, k):
+def element_tangent(
+    axes: Matrix,
+    d: Vector,
+    n: Vector,
+    w: Vector,
+    m: Vector,
+    psi: Vector,
+    ku: Vector,
+    kp: Vector,
+    k: Array,
+) -> None:
     """Add the tangent after (x_1, phi_1, x_2, phi_2) to ``k``, shape (12, 12).
 
     ``ku`` and ``kp`` are stiffnesses of the strains with what damping adds.
@@ -125,7 +138,7 @@ def element_tangent(axes, d, n, w, m, psi, ku, kp, k):
 
 
 @compiled
-def _in_space(axes, stiffness):
+def _in_space(axes: Matrix, stiffness: Vector) -> Matrix:
     """R diag(k_x, k, k) R^T = k + (k_x - k) x x^T."""
     s, more = stiffness[1], stiffness[0] - stiffness[1]
     x, y, z = axes[0], axes[3], axes[6]

@@ -7,7 +7,9 @@ parent front (the multifrontal method: Duff and Reid, ACM Transactions on Mathem
 along.  The work grows linearly with the sections.
 """
 
+from ringsim.frame.mesh import Mesh
 from ringsim.frame.vectors import compiled
+from ringsim.layout.pose import Array
 
 LEAST_PIVOT = 1e-9
 """Pivot over the largest entry of its row in the front as assembled.  Elimination without exchange
@@ -15,7 +17,7 @@ loses as many digits; Newton renews what they spoil, but not without end."""
 
 
 @compiled
-def factor(mesh, fronts):
+def factor(mesh: Mesh, fronts: Array) -> bool:
     """Eliminate all fronts, shape (n, most, most), in place; False where a pivot is too small."""
     sound = True
     for number in range(len(mesh.gone)):
@@ -48,7 +50,7 @@ def factor(mesh, fronts):
 
 
 @compiled
-def solve(mesh, fronts, x):
+def solve(mesh: Mesh, fronts: Array, x: Array) -> None:
     """Replace right-hand sides ``x``, shape (unknowns, n), by solutions with factored fronts."""
     columns = x.shape[1]
     for number in range(len(mesh.gone)):
@@ -77,7 +79,7 @@ def solve(mesh, fronts, x):
 
 
 @compiled
-def solve_one(mesh, fronts, x):
+def solve_one(mesh: Mesh, fronts: Array, x: Array) -> None:
     """``solve`` for one right-hand side, shape (unknowns,)."""
     for number in range(len(mesh.gone)):
         a, spots = fronts[number], mesh.spots[number]

@@ -62,7 +62,7 @@ class Followed(NamedTuple):
 
 
 @compiled
-def follow(coefficients, step, start, now):
+def follow(coefficients: Coefficients, step: float, start: Followed, now: Followed) -> None:
     """Rates and accelerations of ``now`` from its places and where the step has started."""
     alpha_m, alpha_f, beta, gamma = coefficients
     for k in range(len(now.place)):

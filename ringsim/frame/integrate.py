@@ -8,10 +8,9 @@ import numpy as np
 
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.state import work_between
-from ringsim.frame.kernels import Strains, kinetic_energy, move, straighten
+from ringsim.frame.kernels import Strains, kinetic_energy, move, moved_between, straighten
 from ringsim.frame.model import FrameModel, State
 from ringsim.frame.stresses import StressMeter
-from ringsim.frame.vectors import matrix, mul, rotation_vector, transposed
 from ringsim.layout.pose import Array
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
@@ -21,7 +20,7 @@ from ringsim.stepping.instant import Energies, Instant
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
 from ringsim.theory.scales import scales_of
-from ringsim.variables import Cause, Outcome, Reason
+from ringsim.variables import Outcome
 
 _MOST = 25
 """Newton iterations a step at most, as of the full model."""
@@ -64,7 +63,9 @@ class Integration:
         self._kept = (np.zeros((elements, 6)),) * 2
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
         self._reference = model.start.pose.place.copy()
-        angles, _ = model.openings.read(model.start.pose.angle, np.zeros_like(model.start.pose.angle))
+        angles, _ = model.openings.read(
+            model.start.pose.angle, np.zeros_like(model.start.pose.angle)
+        )
         self._locks = (
             Locks(angles, stowed, scene.structure.planes) if scene.structure.locks else None
         )
@@ -77,10 +78,6 @@ class Integration:
         ropes = None
         if model.cables is not None:
             ropes = model.cables.ropes.content
-            followed = model.start.followed
-            self._now.chain = model.cables.state(
-                0.0, model.part(followed.place, 1), model.part(followed.rate, 1)
-            )
         self._control = RunControl(
             scene.solver,
             scales_of(scene, model.layout, ropes),
@@ -218,13 +215,8 @@ class Integration:
 
     def _between(self, before: State, after: State) -> Array:
         """Changes of all unknowns."""
-        mesh, found = self._model.mesh, np.zeros(self._model.size)
-        moved = after.pose.place - before.pose.place
-        turned = _turns(before.pose.axes, after.pose.axes)
-        for k in range(3):
-            found[mesh.home + k] = moved[:, k]
-            found[mesh.home + 3 + k] = turned[:, k]
-        found[mesh.angle_home] = after.pose.angle - before.pose.angle
+        found = np.zeros(self._model.size)
+        moved_between(self._model.mesh, before.pose, after.pose, found)
         if self._model.strings is not None:
             found[-3:] = after.hub - before.hub
         return found
@@ -242,11 +234,6 @@ class Integration:
                 elif isinstance(fault, CableFault) and self._model.cables is not None:
                     assert self._now.chain is not None
                     self._model.cables.strike(fault, self._now.chain)
-                    followed = self._now.followed
-                    self._now.chain = self._model.cables.state(
-                        now.time, self._model.part(followed.place, 1),
-                        self._model.part(followed.rate, 1),
-                    )  # fmt: skip
             after = self._measure(now.time, self._now, self._now, self._strains)
             lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
             energies = after.energies._replace(lost=lost, driven=now.energies.driven)
@@ -291,7 +278,9 @@ class Integration:
             lost = 0.5 * float((forces + old_forces) @ (places - old_places))
         tensions, stretch = None, 0.0
         moving = bool(self._faults)
-        if state.chain is not None and model.cables is not None:
+        if model.cables is not None:
+            place = state.followed.place
+            state.chain = model.cables.state(time, model.part(place, 1), model.part(rate, 1))
             elastic += float(state.chain.elastic_energy.sum())
             if state is not before and before.chain is not None:
                 driven, rubbed = work_between(before.chain, state.chain)
@@ -303,13 +292,9 @@ class Integration:
         self._passing = forces, places
         if state is before:
             self._lossy = self._passing
-        work = sum(float(force @ (state.pose.place[f] - self._reference[f])) for f, force in model.loaded)
+        work = sum(
+            float(force @ (state.pose.place[f] - self._reference[f])) for f, force in model.loaded
+        )
         energies = Energies(float(kinetic), elastic, work, lost, driven)
         gap = max((slide.size(state.pose) for slide in model.slides), default=0.0)
         return Instant(time, angles, rates, energies, gap, tensions, stretch, moving)
-
-
-def _turns(before: Array, after: Array) -> Array:
-    return np.array(
-        [rotation_vector(mul(matrix(b), transposed(matrix(a)))) for a, b in zip(before, after, strict=True)]
-    )

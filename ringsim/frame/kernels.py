@@ -5,7 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.frame.element import carried, element_tangent, middle, scaled
+from ringsim.frame.mesh import Mesh
 from ringsim.frame.vectors import (
+    Matrix,
+    Vector,
     compiled,
     cross,
     dot,
@@ -14,8 +17,10 @@ from ringsim.frame.vectors import (
     mul,
     plus,
     put,
+    rotation_vector,
     store,
     times,
+    transposed,
     turn,
     turned,
     turned_about_z,
@@ -43,7 +48,7 @@ class Strains(NamedTuple):
 
 
 @compiled
-def move(mesh, pose, step):
+def move(mesh: Mesh, pose: Pose, step: Array) -> None:
     """Move a pose by changes of all unknowns, shape (unknowns,); in place."""
     for f in range(len(pose.place)):
         k = mesh.home[f]
@@ -55,7 +60,21 @@ def move(mesh, pose, step):
 
 
 @compiled
-def straighten(pose):
+def moved_between(mesh: Mesh, before: Pose, after: Pose, out: Array) -> None:
+    """Changes of all unknowns from one pose to another, shape (unknowns,)."""
+    for f in range(len(before.place)):
+        k = mesh.home[f]
+        by = mul(matrix(after.axes[f]), transposed(matrix(before.axes[f])))
+        psi = rotation_vector(by)
+        for i in range(3):
+            out[k + i] = after.place[f, i] - before.place[f, i]
+            out[k + 3 + i] = psi[i]
+    for n in range(len(before.angle)):
+        out[mesh.angle_home[n]] = after.angle[n] - before.angle[n]
+
+
+@compiled
+def straighten(pose: Pose) -> float:
     """Take what round-off has done to the axes out: R (3 - R^T R) / 2; returns the largest."""
     worst = 0.0
     for f in range(len(pose.axes)):
@@ -69,7 +88,7 @@ def straighten(pose):
 
 
 @compiled
-def place_points(mesh, pose, out):
+def place_points(mesh: Mesh, pose: Pose, out: Array) -> None:
     """Places of all points with mass, shape (p, 3)."""
     for n in range(len(mesh.point_frame)):
         f = mesh.point_frame[n]
@@ -80,7 +99,7 @@ def place_points(mesh, pose, out):
 
 
 @compiled
-def end_axes(mesh, pose, e, side):
+def end_axes(mesh: Mesh, pose: Pose, e: int, side: int) -> Matrix:
     """Axes of an end of an element."""
     own = mul(matrix(pose.axes[mesh.frame[e, side]]), matrix(mesh.axes[e, side]))
     angle = mesh.angle[e, side]
@@ -88,18 +107,9 @@ def end_axes(mesh, pose, e, side):
 
 
 @compiled
-def strains_of(mesh, pose, points, out):
-    """Strains of all elements, shape (e, 6)."""
-    for e in range(len(mesh.length)):
-        d = minus(vector(points[mesh.point[e, 1]]), vector(points[mesh.point[e, 0]]))
-        r1, r2 = end_axes(mesh, pose, e, 0), end_axes(mesh, pose, e, 1)
-        _, u, psi = middle(r1, r2, d, mesh.length[e])
-        for k in range(3):
-            out[e, k], out[e, 3 + k] = u[k], psi[k]
-
-
-@compiled
-def _loaded(mesh, pose, points, strains, e):
+def _loaded(
+    mesh: Mesh, pose: Pose, points: Array, strains: Strains, e: int
+) -> tuple[Matrix, Matrix, Matrix, Vector, Vector, Vector, Vector, Vector]:
     """What an element holds: axes of its ends and middle, d, psi, n, w, m; keeps its strains."""
     r1, r2 = end_axes(mesh, pose, e, 0), end_axes(mesh, pose, e, 1)
     d = minus(vector(points[mesh.point[e, 1]]), vector(points[mesh.point[e, 0]]))
@@ -115,7 +125,9 @@ def _loaded(mesh, pose, points, strains, e):
 
 
 @compiled
-def _pulls(mesh, accelerations, e, n, w, m):
+def _pulls(
+    mesh: Mesh, accelerations: Array, e: int, n: Vector, w: Vector, m: Vector
+) -> tuple[Vector, Vector, Vector, Vector]:
     """Forces and moments on an element's ends, with those of inertia."""
     a1 = vector(accelerations[mesh.point[e, 0]])
     a2 = vector(accelerations[mesh.point[e, 1]])
@@ -127,7 +139,9 @@ def _pulls(mesh, accelerations, e, n, w, m):
 
 
 @compiled
-def add_forces(mesh, pose, points, accelerations, strains, g):
+def add_forces(
+    mesh: Mesh, pose: Pose, points: Array, accelerations: Array, strains: Strains, g: Array
+) -> None:
     """Add forces of elastic rods and of inertia on all unknowns, shape (unknowns,)."""
     for e in range(len(mesh.length)):
         r1, r2, _, _, _, n, w, m = _loaded(mesh, pose, points, strains, e)
@@ -153,7 +167,15 @@ def add_forces(mesh, pose, points, accelerations, strains, g):
 
 
 @compiled
-def add_tangent(mesh, pose, points, accelerations, strains, by_place, fronts):
+def add_tangent(
+    mesh: Mesh,
+    pose: Pose,
+    points: Array,
+    accelerations: Array,
+    strains: Strains,
+    by_place: float,
+    fronts: Array,
+) -> None:
     """Add the derivative of ``add_forces`` to the fronts; ``by_place`` is that of accelerations
     after places, 1/s^2.
     """
@@ -174,9 +196,7 @@ def add_tangent(mesh, pose, points, accelerations, strains, by_place, fronts):
         for side in range(2):
             x, phi, own = 6 * side, 6 * side + 3, 7 * side
             end = r1 if side == 0 else r2
-            a = minus(
-                vector(points[mesh.point[e, side]]), vector(pose.place[mesh.frame[e, side]])
-            )
+            a = minus(vector(points[mesh.point[e, side]]), vector(pose.place[mesh.frame[e, side]]))
             z = (end[2], end[5], end[8])
             for i in range(12):
                 # d x = d X - a x d phi, and the force's row times that: f . (d phi x a).
@@ -192,9 +212,7 @@ def add_tangent(mesh, pose, points, accelerations, strains, by_place, fronts):
             end = r1 if side == 0 else r2
             f = f1 if side == 0 else f2
             moment = m1 if side == 0 else m2
-            a = minus(
-                vector(points[mesh.point[e, side]]), vector(pose.place[mesh.frame[e, side]])
-            )
+            a = minus(vector(points[mesh.point[e, side]]), vector(pose.place[mesh.frame[e, side]]))
             z = (end[2], end[5], end[8])
             for j in range(14):
                 force = (rows[x, j], rows[x + 1, j], rows[x + 2, j])
@@ -240,7 +258,7 @@ def add_tangent(mesh, pose, points, accelerations, strains, by_place, fronts):
 
 
 @compiled
-def kinetic_energy(mesh, velocities):
+def kinetic_energy(mesh: Mesh, velocities: Array) -> float:
     """Of rods and points, J; velocities of the points, shape (p, 3), m/s."""
     found = 0.0
     for e in range(len(mesh.mass)):

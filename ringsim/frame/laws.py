@@ -106,7 +106,9 @@ class JointLaws:
         """Hold a V-joint, (plane, section), at an opening angle (rad)."""
         self._stuck.append((fault, place, opening))
 
-    def _acting(self, angles: Array, rates: Array) -> list[tuple[Indices, Array, Array, Array, Law]]:
+    def _acting(
+        self, angles: Array, rates: Array
+    ) -> list[tuple[Indices, Array, Array, Array, Law]]:
         """Angles, senses, coordinates and rates of every law that acts, and the law."""
         found: list[tuple[Indices, Array, Array, Array, Law]] = []
         for law, own, sense in self._friction:

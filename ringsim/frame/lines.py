@@ -13,13 +13,16 @@ import numpy as np
 
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.sheaves import BlockSheave, Sheave
+from ringsim.frame.chain import Spans
 from ringsim.frame.kernels import Pose
 from ringsim.frame.mesh import Indices, Mesh, Skeleton
 from ringsim.frame.vectors import (
+    Vector,
     compiled,
     cross,
     dot,
     matrix,
+    minus,
     mul,
     plus,
     put,
@@ -50,7 +53,9 @@ class Lines(NamedTuple):
     local: Indices
 
 
-def lines_of(skeleton: Skeleton, mesh: Mesh, paths: Sequence[Sequence[Sheave]], ropes: Ropes) -> Lines:
+def lines_of(
+    skeleton: Skeleton, mesh: Mesh, paths: Sequence[Sequence[Sheave]], ropes: Ropes
+) -> Lines:
     """The points of paths of a layout."""
     found = [_point(skeleton, sheave) for path in paths for sheave in path]
     frame, arm, axes, swung, angle, share = (np.array(each) for each in zip(*found, strict=True))
@@ -89,7 +94,7 @@ def _point(skeleton: Skeleton, sheave: Sheave) -> tuple[int, Array, Array, Array
 
 
 @compiled
-def _arms(lines, pose, n):
+def _arms(lines: Lines, pose: Pose, n: int) -> tuple[Vector, Vector, Vector]:
     """Arm of a point that turns with its frame, the part that turns with its angle, and the axis."""
     axes = matrix(pose.axes[lines.frame[n]])
     arm, swung, axis = turn(axes, vector(lines.arm[n])), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -102,7 +107,7 @@ def _arms(lines, pose, n):
 
 
 @compiled
-def place_lines(lines, pose, out):
+def place_lines(lines: Lines, pose: Pose, out: Array) -> None:
     """Places of all points, shape (points, 3), m."""
     for n in range(len(lines.frame)):
         arm, _, _ = _arms(lines, pose, n)
@@ -111,7 +116,7 @@ def place_lines(lines, pose, out):
 
 
 @compiled
-def pull_lines(lines, mesh, pose, forces, out):
+def pull_lines(lines: Lines, mesh: Mesh, pose: Pose, forces: Array, out: Array) -> None:
     """Add what forces on all points, shape (n, points, 3), do to the unknowns: (n, unknowns)."""
     for n in range(len(lines.frame)):
         arm, swung, axis = _arms(lines, pose, n)
@@ -125,9 +130,26 @@ def pull_lines(lines, mesh, pose, forces, out):
 
 
 @compiled
-def add_line_tangent(lines, pose, tensions, directions, by_direction, fronts):
-    """Add how the pulls turn with the spans, (spans, 3, 3) in N/m, and with the arms, to fronts."""
-    legs = np.zeros((3, 14))
+def pull_spans(lines: Lines, mesh: Mesh, pose: Pose, spans: Spans, g: Array) -> None:
+    """Add what resists the pull of spans between frames to the unknowns, shape (unknowns,)."""
+    for s in range(len(lines.span)):
+        span = lines.span[s]
+        force = times(spans.tension[span], vector(spans.unit[span]))
+        for side in range(2):
+            n = lines.near[s] + side
+            pull = force if side == 1 else times(-1.0, force)
+            arm, swung, axis = _arms(lines, pose, n)
+            k = mesh.home[lines.frame[n]]
+            put(g[k : k + 3], pull)
+            put(g[k + 3 : k + 6], cross(arm, pull))
+            if lines.angle[n] >= 0:
+                g[mesh.angle_home[lines.angle[n]]] += dot(axis, cross(swung, pull))
+
+
+@compiled
+def add_line_tangent(lines: Lines, pose: Pose, spans: Spans, fronts: Array) -> None:
+    """Add how the pulls of spans between frames turn with the spans and the arms to the fronts."""
+    legs, pulled = np.zeros((3, 14)), np.zeros((3, 14))
     for s in range(len(lines.span)):
         span, front = lines.span[s], fronts[lines.front[s]]
         for side in range(2):
@@ -143,7 +165,7 @@ def add_line_tangent(lines, pose, tensions, directions, by_direction, fronts):
             legs[1, own + 3], legs[1, own + 5] = -sign * a[2], sign * a[0]
             legs[2, own + 3], legs[2, own + 4] = sign * a[1], -sign * a[0]
             # Arms turn under a constant force f that resists: as for the ends of elements.
-            f = times(sign * tensions[span], vector(directions[span]))
+            f = times(sign * spans.tension[span], vector(spans.unit[span]))
             along, b_along, z_along = dot(f, a), dot(f, b), dot(f, z)
             lifted = cross(swing, f)
             local = lines.local[s]
@@ -158,11 +180,20 @@ def add_line_tangent(lines, pose, tensions, directions, by_direction, fronts):
                     front[k, row] += z_along * b[i] - b_along * z[i]
             if local[own + 6] >= 0:
                 front[local[own + 6], local[own + 6]] += dot(z, cross(swing, f))
-        pulled = by_direction[span] @ legs
-        h = legs.T @ pulled
+        # T (1 - u u^T) / L: the tension turns with the span.
+        unit, stiffness = vector(spans.unit[span]), spans.tension[span] / spans.length[span]
+        for j in range(14):
+            leg = (legs[0, j], legs[1, j], legs[2, j])
+            aside = minus(leg, times(dot(unit, leg), unit))
+            for i in range(3):
+                pulled[i, j] = stiffness * aside[i]
         for i in range(14):
             row = lines.local[s, i]
             if row >= 0:
                 for j in range(14):
                     if lines.local[s, j] >= 0:
-                        front[row, lines.local[s, j]] += h[i, j]
+                        front[row, lines.local[s, j]] += (
+                            legs[0, i] * pulled[0, j]
+                            + legs[1, i] * pulled[1, j]
+                            + legs[2, i] * pulled[2, j]
+                        )

@@ -13,12 +13,12 @@ neighbours: its inner unknowns are eliminated by themselves (``ringsim.frame.eli
 from collections import defaultdict
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod
+from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod, Rod
 from ringsim.layout.joints import Joint
 from ringsim.layout.layout import BoomBeam, Layout
 from ringsim.layout.pose import Array, Pose
@@ -283,7 +283,10 @@ def mesh_of(
         touched[int(part[n])] |= {end.frame for end in (first, second) if end.frame < bodies}
     for body in touching:
         touched[int(part[-1])].add(body)
-    home, angle_home = np.zeros(frames, dtype=np.int64), np.zeros(len(skeleton.angles), dtype=np.int64)
+    home, angle_home = (
+        np.zeros(frames, dtype=np.int64),
+        np.zeros(len(skeleton.angles), dtype=np.int64),
+    )
     first_of, inner_of_part, place = [], [], 0
     for own in members.values():
         first_of.append(place)
@@ -375,19 +378,17 @@ def _require_neighbours(blocks: set[int], count: int) -> None:
         raise InputError(f"{_FRAME} rods between corners that are no neighbours: {_CURE}")
 
 
-def _table(ends: list[tuple[End, ...]], name: str, dtype: type) -> NDArray:
+def _table(ends: Sequence[Sequence[End]], name: str, dtype: Any) -> Any:
     return np.array([[getattr(end, name) for end in pair] for pair in ends], dtype=dtype)
 
 
-def stiffness_of(rod, rods: Rods, length: float) -> Array:
+def stiffness_of(rod: Rod, rods: Rods, length: float) -> Array:
     """Stiffness of u and psi, shape (6,), N/m and N m; see ``ringsim.frame.element``."""
     young, area, second = rod.young_modulus, rod.tube.area, rod.tube.second_moment
     shear, bending = young * rods.shear_modulus_ratio, young * second
     direct = rod.tube.shear_factor(rods.poisson_ratio) * shear * area
     across = 1.0 / (1.0 / direct + length**2 / (12.0 * bending))
-    return np.array(
-        [young * area, across, across, 2.0 * shear * second, bending, bending]
-    ) / length
+    return np.array([young * area, across, across, 2.0 * shear * second, bending, bending]) / length
 
 
 def inertia_of(density: float, tube: Tube, length: float) -> Array:

@@ -118,7 +118,9 @@ class FrameModel:
             self.part(place, 3)[:] = pose.place[self.strings.bodies]
             self.part(place, 4)[0] = state.hub
 
-    def residual(self, time: float, step: float, start: State, now: State, strains: Strains) -> Array:
+    def residual(
+        self, time: float, step: float, start: State, now: State, strains: Strains
+    ) -> Array:
         """Forces out of balance on all unknowns, shape (size,); ValueError if the cables have no
         answer.
         """
@@ -140,8 +142,9 @@ class FrameModel:
             inner[spots] += pulls
             g[-3:] += self.strings.hub_mass * self.part(acceleration, 4)[0] - pulls.sum(axis=0)
         if self.cables is not None:
-            now.chain = self.cables.state(time, self.part(place, 1), self.part(rate, 1))
-            self.cables.pull(now.pose, now.chain, inner)
+            self._pulled = self.cables.pull(
+                time, now.pose, self.part(place, 1), self.part(rate, 1), inner
+            )
         inner[self.mesh.fixed] = 0.0
         return g
 
@@ -168,9 +171,9 @@ class FrameModel:
         for slide in self.slides:
             slide.add_tangent(now.pose, fronts)
         columns = rows = np.zeros((0, mesh.unknowns))
-        if self.cables is not None and now.chain is not None:
+        if self.cables is not None:
             columns, rows = self.cables.add_tangent(
-                time, now.pose, now.chain, self.part(rate, 1), by_rate, fronts
+                time, now.pose, *self._pulled, self.part(rate, 1), by_rate, fronts
             )
         corner = -np.eye(len(columns))
         if self.strings is not None:
@@ -234,7 +237,7 @@ class FrameModel:
 class Factored:
     """The tangent K of the unknowns with its border:
 
-        K x + columns^T z = r,   rows x + corner z = r_z.
+    K x + columns^T z = r,   rows x + corner z = r_z.
     """
 
     def __init__(

@@ -1,7 +1,10 @@
 """The net's strings from corners to a hub, a point with three unknowns of its own."""
 
+import math
+
 import numpy as np
 
+from ringsim.frame.vectors import compiled, dot, minus, times, vector
 from ringsim.layout.layout import HubNet
 from ringsim.layout.pose import Array
 from ringsim.parts.persection import at_section
@@ -10,19 +13,28 @@ _NUDGE = 1e-7
 """Change of stretch (m) and rate (m/s) by which the strings' slopes are measured."""
 
 
+@compiled
+def stretched(ends: Array, rates: Array, hub: Array, hub_rate: Array) -> tuple[Array, Array, Array]:
+    """Lengths (m), their rates (m/s) and directions of strings from the hub."""
+    n = len(ends)
+    lengths, along, units = np.empty(n), np.empty(n), np.empty((n, 3))
+    for k in range(n):
+        arm = minus(vector(ends[k]), vector(hub))
+        length = math.sqrt(dot(arm, arm))
+        unit = times(1.0 / length, arm)
+        lengths[k], along[k] = length, dot(unit, minus(vector(rates[k]), vector(hub_rate)))
+        units[k, 0], units[k, 1], units[k, 2] = unit
+    return lengths, along, units
+
+
 class Strings:
     """Strings between the hub and the origins of bodies, at places and rates of shape (n, 3)."""
 
     def __init__(self, held: HubNet) -> None:
         self.bodies = np.array(held.bodies)
         self.hub_mass, self._free = held.law.hub_mass, held.law.neutral_length
+        self._one_sided = not held.law.two_sided
         self._law = at_section(held.law, np.arange(len(held.bodies)))
-
-    def _read(self, ends: Array, rates: Array, hub: Array, hub_rate: Array):
-        arms, moving = ends - hub, rates - hub_rate
-        lengths = np.sqrt(np.einsum("ij,ij->i", arms, arms))
-        units = arms / lengths[:, None]
-        return lengths, units, np.einsum("ij,ij->i", units, moving)
 
     def pulls(
         self, ends: Array, rates: Array, hub: Array, hub_rate: Array
@@ -30,7 +42,9 @@ class Strings:
         """Forces that resist at the bodies, (n, 3), N; energy, J; dissipating forces, N, and the
         strings' lengths, m.
         """
-        lengths, units, along = self._read(ends, rates, hub, hub_rate)
+        lengths, along, units = stretched(ends, rates, hub, hub_rate)
+        if self._one_sided and lengths.max() <= self._free:
+            return np.zeros_like(units), 0.0, np.zeros_like(lengths), lengths
         reaction = self._law.tension(lengths - self._free, along)
         lost = np.broadcast_to(reaction.damping, lengths.shape)
         return reaction.total[:, None] * units, float(np.sum(reaction.stored)), lost, lengths
@@ -39,7 +53,7 @@ class Strings:
         self, ends: Array, rates: Array, hub: Array, hub_rate: Array, rate_by_place: float
     ) -> Array:
         """Derivatives of the forces after the bodies' places, (n, 3, 3), N/m."""
-        lengths, units, along = self._read(ends, rates, hub, hub_rate)
+        lengths, along, units = stretched(ends, rates, hub, hub_rate)
         stretch = lengths - self._free
 
         def force(x: Array, rate: Array) -> Array:

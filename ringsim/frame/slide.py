@@ -7,7 +7,8 @@ import numpy as np
 
 from ringsim.frame.kernels import Pose
 from ringsim.frame.mesh import Mesh
-from ringsim.layout.pose import Array, cross, skew
+from ringsim.frame.vectors import compiled, cross, dot, minus, vector
+from ringsim.layout.pose import Array, skew
 
 STIFFNESS = 100.0
 """Over that of the stiffest rod along its axis, EA / L: the gap is a hundredth of what rods give."""
@@ -42,8 +43,10 @@ class Slide:
     def hold(self, pose: Pose, g: Array) -> None:
         """Add its force to the residual."""
         gap = self.at(pose)
-        spots = np.concatenate([np.arange(6) + self._mesh.home[f] for f in gap.frames])
-        g[spots] += self._stiffness * (gap.sizes @ gap.rows)
+        forces = self._stiffness * (gap.sizes @ gap.rows)
+        for n, frame in enumerate(gap.frames):
+            k = self._mesh.home[frame]
+            g[k : k + 6] += forces[6 * n : 6 * n + 6]
 
     def add_tangent(self, pose: Pose, fronts: Array) -> None:
         """Add to the fronts; gaps are so small that how the rows turn does not matter."""
@@ -55,6 +58,19 @@ class Slide:
         fronts[front][np.ix_(places, places)] += self._stiffness * (gap.rows.T @ gap.rows)
 
 
+@compiled
+def aside(pose: Pose, top: int, low: int, rows: Array) -> Array:
+    """Gaps along x and y of a body's axes, and how they change, shapes (2,) and (2, 12)."""
+    gaps = np.empty(2)
+    apart, axes = minus(vector(pose.place[low]), vector(pose.place[top])), pose.axes[top]
+    for k in range(2):
+        axis = vector(axes[:, k])
+        gaps[k], turned = dot(axis, apart), cross(axis, apart)
+        for i in range(3):
+            rows[k, i], rows[k, 3 + i], rows[k, 6 + i] = -axis[i], turned[i], axis[i]
+    return gaps
+
+
 class RigidSlide(Slide):
     """Along the z axis of body ``top``."""
 
@@ -64,12 +80,8 @@ class RigidSlide(Slide):
 
     def at(self, pose: Pose) -> Gap:
         """See ``Slide``."""
-        apart, axes = pose.place[self._low] - pose.place[self._top], pose.axes[self._top]
         rows = np.zeros((2, 12))
-        for k in range(2):
-            rows[k, :3], rows[k, 6:9] = -axes[:, k], axes[:, k]
-            rows[k, 3:6] = cross(axes[:, k], apart)
-        return Gap(apart @ axes[:, :2], rows, (self._top, self._low))
+        return Gap(aside(pose, self._top, self._low, rows), rows, (self._top, self._low))
 
 
 class BeamSlide(Slide):

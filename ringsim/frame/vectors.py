@@ -3,57 +3,63 @@ registers.
 """
 
 import math
-from typing import TypeAlias
+from collections.abc import Callable
+from typing import Any, TypeAlias, TypeVar, cast
 
-import numpy as np
 from numba import njit
+
+from ringsim.layout.pose import Array
 
 Vector: TypeAlias = tuple[float, float, float]
 Matrix: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 
-compiled = njit(cache=True, error_model="numpy")
-"""Compiled once a machine; divisions by zero give infinity, as numpy's."""
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 _SERIES = 1e-3
 """Angle (rad) below which series are good to round-off: what they leave out is of sixth order."""
 
 
+def compiled(function: _Function) -> _Function:
+    """Compile a function, once a machine; its divisions by zero give infinity, as numpy's."""
+    return cast(_Function, njit(cache=True, error_model="numpy")(function))
+
+
 @compiled
-def vector(a):
+def vector(a: Any) -> Vector:
     return (a[0], a[1], a[2])
 
 
 @compiled
-def matrix(a):
+def matrix(a: Any) -> Matrix:
     return (a[0, 0], a[0, 1], a[0, 2], a[1, 0], a[1, 1], a[1, 2], a[2, 0], a[2, 1], a[2, 2])
 
 
 @compiled
-def plus(a, b):
+def plus(a: Vector, b: Vector) -> Vector:
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @compiled
-def minus(a, b):
+def minus(a: Vector, b: Vector) -> Vector:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @compiled
-def times(s, a):
+def times(s: float, a: Vector) -> Vector:
     return (s * a[0], s * a[1], s * a[2])
 
 
 @compiled
-def dot(a, b):
+def dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
-def cross(a, b):
+def cross(a: Vector, b: Vector) -> Vector:
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @compiled
-def turn(m, a):
+def turn(m: Matrix, a: Vector) -> Vector:
     """M a."""
     return (
         m[0] * a[0] + m[1] * a[1] + m[2] * a[2],
@@ -63,7 +69,7 @@ def turn(m, a):
 
 
 @compiled
-def turn_back(m, a):
+def turn_back(m: Matrix, a: Vector) -> Vector:
     """M^T a."""
     return (
         m[0] * a[0] + m[3] * a[1] + m[6] * a[2],
@@ -73,7 +79,7 @@ def turn_back(m, a):
 
 
 @compiled
-def mul(a, b):
+def mul(a: Matrix, b: Matrix) -> Matrix:
     """A B."""
     return (
         a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
@@ -89,32 +95,32 @@ def mul(a, b):
 
 
 @compiled
-def add(a, b):
+def add(a: Matrix, b: Matrix) -> Matrix:
     """A + B."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5],
             a[6] + b[6], a[7] + b[7], a[8] + b[8])  # fmt: skip
 
 
 @compiled
-def scale(s, a):
+def scale(s: float, a: Matrix) -> Matrix:
     """S A."""
     return (s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5],
             s * a[6], s * a[7], s * a[8])  # fmt: skip
 
 
 @compiled
-def transposed(a):
+def transposed(a: Matrix) -> Matrix:
     return (a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8])
 
 
 @compiled
-def skew(a):
+def skew(a: Vector) -> Matrix:
     """[a], with [a] b = a x b."""
     return (0.0, -a[2], a[1], a[2], 0.0, -a[0], -a[1], a[0], 0.0)
 
 
 @compiled
-def across(a, m):
+def across(a: Vector, m: Matrix) -> Matrix:
     """[a] M."""
     return (
         a[1] * m[6] - a[2] * m[3], a[1] * m[7] - a[2] * m[4], a[1] * m[8] - a[2] * m[5],
@@ -124,7 +130,7 @@ def across(a, m):
 
 
 @compiled
-def turned(a):
+def turned(a: Vector) -> Matrix:
     """The matrix of a rotation vector, by Rodrigues' formula."""
     square = dot(a, a)
     if square < _SERIES * _SERIES:
@@ -142,14 +148,14 @@ def turned(a):
 
 
 @compiled
-def turned_about_z(angle):
+def turned_about_z(angle: float) -> Matrix:
     """The matrix of a turn about z."""
     c, s = math.cos(angle), math.sin(angle)
     return (c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
 
 
 @compiled
-def rotation_vector(m):
+def rotation_vector(m: Matrix) -> Vector:
     """The rotation vector of a matrix, for angles below pi."""
     a = (0.5 * (m[7] - m[5]), 0.5 * (m[2] - m[6]), 0.5 * (m[3] - m[1]))
     square = dot(a, a)
@@ -163,7 +169,7 @@ def rotation_vector(m):
 
 
 @compiled
-def store(a, m):
+def store(a: Any, m: Matrix) -> None:
     """Write a matrix into an array, shape (3, 3)."""
     a[0, 0], a[0, 1], a[0, 2] = m[0], m[1], m[2]
     a[1, 0], a[1, 1], a[1, 2] = m[3], m[4], m[5]
@@ -171,7 +177,7 @@ def store(a, m):
 
 
 @compiled
-def put(a, v):
+def put(a: Any, v: Vector) -> None:
     """Add a vector to an array, shape (3,)."""
     a[0] += v[0]
     a[1] += v[1]
@@ -179,11 +185,8 @@ def put(a, v):
 
 
 @compiled
-def spread_block(a, row, column, m):
+def spread_block(a: Array, row: int, column: int, m: Matrix) -> None:
     """Add a matrix to an array at a row and column."""
     for i in range(3):
         for j in range(3):
             a[row + i, column + j] += m[3 * i + j]
-
-
-Array = np.ndarray
