@@ -95,7 +95,7 @@ def _loads(ends: Ends) -> tuple[tuple[float, ...], ...]:
     return carried(tuple(axes), tuple(ends.x2 - ends.x1), force, moment, tuple(psi))
 
 
-def differences(function, ends: Ends, step: float = 1e-6) -> Array:  # noqa: ANN001
+def differences(function, ends: Ends, step: float = 1e-6) -> Array:
     """Central differences of a function after (x1, phi1, x2, phi2), in the last axis."""
     units = step * np.eye(12)
     return np.stack(
