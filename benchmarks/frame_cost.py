@@ -101,9 +101,8 @@ def ratio(names: list[str]) -> None:
 
 
 def growth(counts: list[int]) -> None:
-    print(
-        "| sections | steps | processor time | a step | exponent | memory |\n|---|---|---|---|---|---|"
-    )
+    print("| sections | steps | processor time | a step | exponent | memory |")
+    print("|---|---|---|---|---|---|")
     before: tuple[int, float] | None = None
     for sections in counts:
         found = min((run(str(sections), "frame") for _ in range(2)), key=lambda one: one["time"])
@@ -155,9 +154,8 @@ def profile(name: str) -> None:
         own = 1e3 * each / calls[kernel]
         print(f"| {kernel} | {calls[kernel]} | {own:.3f} | {each / taken:.1%} |")
     rest = taken - sum(spent.values())
-    print(
-        f"| all else: laws, chain of accepted states, step control, records |  |  | {rest / taken:.1%} |"
-    )
+    what = "all else: laws, chain of accepted states, step control, records"
+    print(f"| {what} |  |  | {rest / taken:.1%} |")
     print(f"\n{taken:.2f} s in all")
 
 
