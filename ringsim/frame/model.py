@@ -100,6 +100,19 @@ class FrameModel:
         self.forced = self.start.followed.place[:0]
         self._fronts = np.zeros((len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]))
 
+    def reached(self, step: float, strains: Strains) -> float:
+        """Residual norm (N) that round-off leaves at this step (s), of coordinates of order 1 m: of
+        inertia, of the rods' damping and of the springs of slides.
+        """
+        mesh = self.mesh
+        inertia = self.coefficients.acceleration_by_place(step) * (
+            mesh.mass[:, 0].max() + mesh.point_mass.max()
+        )
+        rods = mesh.stiffness[:, 0].max() * (1.0 + mesh.tau * strains.lead)
+        slides = STIFFNESS * mesh.stiffness[:, 0].max() if self.slides else 0.0
+        small = 4.0 * float(np.finfo(float).eps)
+        return float(small * (math.sqrt(self.size) * (inertia + rods) + slides))
+
     def part(self, values: Array, which: int) -> Array:
         """Of the followed coordinates: points 0, cables' points 1, angles 2, strings' ends 3, hub
         4; a view, shape (n, 3) or (angles,).
