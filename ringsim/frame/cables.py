@@ -6,6 +6,8 @@ tension, one for its share along the path, and one for every pulley whose fricti
 that it enters as a border of the system, not as its entries.
 """
 
+import math
+
 import numpy as np
 
 from ringsim.cable.chain import Chain
@@ -27,11 +29,12 @@ from ringsim.frame.kernels import Pose
 from ringsim.frame.lines import (
     add_line_tangent,
     lines_of,
-    place_lines,
     pull_lines,
     pull_spans,
 )
-from ringsim.frame.mesh import Mesh, Skeleton
+from ringsim.frame.mesh import Mesh
+from ringsim.frame.parts import Parts
+from ringsim.frame.skeleton import Skeleton
 from ringsim.layout.pose import Array
 
 
@@ -42,11 +45,11 @@ class FrameCables:
     ----------
     present, winches, ropes
         As of ``ringsim.engine.cables.CableDrive``.
-    points
-        Number of points of all paths.
+    lines, points
+        What the paths run over; number of their points.
     """
 
-    def __init__(self, cables: Cables, skeleton: Skeleton, mesh: Mesh, pose: Pose) -> None:
+    def __init__(self, cables: Cables, skeleton: Skeleton, mesh: Mesh, parts: Parts) -> None:
         self.present = cables.present()
         own, paths = [cable for _, cable in self.present], skeleton.layout.paths
         self._chain = Chain(own, [len(path) for path in paths])
@@ -54,12 +57,9 @@ class FrameCables:
         self.points = sum(len(path) for path in paths)
         start = np.array([skeleton.layout.sheave(s)[0] for path in paths for s in path])
         self.ropes = self._chain.start(start)
-        self._lines = lines_of(skeleton, mesh, paths, self.ropes)
+        self.lines = lines_of(skeleton, parts, paths, self.ropes)
+        self._drums_at, self._drums = math.nan, Drums(*np.zeros((3, 0)))
         self._retable()
-
-    def place(self, pose: Pose, out: Array) -> None:
-        """Places of all points, shape (points, 3), m."""
-        place_lines(self._lines, pose, out)
 
     def state(self, time: float, places: Array, rates: Array) -> ChainState:
         """The chain at places and rates of all points; ValueError if it has no answer."""
@@ -83,20 +83,27 @@ class FrameCables:
         """
         ropes, spans, table = self.ropes, self._spans, self._table
         measure(table, ropes.behind, places, rates, spans)
-        path = path_rate = None
+        # Winches that do not answer to their ropes turn alike in all iterations of a step.
+        if self.winches.answering or time != self._drums_at:
+            self._drums, self._drums_at = self._turned(time), time
+        drums = self._drums
+        if not (drums.natural.min() > 0.0 and spans.length.min() > SHORTEST):
+            self.state(time, places, rates)  # says what is wrong
+        log_decays = self._chain.log_decays(spans.angle)
+        tighten(table, drums, log_decays, spans)
+        pull_spans(self.lines, self._mesh, pose, spans, g)
+        return drums, log_decays
+
+    def _turned(self, time: float) -> Drums:
+        """What the winches have done by a time (s), for spans that have been measured."""
+        ropes, spans, path, path_rate = self.ropes, self._spans, None, None
         if self.winches.answering:
             path, path_rate = ropes.along(spans.length), ropes.along(spans.rate)
         wound, wound_rate = self.winches.at(time, ropes, path, path_rate)
-        natural = ropes.content - ropes.per_rope(wound)
-        if not (natural.min() > 0.0 and spans.length.min() > SHORTEST):
-            self.state(time, places, rates)  # says what is wrong
-        inflow = np.zeros(len(natural))
+        inflow = np.zeros(len(ropes.starts))
         inflow[ropes.of_end[:, 1]] = -wound_rate[:, 1]
-        drums = Drums(natural, ropes.per_rope(wound_rate), inflow)
-        log_decays = self._chain.log_decays(spans.angle)
-        tighten(table, drums, log_decays, spans)
-        pull_spans(self._lines, self._mesh, pose, spans, g)
-        return drums, log_decays
+        natural = ropes.content - ropes.per_rope(wound)
+        return Drums(natural, ropes.per_rope(wound_rate), inflow)
 
     def add_tangent(
         self, time: float, pose: Pose, drums: Drums, log_decays: Array, rates: Array,
@@ -115,12 +122,13 @@ class FrameCables:
         factors = np.zeros((2, turning_pulleys(table, spans), self.points, 3))
         log_slopes = self._chain.log_slopes(spans.angle)
         border(table, drums, log_decays, log_slopes, spans, rates, left, by_place, factors)
-        add_line_tangent(self._lines, pose, spans, fronts)
+        add_line_tangent(self.lines, pose, spans, fronts)
         out = np.zeros((2 * factors.shape[1], self._mesh.unknowns))
-        pull_lines(self._lines, self._mesh, pose, factors.reshape(-1, self.points, 3), out)
+        pull_lines(self.lines, self._mesh, pose, factors.reshape(-1, self.points, 3), out)
         return out[: len(out) // 2], out[len(out) // 2 :]
 
     def _retable(self) -> None:
         chain = self._chain
         self._table = RopeTable.of(self.ropes, chain.material, chain.slip_speed)
         self._spans = Spans.empty(self.ropes)
+        self._drums_at = math.nan

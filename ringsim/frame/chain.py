@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.cable.ropes import Ropes
-from ringsim.frame.mesh import Indices
+from ringsim.frame.parts import Indices
 from ringsim.frame.vectors import Vector, compiled, dot, minus, plus, times, vector
 from ringsim.layout.pose import Array
 
@@ -136,7 +136,8 @@ def _force(
 ) -> float:
     """Elastic and viscous force of a rope before slack."""
     strain_rate = (path_rate + path / natural * winding) / natural
-    return table.material[rope, 0] * (path / natural - 1.0 + table.material[rope, 1] * strain_rate)
+    stretch: float = path / natural - 1.0 + table.material[rope, 1] * strain_rate
+    return stretch * float(table.material[rope, 0])
 
 
 @compiled
@@ -144,7 +145,8 @@ def _tension(
     table: RopeTable, rope: int, path: float, path_rate: float, natural: float, winding: float
 ) -> float:
     force, width = _force(table, rope, path, path_rate, natural, winding), table.material[rope, 2]
-    return max(force, 0.0) + width * math.log1p(math.exp(max(-abs(force) / width, -200.0)))
+    smooth: float = width * math.log1p(math.exp(max(-abs(force) / width, -200.0)))
+    return max(force, 0.0) + smooth
 
 
 @compiled
@@ -172,7 +174,7 @@ def border(
     by_velocity: float,
     out: Array,
 ) -> None:
-    """Changes of tension in factors: pulls on all points and what they change with, (2, k, p, 3)."""
+    """Changes of tension in factors: pulls on points and what they change with, (2, k, p, 3)."""
     n = len(spans.length)
     swing = np.empty((n, 3))
     for i in range(n):

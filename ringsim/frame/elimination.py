@@ -3,8 +3,8 @@
 A front is a small dense matrix.  Its first ``gone`` unknowns occur in no other front that is left,
 so they are eliminated there; what that leaves of the others (the Schur complement) is added to the
 parent front (the multifrontal method: Duff and Reid, ACM Transactions on Mathematical Software 9,
-1983).  Parts come first, then the blocks in their order; a closed ring's fronts carry the last block
-along.  The work grows linearly with the sections.
+1983).  Parts come first, then the blocks in their order; a closed ring's fronts carry the last
+block along.  The work grows linearly with the sections.
 """
 
 from ringsim.frame.mesh import Mesh

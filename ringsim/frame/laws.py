@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.frame.mesh import Indices, Skeleton
+from ringsim.frame.parts import Indices
+from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.layout.joints import JointOpening
 from ringsim.layout.pose import Array
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
@@ -22,9 +23,8 @@ Law = Callable[[Array, Array], Reaction]
 
 
 class Torques(NamedTuple):
-    """On all angles, resisting, N m: total and the part that dissipates, shape (a,); energy, J."""
+    """Torques on all angles that dissipate, shape (a,), N m, and energy stored, J."""
 
-    total: Array
     lost: Array
     stored: float
 
@@ -39,15 +39,11 @@ class Openings(NamedTuple):
     def of(cls, skeleton: Skeleton) -> "Openings":
         """Those of a layout."""
         found = [
-            [(skeleton.angle_of[one.joint], one.sense) for one in plane]
+            [(skeleton.angle_of[o.joint], o.sense) for o in plane if isinstance(o, JointOpening)]
             for plane in skeleton.layout.openings
-            if all(isinstance(one, JointOpening) for one in plane)
         ]
-        if len(found) != len(skeleton.layout.openings):
-            raise InputError(
-                'fidelity = "frame" does not represent openings without joints: '
-                'choose fidelity = "full"'
-            )
+        if not all(found):
+            raise InputError(f"{NOT_HERE} openings without joints: {CURE}")
         table = np.array(found)
         return cls(table[..., 0].astype(np.int64), table[..., 1])
 
@@ -137,16 +133,21 @@ class JointLaws:
             )  # fmt: skip
         return found
 
-    def torques(self, angles: Array, rates: Array) -> Torques:
-        """At angles (rad) and their rates (rad/s), shape (a,)."""
-        lost = self.damping * rates
-        total, stored = lost.copy(), 0.0
+    def push(self, angles: Array, rates: Array, g: Array, home: Indices) -> None:
+        """Add all torques but those of linear friction to a residual, whose unknowns of the angles
+        are at ``home``; angles in rad and rates in rad/s, shape (a,).
+        """
+        for own, sense, x, rate, law in self._acting(angles, rates):
+            g[home[own]] += sense * law(x, rate).total
+
+    def passing(self, angles: Array, rates: Array) -> Torques:
+        """What all torques take and store."""
+        lost, stored = self.damping * rates, 0.0
         for own, sense, x, rate, law in self._acting(angles, rates):
             reaction = law(x, rate)
-            np.add.at(total, own, sense * reaction.total)
-            np.add.at(lost, own, sense * reaction.damping)
+            lost[own] += sense * reaction.damping
             stored += float(np.sum(reaction.stored))
-        return Torques(total, lost, stored)
+        return Torques(lost, stored)
 
     def slopes(self, angles: Array, rates: Array, rate_by_angle: float) -> Array:
         """Derivatives of the torques after the angles, whose rates follow them, N m/rad: (a,)."""
@@ -154,5 +155,5 @@ class JointLaws:
         for own, _, x, rate, law in self._acting(angles, rates):
             by_angle = law(x + _NUDGE, rate).total - law(x - _NUDGE, rate).total
             by_rate = law(x, rate + _NUDGE).total - law(x, rate - _NUDGE).total
-            np.add.at(found, own, (by_angle + rate_by_angle * by_rate) / (2.0 * _NUDGE))
+            found[own] += (by_angle + rate_by_angle * by_rate) / (2.0 * _NUDGE)
         return found

@@ -15,7 +15,9 @@ from ringsim.cable.ropes import Ropes
 from ringsim.cable.sheaves import BlockSheave, Sheave
 from ringsim.frame.chain import Spans
 from ringsim.frame.kernels import Pose
-from ringsim.frame.mesh import Indices, Mesh, Skeleton
+from ringsim.frame.mesh import Mesh
+from ringsim.frame.parts import Indices, Parts
+from ringsim.frame.skeleton import Skeleton
 from ringsim.frame.vectors import (
     Vector,
     compiled,
@@ -54,7 +56,7 @@ class Lines(NamedTuple):
 
 
 def lines_of(
-    skeleton: Skeleton, mesh: Mesh, paths: Sequence[Sequence[Sheave]], ropes: Ropes
+    skeleton: Skeleton, parts: Parts, paths: Sequence[Sequence[Sheave]], ropes: Ropes
 ) -> Lines:
     """The points of paths of a layout."""
     found = [_point(skeleton, sheave) for path in paths for sheave in path]
@@ -65,18 +67,23 @@ def lines_of(
         if frame[near] == frame[near + 1]:
             continue
         inner = [int(frame[k]) for k in ends if frame[k] >= len(skeleton.layout.bodies)]
-        front = int(mesh.frame_local[inner[0], 0])
-        where = {int(spot): k for k, spot in enumerate(mesh.spots[front, : mesh.size[front]])}
-        row = []
-        for k in ends:
-            row += [where[int(mesh.home[frame[k]]) + i] for i in range(6)]
-            row.append(where[int(mesh.angle_home[angle[k]])] if angle[k] >= 0 else -1)
+        front, _ = parts.front_of(int(parts.home[inner[0]]))
+        row = parts.local(front, [(int(frame[k]), int(angle[k])) for k in ends])
         spans.append(span)
         fronts.append(front)
         local.append(row)
     return Lines(
         frame, arm, axes, swung, angle, share, np.array(spans), ropes.near[spans],
         np.array(fronts), np.array(local),
+    )  # fmt: skip
+
+
+def no_lines() -> Lines:
+    """Of a scene without cables."""
+    three, whole, one = np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0)
+    return Lines(
+        whole, three, np.zeros((0, 3, 3)), three, whole, one, whole, whole, whole,
+        np.zeros((0, 14), dtype=np.int64),
     )  # fmt: skip
 
 
@@ -95,7 +102,7 @@ def _point(skeleton: Skeleton, sheave: Sheave) -> tuple[int, Array, Array, Array
 
 @compiled
 def _arms(lines: Lines, pose: Pose, n: int) -> tuple[Vector, Vector, Vector]:
-    """Arm of a point that turns with its frame, the part that turns with its angle, and the axis."""
+    """Arm of a point that turns with its frame, what turns with its angle, and about which axis."""
     axes = matrix(pose.axes[lines.frame[n]])
     arm, swung, axis = turn(axes, vector(lines.arm[n])), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if lines.angle[n] >= 0:

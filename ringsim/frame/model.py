@@ -5,13 +5,16 @@ import math
 import numpy as np
 
 from ringsim.cable.state import ChainState
+from ringsim.frame.balance import ANGLES, ENDS, HUB, LINES, POINTS, Held, balance, put_in_place
 from ringsim.frame.cables import FrameCables
 from ringsim.frame.elimination import factor, solve, solve_one
-from ringsim.frame.following import Coefficients, Followed, follow
-from ringsim.frame.kernels import Pose, Strains, add_forces, add_tangent, place_points
+from ringsim.frame.following import Coefficients, Followed
+from ringsim.frame.kernels import Pose, Strains, add_tangent, move
 from ringsim.frame.laws import JointLaws, Openings
-from ringsim.frame.mesh import Skeleton, mesh_of
+from ringsim.frame.lines import no_lines
+from ringsim.frame.mesh import mesh_of
 from ringsim.frame.net import Strings
+from ringsim.frame.skeleton import Skeleton
 from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
 from ringsim.layout.layout import layout_of
 from ringsim.layout.pose import Array, cross
@@ -23,8 +26,8 @@ from ringsim.theory.scales import residual_tolerance
 class State:
     """Where everything stands and how it moves.
 
-    ``followed`` are the coordinates of points with mass, of the cables' points and the hub, and
-    the joint angles, behind one another; the properties are views of these.
+    ``followed`` are all coordinates that ``FrameModel.part`` tells apart; ``chain`` the cables of a
+    state that a step has led to.
     """
 
     def __init__(self, pose: Pose, hub: Array, strains: Array, followed: Followed) -> None:
@@ -63,7 +66,8 @@ class FrameModel:
         beam = self.layout.boom
         boom = [] if beam is None else skeleton.add_beam(beam)
         touching = [] if beam is None else [beam.low.body]
-        self.mesh = mesh = mesh_of(skeleton, scene.rods, boom, touching)
+        self.mesh, parts = mesh_of(skeleton, scene.rods, boom, touching)
+        mesh = self.mesh
         self.openings = Openings.of(skeleton)
         self.laws = JointLaws(scene, skeleton, self.openings)
         self.strings = None if self.layout.net is None else Strings(self.layout.net)
@@ -73,31 +77,40 @@ class FrameModel:
         pose = Pose(np.array(skeleton.places), np.array(skeleton.axes), angle)
         self.cables = None
         if scene.cables is not None:
-            self.cables = FrameCables(scene.cables, skeleton, mesh, pose)
+            self.cables = FrameCables(scene.cables, skeleton, mesh, parts)
         stiffest = float(mesh.stiffness[:, 0].max())
-        self.slides: list[Slide] = [
-            RigidSlide(mesh, *pair, STIFFNESS * stiffest) for pair in skeleton.slides
-        ]
+        slides = [RigidSlide(mesh, *pair, STIFFNESS * stiffest) for pair in skeleton.slides]
+        self._beam_slides: list[Slide] = []
         if beam is not None:
             nodes = [(end.frame, end.axes) for end in skeleton.beam]
-            self.slides.append(
+            self._beam_slides.append(
                 BeamSlide(mesh, nodes, boom[0].length, beam.low.body, STIFFNESS * stiffest)
             )
+        self.slides: list[Slide] = [*slides, *self._beam_slides]
         self.size = mesh.unknowns + (0 if self.strings is None else 3)
         self.loads = np.zeros(self.size)
-        self.loaded: list[tuple[int, Array]] = []
+        self._loaded: list[tuple[int, Array, Array]] = []
         for number, force in self.layout.forces:
             end = skeleton.end_of(self.layout.joints[number].first)
             self.loads[mesh.home[end.frame] : mesh.home[end.frame] + 3] += force
-            self.loaded.append((end.frame, force))
+            self._loaded.append((end.frame, pose.place[end.frame].copy(), force))
         self.tolerance = residual_tolerance(
             scene, self.layout, 4.0 * float(np.finfo(float).eps) * math.sqrt(self.size)
         )
-        points, lines = 3 * len(mesh.point_mass), 0 if self.cables is None else self.cables.points
-        ends = 0 if self.strings is None else len(self.strings.bodies)
-        self._cuts = np.cumsum([0, points, 3 * lines, len(angle), 3 * ends, 3 * (ends > 0)])
+        lines = 0 if self.cables is None else self.cables.points
+        ends = [] if self.layout.net is None else list(self.layout.net.bodies)
+        sizes = 3 * len(mesh.point_mass), 3 * lines, len(angle), 3 * len(ends), 3 * bool(ends)
+        self._held = Held(
+            cuts=np.cumsum([0, *sizes]),
+            ends=np.array(ends, dtype=np.int64),
+            top=np.array([slide.top for slide in slides], dtype=np.int64),
+            low=np.array([slide.low for slide in slides], dtype=np.int64),
+            stiffness=STIFFNESS * stiffest,
+            damping=self.laws.damping,
+        )
+        self._string_spots = mesh.home[self._held.ends][:, None] + np.arange(3)
+        self._lines = no_lines() if self.cables is None else self.cables.lines
         self.start = self._started(pose)
-        self.forced = self.start.followed.place[:0]
         self._fronts = np.zeros((len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]))
 
     def reached(self, step: float, strains: Strains) -> float:
@@ -114,22 +127,22 @@ class FrameModel:
         return float(small * (math.sqrt(self.size) * (inertia + rods) + slides))
 
     def part(self, values: Array, which: int) -> Array:
-        """Of the followed coordinates: points 0, cables' points 1, angles 2, strings' ends 3, hub
-        4; a view, shape (n, 3) or (angles,).
+        """Of followed coordinates those of POINTS, LINES, ANGLES, ENDS or HUB: a view, shape
+        (n, 3) or (angles,).
         """
-        own = values[self._cuts[which] : self._cuts[which + 1]]
-        return own if which == 2 else own.reshape(-1, 3)
+        own = values[self._held.cuts[which] : self._held.cuts[which + 1]]
+        return own if which == ANGLES else own.reshape(-1, 3)
 
-    def place(self, state: State) -> None:
-        """Places of all followed coordinates at the state's pose."""
-        place, pose = state.followed.place, state.pose
-        place_points(self.mesh, pose, self.part(place, 0))
-        if self.cables is not None:
-            self.cables.place(pose, self.part(place, 1))
-        self.part(place, 2)[:] = pose.angle
-        if self.strings is not None:
-            self.part(place, 3)[:] = pose.place[self.strings.bodies]
-            self.part(place, 4)[0] = state.hub
+    def work(self, pose: Pose) -> float:
+        """Of the loads since the start, J."""
+        done = (force @ (pose.place[f] - start) for f, start, force in self._loaded)
+        return float(sum(done))
+
+    def gap(self, pose: Pose) -> float:
+        """Largest distance of a body from the boom that it slides along, m; revolutes cannot come
+        apart.
+        """
+        return max((slide.size(pose) for slide in self.slides), default=0.0)
 
     def residual(
         self, time: float, step: float, start: State, now: State, strains: Strains
@@ -137,35 +150,36 @@ class FrameModel:
         """Forces out of balance on all unknowns, shape (size,); ValueError if the cables have no
         answer.
         """
-        self.place(now)
-        follow(self.coefficients, step, start.followed, now.followed)
         place, rate, acceleration, _ = now.followed
         g = -self.loads
         inner = g[: self.mesh.unknowns]
-        add_forces(
-            self.mesh, now.pose, self.part(place, 0), self.part(acceleration, 0), strains, inner
-        )
-        torques = self.laws.torques(now.pose.angle, self.part(rate, 2))
-        inner[self.mesh.angle_home] += torques.total
-        for slide in self.slides:
+        balance(
+            self.mesh, self._lines, self._held, self.coefficients, step, start.followed, now.pose,
+            now.hub, now.followed, strains, inner,
+        )  # fmt: skip
+        self.laws.push(now.pose.angle, self.part(rate, ANGLES), inner, self.mesh.angle_home)
+        for slide in self._beam_slides:
             slide.hold(now.pose, inner)
         if self.strings is not None:
-            pulls = self.strings.pulls(*self._net_at(now))[0]
-            spots = self.mesh.home[self.strings.bodies][:, None] + np.arange(3)
-            inner[spots] += pulls
-            g[-3:] += self.strings.hub_mass * self.part(acceleration, 4)[0] - pulls.sum(axis=0)
+            g[-3:] += self.strings.hub_mass * self.part(acceleration, HUB)[0]
+            pulls = self.strings.pulls(*self.net_at(now))
+            if pulls is not None:
+                inner[self._string_spots] += pulls
+                g[-3:] -= pulls.sum(axis=0)
         if self.cables is not None:
             self._pulled = self.cables.pull(
-                time, now.pose, self.part(place, 1), self.part(rate, 1), inner
+                time, now.pose, self.part(place, LINES), self.part(rate, LINES), inner
             )
         inner[self.mesh.fixed] = 0.0
         return g
 
-    def _net_at(self, now: State) -> tuple[Array, Array, Array, Array]:
-        place, rate = now.followed.place, now.followed.rate
-        return (
-            self.part(place, 3), self.part(rate, 3), self.part(place, 4)[0], self.part(rate, 4)[0]
-        )  # fmt: skip
+    def net_at(self, now: State) -> tuple[Array, Array, Array, Array]:
+        """Places and rates of the strings' ends, (n, 3), and of the hub, (3,)."""
+        place, rate = (
+            (self.part(each, ENDS), self.part(each, HUB)[0])
+            for each in (now.followed.place, now.followed.rate)
+        )
+        return place[0], rate[0], place[1], rate[1]
 
     def tangent(self, time: float, step: float, now: State, strains: Strains) -> "Factored":
         """The residual's derivative after the unknowns, factored."""
@@ -174,11 +188,9 @@ class FrameModel:
         by_place = self.coefficients.acceleration_by_place(step)
         fronts = self._fronts
         fronts[:] = 0.0
-        add_tangent(
-            mesh, now.pose, self.part(place, 0), self.part(acceleration, 0), strains, by_place,
-            fronts,
-        )  # fmt: skip
-        slopes = self.laws.slopes(now.pose.angle, self.part(rate, 2), by_rate)
+        points, pushed = self.part(place, POINTS), self.part(acceleration, POINTS)
+        add_tangent(mesh, now.pose, points, pushed, strains, by_place, fronts)
+        slopes = self.laws.slopes(now.pose.angle, self.part(rate, ANGLES), by_rate)
         front, spot = mesh.angle_local.T
         fronts[front, spot, spot] += slopes
         for slide in self.slides:
@@ -186,22 +198,36 @@ class FrameModel:
         columns = rows = np.zeros((0, mesh.unknowns))
         if self.cables is not None:
             columns, rows = self.cables.add_tangent(
-                time, now.pose, *self._pulled, self.part(rate, 1), by_rate, fronts
+                time, now.pose, *self._pulled, self.part(rate, LINES), by_rate, fronts
             )
-        corner = -np.eye(len(columns))
+        corner, hub_inertia = -np.eye(len(columns)), np.inf
         if self.strings is not None:
-            blocks = self.strings.tangents(*self._net_at(now), by_rate)
-            front, first = mesh.frame_local[self.strings.bodies].T
-            reach = np.arange(3)
-            spots = first[:, None] + reach
-            fronts[front[:, None, None], spots[:, :, None], spots[:, None, :]] += blocks
-            hub = np.zeros((3, mesh.unknowns))
-            hub[:, mesh.home[self.strings.bodies][:, None] + reach] = -blocks.transpose(1, 0, 2)
-            own = blocks.sum(axis=0) + self.strings.hub_mass * by_place * np.eye(3)
-            whole = np.zeros((len(columns) + 3,) * 2)
-            whole[:-3, :-3], whole[-3:, -3:] = corner, own
-            columns, rows, corner = np.vstack([columns, hub]), np.vstack([rows, hub]), whole
-        return Factored(self, fronts, columns, rows, corner)
+            hub_inertia = self.strings.hub_mass * by_place
+            blocks = self.strings.tangents(*self.net_at(now), by_rate)
+            if blocks is not None:
+                columns, rows, corner = self._strung(blocks, hub_inertia, columns, rows, corner)
+                hub_inertia = np.inf
+        return Factored(self, fronts, columns, rows, corner, hub_inertia)
+
+    def _strung(
+        self, blocks: Array, inertia: float, columns: Array, rows: Array, corner: Array
+    ) -> tuple[Array, Array, Array]:
+        """Add strings that pull to the fronts, and the hub to the border."""
+        mesh, reach = self.mesh, np.arange(3)
+        front, first = mesh.frame_local[self._held.ends].T
+        spots = first[:, None] + reach
+        self._fronts[front[:, None, None], spots[:, :, None], spots[:, None, :]] += blocks
+        hub = np.zeros((3, mesh.unknowns))
+        hub[:, self._string_spots] = -blocks.transpose(1, 0, 2)
+        whole = np.zeros((len(columns) + 3,) * 2)
+        whole[:-3, :-3] = corner
+        whole[-3:, -3:] = blocks.sum(axis=0) + inertia * np.eye(3)
+        return np.vstack([columns, hub]), np.vstack([rows, hub]), whole
+
+    def _place(self, state: State) -> None:
+        """Places of all followed coordinates at the state's pose."""
+        followed = state.followed.place
+        put_in_place(self.mesh, self._lines, self._held, state.pose, state.hub, followed)
 
     def _started(self, pose: Pose) -> State:
         """At rest with the accelerations of the structure with rigid rods, as of the full model."""
@@ -225,23 +251,20 @@ class FrameModel:
         hub = np.zeros(3) if self.layout.net is None else np.array(self.layout.net.hub)
         state = State(
             pose, hub, np.zeros((len(self.mesh.length), 6)),
-            Followed.at_rest(np.zeros(self._cuts[-1]), np.zeros(self._cuts[-1])),
+            Followed.at_rest(np.zeros(self._held.cuts[-1]), np.zeros(self._held.cuts[-1])),
         )  # fmt: skip
-        self.place(state)
+        self._place(state)
         # Accelerations of the points: differences of places along the motion.
         ahead, behind = state.copy(), state.copy()
-        from ringsim.frame.kernels import move
-
         small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)
         move(self.mesh, ahead.pose, small * self.first[: self.mesh.unknowns])
         move(self.mesh, behind.pose, -small * self.first[: self.mesh.unknowns])
         if self.strings is not None:
-            moving = self.first[self.mesh.home[self.strings.bodies][:, None] + np.arange(3)]
-            self.first[-3:] = moving.mean(axis=0)
+            self.first[-3:] = self.first[self._string_spots].mean(axis=0)
             ahead.hub += small * self.first[-3:]
             behind.hub -= small * self.first[-3:]
-        self.place(ahead)
-        self.place(behind)
+        self._place(ahead)
+        self._place(behind)
         acceleration = (ahead.followed.place - behind.followed.place) / (2.0 * small)
         state.followed = Followed.at_rest(state.followed.place, acceleration)
         return state
@@ -250,30 +273,37 @@ class FrameModel:
 class Factored:
     """The tangent K of the unknowns with its border:
 
-    K x + columns^T z = r,   rows x + corner z = r_z.
+        K x + columns^T z = r,   rows x + corner z = r_z.
+
+    A net's hub that no string pulls moves by its inertia alone (N/m); else it ends the border.
     """
 
     def __init__(
-        self, model: FrameModel, fronts: Array, columns: Array, rows: Array, corner: Array
-    ) -> None:
+        self, model: FrameModel, fronts: Array, columns: Array, rows: Array, corner: Array,
+        hub_inertia: float,
+    ) -> None:  # fmt: skip
         self._mesh, self._fronts, self._rows = model.mesh, fronts, rows
-        self._hub = model.strings is not None
+        self._hub, self._hub_inertia = model.strings is not None, hub_inertia
         self.sound = bool(factor(model.mesh, fronts))
         self._reached = columns.T.copy()
         if len(columns):
             solve(model.mesh, fronts, self._reached)
-        self._corner = corner - rows @ self._reached
+            self._corner = np.linalg.inv(corner - rows @ self._reached)
 
     def solve(self, g: Array) -> Array:
         """The change of all unknowns that takes a residual g to zero."""
-        unknowns = self._mesh.unknowns
-        x = -g[:unknowns]
+        unknowns, strung = self._mesh.unknowns, math.isinf(self._hub_inertia)
+        found = -g
+        x, hub = found[:unknowns], found[unknowns:]
         solve_one(self._mesh, self._fronts, x)
-        if not len(self._corner):
-            return np.asarray(x)
-        right = np.zeros(len(self._corner))
-        if self._hub:
-            right[-3:] = -g[-3:]
-        z = np.linalg.solve(self._corner, right - self._rows @ x)
-        x -= self._reached @ z
-        return np.concatenate([x, z[-3:]]) if self._hub else x
+        if len(self._rows):
+            right = -(self._rows @ x)
+            if self._hub and strung:
+                right[-3:] += hub
+            z = self._corner @ right
+            x -= self._reached @ z
+            if self._hub and strung:
+                hub[:] = z[-3:]
+        if self._hub and not strung:
+            hub /= self._hub_inertia
+        return np.asarray(found)

@@ -31,29 +31,35 @@ class Strings:
     """Strings between the hub and the origins of bodies, at places and rates of shape (n, 3)."""
 
     def __init__(self, held: HubNet) -> None:
-        self.bodies = np.array(held.bodies)
         self.hub_mass, self._free = held.law.hub_mass, held.law.neutral_length
         self._one_sided = not held.law.two_sided
         self._law = at_section(held.law, np.arange(len(held.bodies)))
 
-    def pulls(
-        self, ends: Array, rates: Array, hub: Array, hub_rate: Array
-    ) -> tuple[Array, float, Array, Array]:
-        """Forces that resist at the bodies, (n, 3), N; energy, J; dissipating forces, N, and the
-        strings' lengths, m.
-        """
+    def pulls(self, ends: Array, rates: Array, hub: Array, hub_rate: Array) -> Array | None:
+        """Forces that resist at the bodies, (n, 3), N; None while all are slack."""
         lengths, along, units = stretched(ends, rates, hub, hub_rate)
         if self._one_sided and lengths.max() <= self._free:
-            return np.zeros_like(units), 0.0, np.zeros_like(lengths), lengths
+            return None
+        return np.asarray(self._law.tension(lengths - self._free, along).total[:, None] * units)
+
+    def passing(
+        self, ends: Array, rates: Array, hub: Array, hub_rate: Array
+    ) -> tuple[float, Array, Array]:
+        """Energy stored (J), dissipating forces of the strings (N) and their lengths (m)."""
+        lengths, along, _ = stretched(ends, rates, hub, hub_rate)
         reaction = self._law.tension(lengths - self._free, along)
         lost = np.broadcast_to(reaction.damping, lengths.shape)
-        return reaction.total[:, None] * units, float(np.sum(reaction.stored)), lost, lengths
+        return float(np.sum(reaction.stored)), lost, lengths
 
     def tangents(
         self, ends: Array, rates: Array, hub: Array, hub_rate: Array, rate_by_place: float
-    ) -> Array:
-        """Derivatives of the forces after the bodies' places, (n, 3, 3), N/m."""
+    ) -> Array | None:
+        """Derivatives of the forces after the bodies' places, (n, 3, 3), N/m; None while all are
+        slack.
+        """
         lengths, along, units = stretched(ends, rates, hub, hub_rate)
+        if self._one_sided and lengths.max() <= self._free:
+            return None
         stretch = lengths - self._free
 
         def force(x: Array, rate: Array) -> Array:

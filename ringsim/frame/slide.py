@@ -11,7 +11,7 @@ from ringsim.frame.vectors import compiled, cross, dot, minus, vector
 from ringsim.layout.pose import Array, skew
 
 STIFFNESS = 100.0
-"""Over that of the stiffest rod along its axis, EA / L: the gap is a hundredth of what rods give."""
+"""Over that of the stiffest rod along its axis, EA / L: it gives a hundredth of what rods do."""
 
 
 class Gap(NamedTuple):
@@ -26,7 +26,7 @@ class Slide:
     """Holds the origin of a body on a line of other frames."""
 
     def __init__(self, mesh: Mesh, low: int, stiffness: float) -> None:
-        self._mesh, self._low, self._stiffness = mesh, low, stiffness
+        self._mesh, self.low, self._stiffness = mesh, low, stiffness
 
     def at(self, pose: Pose) -> Gap:
         """The gap at a pose; the last of its frames is the body's."""
@@ -59,16 +59,16 @@ class Slide:
 
 
 @compiled
-def aside(pose: Pose, top: int, low: int, rows: Array) -> Array:
+def aside(pose: Pose, top: int, low: int) -> tuple[Array, Array]:
     """Gaps along x and y of a body's axes, and how they change, shapes (2,) and (2, 12)."""
-    gaps = np.empty(2)
+    gaps, rows = np.empty(2), np.zeros((2, 12))
     apart, axes = minus(vector(pose.place[low]), vector(pose.place[top])), pose.axes[top]
     for k in range(2):
         axis = vector(axes[:, k])
         gaps[k], turned = dot(axis, apart), cross(axis, apart)
         for i in range(3):
             rows[k, i], rows[k, 3 + i], rows[k, 6 + i] = -axis[i], turned[i], axis[i]
-    return gaps
+    return gaps, rows
 
 
 class RigidSlide(Slide):
@@ -76,12 +76,11 @@ class RigidSlide(Slide):
 
     def __init__(self, mesh: Mesh, top: int, low: int, stiffness: float) -> None:
         super().__init__(mesh, low, stiffness)
-        self._top = top
+        self.top = top
 
     def at(self, pose: Pose) -> Gap:
         """See ``Slide``."""
-        rows = np.zeros((2, 12))
-        return Gap(aside(pose, self._top, self._low, rows), rows, (self._top, self._low))
+        return Gap(*aside(pose, self.top, self.low), (self.top, self.low))
 
 
 class BeamSlide(Slide):
@@ -99,7 +98,7 @@ class BeamSlide(Slide):
 
     def at(self, pose: Pose) -> Gap:
         """See ``Slide``: the gap to the curve's nearest point."""
-        place, length = pose.place[self._low], self._length
+        place, length = pose.place[self.low], self._length
         ends = np.array([pose.place[f] for f, _ in self._nodes])
         tangents = np.array([pose.axes[f] @ own[:, 0] for f, own in self._nodes])
         along = np.einsum("ij,ij->i", place - ends, tangents)
@@ -121,7 +120,7 @@ class BeamSlide(Slide):
         rows[:, 3:6], rows[:, 9:12] = shares[1] * skew(points[1]), shares[3] * skew(points[3])
         # Along the curve the body is free.
         rows = (_ONE - np.outer(direction, direction)) @ rows
-        return Gap(away, rows, (self._nodes[k][0], self._nodes[k + 1][0], self._low))
+        return Gap(away, rows, (self._nodes[k][0], self._nodes[k + 1][0], self.low))
 
 
 _ONE = np.eye(3)

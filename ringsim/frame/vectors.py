@@ -25,36 +25,43 @@ def compiled(function: _Function) -> _Function:
 
 @compiled
 def vector(a: Any) -> Vector:
+    """Three numbers of an array."""
     return (a[0], a[1], a[2])
 
 
 @compiled
 def matrix(a: Any) -> Matrix:
+    """Nine numbers of an array, shape (3, 3)."""
     return (a[0, 0], a[0, 1], a[0, 2], a[1, 0], a[1, 1], a[1, 2], a[2, 0], a[2, 1], a[2, 2])
 
 
 @compiled
 def plus(a: Vector, b: Vector) -> Vector:
+    """A + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @compiled
 def minus(a: Vector, b: Vector) -> Vector:
+    """A - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @compiled
 def times(s: float, a: Vector) -> Vector:
+    """S a."""
     return (s * a[0], s * a[1], s * a[2])
 
 
 @compiled
 def dot(a: Vector, b: Vector) -> float:
+    """A . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
 def cross(a: Vector, b: Vector) -> Vector:
+    """A x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
@@ -110,6 +117,7 @@ def scale(s: float, a: Matrix) -> Matrix:
 
 @compiled
 def transposed(a: Matrix) -> Matrix:
+    """A^T."""
     return (a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8])
 
 
