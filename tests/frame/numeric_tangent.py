@@ -67,9 +67,7 @@ class Probe:
             state.hub += by[-3:]
         elements = len(self.model.mesh.length)
         strains = Strains(state.strains, np.zeros((elements, 6)), 1.0 / self.step)
-        return np.asarray(
-            self.model.residual(self.time, self.step, self._start, state, strains)
-        )
+        return np.asarray(self.model.residual(self.time, self.step, self._start, state, strains))
 
     def solved(self) -> Array:
         """What the factored tangent gives for unit residuals: minus its inverse."""

@@ -95,7 +95,7 @@ def _loads(ends: Ends) -> tuple[tuple[float, ...], ...]:
     return carried(tuple(axes), tuple(ends.x2 - ends.x1), force, moment, tuple(psi))
 
 
-def differences(function, ends: Ends, step: float = 1e-6) -> Array:  # noqa: ANN001
+def differences(function, ends: Ends, step: float = 1e-6) -> Array:
     """Central differences of a function after (x1, phi1, x2, phi2), in the last axis."""
     units = step * np.eye(12)
     return np.stack(
@@ -135,7 +135,9 @@ def exudyn_cantilever(force: Array, moment: Array) -> Ends:
     system.AddObject(
         item.ObjectBeamGeometricallyExact(nodeNumbers=nodes, length=LENGTH, sectionData=section)
     )
-    ground = system.AddMarker(item.MarkerBodyRigid(bodyNumber=system.AddObject(item.ObjectGround())))
+    ground = system.AddMarker(
+        item.MarkerBodyRigid(bodyNumber=system.AddObject(item.ObjectGround()))
+    )
     first, second = (system.AddMarker(item.MarkerNodeRigid(nodeNumber=node)) for node in nodes)
     system.AddObject(item.ObjectJointGeneric(markerNumbers=[ground, first]))
     system.AddLoad(item.LoadForceVector(markerNumber=second, loadVector=list(force)))

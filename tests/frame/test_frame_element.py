@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from one_element import (
     LENGTH,
     STIFFNESS,
