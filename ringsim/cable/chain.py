@@ -89,10 +89,12 @@ class Chain:
                     f"are {pulleys} pulleys: give one value for all, or one for each"
                 )
             slip += [cable.slip_speed_over(pulleys)] * pulleys
-        self._slip_speed = np.array(slip)
-        self._material = np.array(
+        self.slip_speed = np.array(slip)
+        """Of all pulleys, m/s, shape (pulleys,)."""
+        self.material = np.array(
             [[c.axial_stiffness, c.damping_time, c.slack_width] for c in cables]
         ).T
+        """EA (N), Kelvin-Voigt time (s) and slack width (N) of each cable, shape (3, cables)."""
 
     def start(self, points: Array) -> Ropes:
         """One rope per cable, as long as its path at the start plus its initial slack.
@@ -137,7 +139,7 @@ class Chain:
             for sides in (before + behind, behind - before)
         )
         angles = 2.0 * np.arctan2(sine, cosine)
-        log_decays = self._log_decays(angles)
+        log_decays = self.log_decays(angles)
 
         rope = ropes.of_pulley
         last, inner = ropes.ends[rope] - 1, ropes.behind - 1
@@ -148,7 +150,7 @@ class Chain:
         inflow[ropes.of_end[:, 1]] = -wound_rate[:, 1]
         share_rate = (beyond_rate - beyond * path_rates[rope]) * (natural / paths)[rope]
         speeds = (inflow[rope] + winding[rope] * beyond - share_rate) * ropes.slips
-        exponents = np.tanh(speeds / self._slip_speed)
+        exponents = np.tanh(speeds / self.slip_speed)
 
         steps = np.zeros(ropes.spans)
         steps[ropes.behind] = exponents * log_decays * ropes.slips
@@ -157,7 +159,7 @@ class Chain:
         weights = np.exp(logs - np.maximum.reduceat(logs, ropes.starts)[ropes.of_span])
         shares = weights / (ropes.along(weights * lengths) / paths)[ropes.of_span]
 
-        material = stiffness, damping_time, slack_width = self._material[:, ropes.cable]
+        material = stiffness, damping_time, slack_width = self.material[:, ropes.cable]
         strains = paths / natural - 1.0
         strain_rates = (path_rates + paths / natural * winding) / natural
         forces = stiffness * (strains + damping_time * strain_rates)
@@ -170,10 +172,10 @@ class Chain:
             directions=directions,
             angles=angles,
             log_decays=log_decays,
-            friction_slopes=partial(self._log_slopes, angles),
+            friction_slopes=partial(self.log_slopes, angles),
             speeds=speeds,
             exponents=exponents,
-            slip_speeds=self._slip_speed,
+            slip_speeds=self.slip_speed,
             shares=shares,
             tensions=shares * tension[ropes.of_span],
             paths=paths,
@@ -188,10 +190,12 @@ class Chain:
             wound_rate=wound_rate,
         )
 
-    def _log_decays(self, angles: Array) -> Array:
+    def log_decays(self, angles: Array) -> Array:
+        """Logarithms of the full decay at angles (rad) of all pulleys, shape (pulleys,)."""
         own = zip(self.cables, self._pulleys, strict=True)
         return np.concatenate([c.friction.log_decay(angles[n], c.pulley_radius) for c, n in own])
 
-    def _log_slopes(self, angles: Array) -> Array:
+    def log_slopes(self, angles: Array) -> Array:
+        """Their derivatives after the angles, 1/rad."""
         own = zip(self.cables, self._pulleys, strict=True)
         return np.concatenate([c.friction.log_slope(angles[n], c.pulley_radius) for c, n in own])

@@ -79,6 +79,17 @@ def decay_tangent(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[A
     Derivatives of each span's tension after each difference of points (N/m) and of velocities
     (N s/m), shape (n, n, 3) each.
     """
+    tensions, by_place, by_velocity = decay_factors(state, tangent, rope)
+    both = np.stack([by_place, by_velocity]).reshape(2, len(by_place), -1)
+    decay, drag = (tensions @ both).reshape(2, len(tensions), *by_place.shape[1:])
+    return decay, drag
+
+
+def decay_factors(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[Array, Array, Array]:
+    """The decay part of one rope in factors: changes of tension (N) with the logarithms of the
+    decays at its pulleys and, last, with that of the path, shape (n, k), and derivatives of these
+    logarithms after differences of points (1/m) and of velocities (s/m), shape (k, n, 3) each.
+    """
     spans, inner = tangent.spans, state.ropes.inner(rope)
     length, rate, unit = state.lengths[spans], state.rates[spans], state.directions[spans]
     path, path_rate = float(state.paths[rope]), float(state.path_rates[rope])
@@ -105,10 +116,11 @@ def decay_tangent(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[A
 
     # ln(c_i) - sum omega_k ln(c_k) after those logarithms, shape (spans, pulleys).
     spread = beyond.T - (share * length / path)[::-1].cumsum()[::-1][1:]
-    both = np.stack([by_place, by_rate[:, :, None] * unit]).reshape(2, -1, unit.size)
-    decay, drag = ((tension[:, None] * spread) @ both).reshape(2, count, *unit.shape)
-    decay += tension[:, None, None] * (((1.0 - share) / path)[:, None] * unit)
-    return decay, drag
+    logs = np.column_stack([tension[:, None] * spread, tension])
+    stretch = ((1.0 - share) / path)[:, None] * unit
+    by_place = np.concatenate([by_place, stretch[None]])
+    by_velocity = np.concatenate([by_rate[:, :, None] * unit, np.zeros((1, *unit.shape))])
+    return logs, by_place, by_velocity
 
 
 def _angle_gradients(unit: Array, length: Array) -> tuple[Array, Array]:

@@ -17,13 +17,14 @@ from ringsim.engine.build import Built, build
 from ringsim.engine.meters import BendingMeter, EnergyMeter, StressMeter
 from ringsim.engine.readings import Openings, State, joint_groups
 from ringsim.engine.rotations import Array
-from ringsim.engine.settings import residual_tolerance, scales_of, solver_settings
+from ringsim.engine.settings import newton_norm, solver_settings
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
+from ringsim.theory.scales import scales_of
 from ringsim.variables import Cause, Outcome, Reason
 
 _REFUSE = 10.0
@@ -51,7 +52,7 @@ class Integration:
         self._built, self._scene = built, scene
         self._system = model.assembly.system
         self._solver = exu.MainSolverImplicitSecondOrder()
-        self._settings = solver_settings(scene, residual_tolerance(built))
+        self._settings = solver_settings(scene, newton_norm(built))
         self._state = State(model)
         self._openings = Openings(model)
         self._energy = EnergyMeter(built)
@@ -71,9 +72,10 @@ class Integration:
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
         self.history = Recorder(scene, coordinates)
+        ropes = None if built.cables is None else built.cables.ropes.content
         self._control = RunControl(
             scene.solver,
-            scales_of(built),
+            scales_of(scene, model.layout, ropes),
             self._read(self._measure(0.0)),
             self._locks,
             limits=scene.limits,

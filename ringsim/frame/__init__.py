@@ -1,0 +1,1 @@
+"""The frame engine: rings in joint coordinates, compiled; see docs/frame.md."""

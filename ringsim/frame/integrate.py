@@ -1,0 +1,255 @@
+"""Time integration of a scene in joint coordinates; ``ringsim.stepping`` decides on the steps."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ringsim.cable.faults.family import CableFault
+from ringsim.frame.kernels import Strains, move, moved_between, straighten
+from ringsim.frame.meter import EnergyMeter
+from ringsim.frame.model import FrameModel
+from ringsim.frame.state import State
+from ringsim.frame.stresses import StressMeter
+from ringsim.layout.pose import Array
+from ringsim.outputs.recorder import Recorder
+from ringsim.outputs.series import Reading
+from ringsim.parts.faults.stuck_vjoint import StuckVJoint
+from ringsim.scene import Scene
+from ringsim.stepping.instant import Instant
+from ringsim.stepping.locks import Locks
+from ringsim.stepping.run_control import RunControl
+from ringsim.theory.scales import scales_of
+from ringsim.variables import Outcome
+
+_MOST = 25
+"""Newton iterations a step at most, as of the full model."""
+_FALL = 0.3
+"""Ratio of successive residuals above which the tangent is renewed: one more iteration costs a
+third of a tangent."""
+_DESCENT = 0.9
+"""Ratio of successive residuals above which half the change is tried, and half of that ..."""
+_SMALLEST_SHARE = 0.1
+"""... down to a sixteenth: by then the tangent of the other side is better."""
+_SHORTEST = 1e-9
+"""Step (s) below which a run is given up, as of the full model."""
+
+Watch = Callable[[Instant], None]
+"""What is shown every accepted state of a run."""
+
+
+def solve(scene: Scene, watch: Watch | None = None) -> Outcome:
+    """Run a scene.  A solve that fails is a status, not an exception.
+
+    InputError if the scene has what frames do not represent.
+    """
+    return Integration(FrameModel(scene), watch).run().outcome()
+
+
+class NoBalanceError(Exception):
+    """Newton found no state in balance; why."""
+
+
+class Integration:
+    """One run of a model."""
+
+    def __init__(self, model: FrameModel, watch: Watch | None = None) -> None:
+        self._model, self._watch = model, watch
+        scene, elements = model.scene, len(model.mesh.length)
+        self._scene, self._now, self._energy = scene, model.start, EnergyMeter(model)
+        self._moves: list[tuple[float, Array]] = []
+        self._steps: list[tuple[float, Array]] = []
+        self._faults = sorted(scene.faults, key=lambda fault: fault.time)
+        self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
+        self._stress = StressMeter(model.mesh, model.layout) if scene.record.stress else None
+        stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
+        first = self._measure(0.0, self._now)
+        self._locks = (
+            Locks(first.angles, stowed, scene.structure.planes) if scene.structure.locks else None
+        )
+        self.history = Recorder(scene, {"rod": np.array(list(model.layout.halves()))})
+        ropes = None if model.cables is None else model.cables.ropes.content
+        self._control = RunControl(
+            scene.solver,
+            scales_of(scene, model.layout, ropes),
+            self._read(first),
+            self._locks,
+            limits=scene.limits,
+            follow_deviations=scene.record.stress,
+        )
+
+    def run(self) -> Recorder:
+        """Integrate until all V-joints have locked and settled, or to the end time."""
+        control, history = self._control, self.history
+        while control.goes_on:
+            step = control.next_step(self._faults[0].time if self._faults else math.inf)
+            self._begin()
+            while step >= _SHORTEST:
+                try:
+                    after, found = self._try(step)
+                except NoBalanceError as error:
+                    cause, step = str(error), control.retry(0.5 * step)
+                    continue
+                if control.shorter(found) is None:
+                    self._accept(step, after, found)
+                    break
+                step = control.retry(step)
+            else:
+                control.fail(cause)
+        control.conclude()
+        history.status, history.fate = control.status, control.fate
+        history.reason, history.repeats = control.reason, control.repeats
+        return history
+
+    def _begin(self) -> None:
+        """Let the winches begin a step."""
+        cables, now = self._model.cables, self._control.now
+        if cables is not None and self._now.chain is not None:
+            slope = self._scene.structure.path_slope
+            slopes = [slope(cable, now.angles[plane]) for plane, cable in cables.present]
+            cables.winches.advance(now.time, self._now.chain, np.array(slopes))
+
+    def _try(self, step: float) -> tuple[State, Instant]:
+        """The state a step later."""
+        time = self._control.now.time + step
+        after = self._now.copy()
+        self._move(after, self._guess(step))
+        self._strains = self._damped(step, after)
+        self._newton(time, step, after)
+        return after, self._measure(time, after)
+
+    def _damped(self, step: float, after: State) -> Strains:
+        """How the rates of strains follow from strains: the backward differences of second order
+        of ringsim.engine.rod_dampers.
+        """
+        now = self._now.strains
+        if not self._steps:
+            return Strains(after.strains, -now / step, 1.0 / step)
+        last, before = self._steps[-1]
+        r = step / last
+        lead = (1.0 + 2.0 * r) / (step * (1.0 + r))
+        return Strains(after.strains, (r**2 / (1.0 + r) * before - (1.0 + r) * now) / step, lead)
+
+    def _newton(self, time: float, step: float, after: State) -> None:
+        """Newton's method with a line search, in place: where forces bend sharply, as of stops and
+        of pulleys whose friction turns round, a whole step may lead as far to the other side.
+        """
+        model, factored, last, share = self._model, None, math.inf, 1.0
+        begun, change, fresh = after.stand(), np.zeros(0), False
+        tolerance = model.tolerance(step, self._strains)
+        for _ in range(_MOST):
+            try:
+                g = model.residual(time, step, self._now, after, self._strains)
+            except ValueError as error:
+                raise NoBalanceError(str(error)) from error
+            norm = float(np.sqrt(g @ g))
+            if not math.isfinite(norm):
+                raise NoBalanceError("the state is not finite")
+            if norm <= tolerance:
+                return
+            self.history.newton_iterations += 1
+            if fresh and norm > _DESCENT * last and share > _SMALLEST_SHARE:
+                share *= 0.5
+                after.take(begun)
+                self._move(after, share * change)
+                continue
+            fresh = factored is None or norm > _FALL * last
+            if factored is None or fresh:
+                factored = model.tangent(time, step, after, self._strains)
+                self.history.jacobians += 1
+                if not factored.sound:
+                    raise NoBalanceError("a pivot of the tangent is too small")
+            last, share, begun = norm, 1.0, after.stand()
+            change = factored.solve(g)
+            self._move(after, change)
+        raise NoBalanceError(
+            f"Newton's residual is {norm:.3g} N after {_MOST} iterations, step {step:.3g} s"
+        )
+
+    def _move(self, state: State, by: Array) -> None:
+        move(self._model.mesh, state.pose, by[: self._model.mesh.unknowns])
+        if self._model.strings is not None:
+            state.hub += by[-3:]
+
+    def _guess(self, step: float) -> Array:
+        """Change of all unknowns over a step: mean rates of the last two steps, extrapolated."""
+        if not self._moves:
+            return 0.5 * step**2 * self._model.first
+        last, rate = self._moves[-1]
+        # From rest the mean of the first step is half the rate at its end.
+        before, earlier = self._moves[-2] if len(self._moves) > 1 else (last, -rate)
+        return step * (rate + (rate - earlier) * (step + last) / (last + before))
+
+    def _accept(self, step: float, after: State, found: Instant) -> None:
+        """Go on from a state."""
+        model, control, before = self._model, self._control, self._now
+        self._moves = [*self._moves[-1:], (step, self._between(before, after) / step)]
+        self._steps = [(step, before.strains)]
+        straighten(after.pose)
+        self._now = after
+        control.accept(found, self._read(found))
+        if self._watch is not None:
+            self._watch(control.now)
+        if self._locks is not None:
+            deployed = self._locks.deployed
+            model.laws.latch(deployed)
+            if model.cables is not None and after.chain is not None:
+                for number, (plane, _) in enumerate(model.cables.present):
+                    if deployed[plane].all():
+                        model.cables.winches.lock(number, found.time, after.chain)
+
+    def _between(self, before: State, after: State) -> Array:
+        """Changes of all unknowns."""
+        found = np.zeros(self._model.size)
+        moved_between(self._model.mesh, before.pose, after.pose, found)
+        if self._model.strings is not None:
+            found[-3:] = after.hub - before.hub
+        return found
+
+    def _read(self, now: Instant) -> Instant:
+        """Note a state that the run goes on from; returns it as faults that strike leave it."""
+        if self._strike(now):
+            after = self._measure(now.time, self._now)
+            # What a fault lets go is lost; nothing moves while it strikes.
+            lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
+            energies = after.energies._replace(lost=lost, driven=now.energies.driven)
+            now = replace(after, energies=energies)
+        self._energy.keep()
+        cables = self._model.cables
+        self.history.note(
+            Reading(
+                **vars(now),
+                chain=self._now.chain,
+                planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
+                stress=None if self._stress is None else self._stress.read(self._strains),
+            )
+        )
+        return now
+
+    def _strike(self, now: Instant) -> bool:
+        """Strike all faults that are due; returns whether there was one."""
+        due = [fault for fault in self._faults if fault.time <= now.time + 1e-12]
+        del self._faults[: len(due)]
+        for fault in due:
+            if isinstance(fault, StuckVJoint):
+                place = self._scene.structure.planes.index(fault.plane), fault.section - 1
+                self._model.laws.stick(fault, place, float(now.angles[place]))
+            elif isinstance(fault, CableFault) and self._model.cables is not None:
+                assert self._now.chain is not None
+                self._model.cables.strike(fault, self._now.chain)
+        return bool(due)
+
+    def _measure(self, time: float, state: State) -> Instant:
+        """A state, with its cables, and what has passed since the one that was kept last."""
+        model = self._model
+        tensions, stretch, driven = None, 0.0, bool(self._faults)
+        if model.cables is not None:
+            chain = model.cables.state(time, state.place.lines, state.rate.lines)
+            state.chain, tensions = chain, chain.tensions
+            stretch = float(np.max(chain.strains, where=chain.ropes.alive, initial=0.0))
+            driven = driven or model.cables.winches.driving(time, chain)
+        angles, rates = model.openings.read(state.pose.angle, state.rate.angles)
+        energies = self._energy.read(state, self._strains)
+        gap = model.gap(state.pose)
+        return Instant(time, angles, rates, energies, gap, tensions, stretch, driven)

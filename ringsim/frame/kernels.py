@@ -1,0 +1,270 @@
+"""Forces and tangent of all rods and masses, compiled."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ringsim.frame.element import carried, element_tangent, middle, scaled
+from ringsim.frame.mesh import Mesh
+from ringsim.frame.vectors import (
+    Matrix,
+    Vector,
+    compiled,
+    cross,
+    dot,
+    matrix,
+    minus,
+    mul,
+    plus,
+    put,
+    rotation_vector,
+    store,
+    times,
+    transposed,
+    turn,
+    turned,
+    turned_about_z,
+    vector,
+)
+from ringsim.layout.pose import Array
+
+
+class Pose(NamedTuple):
+    """Places (f, 3), m, and axes (f, 3, 3) of all frames, and all joint angles (a,), rad."""
+
+    place: Array
+    axes: Array
+    angle: Array
+
+
+class Strains(NamedTuple):
+    """Strains u (m) and psi (rad) of all elements at a state, shape (e, 6); ``before`` and
+    ``lead`` (1/s) give their rates, lead * strain + before.
+    """
+
+    now: Array
+    before: Array
+    lead: float
+
+
+@compiled
+def move(mesh: Mesh, pose: Pose, step: Array) -> None:
+    """Move a pose by changes of all unknowns, shape (unknowns,); in place."""
+    for f in range(len(pose.place)):
+        k = mesh.home[f]
+        put(pose.place[f], (step[k], step[k + 1], step[k + 2]))
+        by = turned((step[k + 3], step[k + 4], step[k + 5]))
+        store(pose.axes[f], mul(by, matrix(pose.axes[f])))
+    for n in range(len(pose.angle)):
+        pose.angle[n] += step[mesh.angle_home[n]]
+
+
+@compiled
+def moved_between(mesh: Mesh, before: Pose, after: Pose, out: Array) -> None:
+    """Changes of all unknowns from one pose to another, shape (unknowns,)."""
+    for f in range(len(before.place)):
+        k = mesh.home[f]
+        by = mul(matrix(after.axes[f]), transposed(matrix(before.axes[f])))
+        psi = rotation_vector(by)
+        for i in range(3):
+            out[k + i] = after.place[f, i] - before.place[f, i]
+            out[k + 3 + i] = psi[i]
+    for n in range(len(before.angle)):
+        out[mesh.angle_home[n]] = after.angle[n] - before.angle[n]
+
+
+@compiled
+def straighten(pose: Pose) -> float:
+    """Take what round-off has done to the axes out: R (3 - R^T R) / 2; returns the largest."""
+    worst = 0.0
+    for f in range(len(pose.axes)):
+        r = pose.axes[f]
+        square = r.T @ r
+        for i in range(3):
+            for j in range(3):
+                worst = max(worst, abs(square[i, j] - (i == j)))
+        r[:] = 1.5 * r - 0.5 * (r @ square)
+    return worst
+
+
+@compiled
+def place_points(mesh: Mesh, pose: Pose, out: Array) -> None:
+    """Places of all points with mass, shape (p, 3)."""
+    for n in range(len(mesh.point_frame)):
+        f = mesh.point_frame[n]
+        arm = turn(matrix(pose.axes[f]), vector(mesh.point_arm[n]))
+        out[n, 0] = pose.place[f, 0] + arm[0]
+        out[n, 1] = pose.place[f, 1] + arm[1]
+        out[n, 2] = pose.place[f, 2] + arm[2]
+
+
+@compiled
+def end_axes(mesh: Mesh, pose: Pose, e: int, side: int) -> Matrix:
+    """Axes of an end of an element."""
+    own = mul(matrix(pose.axes[mesh.frame[e, side]]), matrix(mesh.axes[e, side]))
+    angle = mesh.angle[e, side]
+    return own if angle < 0 else mul(own, turned_about_z(pose.angle[angle]))
+
+
+@compiled
+def _loaded(
+    mesh: Mesh, pose: Pose, points: Array, strains: Strains, e: int
+) -> tuple[Matrix, Matrix, Matrix, Vector, Vector, Vector, Vector, Vector]:
+    """What an element holds: axes of its ends and middle, d, psi, n, w, m; keeps its strains."""
+    r1, r2 = end_axes(mesh, pose, e, 0), end_axes(mesh, pose, e, 1)
+    d = minus(vector(points[mesh.point[e, 1]]), vector(points[mesh.point[e, 0]]))
+    axes, u, psi = middle(r1, r2, d, mesh.length[e])
+    for k in range(3):
+        strains.now[e, k], strains.now[e, 3 + k] = u[k], psi[k]
+    du = plus(times(strains.lead, u), vector(strains.before[e, :3]))
+    dpsi = plus(times(strains.lead, psi), vector(strains.before[e, 3:]))
+    force = scaled(vector(mesh.stiffness[e, :3]), u, du, mesh.tau)
+    moment = scaled(vector(mesh.stiffness[e, 3:]), psi, dpsi, mesh.tau)
+    n, w, m = carried(axes, d, force, moment, psi)
+    return r1, r2, axes, d, psi, n, w, m
+
+
+@compiled
+def _pulls(
+    mesh: Mesh, accelerations: Array, e: int, n: Vector, w: Vector, m: Vector
+) -> tuple[Vector, Vector, Vector, Vector]:
+    """Forces and moments on an element's ends, with those of inertia."""
+    a1 = vector(accelerations[mesh.point[e, 0]])
+    a2 = vector(accelerations[mesh.point[e, 1]])
+    own, other = mesh.mass[e, 0], mesh.mass[e, 1]
+    f1 = minus(plus(times(own, a1), times(other, a2)), n)
+    f2 = plus(plus(times(own, a2), times(other, a1)), n)
+    half = times(0.5, w)
+    return f1, minus(times(-1.0, m), half), f2, minus(m, half)
+
+
+@compiled
+def add_forces(
+    mesh: Mesh, pose: Pose, points: Array, accelerations: Array, strains: Strains, g: Array
+) -> None:
+    """Add forces of elastic rods and of inertia on all unknowns, shape (unknowns,)."""
+    for e in range(len(mesh.length)):
+        r1, r2, _, _, _, n, w, m = _loaded(mesh, pose, points, strains, e)
+        f1, m1, f2, m2 = _pulls(mesh, accelerations, e, n, w, m)
+        for side in range(2):
+            force, moment, axes = (f1, m1, r1) if side == 0 else (f2, m2, r2)
+            f = mesh.frame[e, side]
+            k = mesh.home[f]
+            arm = minus(vector(points[mesh.point[e, side]]), vector(pose.place[f]))
+            put(g[k : k + 3], force)
+            put(g[k + 3 : k + 6], plus(moment, cross(arm, force)))
+            if mesh.angle[e, side] >= 0:
+                z = (axes[2], axes[5], axes[8])
+                g[mesh.angle_home[mesh.angle[e, side]]] += dot(z, moment)
+    for p in range(len(mesh.point_mass)):
+        if mesh.point_mass[p] > 0.0:
+            f = mesh.point_frame[p]
+            k = mesh.home[f]
+            force = times(mesh.point_mass[p], vector(accelerations[p]))
+            arm = minus(vector(points[p]), vector(pose.place[f]))
+            put(g[k : k + 3], force)
+            put(g[k + 3 : k + 6], cross(arm, force))
+
+
+@compiled
+def add_tangent(
+    mesh: Mesh,
+    pose: Pose,
+    points: Array,
+    accelerations: Array,
+    strains: Strains,
+    by_place: float,
+    fronts: Array,
+) -> None:
+    """Add the derivative of ``add_forces`` to the fronts; ``by_place`` is that of accelerations
+    after places, 1/s^2.
+    """
+    k12, rows, h = np.zeros((12, 12)), np.zeros((12, 14)), np.zeros((14, 14))
+    more = 1.0 + mesh.tau * strains.lead
+    for e in range(len(mesh.length)):
+        r1, r2, axes, d, psi, n, w, m = _loaded(mesh, pose, points, strains, e)
+        f1, m1, f2, m2 = _pulls(mesh, accelerations, e, n, w, m)
+        k12[:] = 0.0
+        ku = times(more, vector(mesh.stiffness[e, :3]))
+        kp = times(more, vector(mesh.stiffness[e, 3:]))
+        element_tangent(axes, d, n, w, m, psi, ku, kp, k12)
+        for k in range(3):
+            k12[k, k] += by_place * mesh.mass[e, 0]
+            k12[k, 6 + k] += by_place * mesh.mass[e, 1]
+            k12[6 + k, k] += by_place * mesh.mass[e, 1]
+            k12[6 + k, 6 + k] += by_place * mesh.mass[e, 0]
+        for side in range(2):
+            x, phi, own = 6 * side, 6 * side + 3, 7 * side
+            end = r1 if side == 0 else r2
+            a = minus(vector(points[mesh.point[e, side]]), vector(pose.place[mesh.frame[e, side]]))
+            z = (end[2], end[5], end[8])
+            for i in range(12):
+                # d x = d X - a x d phi, and the force's row times that: f . (d phi x a).
+                f = (k12[i, x], k12[i, x + 1], k12[i, x + 2])
+                t = (k12[i, phi], k12[i, phi + 1], k12[i, phi + 2])
+                swung = cross(a, f)
+                for j in range(3):
+                    rows[i, own + j] = f[j]
+                    rows[i, own + 3 + j] = t[j] + swung[j]
+                rows[i, own + 6] = dot(t, z)
+        for side in range(2):
+            x, phi, own = 6 * side, 6 * side + 3, 7 * side
+            end = r1 if side == 0 else r2
+            f = f1 if side == 0 else f2
+            moment = m1 if side == 0 else m2
+            a = minus(vector(points[mesh.point[e, side]]), vector(pose.place[mesh.frame[e, side]]))
+            z = (end[2], end[5], end[8])
+            for j in range(14):
+                force = (rows[x, j], rows[x + 1, j], rows[x + 2, j])
+                torque = (rows[phi, j], rows[phi + 1, j], rows[phi + 2, j])
+                swung = cross(a, force)
+                for i in range(3):
+                    h[own + i, j] = force[i]
+                    h[own + 3 + i, j] = torque[i] + swung[i]
+                h[own + 6, j] = dot(z, torque)
+            # The arm and the joint's axis turn with the frame under constant force and moment:
+            # (d phi x a) x f = (a f^T - (f . a)) d phi, (d phi x z) . m = (z x m) . d phi.
+            along, sideways = dot(f, a), cross(z, moment)
+            for i in range(3):
+                for j in range(3):
+                    h[own + 3 + i, own + 3 + j] += a[i] * f[j]
+                h[own + 3 + i, own + 3 + i] -= along
+                h[own + 6, own + 3 + i] += sideways[i]
+        front = fronts[mesh.part[e]]
+        for i in range(14):
+            row = mesh.local[e, i]
+            if row >= 0:
+                for j in range(14):
+                    column = mesh.local[e, j]
+                    if column >= 0:
+                        front[row, column] += h[i, j]
+    # Points with mass of their own: those of frames in parts have no arm.
+    for p in range(len(mesh.point_mass)):
+        if mesh.point_mass[p] == 0.0:
+            continue
+        f, mass = mesh.point_frame[p], by_place * mesh.point_mass[p]
+        front, first = fronts[mesh.frame_local[f, 0]], mesh.frame_local[f, 1]
+        a = minus(vector(points[p]), vector(pose.place[f]))
+        force = times(mesh.point_mass[p], vector(accelerations[p]))
+        along, square = dot(force, a), dot(a, a)
+        s = (0.0, -a[2], a[1], a[2], 0.0, -a[0], -a[1], a[0], 0.0)
+        for i in range(3):
+            front[first + i, first + i] += mass
+            front[first + 3 + i, first + 3 + i] += mass * square - along
+            for j in range(3):
+                front[first + i, first + 3 + j] -= mass * s[3 * i + j]
+                front[first + 3 + i, first + j] += mass * s[3 * i + j]
+                front[first + 3 + i, first + 3 + j] += a[i] * force[j] - mass * a[i] * a[j]
+
+
+@compiled
+def kinetic_energy(mesh: Mesh, velocities: Array) -> float:
+    """Of rods and points, J; velocities of the points, shape (p, 3), m/s."""
+    found = 0.0
+    for e in range(len(mesh.mass)):
+        v1, v2 = vector(velocities[mesh.point[e, 0]]), vector(velocities[mesh.point[e, 1]])
+        found += 0.5 * mesh.mass[e, 0] * (dot(v1, v1) + dot(v2, v2)) + mesh.mass[e, 1] * dot(v1, v2)
+    for p in range(len(mesh.point_mass)):
+        v = vector(velocities[p])
+        found += 0.5 * mesh.point_mass[p] * dot(v, v)
+    return found

@@ -1,0 +1,169 @@
+"""Torques on joint angles: friction, stops and joints that stick, by the laws of ringsim.parts."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.frame.parts import Indices
+from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
+from ringsim.layout.joints import JointOpening
+from ringsim.layout.pose import Array
+from ringsim.parts.faults.stuck_vjoint import StuckVJoint
+from ringsim.parts.joint_friction.family import JointFriction
+from ringsim.parts.persection import at_section
+from ringsim.parts.springs import Reaction
+from ringsim.refusal import InputError
+from ringsim.scene import Scene
+
+_NUDGE = 1e-7
+"""Change of place (m, rad) and rate by which the slopes of laws are measured."""
+_SIDES = np.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
+Law = Callable[[Array, Array], Reaction]
+
+
+def slope_of(
+    law: Callable[[Array, Array], Array], x: Array, rate: Array, rate_by_place: float
+) -> Array:
+    """Derivative of a force after its coordinate, whose rate follows it, by central differences."""
+    moved = _NUDGE * _SIDES[0].reshape(-1, *[1] * x.ndim)
+    hurried = _NUDGE * _SIDES[1].reshape(-1, *[1] * x.ndim)
+    # All at once: numpy's calls cost more than its numbers.
+    ahead, behind, faster, slower = law(x + moved, rate + hurried)
+    return np.asarray((ahead - behind + rate_by_place * (faster - slower)) / (2.0 * _NUDGE))
+
+
+class Torques(NamedTuple):
+    """Torques on all angles that dissipate, shape (a,), N m, and energy stored, J."""
+
+    lost: Array
+    stored: float
+
+
+class Openings(NamedTuple):
+    """Joint angles and senses of the opening angles, shape (planes, sections)."""
+
+    angle: Indices
+    sense: Array
+
+    @classmethod
+    def of(cls, skeleton: Skeleton) -> "Openings":
+        """Those of a layout."""
+        found = [
+            [(skeleton.angle_of[o.joint], o.sense) for o in plane if isinstance(o, JointOpening)]
+            for plane in skeleton.layout.openings
+        ]
+        if not all(found):
+            raise InputError(f"{NOT_HERE} openings without joints: {CURE}")
+        table = np.array(found)
+        return cls(table[..., 0].astype(np.int64), table[..., 1])
+
+    def unwrapped(self, angles: Array) -> None:
+        """Turn angles so that folded ones lie between -pi/2 and 3 pi/2; in place."""
+        folded = self.sense * angles[self.angle]
+        angles[self.angle] += self.sense * np.where(folded < -0.5 * np.pi, 2.0 * np.pi, 0.0)
+
+    def read(self, angles: Array, rates: Array) -> tuple[Array, Array]:
+        """Opening angles and rates, rad and rad/s."""
+        return np.pi - self.sense * angles[self.angle], -self.sense * rates[self.angle]
+
+
+class JointLaws:
+    """All torques of a scene's joints.
+
+    ``damping`` is the torque over the rate of each angle where friction is linear, N m s/rad.
+    """
+
+    def __init__(self, scene: Scene, skeleton: Skeleton, openings: Openings) -> None:
+        self._openings, self._stop = openings, scene.stop
+        self.damping = np.zeros(len(skeleton.angles))
+        self._friction: list[tuple[JointFriction, Indices, Array]] = []
+        for family, law in scene.joints.present().items():
+            self._rub(family, law, skeleton)
+        self.latched = np.zeros(openings.angle.shape, dtype=bool)
+        self._stuck: list[tuple[StuckVJoint, tuple[int, int], float]] = []
+
+    def _rub(self, family: str, law: JointFriction, skeleton: Skeleton) -> None:
+        joints = skeleton.layout.joints
+        own = [n for n, one in enumerate(skeleton.angles) if joints[one.joint].family == family]
+        if not own:
+            known = ", ".join(sorted({joint.family for joint in joints} - {""}))
+            raise InputError(
+                f"joints.{family}: this structure has no joint of that family (it has: "
+                f'{known or "none"}): leave it out (joints.{family} = "none")'
+            )
+        rest = []
+        for n in own:
+            linear = at_section(law, joints[skeleton.angles[n].joint].section).linear_damping()
+            if linear is None:
+                rest.append(n)
+            else:
+                self.damping[n] += linear
+        if rest:
+            sections = np.array([joints[skeleton.angles[n].joint].section for n in rest])
+            senses = np.array([skeleton.angles[n].sense for n in rest])
+            self._friction.append((at_section(law, sections), np.array(rest), senses))
+
+    def latch(self, deployed: NDArray[np.bool_]) -> None:
+        """Hold these V-joints from both sides from now on, if the stop latches."""
+        if self._stop is not None and self._stop.latch:
+            self.latched |= deployed
+
+    def stick(self, fault: StuckVJoint, place: tuple[int, int], opening: float) -> None:
+        """Hold a V-joint, (plane, section), at an opening angle (rad)."""
+        self._stuck.append((fault, place, opening))
+
+    def _acting(
+        self, angles: Array, rates: Array
+    ) -> list[tuple[Indices, Array, Array, Array, Law]]:
+        """Angles, senses, coordinates and rates of every law that acts, and the law."""
+        found: list[tuple[Indices, Array, Array, Array, Law]] = []
+        for law, own, sense in self._friction:
+
+            def rub(_: Array, rate: Array, law: JointFriction = law) -> Reaction:
+                return Reaction(0.0 * rate, law.torque(rate), 0.0)
+
+            found.append((own, sense, angles[own], sense * rates[own], rub))
+        own, sense = self._openings
+        if self._stop is not None:
+            folded = sense * angles[own]
+            free = folded.min() > _NUDGE and folded.max() < self._stop.most_folded - _NUDGE
+            if self.latched.any() or not free:
+                stop, latched = self._stop, self.latched
+
+                def hold(x: Array, rate: Array) -> Reaction:
+                    return stop.torque(x, rate, latched)
+
+                found.append((own, sense, folded, sense * rates[own], hold))
+        for fault, place, opening in self._stuck:
+            where = np.array([own[place]])
+            turned = np.pi - sense[place] * angles[where] - opening
+            found.append(
+                (where, np.array([-sense[place]]), turned, -sense[place] * rates[where],
+                 fault.torque)
+            )  # fmt: skip
+        return found
+
+    def push(self, angles: Array, rates: Array, g: Array, home: Indices) -> None:
+        """Add all torques but those of linear friction to a residual, whose unknowns of the angles
+        are at ``home``; angles in rad and rates in rad/s, shape (a,).
+        """
+        for own, sense, x, rate, law in self._acting(angles, rates):
+            g[home[own]] += sense * law(x, rate).total
+
+    def passing(self, angles: Array, rates: Array) -> Torques:
+        """What all torques take and store."""
+        lost, stored = self.damping * rates, 0.0
+        for own, sense, x, rate, law in self._acting(angles, rates):
+            reaction = law(x, rate)
+            lost[own] += sense * reaction.damping
+            stored += float(np.sum(reaction.stored))
+        return Torques(lost, stored)
+
+    def slopes(self, angles: Array, rates: Array, rate_by_angle: float) -> Array:
+        """Derivatives of the torques after the angles, whose rates follow them, N m/rad: (a,)."""
+        found = self.damping * rate_by_angle
+        for own, _, x, rate, law in self._acting(angles, rates):
+            found[own] += slope_of(lambda *at, law=law: law(*at).total, x, rate, rate_by_angle)
+        return found

@@ -1,0 +1,265 @@
+"""A scene in joint coordinates: residual and Newton's step at any state."""
+
+import math
+
+import numpy as np
+
+from ringsim.frame.balance import Held, add_slides, balance, put_in_place
+from ringsim.frame.cables import FrameCables
+from ringsim.frame.elimination import factor, solve, solve_one
+from ringsim.frame.following import Coefficients, Followed
+from ringsim.frame.kernels import Pose, Strains, add_tangent, move
+from ringsim.frame.laws import JointLaws, Openings
+from ringsim.frame.lines import no_lines
+from ringsim.frame.mesh import mesh_of
+from ringsim.frame.net import Strings
+from ringsim.frame.skeleton import Skeleton
+from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
+from ringsim.frame.state import State
+from ringsim.layout.layout import layout_of
+from ringsim.layout.pose import Array, cross
+from ringsim.scene import Scene
+from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.scales import residual_tolerance
+
+
+class FrameModel:
+    """All parts of a scene on their unknowns.
+
+    Attributes
+    ----------
+    size
+        Number of unknowns: those of the mesh and the hub's three, if there is a net.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.layout = scene, layout_of(scene)
+        self.skeleton = skeleton = Skeleton(self.layout)
+        beam = self.layout.boom
+        boom = [] if beam is None else skeleton.add_beam(beam)
+        touching = [] if beam is None else [beam.low.body]
+        self.mesh, parts = mesh_of(skeleton, scene.rods, boom, touching)
+        mesh = self.mesh
+        self.openings = Openings.of(skeleton)
+        self.laws = JointLaws(scene, skeleton, self.openings)
+        self.strings = None if self.layout.net is None else Strings(self.layout.net)
+        self.coefficients = Coefficients.of(scene.solver.spectral_radius)
+        angle = np.array([one.start for one in skeleton.angles])
+        self.openings.unwrapped(angle)
+        pose = Pose(np.array(skeleton.places), np.array(skeleton.axes), angle)
+        self.cables = None
+        if scene.cables is not None:
+            self.cables = FrameCables(scene.cables, skeleton, mesh, parts)
+        self._stiffest = stiffest = float(mesh.stiffness[:, 0].max())
+        slides = [RigidSlide(mesh, *pair, STIFFNESS * stiffest) for pair in skeleton.slides]
+        self._beam_slides: list[Slide] = []
+        if beam is not None:
+            nodes = [(end.frame, end.axes) for end in skeleton.beam]
+            self._beam_slides.append(
+                BeamSlide(mesh, nodes, boom[0].length, beam.low.body, STIFFNESS * stiffest)
+            )
+        self.slides: list[Slide] = [*slides, *self._beam_slides]
+        self.size = mesh.unknowns + (0 if self.strings is None else 3)
+        self.loads = np.zeros(self.size)
+        self._loaded: list[tuple[int, Array, Array]] = []
+        for number, force in self.layout.forces:
+            end = skeleton.end_of(self.layout.joints[number].first)
+            self.loads[mesh.home[end.frame] : mesh.home[end.frame] + 3] += force
+            self._loaded.append((end.frame, pose.place[end.frame].copy(), force))
+        self._tolerance = residual_tolerance(scene, self.layout, 0.0)
+        self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
+        lines = 0 if self.cables is None else self.cables.points
+        ends = [] if self.layout.net is None else list(self.layout.net.bodies)
+        sizes = 3 * len(mesh.point_mass), 3 * lines, len(angle), 3 * len(ends), 3 * bool(ends)
+        self._held = Held(
+            cuts=np.cumsum([0, *sizes]),
+            ends=np.array(ends, dtype=np.int64),
+            top=np.array([slide.top for slide in slides], dtype=np.int64),
+            low=np.array([slide.low for slide in slides], dtype=np.int64),
+            stiffness=STIFFNESS * stiffest,
+            damping=self.laws.damping,
+        )
+        self._string_spots = mesh.home[self._held.ends][:, None] + np.arange(3)
+        self._lines = no_lines() if self.cables is None else self.cables.lines
+        self.start = self._started(pose)
+        self._fronts = np.zeros((len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]))
+
+    def work(self, pose: Pose) -> float:
+        """Of the loads since the start, J."""
+        done = (force @ (pose.place[f] - start) for f, start, force in self._loaded)
+        return float(sum(done))
+
+    def gap(self, pose: Pose) -> float:
+        """Largest distance of a body from the boom that it slides along, m; revolutes cannot come
+        apart.
+        """
+        return max((slide.size(pose) for slide in self.slides), default=0.0)
+
+    def tolerance(self, step: float, strains: Strains) -> float:
+        """Residual norm at which Newton stops in a step (s), N; not below what round-off leaves of
+        coordinates of order 1 m: of inertia, of the rods with their damping, of slides.
+        """
+        inertia = self._heaviest * self.coefficients.acceleration_by_place(step)
+        rods = self._stiffest * (1.0 + self.mesh.tau * strains.lead)
+        slides = STIFFNESS * self._stiffest if self.slides else 0.0
+        small = 4.0 * float(np.finfo(float).eps)
+        reached = small * (math.sqrt(self.size) * (inertia + rods) + slides)
+        return max(self._tolerance, reached)
+
+    def residual(
+        self, time: float, step: float, start: State, now: State, strains: Strains
+    ) -> Array:
+        """Forces out of balance on all unknowns, shape (size,); ValueError if the cables have no
+        answer.
+        """
+        g = -self.loads
+        inner = g[: self.mesh.unknowns]
+        balance(
+            self.mesh, self._lines, self._held, self.coefficients, step, start.followed, now.pose,
+            now.hub, now.followed, strains, inner,
+        )  # fmt: skip
+        self.laws.push(now.pose.angle, now.rate.angles, inner, self.mesh.angle_home)
+        for slide in self._beam_slides:
+            slide.hold(now.pose, inner)
+        if self.strings is not None:
+            g[-3:] += self.strings.hub_mass * now.acceleration.hub[0]
+            pulls = self.strings.pulls(*now.net)
+            if pulls is not None:
+                inner[self._string_spots] += pulls
+                g[-3:] -= pulls.sum(axis=0)
+        if self.cables is not None:
+            self._pulled = self.cables.pull(time, now.pose, now.place.lines, now.rate.lines, inner)
+        inner[self.mesh.fixed] = 0.0
+        return g
+
+    def tangent(self, time: float, step: float, now: State, strains: Strains) -> "Factored":
+        """The residual's derivative after the unknowns, factored."""
+        mesh = self.mesh
+        by_rate = self.coefficients.rate_by_place(step)
+        by_place = self.coefficients.acceleration_by_place(step)
+        fronts = self._fronts
+        fronts[:] = 0.0
+        add_tangent(
+            mesh, now.pose, now.place.points, now.acceleration.points, strains, by_place, fronts
+        )
+        add_slides(mesh, self._held, now.pose, fronts)
+        slopes = self.laws.slopes(now.pose.angle, now.rate.angles, by_rate)
+        front, spot = mesh.angle_local.T
+        fronts[front, spot, spot] += slopes
+        for slide in self._beam_slides:
+            slide.add_tangent(now.pose, fronts)
+        border = np.zeros((2, 0, mesh.unknowns))
+        if self.cables is not None:
+            border = self.cables.add_tangent(
+                time, now.pose, *self._pulled, now.rate.lines, by_rate, fronts
+            )
+        corner, hub_inertia = -np.eye(border.shape[1]), np.inf
+        if self.strings is not None:
+            hub_inertia = self.strings.hub_mass * by_place
+            blocks = self.strings.tangents(*now.net, by_rate)
+            if blocks is not None:
+                border, corner = self._strung(blocks, hub_inertia, border, corner)
+                hub_inertia = np.inf
+        return Factored(self, fronts, border, corner, hub_inertia)
+
+    def _strung(
+        self, blocks: Array, inertia: float, border: Array, corner: Array
+    ) -> tuple[Array, Array]:
+        """Add strings that pull to the fronts, and the hub to the border."""
+        mesh, reach = self.mesh, np.arange(3)
+        front, first = mesh.frame_local[self._held.ends].T
+        spots = first[:, None] + reach
+        self._fronts[front[:, None, None], spots[:, :, None], spots[:, None, :]] += blocks
+        count = border.shape[1]
+        longer = np.zeros((2, count + 3, mesh.unknowns))
+        longer[:, :count] = border
+        # Both a row for each of the hub's unknowns and a column.
+        longer[:, count:, self._string_spots] = -blocks.transpose(1, 0, 2)
+        whole = np.zeros((count + 3,) * 2)
+        whole[:count, :count] = corner
+        whole[count:, count:] = blocks.sum(axis=0) + inertia * np.eye(3)
+        return longer, whole
+
+    def _place(self, state: State) -> None:
+        """Places of all followed coordinates at the state's pose."""
+        followed = state.followed.place
+        put_in_place(self.mesh, self._lines, self._held, state.pose, state.hub, followed)
+
+    def _started(self, pose: Pose) -> State:
+        """At rest with the accelerations of the structure with rigid rods, as of the full model."""
+        skeleton, scene = self.skeleton, self.scene
+        pull, velocity, rotation = 0.0, np.zeros(3), np.zeros(3)
+        if not self.layout.springs:
+            ideal, q = OneCoordinate(scene), scene.structure.coordinate
+            motion = ideal.motion(q)
+            pull = ideal.work_rate(q) / motion.inertia
+            velocity, rotation = motion.velocity, motion.rotation
+        self.first = np.zeros(self.size)
+        rates = []
+        for f, (rate, turn) in enumerate(skeleton.rates):
+            moving = pull * (rate - velocity - cross(rotation, skeleton.places[f]))
+            turning = pull * (turn - rotation)
+            rates.append((moving, turning))
+            k = self.mesh.home[f]
+            self.first[k : k + 3], self.first[k + 3 : k + 6] = moving, turning
+        angular = pull * np.array(skeleton.angle_rates)
+        self.first[self.mesh.angle_home] = angular
+        hub = np.zeros(3) if self.layout.net is None else np.array(self.layout.net.hub)
+        state = State(
+            pose, hub, np.zeros((len(self.mesh.length), 6)),
+            Followed.at_rest(np.zeros(self._held.cuts[-1]), np.zeros(self._held.cuts[-1])),
+            self._held,
+        )  # fmt: skip
+        self._place(state)
+        # Accelerations of the points: differences of places along the motion.
+        ahead, behind = state.copy(), state.copy()
+        small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)
+        move(self.mesh, ahead.pose, small * self.first[: self.mesh.unknowns])
+        move(self.mesh, behind.pose, -small * self.first[: self.mesh.unknowns])
+        if self.strings is not None:
+            self.first[-3:] = self.first[self._string_spots].mean(axis=0)
+            ahead.hub += small * self.first[-3:]
+            behind.hub -= small * self.first[-3:]
+        self._place(ahead)
+        self._place(behind)
+        acceleration = (ahead.followed.place - behind.followed.place) / (2.0 * small)
+        followed = Followed.at_rest(state.followed.place, acceleration)
+        return State(pose, hub, state.strains, followed, self._held)
+
+
+class Factored:
+    """The tangent K of the unknowns with its border of columns and rows, shape (2, k, unknowns):
+
+        K x + columns^T z = r,   rows x + corner z = r_z.
+
+    A net's hub that no string pulls moves by its inertia alone (N/m); else it ends the border.
+    """
+
+    def __init__(
+        self, model: FrameModel, fronts: Array, border: Array, corner: Array, hub_inertia: float
+    ) -> None:
+        self._mesh, self._fronts, self._rows = model.mesh, fronts, border[1]
+        self._hub, self._hub_inertia = model.strings is not None, hub_inertia
+        self.sound = bool(factor(model.mesh, fronts))
+        self._reached = border[0].T.copy()
+        if len(corner):
+            solve(model.mesh, fronts, self._reached)
+            self._corner = np.linalg.inv(corner - self._rows @ self._reached)
+
+    def solve(self, g: Array) -> Array:
+        """The change of all unknowns that takes a residual g to zero."""
+        unknowns, strung = self._mesh.unknowns, math.isinf(self._hub_inertia)
+        found = -g
+        x, hub = found[:unknowns], found[unknowns:]
+        solve_one(self._mesh, self._fronts, x)
+        if len(self._rows):
+            right = -(self._rows @ x)
+            if self._hub and strung:
+                right[-3:] += hub
+            z = self._corner @ right
+            x -= self._reached @ z
+            if self._hub and strung:
+                hub[:] = z[-3:]
+        if self._hub and not strung:
+            hub /= self._hub_inertia
+        return np.asarray(found)

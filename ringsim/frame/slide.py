@@ -1,0 +1,137 @@
+"""Bodies that slide along a boom: a stiff spring across it."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ringsim.frame.kernels import Pose
+from ringsim.frame.mesh import Mesh
+from ringsim.frame.vectors import compiled, cross, dot, minus, vector
+from ringsim.layout.pose import Array, skew
+
+STIFFNESS = 100.0
+"""Over that of the stiffest rod along its axis, EA / L: it gives a hundredth of what rods do."""
+
+
+class Gap(NamedTuple):
+    """Distances across the boom (n,), m, and derivatives after the unknowns of frames (n, 6 f)."""
+
+    sizes: Array
+    rows: Array
+    frames: tuple[int, ...]
+
+
+class Slide:
+    """Holds the origin of a body on a line of other frames."""
+
+    def __init__(self, mesh: Mesh, low: int, stiffness: float) -> None:
+        self._mesh, self.low, self._stiffness = mesh, low, stiffness
+
+    def at(self, pose: Pose) -> Gap:
+        """The gap at a pose; the last of its frames is the body's."""
+        raise NotImplementedError
+
+    def size(self, pose: Pose) -> float:
+        """Distance from the line, m."""
+        return float(np.linalg.norm(self.at(pose).sizes))
+
+    def stored(self, pose: Pose) -> float:
+        """Energy of the spring, J."""
+        return 0.5 * self._stiffness * self.size(pose) ** 2
+
+    def hold(self, pose: Pose, g: Array) -> None:
+        """Add its force to the residual."""
+        gap = self.at(pose)
+        forces = self._stiffness * (gap.sizes @ gap.rows)
+        for n, frame in enumerate(gap.frames):
+            k = self._mesh.home[frame]
+            g[k : k + 6] += forces[6 * n : 6 * n + 6]
+
+    def add_tangent(self, pose: Pose, fronts: Array) -> None:
+        """Add to the fronts; gaps are so small that how the rows turn does not matter."""
+        gap, mesh = self.at(pose), self._mesh
+        # Where a part holds one of the frames, it holds all of them.
+        front = int(mesh.frame_local[list(gap.frames), 0].min())
+        where = {int(spot): k for k, spot in enumerate(mesh.spots[front, : mesh.size[front]])}
+        places = [where[int(mesh.home[f]) + k] for f in gap.frames for k in range(6)]
+        fronts[front][np.ix_(places, places)] += self._stiffness * (gap.rows.T @ gap.rows)
+
+
+@compiled
+def aside(pose: Pose, top: int, low: int) -> tuple[Array, Array]:
+    """Gaps along x and y of a body's axes, and how they change, shapes (2,) and (2, 12)."""
+    gaps, rows = np.empty(2), np.zeros((2, 12))
+    apart, axes = minus(vector(pose.place[low]), vector(pose.place[top])), pose.axes[top]
+    for k in range(2):
+        axis = vector(axes[:, k])
+        gaps[k], turned = dot(axis, apart), cross(axis, apart)
+        for i in range(3):
+            rows[k, i], rows[k, 3 + i], rows[k, 6 + i] = -axis[i], turned[i], axis[i]
+    return gaps, rows
+
+
+class RigidSlide(Slide):
+    """Along the z axis of body ``top``."""
+
+    def __init__(self, mesh: Mesh, top: int, low: int, stiffness: float) -> None:
+        super().__init__(mesh, low, stiffness)
+        self.top = top
+
+    def at(self, pose: Pose) -> Gap:
+        """See ``Slide``."""
+        return Gap(*aside(pose, self.top, self.low), (self.top, self.low))
+
+
+class BeamSlide(Slide):
+    """Along the cubic (Hermite) curves between the nodes of a boom with elements of a length, m.
+
+    ``nodes`` are their frames and axes there, whose x is the curve's direction.
+    """
+
+    def __init__(
+        self, mesh: Mesh, nodes: Sequence[tuple[int, Array]], length: float, low: int,
+        stiffness: float,
+    ) -> None:  # fmt: skip
+        super().__init__(mesh, low, stiffness)
+        self._nodes, self._length = nodes, length
+
+    def at(self, pose: Pose) -> Gap:
+        """See ``Slide``: the gap to the curve's nearest point."""
+        place, length = pose.place[self.low], self._length
+        ends = np.array([pose.place[f] for f, _ in self._nodes])
+        tangents = np.array([pose.axes[f] @ own[:, 0] for f, own in self._nodes])
+        along = np.einsum("ij,ij->i", place - ends, tangents)
+        k = int(np.clip(np.count_nonzero(along > 0.0) - 1, 0, len(self._nodes) - 2))
+        points = np.array([ends[k], length * tangents[k], ends[k + 1], length * tangents[k + 1]])
+        x = float(np.clip(along[k] / length, 0.0, 1.0))
+        for _ in range(20):  # Newton for the foot of the perpendicular
+            away, slope, bend = (place * (n == 0) - _hermite(x, n) @ points for n in range(3))
+            change = float(away @ slope) / float(slope @ slope + away @ bend)
+            x -= change
+            if abs(change) < 1e-14:
+                break
+        shares = _hermite(x, 0)
+        away = place - shares @ points
+        direction = _hermite(x, 1) @ points
+        direction /= np.linalg.norm(direction)
+        rows = np.zeros((3, 18))
+        rows[:, 0:3], rows[:, 6:9], rows[:, 12:15] = -shares[0] * _ONE, -shares[2] * _ONE, _ONE
+        rows[:, 3:6], rows[:, 9:12] = shares[1] * skew(points[1]), shares[3] * skew(points[3])
+        # Along the curve the body is free.
+        rows = (_ONE - np.outer(direction, direction)) @ rows
+        return Gap(away, rows, (self._nodes[k][0], self._nodes[k + 1][0], self.low))
+
+
+_ONE = np.eye(3)
+_CUBIC = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0],
+                   [0.0, 0.0, -1.0, 1.0]])  # fmt: skip
+"""Hermite's cubics: coefficients of 1, x, x^2, x^3 for place and slope at both ends."""
+
+
+def _hermite(x: float, derivative: int) -> Array:
+    """Values of the cubics, or of their derivatives, shape (4,)."""
+    powers = np.zeros(4)
+    for k in range(derivative, 4):
+        powers[k] = np.prod(np.arange(k, k - derivative, -1)) * x ** (k - derivative)
+    return np.asarray(_CUBIC @ powers)

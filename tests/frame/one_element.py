@@ -1,0 +1,157 @@
+"""One rod element: its energy and forces, and cantilevers of it here and in exudyn."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import exudyn as exu
+import exudyn.itemInterface as item
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.frame.element import carried, element_tangent, middle, scaled
+from ringsim.frame.vectors import turned
+
+Array = NDArray[np.float64]
+REST = (0.0, 0.0, 0.0)
+LENGTH = 0.3
+STIFFNESS = np.array([4e2, 5e1, 5e1]), np.array([1.0, 3.0, 3.0])
+"""Of u (N/m) and psi (N m): what a bend of 1 rad needs moves the middle by some tenths."""
+
+
+class Ends(NamedTuple):
+    """Places (m) and axes of the two ends."""
+
+    x1: Array
+    r1: Array
+    x2: Array
+    r2: Array
+
+    def moved(self, by: Array) -> Ends:
+        """Changed by (x1, phi1, x2, phi2), shape (12,)."""
+        return Ends(
+            self.x1 + by[:3], rotation(by[3:6]) @ self.r1,
+            self.x2 + by[6:9], rotation(by[9:]) @ self.r2,
+        )  # fmt: skip
+
+    def carried_along(self, place: Array, turn: Array) -> Ends:
+        """After a rigid motion."""
+        return Ends(place + turn @ self.x1, turn @ self.r1, place + turn @ self.x2, turn @ self.r2)
+
+    def exchanged(self) -> Ends:
+        """The same rod counted from its other end: both axes x and y turn round."""
+        back = np.diag([-1.0, -1.0, 1.0])
+        return Ends(self.x2, self.r2 @ back, self.x1, self.r1 @ back)
+
+
+def rotation(vector: Array) -> Array:
+    """Matrix of a rotation vector."""
+    return np.array(turned(tuple(vector))).reshape(3, 3)
+
+
+def bent(rng: np.random.Generator, angle: float) -> Ends:
+    """An element somewhere, bent and twisted by an angle (rad) and stretched in proportion."""
+    axis = rng.normal(size=3)
+    r1 = rotation(rng.normal(size=3))
+    r2 = r1 @ rotation(angle * axis / np.linalg.norm(axis))
+    x1 = rng.normal(size=3)
+    x2 = x1 + r1 @ (np.array([LENGTH, 0.0, 0.0]) + 0.1 * LENGTH * angle * rng.normal(size=3))
+    return Ends(x1, r1, x2, r2)
+
+
+def strains(ends: Ends) -> tuple[Array, Array, Array]:
+    """Axes of the middle, u and psi."""
+    across = tuple(ends.x2 - ends.x1)
+    axes, u, psi = middle(tuple(ends.r1.ravel()), tuple(ends.r2.ravel()), across, LENGTH)
+    return np.array(axes), np.array(u), np.array(psi)
+
+
+def energy(ends: Ends) -> float:
+    _, u, psi = strains(ends)
+    return float(0.5 * (STIFFNESS[0] @ u**2 + STIFFNESS[1] @ psi**2))
+
+
+def forces(ends: Ends) -> Array:
+    """Forces and moments on (x1, phi1, x2, phi2), shape (12,)."""
+    n, w, m = (np.array(each) for each in _loads(ends))
+    return np.concatenate([-n, -m - 0.5 * w, n, m - 0.5 * w])
+
+
+def tangent(ends: Ends) -> Array:
+    """``element_tangent``, shape (12, 12)."""
+    n, w, m = _loads(ends)
+    axes, _, psi = strains(ends)
+    found = np.zeros((12, 12))
+    element_tangent(
+        tuple(axes), tuple(ends.x2 - ends.x1), n, w, m, tuple(psi), *map(tuple, STIFFNESS), found
+    )
+    return found
+
+
+def _loads(ends: Ends) -> tuple[tuple[float, ...], ...]:
+    axes, u, psi = strains(ends)
+    force = scaled(tuple(STIFFNESS[0]), tuple(u), REST, 0.0)
+    moment = scaled(tuple(STIFFNESS[1]), tuple(psi), REST, 0.0)
+    return carried(tuple(axes), tuple(ends.x2 - ends.x1), force, moment, tuple(psi))
+
+
+def differences(function, ends: Ends, step: float = 1e-6) -> Array:
+    """Central differences of a function after (x1, phi1, x2, phi2), in the last axis."""
+    units = step * np.eye(12)
+    return np.stack(
+        [(function(ends.moved(e)) - function(ends.moved(-e))) / (2.0 * step) for e in units], -1
+    )
+
+
+def cantilever(force: Array, moment: Array) -> Ends:
+    """One element clamped at its first end, with dead loads on its second."""
+    ends = Ends(np.zeros(3), np.eye(3), np.array([LENGTH, 0.0, 0.0]), np.eye(3))
+    load = np.concatenate([force, moment])
+    for share in np.linspace(0.1, 1.0, 10):
+        for _ in range(50):
+            missing = forces(ends)[6:] - share * load
+            if np.linalg.norm(missing) < 1e-9 * np.linalg.norm(load):
+                break
+            change = np.linalg.solve(tangent(ends)[6:, 6:], missing)
+            ends = ends.moved(np.concatenate([np.zeros(6), -change]))
+        else:
+            raise AssertionError("Newton found no balance")
+    return ends
+
+
+def exudyn_cantilever(force: Array, moment: Array) -> Ends:
+    """The same by exudyn's own element."""
+    container = exu.SystemContainer()
+    system = container.AddSystem()
+    turn = [1.0, 0.0, 0.0, 0.0]
+    nodes = [
+        system.AddNode(item.NodeRigidBodyEP(referenceCoordinates=[x, 0.0, 0.0, *turn]))
+        for x in (0.0, LENGTH)
+    ]
+    section = exu.BeamSection()
+    section.massPerLength = 1.0
+    section.inertia = 1e-3 * np.eye(3)
+    section.stiffnessMatrix = np.diag([*STIFFNESS[0], *STIFFNESS[1]]) * LENGTH
+    system.AddObject(
+        item.ObjectBeamGeometricallyExact(nodeNumbers=nodes, length=LENGTH, sectionData=section)
+    )
+    ground = system.AddMarker(
+        item.MarkerBodyRigid(bodyNumber=system.AddObject(item.ObjectGround()))
+    )
+    first, second = (system.AddMarker(item.MarkerNodeRigid(nodeNumber=node)) for node in nodes)
+    system.AddObject(item.ObjectJointGeneric(markerNumbers=[ground, first]))
+    system.AddLoad(item.LoadForceVector(markerNumber=second, loadVector=list(force)))
+    system.AddLoad(item.LoadTorqueVector(markerNumber=second, loadVector=list(moment)))
+    system.Assemble()
+    settings = exu.SimulationSettings()
+    settings.staticSolver.numberOfLoadSteps = 10
+    settings.staticSolver.verboseMode = 0
+    settings.staticSolver.newton.relativeTolerance = 1e-13
+    settings.staticSolver.newton.absoluteTolerance = 1e-13
+    settings.staticSolver.newton.maxIterations = 50
+    settings.solution.file.write = False
+    assert system.SolveStatic(settings)
+    x2 = np.array(system.GetNodeOutput(nodes[1], exu.OutputVariableType.Position))
+    r2 = np.array(system.GetNodeOutput(nodes[1], exu.OutputVariableType.RotationMatrix))
+    container.Reset()
+    return Ends(np.zeros(3), np.eye(3), x2, r2.reshape(3, 3))
