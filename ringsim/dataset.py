@@ -100,9 +100,9 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
     now = datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
     software = f"ringsim {version('ringsim')}"
     title = scene.title or scene.name
-    ideal = int(outcome.values.get("fidelity", Fidelity.FULL)) == Fidelity.IDEAL
-    model = "ideal ring of rigid rods" if ideal else "multibody simulation with exudyn"
-    engine = "" if ideal else f" {version('exudyn')}"
+    fidelity = Fidelity(int(outcome.values.get("fidelity", Fidelity.FULL)))
+    # The libraries whose versions decide about the numbers of each model.
+    engines = {Fidelity.FULL: f" {version('exudyn')}", Fidelity.FRAME: f" {version('numba')}"}
     return {
         "Conventions": "CF-1.11, ACDD-1.3",
         "title": title,
@@ -111,10 +111,10 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
         "reason": outcome.reason,
         "history": f"{now} simulated by {software}",
         "date_created": now,
-        "source": f"{software}: {model}{engine}",
-        "fidelity": "ideal" if ideal else "full",
+        "source": f"{software}: {fidelity.model}{engines.get(fidelity, '')}",
+        "fidelity": fidelity.word,
         "creator_name": "ringsim",
-        **{f"{package}_version": version(package) for package in ("ringsim", "exudyn", "numpy")},
+        **{f"{name}_version": version(name) for name in ("ringsim", "exudyn", "numba", "numpy")},
         "python_version": platform.python_version(),
         "scene": scene.to_toml(),
     }

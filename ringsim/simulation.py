@@ -1,4 +1,7 @@
-"""One simulation: scene in, outcome or dataset out.  Failures are values, not exceptions."""
+"""One simulation: scene in, outcome or dataset out.  Failures are values, not exceptions.
+
+Engines are imported by whoever runs them: each costs a second, and its own libraries.
+"""
 
 import time
 import traceback
@@ -9,11 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ringsim.engine.integrate import Watch, solve
+from ringsim.choice import kind_of
+from ringsim.compile_cache import choose_folder, compile_once
 from ringsim.outputs.error_bars import error_bars
+from ringsim.outputs.family import holds
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene, load_scene
+from ringsim.stepping.instant import Instant
 from ringsim.stepping.restarts import run_with_restarts
 from ringsim.theory.ideal_fidelity import run_ideal, with_remark
 from ringsim.variables import Cause, Fidelity, Outcome, Status
@@ -21,7 +27,15 @@ from ringsim.variables import Cause, Fidelity, Outcome, Status
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIDELITIES", "run", "run_ideal", "simulate"]
+__all__ = ["FIDELITIES", "run", "run_frame", "run_ideal", "simulate"]
+
+Watch = Callable[[Instant], None]
+"""What is shown every accepted state of a run."""
+Solve = Callable[[Scene, Watch | None], Outcome]
+"""An engine."""
+
+_COMPILING_STEPS = 5
+"""Steps of the run that compiles: predictor and damping take three to be complete."""
 
 
 def run(scene: Scene, watch: Watch | None = None) -> Outcome:
@@ -33,41 +47,99 @@ def run(scene: Scene, watch: Watch | None = None) -> Outcome:
     has a status other than OK and the reason; it never raises.  ``watch`` is called with every
     accepted state.
     """
+    prepare_run(scene)
+    from ringsim.engine.integrate import solve
+
+    return _run(solve, Fidelity.FULL, scene, watch)
+
+
+def prepare_run(scene: Scene) -> None:
+    """Load what ``run`` needs, so that the time of the first run is that of a run."""
+    import ringsim.engine.integrate  # noqa: F401
+
+
+def run_frame(scene: Scene, watch: Watch | None = None) -> Outcome:
+    """As :func:`run`, by the frame engine.
+
+    Raises
+    ------
+    InputError
+        If it cannot represent the scene.
+    """
+    prepare_run_frame(scene)
+    from ringsim.frame.integrate import solve
+
+    return _run(solve, Fidelity.FRAME, scene, watch, refusal=(InputError,))
+
+
+def prepare_run_frame(scene: Scene) -> None:
+    """Load what ``run_frame`` needs, and compile it for scenes like this one, once a machine.
+
+    Raises
+    ------
+    InputError
+        If it cannot represent the scene.
+    """
+    choose_folder()
+    from ringsim.frame.integrate import solve
+
+    left = iter(range(_COMPILING_STEPS))
+
+    def watch(now: Instant) -> None:
+        next(left)  # raises StopIteration
+
+    def compiling() -> None:
+        try:
+            solve(scene, watch)
+        except InputError:
+            raise
+        except Exception:  # its end; what breaks here breaks in the run, too, which tells of it
+            return
+
+    compile_once((sorted(holds(scene)), kind_of(scene.rods)), compiling)
+
+
+def _run(
+    solve: Solve, fidelity: Fidelity, scene: Scene, watch: Watch | None,
+    refusal: tuple[type[InputError], ...] = (),
+) -> Outcome:  # fmt: skip
+    """Run a scene with an engine, which may raise what is a ``refusal``."""
     begin = (time.perf_counter(), time.process_time())
 
     def start(solver: Solver) -> Outcome:
-        return _attempt(scene.model_copy(update={"solver": solver}), begin, watch)
+        """One start; times count from the first."""
+        try:
+            outcome = solve(scene.model_copy(update={"solver": solver}), watch)
+            outcome.values["wall_time"] = np.array(time.perf_counter() - begin[0])
+            outcome.values["cpu_time"] = np.array(time.process_time() - begin[1])
+            return outcome
+        except refusal:
+            raise
+        except Exception as error:  # whatever broke, a campaign goes on and the user learns of it
+            traceback.print_exc()  # a campaign keeps it in the sample's log
+            cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
+            return Outcome(Status.ERROR, f"{type(error).__name__}: {error}", cause=cause)
 
     bars = partial(error_bars, elements=scene.rods.elements)
     outcome = run_with_restarts(start, scene.solver, bars)
-    outcome.values["fidelity"] = np.array(int(Fidelity.FULL))
+    outcome.values["fidelity"] = np.array(int(fidelity))
     return with_remark(outcome, scene)
 
 
-def _attempt(scene: Scene, begin: tuple[float, float], watch: Watch | None) -> Outcome:
-    """One start of a run; times count from ``begin`` (s, elapsed and of the processor)."""
-    try:
-        outcome = solve(scene, watch)
-        outcome.values["wall_time"] = np.array(time.perf_counter() - begin[0])
-        outcome.values["cpu_time"] = np.array(time.process_time() - begin[1])
-        return outcome
-    except Exception as error:  # whatever broke, a campaign goes on and the user learns of it
-        traceback.print_exc()  # a campaign keeps it in the sample's log
-        cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
-        return Outcome(Status.ERROR, f"{type(error).__name__}: {error}", cause=cause)
-
-
-FIDELITIES: dict[str, Callable[[Scene], Outcome]] = {"full": run, "ideal": run_ideal}
-"""What answers a scene: the full multibody model, or the ideal ring of rigid rods, which knows
-neither asynchrony nor stress and costs a fraction."""
+FIDELITIES: dict[str, Callable[[Scene], Outcome]] = {
+    "full": run, "frame": run_frame, "ideal": run_ideal,
+}  # fmt: skip
+"""What answers a scene: the full multibody model; the same rods, joints and cables in joint
+coordinates, several times as fast; or the ideal ring of rigid rods, which knows neither asynchrony
+nor stress and costs a fraction."""
 
 
 def simulate(scene: Scene | str | Path, fidelity: str = "full") -> "xr.Dataset":
     """Run a scene and return its dataset (see ``ringsim.dataset.to_dataset``).
 
     ``scene`` is a scene, or what ``load_scene`` reads: the name of a built-in one or a file.
-    InputError if that, or ``fidelity`` ("full", "ideal"), is refused, or if the ideal ring cannot
-    represent the scene.
+    InputError if that, or ``fidelity`` ("full", "frame", "ideal"), is refused, or if the frame
+    engine or the ideal ring cannot represent the scene.
 
     >>> from ringsim.scene import load_scene
     >>> scene = load_scene("truss2").with_values({"solver.end_time": 0.5})

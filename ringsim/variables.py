@@ -111,11 +111,21 @@ class Reason(str):
         return type(self)(self.cause, f"{self}{more}")
 
 
-class Fidelity(IntEnum):
-    """Which model answered: the full multibody model, or the ideal ring with rigid rods."""
+class Fidelity(Code):
+    """Which model answered."""
 
     FULL = 0
     IDEAL = 1
+    FRAME = 2
+
+    @property
+    def model(self) -> str:
+        """What it is, in words."""
+        return {
+            Fidelity.FULL: "multibody simulation with exudyn",
+            Fidelity.IDEAL: "ideal ring of rigid rods",
+            Fidelity.FRAME: "flexible rods in joint coordinates, compiled with numba",
+        }[self]
 
 
 @dataclass(frozen=True)

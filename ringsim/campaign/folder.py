@@ -9,7 +9,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from ringsim.campaign.specification import Campaign, flat
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.campaign.specification import SOLVERS, Campaign, flat
 from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError, show
 from ringsim.sampling.columns import Table
@@ -20,8 +23,12 @@ from ringsim.storage.merge import NAME as MERGED
 from ringsim.storage.merge import write_merged
 from ringsim.storage.netcdf import DESIGN, OutputTable, provenance, read_design, write_design
 from ringsim.units import LEFT_OUT
+from ringsim.variables import Fidelity
 
-_KEPT = ("identity", "seed", "solver", "campaign", "campaign_name", "scene", "output")
+_KEPT = (
+    "identity", "seed", "solver", "campaign", "campaign_name", "scene", "output", "check_every",
+    "judge", "max_difference",
+)  # fmt: skip
 """Attributes of the design that a merged file has, too."""
 
 
@@ -35,9 +42,21 @@ class Folder:
     attributes: dict[str, Any]
     """Those of the design: "identity", the digest of all that decides about the results, ..."""
 
-    def survey(self) -> Survey:
-        """What it holds of every sample."""
-        return survey(self.path, self.attributes["identity"], self.table.samples)
+    def survey(self, *, checks: bool = False) -> Survey:
+        """What it holds of every sample, or of every sample's check."""
+        return survey(self.path, self.attributes["identity"], self.table.samples, checks=checks)
+
+    @property
+    def checked(self) -> NDArray[np.int64]:
+        """Samples that run with the judging engine, too."""
+        every = int(self.attributes.get("check_every", 0))
+        return np.arange(0, self.table.samples, every) if every else np.empty(0, dtype=np.int64)
+
+    def unchecked(self) -> NDArray[np.int64]:
+        """Samples whose check has no result."""
+        if not len(self.checked):
+            return self.checked
+        return np.intersect1d(self.survey(checks=True).missing, self.checked)
 
 
 def open_folder(path: Path) -> Folder:
@@ -47,7 +66,9 @@ def open_folder(path: Path) -> Folder:
     return Folder(path, table, scene, attributes)
 
 
-def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> None:
+def prepare_folder(
+    campaign: Campaign, path: Path, *, solver: str, judge: str = SOLVERS["full"]
+) -> None:
     """Create a campaign's folder, or check that it is this campaign's.
 
     A design may have grown since: if its first samples are those of the folder, the new ones
@@ -69,7 +90,7 @@ def prepare_folder(campaign: Campaign, path: Path, *, solver: str) -> None:
             with locked(path / "lock") as alone:
                 if alone:
                     if not _is_ready(campaign, path, table, solver):
-                        _write(campaign, path, table, solver)
+                        _write(campaign, path, table, solver, judge)
                     return
 
 
@@ -96,13 +117,20 @@ def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool
     return False
 
 
-def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> None:
+def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str) -> None:
     wanted = campaign.specification
-    attributes = provenance(name=wanted.name, title=wanted.title, action="designed") | {
+    model = Fidelity[wanted.fidelity.upper()]
+    made = provenance(name=wanted.name, title=wanted.title, action="designed", model=model)
+    attributes = made | {
         "seed": wanted.seed, "solver": solver, "scene": campaign.scene.to_toml(),
         "campaign": campaign.text, "campaign_name": wanted.name,
         "output": wanted.output.model_dump_json(),
     }  # fmt: skip
+    if wanted.check_every:
+        attributes |= {
+            "check_every": wanted.check_every, "judge": judge,
+            "max_difference": json.dumps(wanted.max_difference),
+        }  # fmt: skip
     content = json.dumps(_decisive(table, attributes), sort_keys=True)
     attributes["identity"] = hashlib.sha256(content.encode()).hexdigest()[:32]
     for draft in path.glob(f".{DESIGN}.*{DRAFT}"):
@@ -119,7 +147,9 @@ def _decisive(table: Table, attributes: dict[str, Any]) -> dict[str, Any]:
         "the version of exudyn": attributes["exudyn_version"],
         "its inputs": [column.path for column in table.columns],
         "its solver": attributes["solver"],
-    }
+        "the version of numba": attributes.get("numba_version")
+        if attributes["solver"] == SOLVERS["frame"] else None,
+    }  # fmt: skip
 
 
 def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder | None:
@@ -130,7 +160,7 @@ def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Fold
     held = _decisive(old.table, old.attributes)
     mine = {
         "scene": campaign.scene.to_toml(), "seed": campaign.specification.seed, "solver": solver,
-        **{f"{name}_version": version(name) for name in ("ringsim", "exudyn")},
+        **{f"{name}_version": version(name) for name in ("ringsim", "exudyn", "numba")},
     }  # fmt: skip
     wanted = _decisive(table, mine)
     what = " and ".join(word for word in wanted if wanted[word] != held[word])
@@ -171,13 +201,15 @@ def _changed_input(new: Table, old: Table) -> str:
 def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, Path | None]:
     """Write ``campaign.nc``, one process at a time, so that it never loses samples it had.
 
-    ``execution`` says who computed it; if samples are left, it is written only if ``partly``.
-    Returns the number of samples left, of failed ones, and the file, or None if it is not written.
-    InputError if the folder cannot be written to.
+    ``execution`` says who computed it; if samples or checks are left, it is written only if
+    ``partly``.  Returns the number of samples left, of failed ones, and the file, or None if it is
+    not written.  InputError if the folder cannot be written to.
     """
     path, design = campaign.path / MERGED, campaign.attributes
-    made = provenance(name=design["campaign_name"], title=design["title"], action="merged")
-    attributes = made | {name: design[name] for name in _KEPT} | {"execution": execution}
+    model = Fidelity[design.get("fidelity", "full").upper()]
+    title = design["title"]
+    made = provenance(name=design["campaign_name"], title=title, action="merged", model=model)
+    attributes = made | {n: design[n] for n in _KEPT if n in design} | {"execution": execution}
     attributes["history"] += f"\n{design['history']}"
     output = OutputTable.model_validate_json(design["output"])
     with writing(path, GO_ON), locked(campaign.path / "lock-merge", wait=True):
@@ -185,13 +217,15 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
             draft.unlink(missing_ok=True)
         for whole in (False, True):
             found = campaign.survey()
+            checks = campaign.survey(checks=True) if len(campaign.checked) else None
             left, failed = len(found.missing), len(found.failed)
-            if left and not partly:
+            if not partly and (left or len(campaign.unchecked())):
                 return left, failed, None
             try:
                 failed += write_merged(
-                    campaign.path, found, campaign.table, campaign.scene, output, attributes
-                )
+                    campaign.path, found, campaign.table, campaign.scene, output, attributes,
+                    checks,
+                )  # fmt: skip
                 break
             except DamagedError:
                 if whole:

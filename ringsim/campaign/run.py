@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.campaign_notes import budget_lines, notes
+from ringsim.analysis.engines import check_lines, too_far
 from ringsim.campaign.folder import Folder, merge, open_folder
 from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
 from ringsim.execution.work import Limits, Scheduler, Work, longest_first, relative_cost
@@ -18,6 +19,7 @@ from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.refusal import InputError
 from ringsim.storage.journal import Journal
 from ringsim.storage.locks import reserved
+from ringsim.storage.result import check_of, sample_of
 from ringsim.variables import Status
 
 
@@ -68,8 +70,9 @@ class Choices:
 def run_campaign(folder: Path, choices: Choices) -> int:
     """Run the missing samples of a prepared folder, on every rank that takes part.
 
-    Returns the exit code: 0 all samples have run, 3 too many (or all) of them failed, 130 stopped
-    by a signal, or samples are left.  InputError if the folder is in use or cannot be written.
+    Returns the exit code: 0 all samples have run, 3 too many (or all) of them failed, or engines
+    differ by more than the campaign allows, 130 stopped by a signal, or samples are left.
+    InputError if the folder is in use or cannot be written.
     """
     scheduler, share = choices.scheduler, choices.share
     with contextlib.ExitStack() as held:
@@ -97,7 +100,8 @@ def _run_missing(campaign: Folder, choices: Choices, stop: StopRequest) -> None:
     own = dict(choices.overrides)
     work = Work(
         solver=campaign.attributes["solver"], scene=campaign.scene.to_table(),
-        values_of=lambda sample: campaign.table.values_of(sample) | own, limits=choices.limits,
+        values_of=lambda number: campaign.table.values_of(sample_of(number)) | own,
+        limits=choices.limits, judge=campaign.attributes.get("judge", ""),
         keep=lambda result: journal.append(replace(result, overrides=own)),
         stop=lambda: stop.reason,
     )  # fmt: skip
@@ -126,7 +130,7 @@ def _run_missing(campaign: Folder, choices: Choices, stop: StopRequest) -> None:
 def _watched(
     campaign: Folder, choices: Choices, stop: StopRequest, work: Work
 ) -> tuple[list[int], Progress, Work]:
-    """The samples to run, longest ones first, and the work with somebody who watches it."""
+    """The checks and samples to run, longest ones first, and the work with who watches it."""
     share, most = choices.share, choices.max_failed
     before, every = campaign.survey(), np.arange(campaign.table.samples)
     again = every[np.isin(before.status, list(choices.again))]
@@ -149,8 +153,22 @@ def _watched(
         return stop.reason
 
     samples = longest_first(missing, relative_cost(campaign.table, campaign.scene))
+    # First, since the full engine takes longest.
+    samples = [check_of(sample) for sample in _checks(campaign, choices)] + samples
     work = replace(work, started=progress.started, finished=progress.finished, stop=asked)
     return samples, progress, work
+
+
+def _checks(campaign: Folder, choices: Choices) -> list[int]:
+    """The samples of this share whose checks are to run."""
+    if not len(campaign.checked):
+        return []
+    found = campaign.survey(checks=True)
+    wanted = np.isin(found.status, list(choices.again))
+    if not choices.overrides:
+        wanted[found.missing] = True
+    chosen = campaign.checked[wanted[campaign.checked]]
+    return [int(sample) for sample in chosen[choices.share.holds(chosen)]]
 
 
 def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
@@ -163,6 +181,7 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
         return EXIT_INTERRUPTED
     finally:
         stop.at_once = False
+    refused = []
     if path is not None:
         _tell(f"{path}: {campaign.table.samples} samples, {failed} failed")
         listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
@@ -170,6 +189,8 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
             lines = notes(dataset)
             if listed or campaign.scene.solver.error_bars:
                 lines += budget_lines(dataset)
+            lines += check_lines(dataset)
+            refused = too_far(dataset)
         for line in lines:
             _tell(f"  {line}")
     if stop.reason and not stop.signalled:
@@ -178,16 +199,18 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
             "give the same command with --retry-failed (and --set solver.tolerance=...)"
         )
         return EXIT_FAILED
+    unchecked = len(campaign.unchecked())
+    todo = f"{left} samples" + (f" and {unchecked} checks" if unchecked else "")
     alone = choices.share.count == 1 and not choices.overrides
-    interrupted = left and (stop.signalled or alone)
+    interrupted = (left or unchecked) and (stop.signalled or alone)
     if interrupted:
         why = stop.reason or "some results were lost"
-        _tell(f"{why}; {left} samples are left: the same command goes on with them")
-    elif left and choices.overrides:
-        _tell(f"{left} samples are left: give the command without --retry-failed and --set")
-    elif left:
-        _tell(f"this part is done; {left} samples of other parts are left")
-    if failed == campaign.table.samples:
+        _tell(f"{why}; {todo} are left: the same command goes on with them")
+    elif (left or unchecked) and choices.overrides:
+        _tell(f"{todo} are left: give the command without --retry-failed and --set")
+    elif left or unchecked:
+        _tell(f"this part is done; {todo} of other parts are left")
+    if failed == campaign.table.samples or refused:
         return EXIT_FAILED
     return EXIT_INTERRUPTED if interrupted else EXIT_DONE
 

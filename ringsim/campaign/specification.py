@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
+from ringsim.analysis.engines import compared
 from ringsim.choice import kinds_of
 from ringsim.execution.work import Limits
 from ringsim.files import parse_toml, read_text
-from ringsim.refusal import InputError, explain, show
+from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.sampling.columns import Table
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Design
@@ -20,7 +21,11 @@ from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import OutputTable
 from ringsim.units import Model
 
-SOLVERS = {"full": "ringsim.simulation:run", "ideal": "ringsim.simulation:run_ideal"}
+SOLVERS = {
+    "full": "ringsim.simulation:run",
+    "frame": "ringsim.simulation:run_frame",
+    "ideal": "ringsim.simulation:run_ideal",
+}
 """What maps a scene to its outcome, by fidelity."""
 
 
@@ -36,6 +41,9 @@ def flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
     for name, inner in table.items():
         found |= flat(inner, whole, f"{prefix}.{name}" if prefix else name)
     return found
+
+
+_Share = Annotated[float, Field(gt=0.0, le=1e3)]
 
 
 class Specification(Model):
@@ -60,13 +68,41 @@ class Specification(Model):
     correlations: list[Correlation] = Field(default_factory=list)
     design: AnyDesign
     limits: Limits = Limits()
-    fidelity: Literal["full", "ideal"] = "full"
-    """full: the flexible multibody model; ideal: rigid rods."""
+    fidelity: Literal["full", "frame", "ideal"] = "full"
+    """full: the flexible multibody model; frame: the same in joint coordinates, several times as
+    fast; ideal: rigid rods."""
+    check_every: Annotated[int, Field(ge=0)] = 0
+    """One sample in so many runs with the full model, too, as a check of the frame engine: samples
+    0, check_every, 2 check_every, ...; 0 for none."""
+    max_difference: _Share | dict[str, _Share] | None = None
+    """Largest difference of the checked samples, as a share of the full model's value: by output,
+    or one for the main outputs; beyond it the campaign ends with exit code 3."""
     error_bars_every: Annotated[int, Field(ge=0)] = 0
     """One sample in so many states its error bars (``solver.error_bars``); 0 for none."""
     max_failed: Annotated[int, Field(ge=0)] | None = None
     """The campaign stops when more samples than this have failed."""
     output: OutputTable = OutputTable()
+
+    @model_validator(mode="after")
+    def _can_be_checked(self) -> "Specification":
+        if self.check_every and self.fidelity != "frame":
+            raise ValueError(
+                f'check_every = {self.check_every} repeats samples of fidelity = "frame" with the '
+                f'full model, but fidelity = "{self.fidelity}": leave check_every out, or set '
+                'fidelity = "frame"'
+            )
+        if self.max_difference is not None and not self.check_every:
+            raise ValueError(
+                f"max_difference = {show(self.max_difference)} says nothing without check_every: "
+                "give both"
+            )
+        for name in self.max_difference if isinstance(self.max_difference, dict) else ():
+            if name not in compared():
+                raise ValueError(
+                    f"max_difference.{name}: there is no such output to compare engines by "
+                    f"({known_or_nearest(name, compared())})"
+                )
+        return self
 
 
 @dataclass(frozen=True)

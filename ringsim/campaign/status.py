@@ -19,7 +19,7 @@ from ringsim.sampling.values import labels_of
 from ringsim.storage.journal import survey
 from ringsim.storage.locks import in_use
 from ringsim.storage.netcdf import NOT_RUN
-from ringsim.storage.result import Result
+from ringsim.storage.result import Result, sample_of
 from ringsim.variables import Status
 
 _TOLD = {"state", "host", "pid", "workers", "elapsed", "updated", "done", "done_before", "running"}
@@ -49,6 +49,8 @@ def status_lines(campaign: Folder) -> list[str]:
         f"{campaign.table.samples} samples done, {left} left",
         *(f"  {words[code]:<14} {counts[code]}" for code in words if counts[code]),
     ]
+    if every := len(campaign.checked):
+        lines.append(f"  checked        {every - len(campaign.unchecked())} of {every}")
     running, rate = dict[int, float](), 0.0
     for path in sorted(campaign.path.glob("progress-*.json")):
         told = None
@@ -62,21 +64,29 @@ def status_lines(campaign: Folder) -> list[str]:
         # Clocks jump, and differ between hosts: durations are the writer's own.
         since = max(0.0, now - told["updated"])
         if state == "running":
-            running |= {int(sample): lasts + since for sample, lasts in told["running"].items()}
+            running |= {int(number): lasts + since for number, lasts in told["running"].items()}
             rate += (told["done"] - told["done_before"]) / max(told["elapsed"] + since, 1e-9)
         lines.append(
             f"  {writer:<14} {state}, {told['workers']} workers, "
             f"process {told['pid']} on {told['host']}, {since:.0f} s ago"
         )
-    unfinished = [item for item in running.items() if found.status[item[0]] == NOT_RUN]
+    checks = campaign.survey(checks=True)
+    unfinished = [
+        item for item in running.items()
+        if (found if item[0] >= 0 else checks).status[sample_of(item[0])] == NOT_RUN
+    ]  # fmt: skip
     if unfinished:
         longest = sorted(unfinished, key=lambda item: -item[1])[:_MOST_SHOWN]
-        listed = ", ".join(f"{sample} ({seconds:.0f} s)" for sample, seconds in longest)
+        listed = ", ".join(f"{_named(number)} ({seconds:.0f} s)" for number, seconds in longest)
         lines.append(f"  running        {len(unfinished)}: {listed}")
     if rate > 0.0:
         lines.append(f"  rate           {rate:.3g} samples/s")
         lines.append(f"  time left      about {in_words(left / rate)}")
     return lines
+
+
+def _named(number: int) -> str:
+    return str(number) if number >= 0 else f"check of {sample_of(number)}"
 
 
 def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver: str) -> list[str]:
@@ -98,6 +108,9 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver
         f"  workers        {workers}",
         *map(_extent, table.columns),
     ]
+    if every := campaign.specification.check_every:
+        number = len(range(0, table.samples, every))
+        lines.append(f"  checks         {number} samples with the full engine, too (not predicted)")
     if len(todo) == 0:
         return [*lines, "  nothing is left to run"]
     known = np.flatnonzero(np.isfinite(found.seconds))

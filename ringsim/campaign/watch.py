@@ -15,7 +15,7 @@ from typing import Any
 from tqdm import tqdm
 
 from ringsim.files import whole
-from ringsim.storage.result import Result
+from ringsim.storage.result import Result, sample_of
 
 _STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 _PLAIN_SECONDS = 30.0
@@ -85,14 +85,17 @@ class Progress:
         print(f"{self.name}: {text}", file=sys.stderr, flush=True)
 
     def started(self, sample: int) -> None:
-        """Note that a sample runs."""
+        """Note that a sample, or one's check, runs."""
         self.running[sample], self._news = time.monotonic(), True
         self.refresh()
 
     def finished(self, result: Result) -> None:
-        """Note that a sample has ended."""
+        """Note that it has ended."""
         self.running.pop(result.sample, None)
-        self.done, self._news = self.done + 1, True
+        self._news = True
+        if sample_of(result.sample) != result.sample:  # a check
+            return
+        self.done += 1
         self.failed += result.status.failed
         self._bar.set_postfix(refresh=False, failed=self.failed)
         self._bar.update()

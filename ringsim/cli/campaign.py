@@ -42,15 +42,17 @@ from ringsim.variables import Status
 )  # fmt: skip
 @click.option("--dry-run", is_flag=True, help="Show plan and predicted cost; keep nothing.")
 @click.option("--solver", default="", hidden=True)
+@click.option("--judge", default=SOLVERS["full"], hidden=True)
 def command(
     file: Path, workers: int | None, settings: dict[str, Any], samples: int | None,
     out: Path | None, part: str, *, retry_failed: bool, dry_run: bool, solver: str,
+    judge: str,
 ) -> int:  # fmt: skip
     """Run the campaign of FILE; the same command again goes on with what is missing.
 
     Under mpiexec or srun every rank computes, and --workers is left out.  Exit codes: 0 all
-    samples have run (some may have failed, up to max_failed), 3 too many or all of them failed,
-    130 stopped by a signal.
+    samples have run (some may have failed, up to max_failed), 3 too many or all of them failed, or
+    the frame engine differs from the full one by more than max_difference, 130 stopped by a signal.
     """
     size = launched_size()
 
@@ -78,7 +80,7 @@ def command(
                     "its folder with --out"
                 )
         else:
-            prepare_folder(campaign, folder, solver=name)
+            prepare_folder(campaign, folder, solver=name, judge=judge)
         again = FAILED if retry_failed else frozenset[Status]()
         return folder, (wanted.limits, wanted.max_failed, share, again, theirs)
 

@@ -6,6 +6,7 @@ import click
 import xarray as xr
 
 from ringsim.analysis.campaign_notes import notes
+from ringsim.analysis.engines import check_lines
 from ringsim.campaign.folder import merge, open_folder
 from ringsim.cli.options import FOLDER
 
@@ -23,5 +24,5 @@ def command(folder: Path) -> None:
     click.echo(f"{path}: {samples} samples, {samples - left} done, {left} not run, {failed} failed")
     if path is not None:
         with xr.open_dataset(path) as dataset:
-            for line in notes(dataset):
+            for line in notes(dataset) + check_lines(dataset):
                 click.echo(f"  {line}")

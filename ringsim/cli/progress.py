@@ -1,19 +1,21 @@
 """How far a run is, on a terminal."""
 
 import sys
+from collections.abc import Callable
 
 import numpy as np
 from tqdm import tqdm
 
 from ringsim.scene import Scene
-from ringsim.simulation import run
+from ringsim.simulation import Watch
 from ringsim.stepping.instant import Instant
 from ringsim.variables import Outcome
 
 
-def watched(scene: Scene) -> Outcome:
-    """Run a scene; where stderr is a terminal a bar counts its time up to ``solver.end_time``, and
-    the V-joints that have locked.  A run that starts anew starts its bar anew.
+def watched(run: Callable[[Scene, Watch | None], Outcome], scene: Scene) -> Outcome:
+    """Run a scene by ``run``; where stderr is a terminal a bar counts its time up to
+    ``solver.end_time``, and the V-joints that have locked.  A run that starts anew starts its bar
+    anew.
     """
     most = 0
     with tqdm(

@@ -19,8 +19,11 @@ from ringsim.scene import Scene, load_scene
 @SETTINGS
 @click.option("--out", metavar="FILE", type=PATH, help="netCDF file to write (default SCENE.nc).")
 @click.option(
-    "--fidelity", type=click.Choice(["full", "ideal"]), default="full", show_default=True,
-    help="Full model, or the ideal ring of rigid rods (in seconds; no asynchrony, no stress).",
+    "--fidelity", type=click.Choice(["full", "frame", "ideal", "both"]), default="full",
+    show_default=True,
+    help="Full model; the same in joint coordinates (frame: closed and open rings, several times "
+    "as fast); the ideal ring of rigid rods (no asynchrony, no stress); full and frame (both), "
+    "with a table of their differences.",
 )  # fmt: skip
 @click.option(
     "--accuracy", metavar="ERROR", type=click.FloatRange(1e-8, 1.0),
@@ -57,7 +60,7 @@ def command(
     if fidelity == "ideal" and chosen.record.stress:
         chosen = chosen.with_values({"record.stress": False})
         click.echo("stress is left out: the rods of the ideal ring are rigid")
-    elif plot and fidelity == "full" and kind_of(chosen.rods) != "ancf":
+    elif plot and fidelity != "ideal" and kind_of(chosen.rods) != "ancf":
         chosen = chosen.with_values({"record.stress": True})
     target = out or Path(f"{chosen.name}.nc")
 
@@ -65,21 +68,36 @@ def command(
     from ringsim.dataset import require_file, save, to_dataset
     from ringsim.outputs import VARIABLES
     from ringsim.outputs.summary import summary
-    from ringsim.simulation import FIDELITIES
+    from ringsim.simulation import run, run_frame, run_ideal
 
     require_file(target)
+    # The frame engine first: it refuses what it cannot represent.
+    engines = {"frame": run_frame, "full": run}
+    outcomes = {
+        name: watched(engine, chosen)
+        for name, engine in engines.items() if fidelity in (name, "both")
+    }  # fmt: skip
     # Solved in seconds, the ideal ring needs no bar.
-    outcome = FIDELITIES[fidelity](chosen) if fidelity != "full" else watched(chosen)
-    values = outcome.values
-    became = "" if outcome.status.failed else f", {outcome.fate.word.replace('_', ' ')}"
-    click.echo(f"{chosen.name}: {outcome.status.word}{became}: {outcome.reason}")
-    if anew := _restarted(values, chosen.solver):
-        click.echo(f"  {anew}")
-    for name, told in summary(values, chosen.span_names).items():
-        label = (VARIABLES[name].summary or ("",))[0]
-        if anew or name != "total_steps":
-            click.echo(f"  {label:20s}{told}")
-    dataset = to_dataset(outcome, chosen)
+    outcomes = outcomes or {"ideal": run_ideal(chosen)}
+    for by, outcome in outcomes.items():
+        values = outcome.values
+        became = "" if outcome.status.failed else f", {outcome.fate.word.replace('_', ' ')}"
+        engine = f" ({by})" if len(outcomes) > 1 else ""
+        click.echo(f"{chosen.name}{engine}: {outcome.status.word}{became}: {outcome.reason}")
+        if anew := _restarted(values, chosen.solver):
+            click.echo(f"  {anew}")
+        for name, told in summary(values, chosen.span_names).items():
+            label = (VARIABLES[name].summary or ("",))[0]
+            if anew or name != "total_steps":
+                click.echo(f"  {label:20s}{told}")
+    datasets = [to_dataset(outcome, chosen) for outcome in outcomes.values()]
+    dataset = datasets[-1]
+    if fidelity == "both":
+        from ringsim.analysis.engines import run_lines, with_frame
+
+        for line in run_lines(outcomes["frame"], outcomes["full"]):
+            click.echo(f"  {line}")
+        dataset = with_frame(*reversed(datasets))
     # Replaced, not refused: to change a scene and run it again is what one does all day, and
     # scripts do it with one name.  Everything of a run can be computed again from its file.
     done = "replaced" if target.exists() else "wrote"
@@ -90,7 +108,8 @@ def command(
 
         for picture in draw_run(dataset, target.parent, target.stem, formats or ("png",)):
             click.echo(f"wrote {picture}")
-    return EXIT_FAILED if outcome.status.failed else EXIT_DONE
+    failed = any(outcome.status.failed for outcome in outcomes.values())
+    return EXIT_FAILED if failed else EXIT_DONE
 
 
 def _restarted(values: dict[str, Any], asked: Solver) -> str:
@@ -116,8 +135,8 @@ def _with_accuracy(
 
     if fidelity != "full":
         raise InputError(
-            f"--accuracy {accuracy:g}: the ideal fidelity keeps its own tolerances: leave out one "
-            "of --accuracy and --fidelity"
+            f"--accuracy {accuracy:g}: its settings were measured with the full model, not with "
+            f"--fidelity {fidelity}: leave out one of the two"
         )
     if (output := of or JUDGED_BY) not in CHOICES:
         raise InputError(f"--of {output}: must be one of {', '.join(CHOICES)}")

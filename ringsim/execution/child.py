@@ -35,11 +35,12 @@ def main() -> None:
 
 
 def _serve(pipe: Connection, setup: dict[str, Any]) -> None:
-    from ringsim.execution.solve import load_solver, solve
+    from ringsim.execution.solve import load_solver, prepare, solve
     from ringsim.scene import Scene
 
     try:
         solver, base = load_solver(setup["solver"]), Scene.model_validate(setup["scene"])
+        prepare(setup["solver"], base)
     except InputError as error:
         pipe.send(str(error))
         return
@@ -54,7 +55,8 @@ def _serve(pipe: Connection, setup: dict[str, Any]) -> None:
         os.ftruncate(1, 0)
         # Ends this process, should its parent be unable to look at it.
         signal.setitimer(signal.ITIMER_REAL, 2.0 * setup["limits"].timeout + 60.0)
-        result = solve(solver, base, sample, values)
+        chosen = solver if sample >= 0 else load_solver(setup["judge"])
+        result = solve(chosen, base, sample, values)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         _C.fflush(None)  # into the log of its own sample
         pipe.send(result)

@@ -21,10 +21,11 @@ class Local(Scheduler):
         """See :meth:`Scheduler.run`."""
         queue = deque(samples)
         with ExitStack() as open_slots:
-            slots = [
-                open_slots.enter_context(closing(Slot(work.solver, work.scene, work.limits)))
+            made = (
+                Slot(work.solver, work.scene, work.limits, work.judge)
                 for _ in range(min(self.workers, len(queue)))
-            ]
+            )
+            slots = [open_slots.enter_context(closing(slot)) for slot in made]
             while not work.stop():
                 for slot in slots:
                     slot.serve(queue, work)
@@ -47,7 +48,8 @@ class Serial(Scheduler):
             if work.stop():
                 break
             work.started(sample)
-            result = solve(solver, base, sample, work.values_of(sample))
+            chosen = solver if sample >= 0 else load_solver(work.judge)
+            result = solve(chosen, base, sample, work.values_of(sample))
             work.keep(result)
             work.finished(result)
         return work.stop()

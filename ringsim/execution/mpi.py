@@ -115,7 +115,7 @@ class Mpi(Scheduler):
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """See :meth:`Scheduler.run`."""
-        with contextlib.closing(Slot(work.solver, work.scene, work.limits)) as slot:
+        with contextlib.closing(Slot(work.solver, work.scene, work.limits, work.judge)) as slot:
             if self.rank == 0:
                 return self._schedule(deque(samples), slot, work)
             return self._serve(slot, work)

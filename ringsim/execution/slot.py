@@ -26,7 +26,8 @@ from ringsim.variables import Cause, Status
 TICK = 0.2
 """Seconds between two looks at a process that says nothing."""
 
-_START_SECONDS = 120.0
+_START_SECONDS = 300.0
+"""Longest time until a process is ready, with code that it compiles, or waits for others to."""
 _PAUSE_SECONDS = 1.0
 """Nobody looked for so long: a batch system suspended the job, or the machine is overloaded."""
 _MOST_DEATHS_FROM_OUTSIDE = 2
@@ -135,8 +136,8 @@ class Slot:
     pipe: Connection
     """What to wait on while a sample is running."""
 
-    def __init__(self, solver: str, scene: dict[str, Any], limits: Limits) -> None:
-        self._setup = {"solver": solver, "scene": scene, "limits": limits}
+    def __init__(self, solver: str, scene: dict[str, Any], limits: Limits, judge: str = "") -> None:
+        self._setup = {"solver": solver, "scene": scene, "limits": limits, "judge": judge}
         self._limits, self._deaths = limits, 0
         self._process: SolverProcess | None = None
         self.busy = False

@@ -32,6 +32,16 @@ def load_solver(name: str) -> Run:
     return solver
 
 
+def prepare(name: str, base: Scene) -> None:
+    """Let ``module:prepare_FUNCTION``, if there is one, load and compile; InputError if it refuses
+    the scene.
+    """
+    module, _, function = name.partition(":")
+    ready = getattr(importlib.import_module(module), f"prepare_{function}", None)
+    if ready is not None:
+        ready(base)
+
+
 def solve(solver: Run, base: Scene, sample: int, values: dict[str, Any]) -> Result:
     """Run one sample of the scene ``base``, with its values by scene path."""
     begin, log, form, body = time.monotonic(), "", "", b""

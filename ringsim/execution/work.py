@@ -45,10 +45,11 @@ class Work:
     """The samples' content, and where results go."""
 
     solver: str
-    """``module:function`` that maps a scene to an outcome."""
+    """``module:function`` that maps a scene to an outcome; a function ``prepare_FUNCTION`` beside
+    it is called with the scene before the first run."""
     scene: dict[str, Any]
     values_of: Callable[[int], dict[str, Any]]
-    """Inputs of a sample by scene path."""
+    """Inputs of a sample, or of one's check, by scene path."""
     limits: Limits
     keep: Callable[[Result], None]
     """Stores a result; called in the process that supervised the run."""
@@ -57,6 +58,8 @@ class Work:
     started: Callable[[int], None] = lambda sample: None
     finished: Callable[[Result], None] = lambda result: None
     """Tell rank 0 what goes on; results of other ranks come without their arrays."""
+    judge: str = ""
+    """What maps the scenes of checks to outcomes; see ``ringsim.storage.result.check_of``."""
 
 
 class Scheduler:

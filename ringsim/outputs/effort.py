@@ -11,6 +11,7 @@ class Effort(Output):
     """Counts of the last attempt; ``ringsim.stepping.restarts`` adds those of all attempts."""
 
     rank = 70
+    of_antenna = False
     variables = (
         _number("steps", "time steps of the last attempt", ("steps", "10d")),
         _number("repeated_steps", "steps that were repeated with a smaller one"),
@@ -22,7 +23,10 @@ class Effort(Output):
         ),
         _number("total_newton_iterations", "Newton iterations of all attempts"),
         _number("total_jacobians", "Jacobian factorisations of all attempts"),
-        _number("fidelity", "model: 0 full multibody, 1 ideal ring of rigid rods"),
+        _number(
+            "fidelity",
+            "model: 0 full multibody, 1 ideal ring of rigid rods, 2 rods in joint coordinates",
+        ),
         Variable("step_used", (), "s", "largest step allowed, solver.step, of the last attempt"),
         Variable("tolerance_used", (), "1", "solver.tolerance of the last attempt"),
         Variable("final_time", (), "s", "time at which the run ended"),

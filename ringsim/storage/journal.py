@@ -168,8 +168,8 @@ class Survey:
                     yield result
 
 
-def survey(folder: Path, campaign: str, samples: int) -> Survey:
-    """Look through the journals of a campaign's folder.
+def survey(folder: Path, campaign: str, samples: int, *, checks: bool = False) -> Survey:
+    """Look through the journals of a campaign's folder, for samples or for their ``checks``.
 
     Of several results of one sample, one that went well counts before one that failed, whatever
     the clocks said; otherwise the later one does.  A warning in the log tells of records that are
@@ -187,12 +187,13 @@ def survey(folder: Path, campaign: str, samples: int) -> Survey:
     records = np.concatenate([np.empty(0, RECORD), *(each.records for each in known.values())])
     counts = np.array([len(each.records) for each in known.values()], dtype=np.int64)
     owner = np.repeat(np.arange(len(known)), counts)
-    inside = (records["sample"] >= 0) & (records["sample"] < samples)
-    records, owner = records[inside], owner[inside]
+    number = ~records["sample"] if checks else records["sample"]  # see result.check_of
+    inside = (number >= 0) & (number < samples)
+    records, owner, number = records[inside], owner[inside], number[inside]
     # No clock is 1e12 s (30,000 years) wrong.
     weight = records["finished"] + 1e12 * (records["status"] < Status.SOLVER_FAILED)
-    order = np.lexsort((-np.arange(len(records)), weight, records["sample"]))
-    which, attempts = np.unique(records["sample"], return_counts=True)
+    order = np.lexsort((-np.arange(len(records)), weight, number))
+    which, attempts = np.unique(number, return_counts=True)
     best = order[np.cumsum(attempts) - 1]  # the last of each sample's
 
     def of_each(values: NDArray[Any], missing: Any) -> NDArray[Any]:

@@ -1,6 +1,7 @@
 """Merging: all inputs beside all outputs in one file, in bounded memory."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.analysis.engines import CHECKED
 from ringsim.files import whole
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME, span_names
@@ -16,9 +18,12 @@ from ringsim.scene import Scene
 from ringsim.storage import netcdf
 from ringsim.storage.journal import Survey
 from ringsim.storage.netcdf import PER_SAMPLE
+from ringsim.storage.result import sample_of
 from ringsim.variables import Cause, Status, Variable
 
 NAME = "campaign.nc"
+_OF_SAMPLES = ("log", "overrides", "attempts")
+"""What is not told of checks."""
 BLOCK_BYTES = 64 << 20
 UNFIT = (
     "its output times or places differ from those of the first samples: do not vary what shapes "
@@ -34,10 +39,13 @@ def write_merged(
     scene: Scene,
     output: netcdf.OutputTable,
     attributes: Mapping[str, Any],
+    checks: Survey | None = None,
 ) -> int:
     """Write ``campaign.nc`` of what was found in a folder, whole or not at all.
 
-    The samples of ``table`` vary ``scene``, whose spans name those of all of them.
+    The samples of ``table`` vary ``scene``, whose spans name those of all of them.  If there are
+    ``checks``, numbers and words without dimensions of the full engine stand beside those of the
+    samples, as ``NAME_checked``.
 
     Returns how many samples count as failed because their coordinates differ.  OSError or
     RuntimeError if the disk is full; an older file stays.
@@ -63,6 +71,8 @@ def write_merged(
             digits = output.significant_digits.get(name)
             netcdf.add_variable(file, variable, compression=output.compression, digits=digits)
         _copy(file, found, fits, wanted)
+        if checks is not None:
+            _add_checks(file, checks, wanted, output)
     return int((~fits[found.form[found.form >= 0]]).sum())
 
 
@@ -82,6 +92,27 @@ def _common(found: Survey) -> tuple[dict[str, NDArray[Any]], set[str], NDArray[n
             axes |= own
             names |= arrays.keys() - own.keys()
     return axes, names, fits
+
+
+def _add_checks(
+    file: Any, checks: Survey, wanted: Mapping[str, Variable], output: netcdf.OutputTable
+) -> None:
+    """Create and fill the variables of the checks."""
+    both = {name: v for name, v in wanted.items() if not v.dims and name not in _OF_SAMPLES}
+    blocks = {}
+    for name, variable in both.items():
+        words = f"{variable.long_name}, of the check with the full engine"
+        mine = replace(variable, name=f"{name}{CHECKED}", long_name=words)
+        digits = output.significant_digits.get(name)
+        netcdf.add_variable(file, mine, compression=output.compression, digits=digits)
+        blocks[name] = netcdf.blank(variable, checks.status.shape)
+    for result in checks.results(np.arange(len(checks.status))):
+        known = {"status": result.status, "cause": result.cause, "reason": result.reason}
+        for name, value in {**result.arrays(), **known}.items():
+            if name in both:
+                blocks[name][sample_of(result.sample)] = np.asarray(value)[()]
+    for name, values in blocks.items():
+        file[f"{name}{CHECKED}"][:] = values
 
 
 def _copy(

@@ -22,10 +22,10 @@ from ringsim.refusal import InputError, known_or_nearest
 from ringsim.sampling.columns import Table, add_inputs, read_inputs
 from ringsim.storage.result import MISSING_COUNT
 from ringsim.units import Model
-from ringsim.variables import Variable, flags_of
+from ringsim.variables import Fidelity, Variable, flags_of
 
 DESIGN = "design.nc"
-_PACKAGES = ("ringsim", "exudyn", "numpy", "scipy", "netCDF4", "mpi4py")
+_PACKAGES = ("ringsim", "exudyn", "numba", "numpy", "scipy", "netCDF4", "mpi4py")
 
 NOT_RUN = -1
 """Value of ``status`` for samples that have not been run, and of codes that are missing."""
@@ -105,7 +105,7 @@ def add_variable(
     variable.set_auto_maskandscale(False)
     if definition.flags is not None:
         flags = flags_of(definition.flags)
-        missing = "not_run" if definition.name == "status" else "unknown"
+        missing = "not_run" if definition.name.startswith("status") else "unknown"
         variable.flag_values = np.append(np.int8(NOT_RUN), flags["flag_values"])
         variable.flag_meanings = f"{missing} {flags['flag_meanings']}"
 
@@ -160,7 +160,7 @@ def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
     return table, attributes
 
 
-def provenance(*, name: str, title: str, action: str) -> dict[str, Any]:
+def provenance(*, name: str, title: str, action: str, model: Fidelity) -> dict[str, Any]:
     """Attributes after ACDD: by whom, when, where and with what a campaign's file was made."""
     now = datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
     software = f"ringsim {version('ringsim')}"
@@ -170,7 +170,7 @@ def provenance(*, name: str, title: str, action: str) -> dict[str, Any]:
         "summary": f"Campaign {name} of simulated ring deployments: inputs and outputs by sample.",
         "history": f"{now} {action} by {software}",
         "date_created": now,
-        "source": f"{software}: multibody simulation with exudyn",
+        "source": f"{software}: {model.model}", "fidelity": model.word,
         "creator_name": "ringsim", "creator_type": "institution", "creator_software": software,
         "python_version": platform.python_version(), "platform": platform.platform(),
         "host": platform.node(), "git_commit": _git_commit(),

@@ -28,6 +28,7 @@ class Result:
     """How one sample ended, and what it gave."""
 
     sample: int
+    """Its number, or that of its check: see :func:`check_of`."""
     status: Status
     reason: str
     """One sentence: why it ended so."""
@@ -87,6 +88,20 @@ class Result:
             found[name] = values.view(kind).reshape(shape)
             start += planes.size
         return found
+
+
+def check_of(sample: int) -> int:
+    """Number under which a sample's repetition with the judging engine runs and is kept."""
+    return ~sample
+
+
+def sample_of(number: int) -> int:
+    """The sample that a number is of, its own or that of its check.
+
+    >>> sample_of(7), sample_of(check_of(7))
+    (7, 7)
+    """
+    return number if number >= 0 else ~number
 
 
 def plain(text: str) -> str:

@@ -133,6 +133,15 @@ def spy(scene: Scene) -> Outcome:
     return Outcome(Status.OK, ", ".join(heavy + inherited + threads) or "clean", {}, {})
 
 
+def judge(scene: Scene) -> Outcome:
+    """Another engine: all deploys a tenth of a percent later; it dies where it is told to."""
+    if "JUDGE_DIES" in os.environ:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    outcome = run(scene)
+    outcome.values["deployment_time"] = 1.001 * outcome.values["deployment_time"]
+    return outcome
+
+
 def slow(scene: Scene) -> Outcome:
     """Sleeps for as many seconds as ``rods.damping``."""
     time.sleep(scene.rods.damping)

@@ -2,12 +2,13 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 import ringsim
 
-HEAVY = ("exudyn", "mpi4py", "matplotlib", "xarray", "netCDF4", "scipy")
+HEAVY = ("exudyn", "numba", "mpi4py", "matplotlib", "xarray", "netCDF4", "scipy")
 
 
 def loaded_by(statements: str) -> set[str]:
@@ -42,6 +43,15 @@ def calling(*arguments: str) -> str:
 )
 def test_nothing_heavy_is_loaded(statements: str) -> None:
     assert loaded_by(statements) == set()
+
+
+@pytest.mark.parametrize(
+    ("fidelity", "engine"), [("full", {"exudyn"}), ("frame", {"numba"}), ("ideal", set())]
+)
+def test_a_run_loads_its_own_engine_only(fidelity: str, engine: set[str], tmp_path: Path) -> None:
+    out = str(tmp_path / "run.nc")
+    words = "run", "truss2", "--fidelity", fidelity, "--set", "solver.end_time=0.2", "--out", out
+    assert loaded_by(calling(*words)) & {"exudyn", "numba"} == engine
 
 
 def test_importing_ringsim_does_not_even_load_numpy_or_pydantic() -> None:

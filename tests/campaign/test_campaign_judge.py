@@ -1,0 +1,170 @@
+"""Samples of the frame engine are repeated with the full one, and the file holds both."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from campaign_bench import comparable, journals, lose
+from ringsim.campaign.folder import open_folder
+from ringsim.campaign.specification import load_campaign
+from ringsim.refusal import InputError
+from ringsim.storage.journal import read_journal
+from ringsim.storage.result import check_of, sample_of
+from ringsim.variables import Status
+
+CHECKED = 'fidelity = "frame"\ncheck_every = 2\n'
+START = ("campaign", "small.toml", "--out", "out", "--judge", "fake_solver:judge")
+
+
+def written(bench, top=CHECKED, samples=5):
+    path = bench.write(samples)
+    path.write_text(top + path.read_text())
+    return path
+
+
+@pytest.fixture
+def checked(bench):
+    """A finished campaign whose samples 0, 2 and 4 were checked."""
+    written(bench)
+    bench.printed = bench.run(*START, "--workers", 2)
+    return bench
+
+
+def stored(bench):
+    folder = open_folder(bench.folder / "out")
+    identity = folder.attributes["identity"]
+    return [each.sample for path in journals(bench) for *_, each in read_journal(path, identity)]
+
+
+def test_the_file_holds_the_answers_of_both_engines(checked):
+    found = checked.result("out")
+    assert found.sizes["sample"] == 5
+    assert found.status_checked.values.tolist() == [0, -1, 0, -1, 0]
+    frame, full = found.deployment_time.values, found.deployment_time_checked.values
+    assert full[::2] == pytest.approx(1.001 * frame[::2], rel=1e-12)
+    assert np.isnan(full[1::2]).all()
+    assert found.steps_checked.values[0] == 100
+    assert np.isnan(found.steps_checked.values[1])
+    assert found.reason_checked.values[1] == ""
+    assert found.deployment_time_checked.attrs["units"] == "s"
+    assert "check with the full engine" in found.deployment_time_checked.attrs["long_name"]
+    # What has dimensions beside the samples is not kept twice.
+    assert "opening_angle_checked" not in found
+    assert found.attrs["fidelity"] == "frame"
+    assert found.attrs["check_every"] == 2
+
+
+def test_checks_change_nothing_of_the_samples(checked):
+    both = checked.result("out")
+    checked.write(5)
+    checked.run("campaign", "small.toml", "--out", "alone")
+    alone = comparable(checked.result("alone"))
+    xr.testing.assert_identical(comparable(both)[list(alone.data_vars)], alone)
+
+
+def test_campaign_merge_and_status_tell_of_the_checks(checked):
+    found = checked.result("out")
+    times = found.deployment_time.values
+    k = int(np.argmax(times[::2])) * 2  # a thousandth of the longest time is the most
+    for printed in (checked.printed, checked.run("merge", "out")):
+        assert "3 of 5 samples were checked with the full engine" in printed
+        (row,) = [line.split() for line in printed.splitlines() if "deployment_time " in line]
+        median, worst, sample, share, bars, error = row[-6:]
+        assert float(median) == pytest.approx(0.001 * np.median(times[::2]), rel=0.05)
+        assert float(worst) == pytest.approx(0.001 * times[k], rel=0.05)
+        assert (int(sample), float(share), bars) == (k, pytest.approx(0.001, rel=0.01), "-")
+        assert float(error) == pytest.approx(times.std(ddof=1) / np.sqrt(5), rel=0.05)
+    assert "checked        3 of 3" in checked.run("status", "out")
+    assert "3 samples with the full engine, too" in checked.run(*START, "--dry-run")
+
+
+@pytest.mark.parametrize(
+    ("most", "code"),
+    [("0.002", 0), ("5e-4", 3), ("{ deployment_time = 5e-4 }", 3), ("{ peak_tension = 5e-4 }", 0)],
+)
+def test_a_campaign_whose_engines_differ_too_much_ends_with_code_3(bench, most, code):
+    written(bench, f"{CHECKED}max_difference = {most}\n")
+    printed = bench.run(*START, code=code)
+    last = printed.strip().splitlines()[-1]
+    told = "the engines differ by more than the campaign allows in deployment_time (0.001 of"
+    assert (told in last) == (code == 3)
+    assert bench.run(*START, code=code).strip().splitlines()[-1] == last  # nothing runs again
+
+
+def test_a_check_that_dies_costs_no_sample_and_can_be_repeated(bench):
+    written(bench)
+    bench.extra["JUDGE_DIES"] = "1"
+    printed = bench.run(*START, "--workers", 2)
+    assert "5 samples, 0 failed" in printed
+    assert "3 checks failed, first sample 0: the solver process died of SIGSEGV" in printed
+    found = bench.result("out")
+    assert found.status.values.tolist() == [0] * 5
+    assert found.status_checked.values.tolist() == [Status.CRASHED, -1, Status.CRASHED, -1, Status.CRASHED]
+    del bench.extra["JUDGE_DIES"]
+    bench.run(*START)
+    assert len(stored(bench)) == 8  # a failure is a result, as of samples
+    bench.run(*START, "--retry-failed")
+    assert bench.result("out").status_checked.values.tolist() == [0, -1, 0, -1, 0]
+    assert len(stored(bench)) == 11
+
+
+def test_nothing_checked_cannot_keep_max_difference(bench):
+    written(bench, f"{CHECKED}max_difference = 0.5\n")
+    bench.extra["JUDGE_DIES"] = "1"
+    last = bench.run(*START, code=3).strip().splitlines()[-1]
+    assert "no sample ended well with both engines" in last
+
+
+def test_lost_checks_and_samples_run_again_and_nothing_else(checked):
+    before = comparable(checked.result("out"))
+    lose(checked, [1, check_of(2)])
+    assert "2 of 3" in checked.run("status", "out")
+    checked.run(*START)
+    assert sorted(stored(checked)) == sorted([*range(5), *map(check_of, (0, 2, 4))])
+    xr.testing.assert_identical(comparable(checked.result("out")), before)
+
+
+def test_a_finished_campaign_may_be_checked_later(bench):
+    written(bench, 'fidelity = "frame"\n')
+    bench.run(*START)
+    assert "status_checked" not in bench.result("out")
+    written(bench)
+    bench.run(*START)
+    assert sorted(map(sample_of, stored(bench))) == [0, 0, 1, 2, 2, 3, 4, 4]
+    assert bench.result("out").status_checked.values.tolist() == [0, -1, 0, -1, 0]
+
+
+def test_every_way_to_run_gives_the_same(checked, mpi):
+    before = comparable(checked.result("out"))
+    for name, options, ranks in (("serial", ("--workers", 0), 0), ("ranks", (), 2)):
+        start = (*START[:2], "--out", name, *START[4:])
+        checked.run(*start, *options, ranks=ranks)
+        xr.testing.assert_identical(comparable(checked.result(name)), before)
+
+
+def test_parts_check_their_own_samples(bench):
+    written(bench)
+    assert "are left" in bench.run(*START, "--part", "1/2")
+    assert sorted(stored(bench)) == sorted([0, 2, 4, *map(check_of, (0, 2, 4))])
+    bench.run(*START, "--part", "2/2")
+    assert bench.result("out").status_checked.values.tolist() == [0, -1, 0, -1, 0]
+
+
+@pytest.mark.parametrize(
+    ("top", "words"),
+    [
+        ("check_every = 2\n", 'but fidelity = "full": leave check_every out'),
+        ('check_every = 2\nfidelity = "ideal"\n', 'but fidelity = "ideal": leave check_every out'),
+        ('fidelity = "frame"\nmax_difference = 0.1\n', "says nothing without check_every"),
+        (f"{CHECKED}max_difference = 0.0\n", "max_difference"),
+        (f"{CHECKED}max_difference = {{ deploymenttime = 0.1 }}\n", "did you mean deployment_time"),
+        (f"{CHECKED}max_difference = {{ steps = 0.1 }}\n", "no such output to compare engines by"),
+        ('fidelity = "fram"\n', "did you mean frame"),
+    ],
+)
+def test_senseless_checks_are_refused_in_one_line(bench, top, words):
+    with pytest.raises(InputError, match=words) as refusal:
+        load_campaign(written(bench, top))
+    assert "\n" not in str(refusal.value)
