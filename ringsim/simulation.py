@@ -96,7 +96,9 @@ def prepare_run_frame(scene: Scene) -> None:
         except Exception:  # its end; what breaks here breaks in the run, too, which tells of it
             return
 
-    compile_once((sorted(holds(scene)), kind_of(scene.rods)), compiling)
+    parts = (getattr(scene, name) for name in ("rods", *sorted(type(scene).parts())))
+    kinds = [kind_of(each) for each in parts if hasattr(each, "kind")]
+    compile_once((sorted(holds(scene)), kinds), compiling)
 
 
 def _run(

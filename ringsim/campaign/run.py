@@ -13,7 +13,9 @@ import xarray as xr
 from ringsim.analysis.campaign_notes import budget_lines, notes
 from ringsim.analysis.engines import check_lines, too_far
 from ringsim.campaign.folder import Folder, merge, open_folder
+from ringsim.campaign.specification import SOLVERS
 from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
+from ringsim.compile_cache import choose_folder
 from ringsim.execution.work import Limits, Scheduler, Work, longest_first, relative_cost
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.refusal import InputError
@@ -85,6 +87,8 @@ def run_campaign(folder: Path, choices: Choices) -> int:
         if fault := scheduler.from_first(fault):
             raise InputError(fault)
         campaign = open_folder(folder)
+        if scheduler.rank == 0 and campaign.attributes["solver"] == SOLVERS["frame"]:
+            choose_folder()  # tells, where it is a temporary one; solver processes tell nobody
         _run_missing(campaign, choices, stop)
         try:
             return _conclude(campaign, choices, stop) if scheduler.rank == 0 else EXIT_DONE

@@ -137,6 +137,7 @@ class Integration:
         """
         model, factored, last, share = self._model, None, math.inf, 1.0
         begun, change, fresh = after.stand(), np.zeros(0), False
+        tolerance = model.tolerance(step)
         for _ in range(_MOST):
             try:
                 g = model.residual(time, step, self._now, after, self._strains)
@@ -145,7 +146,7 @@ class Integration:
             norm = float(np.sqrt(g @ g))
             if not math.isfinite(norm):
                 raise NoBalanceError("the state is not finite")
-            if norm <= model.tolerance:
+            if norm <= tolerance:
                 return
             self.history.newton_iterations += 1
             if fresh and norm > _DESCENT * last and share > _SMALLEST_SHARE:

@@ -30,8 +30,6 @@ class FrameModel:
     ----------
     size
         Number of unknowns: those of the mesh and the hub's three, if there is a net.
-    tolerance
-        Residual norm at which Newton stops, N.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -68,9 +66,9 @@ class FrameModel:
             end = skeleton.end_of(self.layout.joints[number].first)
             self.loads[mesh.home[end.frame] : mesh.home[end.frame] + 3] += force
             self._loaded.append((end.frame, pose.place[end.frame].copy(), force))
-        self.tolerance = residual_tolerance(
-            scene, self.layout, 4.0 * float(np.finfo(float).eps) * math.sqrt(self.size)
-        )
+        self._round_off = 4.0 * float(np.finfo(float).eps) * math.sqrt(self.size)
+        self._tolerance = residual_tolerance(scene, self.layout, self._round_off)
+        self._heaviest = float(max(mesh.point_mass.max(), 2.0 * mesh.mass.max()))
         lines = 0 if self.cables is None else self.cables.points
         ends = [] if self.layout.net is None else list(self.layout.net.bodies)
         sizes = 3 * len(mesh.point_mass), 3 * lines, len(angle), 3 * len(ends), 3 * bool(ends)
@@ -97,6 +95,13 @@ class FrameModel:
         apart.
         """
         return max((slide.size(pose) for slide in self.slides), default=0.0)
+
+    def tolerance(self, step: float) -> float:
+        """Residual norm at which Newton stops in a step (s), N: in short ones accelerations of
+        points of order 1 m are rounded to eps / (beta h^2).
+        """
+        inertia = self._heaviest * self.coefficients.acceleration_by_place(step)
+        return max(self._tolerance, self._round_off * inertia)
 
     def residual(
         self, time: float, step: float, start: State, now: State, strains: Strains

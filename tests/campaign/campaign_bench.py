@@ -23,7 +23,7 @@ MODULES = os.pathsep.join(filter(None, [str(HERE), os.environ.get("PYTHONPATH", 
 """Where the stand-ins for the solver are found."""
 
 MPIEXEC = shutil.which("mpiexec", path=PATH)
-NOT_COMPARED = ("wall_time", "cpu_time", "log")
+NOT_COMPARED = ("wall_time", "cpu_time", "log", "wall_time_checked", "cpu_time_checked")
 """Timings, and the text that a dying process prints."""
 
 CAMPAIGN = """

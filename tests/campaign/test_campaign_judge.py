@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
+
 import numpy as np
 import pytest
 import xarray as xr
 
-from campaign_bench import comparable, journals, lose
+from campaign_bench import Bench, comparable, journals, lose
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.specification import load_campaign
 from ringsim.refusal import InputError
@@ -24,12 +26,19 @@ def written(bench, top=CHECKED, samples=5):
     return path
 
 
-@pytest.fixture
-def checked(bench):
-    """A finished campaign whose samples 0, 2 and 4 were checked."""
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A finished campaign whose samples 0, 2 and 4 were checked, and what it printed."""
+    bench = Bench(tmp_path_factory.mktemp("checked"))
     written(bench)
-    bench.printed = bench.run(*START, "--workers", 2)
-    return bench
+    return bench, bench.run(*START, "--workers", 2)
+
+
+@pytest.fixture
+def checked(finished, tmp_path):
+    """A copy of it."""
+    shutil.copytree(finished[0].folder, tmp_path, dirs_exist_ok=True)
+    return Bench(tmp_path)
 
 
 def stored(bench):
@@ -64,11 +73,11 @@ def test_checks_change_nothing_of_the_samples(checked):
     xr.testing.assert_identical(comparable(both)[list(alone.data_vars)], alone)
 
 
-def test_campaign_merge_and_status_tell_of_the_checks(checked):
+def test_campaign_merge_and_status_tell_of_the_checks(checked, finished):
     found = checked.result("out")
     times = found.deployment_time.values
     k = int(np.argmax(times[::2])) * 2  # a thousandth of the longest time is the most
-    for printed in (checked.printed, checked.run("merge", "out")):
+    for printed in (finished[1], checked.run("merge", "out")):
         assert "3 of 5 samples were checked with the full engine" in printed
         (row,) = [line.split() for line in printed.splitlines() if "deployment_time " in line]
         median, worst, sample, share, bars, error = row[-6:]
@@ -101,7 +110,13 @@ def test_a_check_that_dies_costs_no_sample_and_can_be_repeated(bench):
     assert "3 checks failed, first sample 0: the solver process died of SIGSEGV" in printed
     found = bench.result("out")
     assert found.status.values.tolist() == [0] * 5
-    assert found.status_checked.values.tolist() == [Status.CRASHED, -1, Status.CRASHED, -1, Status.CRASHED]
+    assert found.status_checked.values.tolist() == [
+        Status.CRASHED,
+        -1,
+        Status.CRASHED,
+        -1,
+        Status.CRASHED,
+    ]
     del bench.extra["JUDGE_DIES"]
     bench.run(*START)
     assert len(stored(bench)) == 8  # a failure is a result, as of samples
@@ -161,7 +176,7 @@ def test_parts_check_their_own_samples(bench):
         (f"{CHECKED}max_difference = 0.0\n", "max_difference"),
         (f"{CHECKED}max_difference = {{ deploymenttime = 0.1 }}\n", "did you mean deployment_time"),
         (f"{CHECKED}max_difference = {{ steps = 0.1 }}\n", "no such output to compare engines by"),
-        ('fidelity = "fram"\n', "did you mean frame"),
+        ('fidelity = "fram"\n', "must be 'full', 'frame' or 'ideal'"),
     ],
 )
 def test_senseless_checks_are_refused_in_one_line(bench, top, words):

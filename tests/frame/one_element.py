@@ -135,7 +135,9 @@ def exudyn_cantilever(force: Array, moment: Array) -> Ends:
     system.AddObject(
         item.ObjectBeamGeometricallyExact(nodeNumbers=nodes, length=LENGTH, sectionData=section)
     )
-    ground = system.AddMarker(item.MarkerBodyRigid(bodyNumber=system.AddObject(item.ObjectGround())))
+    ground = system.AddMarker(
+        item.MarkerBodyRigid(bodyNumber=system.AddObject(item.ObjectGround()))
+    )
     first, second = (system.AddMarker(item.MarkerNodeRigid(nodeNumber=node)) for node in nodes)
     system.AddObject(item.ObjectJointGeneric(markerNumbers=[ground, first]))
     system.AddLoad(item.LoadForceVector(markerNumber=second, loadVector=list(force)))

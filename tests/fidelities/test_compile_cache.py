@@ -1,0 +1,113 @@
+"""Compiled code has a folder of its own that can be written, and one process compiles at a time."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ringsim.compile_cache import VARIABLE, compile_once
+
+CHOOSES = "from ringsim.compile_cache import choose_folder\nprint(choose_folder())"
+COMPILES = """
+import sys, time
+from pathlib import Path
+from ringsim.compile_cache import compile_once
+
+def compiling():
+    with open("trace", "a") as trace:
+        trace.write("begin ")
+    time.sleep(0.5)
+    with open("trace", "a") as trace:
+        trace.write("end ")
+
+compile_once("ring", compiling)
+assert "end" in Path("trace").read_text()
+"""
+RUNS = """
+from ringsim.scene import load_scene
+from ringsim.simulation import run_frame
+found = run_frame(load_scene("truss2").with_values({"solver.end_time": 0.5}))
+print(found.status, found.values["peak_tension"], found.values["steps"])
+"""
+
+
+def started(code: str, folder: Path, **environment: str) -> subprocess.Popen[str]:
+    """A fresh interpreter; variables that are empty are left out."""
+    mine = {"XDG_CACHE_HOME": "", VARIABLE: "", **environment}
+    kept = {name: value for name, value in (os.environ | mine).items() if value}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(
+        [sys.executable, "-c", code], cwd=folder, env=kept, text=True, **pipes
+    )  # fmt: skip
+
+
+def ended(process: subprocess.Popen[str]) -> tuple[str, str]:
+    out, errors = process.communicate(timeout=300)
+    assert process.returncode == 0, errors
+    return out.strip(), errors
+
+
+def test_compiled_code_goes_to_the_users_cache(tmp_path: Path) -> None:
+    out, errors = ended(started(CHOOSES, tmp_path, HOME=str(tmp_path)))
+    assert Path(out).parent == tmp_path / ".cache" / "ringsim"
+    assert errors == ""
+    out, _ = ended(started(CHOOSES, tmp_path, HOME=str(tmp_path), XDG_CACHE_HOME="/tmp"))
+    assert Path(out).parent == Path("/tmp/ringsim")
+
+
+def test_a_folder_that_is_given_is_taken(tmp_path: Path) -> None:
+    given = str(tmp_path / "mine")
+    assert ended(started(CHOOSES, tmp_path, **{VARIABLE: given}))[0] == given
+
+
+def test_without_a_home_to_write_to_a_temporary_folder_is_told(tmp_path: Path) -> None:
+    """Nothing can be made below a file, whoever asks."""
+    home = tmp_path / "home"
+    home.write_text("")
+    places = {"HOME": str(home), "TMPDIR": str(tmp_path)}
+    out, errors = ended(started(CHOOSES, tmp_path, **places))
+    assert Path(out).parent == tmp_path
+    assert len(errors.strip().splitlines()) == 1
+    assert "cannot be written: compiled code goes to" in errors
+    # The next run finds what this one compiled, but not in a folder that others can write to.
+    assert ended(started(CHOOSES, tmp_path, **places))[0] == out
+    Path(out).chmod(0o777)
+    assert ended(started(CHOOSES, tmp_path, **places))[0] != out
+
+
+def test_of_two_processes_one_compiles_and_the_other_waits(tmp_path: Path) -> None:
+    places = {VARIABLE: str(tmp_path / "cache")}
+    for process in [started(COMPILES, tmp_path, **places) for _ in range(2)]:
+        ended(process)
+    assert (tmp_path / "trace").read_text() == "begin end "
+
+
+def test_every_kind_is_compiled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    done = []
+    for kind in ("ring", "ring", "truss", "ring"):
+        compile_once(kind, lambda kind=kind: done.append(kind))
+    assert done == ["ring", "truss"]
+
+
+def test_what_breaks_is_compiled_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    with pytest.raises(ZeroDivisionError):
+        compile_once("ring", lambda: 1 / 0)
+    done = []
+    compile_once("ring", lambda: done.append("ring"))
+    assert done == ["ring"]
+
+
+@pytest.mark.slow  # compiles everything; that one waits for the other is tested above
+def test_two_runs_on_an_empty_cache_give_the_same(tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    home.write_text("")
+    places = {"HOME": str(home), "TMPDIR": str(tmp_path)}
+    one, other = (ended(p)[0] for p in [started(RUNS, tmp_path, **places) for _ in range(2)])
+    assert one == other == ended(started(RUNS, tmp_path, **places))[0]
+    assert list(tmp_path.rglob("*.nbc"))

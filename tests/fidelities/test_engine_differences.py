@@ -1,0 +1,82 @@
+"""The table of differences counts what it says, and the verdict follows from it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from ringsim.analysis.engines import check_lines, compared, differences, main_outputs
+from ringsim.variables import Fate, Status
+
+NAN = np.nan
+
+
+def campaign(**changed: list[float]) -> xr.Dataset:
+    """Four samples, of which 0, 1 and 3 were checked; the check of 3 has failed."""
+    values = {
+        "status": [Status.OK] * 4,
+        "outcome": [Fate.DEPLOYED] * 4,
+        "deployment_time": [10.0, 11.0, 12.0, 13.0],
+        "deployment_time_error": [0.02, NAN, NAN, NAN],
+        "status_checked": [Status.OK, Status.OK, -1, Status.SOLVER_FAILED],
+        "outcome_checked": [Fate.DEPLOYED, Fate.DEPLOYED, -1, Fate.NONE],
+        "deployment_time_checked": [10.01, 11.03, NAN, NAN],
+        "deployment_time_error_checked": [0.005, NAN, NAN, NAN],
+    } | changed
+    columns = {name: ("sample", np.array(column)) for name, column in values.items()}
+    reasons = ("sample", ["", "", "", "too stiff"])
+    return xr.Dataset({**columns, "reason_checked": reasons}, {"sample": np.arange(4)})
+
+
+def test_numbers_of_the_antenna_are_compared() -> None:
+    names = compared().keys()
+    assert names >= {"deployment_time", "asynchrony_max_time", "peak_tension", "locked_joints"}
+    for other in ("energy_error", "steps", "cpu_time", "peak_tension_span", "opening_angle"):
+        assert other not in names
+    assert {"deployment_time", "asynchrony_max", "peak_tension"} <= set(main_outputs())
+
+
+def test_only_samples_that_ended_well_with_both_count() -> None:
+    (found,) = differences(campaign())
+    assert found.name == "deployment_time"
+    assert found.samples.tolist() == [0, 1]
+    assert found.apart == pytest.approx([0.01, 0.03])
+    assert found.share == pytest.approx([0.01 / 10.01, 0.03 / 11.03])
+    assert found.worst == 1
+    # Where a sample states no bar, the largest of its engine stands in.
+    assert found.bars == pytest.approx([0.025, 0.025])
+    assert found.standard_error == pytest.approx(np.std([10, 11, 12, 13], ddof=1) / 2.0)
+
+
+def test_the_last_line_says_whether_bars_cover_the_differences() -> None:
+    lines = check_lines(campaign())
+    assert lines[0] == "3 of 4 samples were checked with the full engine"
+    assert lines[1] == "1 checks failed, first sample 3: too stiff"
+    assert lines[-1] == (
+        "the engines differ by more than their error bars in deployment_time (sample 1: 0.03 s, "
+        "error bars 0.025)"
+    )
+    near = check_lines(campaign(deployment_time_checked=[10.01, 11.02, NAN, NAN]))
+    assert near[-1] == "the engines differ by no more than their error bars"
+    silent = campaign().drop_vars(["deployment_time_error", "deployment_time_error_checked"])
+    assert "error bars in" not in check_lines(silent)[-1]
+
+
+def test_a_number_that_one_engine_lacks_differs_by_all() -> None:
+    stalled = campaign(
+        deployment_time_checked=[10.01, NAN, NAN, NAN],
+        outcome_checked=[Fate.DEPLOYED, Fate.STALLED, -1, Fate.NONE],
+    )
+    (found,) = differences(stalled)
+    assert found.apart.tolist() == [pytest.approx(0.01), np.inf]
+    assert found.share[1] == np.inf
+    told = "the outcome differs in 1 of 2: sample 1: deployed, full engine: stalled"
+    assert told in check_lines(stalled)
+    stalled.attrs["max_difference"] = "1000.0"
+    assert "more than the campaign allows" in check_lines(stalled)[-1]
+
+
+def test_a_campaign_without_checks_says_nothing() -> None:
+    plain = campaign()
+    assert check_lines(plain.drop_vars([n for n in plain if str(n).endswith("_checked")])) == []
