@@ -27,7 +27,7 @@ from ringsim.variables import Cause, Fidelity, Outcome, Status
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIDELITIES", "run", "run_frame", "run_ideal", "simulate"]
+__all__ = ["FIDELITIES", "run", "run_frame", "run_ideal", "simulate", "why_not_frame"]
 
 Watch = Callable[[Instant], None]
 """What is shown every accepted state of a run."""
@@ -99,6 +99,18 @@ def prepare_run_frame(scene: Scene) -> None:
     parts = (getattr(scene, name) for name in ("rods", *sorted(type(scene).parts())))
     kinds = [kind_of(each) for each in parts if hasattr(each, "kind")]
     compile_once((sorted(holds(scene)), kinds), compiling)
+
+
+def why_not_frame(scene: Scene) -> str:
+    """Why the frame engine cannot represent a scene; empty if it can."""
+    choose_folder()
+    from ringsim.frame.model import FrameModel
+
+    try:
+        FrameModel(scene)
+    except InputError as error:
+        return str(error)
+    return ""
 
 
 def _run(
