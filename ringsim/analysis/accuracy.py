@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from ringsim.analysis.errors import OUTPUTS, Array, Errors, largest
+from ringsim.analysis.errors import GROUPS, OUTPUTS, Array, Errors, largest
 from ringsim.analysis.ladder import FRAME, IDEAL, PATHS, STANDING, Rung
 from ringsim.outputs import VARIABLES
 

@@ -45,11 +45,11 @@ def run_ladder(
     A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
     cheapest run of the reference goes first, then the whole reference, then the rest, so that a
     scene which cannot be studied costs little.  The frame engine and the ideal fidelity are
-    settings too, where they can represent the scene.  ``folder`` holds the campaigns, and a study that was interrupted goes on,
-    also with rungs that took longer than ``timeout``, the longest time of one rung, s;
-    ``most_elements`` (4 or 8) is how many times more than the scene's are tried.  What the study
-    had to do without is in the attribute ``remarks``.  InputError if the scene is refused,
-    ReferenceRunError if too few runs for a reference end well.
+    settings too, where they can represent the scene.  ``folder`` holds the campaigns, and a study
+    that was interrupted goes on, also with rungs that took longer than ``timeout``, the longest
+    time of one rung, s; ``most_elements`` (4 or 8) is how many times more than the scene's are
+    tried.  What the study had to do without is in the attribute ``remarks``.  InputError if the
+    scene is refused, ReferenceRunError if too few runs for a reference end well.
     """
     plain = {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
     scene = scene.with_values(plain)
