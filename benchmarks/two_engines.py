@@ -8,8 +8,9 @@
 laws of friction and winding, booms, nets, faults) by exudyn and in joint coordinates, each with the
 error bars of its own two runs, and keeps what it finds as it comes.  Scenes on which exudyn takes
 more than ``DEAR`` are left out: that says nothing about agreement.  ``table`` compares all that has
-a bar: the difference over the sum of both bars, of series where it is largest.  Both engines have the same elements, so
-that the part of a bar that stands for one element a half says nothing about them; it is left out.
+a bar: the difference over the sum of both bars, of series where it is largest.  Both engines have
+the same elements, so that the part of a bar that stands for one element a half says nothing about
+them; it is left out.
 ``look`` runs one scene again in both at a tolerance divided by so much, to see whose a difference
 is.
 """
@@ -40,6 +41,8 @@ DEAR = 25.0
 """Processor time of exudyn's run without bars, s."""
 REPRESENTED = ("forces-ring", "forces-arc", "cables-ring", "cables-arc", "cable-faults",
                "constant-steps")  # fmt: skip
+LEAST = {"asynchrony": 1e-6}
+"""Difference that is round-off: at the start of a run deviations and their bars are."""
 ONE_ELEMENT = 10**6
 """Elements of a half at which a bar has no part for one element."""
 
@@ -76,9 +79,8 @@ def apart(one: Outcome, two: Outcome) -> dict[str, tuple[float, float, float]]:
         if bar not in one.values or bar not in two.values:
             continue
         bars = np.atleast_1d(one.values[bar] + two.values[bar])
-        # What is below round-off has no bar worth the name.
-        there = np.isfinite(bars) & (bars > 0.0)
-        if there.any():
+        there = np.isfinite(bars) & (difference > LEAST.get(name, 0.0))
+        if np.isfinite(bars).any():
             own, value = np.atleast_1d(difference), np.atleast_1d(largest(name, one.values[name]))
             worst = int(np.argmax(np.where(there, own / np.maximum(bars, 1e-300), -1.0)))
             found[name] = (float(value[worst]), float(own[worst]), float(bars[worst]))
@@ -148,7 +150,8 @@ def table(asked: argparse.Namespace) -> None:
 
 def cells_of(own: list[tuple[float, float]]) -> str:
     ratio, share = np.array(own).T
-    return f"{len(own)} | {np.mean(ratio <= 1.0):.0%} | {np.median(ratio):.2g} | {np.median(share):.1e}"
+    within, middle = np.mean(ratio <= 1.0), np.median(ratio)
+    return f"{len(own)} | {within:.0%} | {middle:.2g} | {np.median(share):.1e}"
 
 
 def look(asked: argparse.Namespace) -> None:

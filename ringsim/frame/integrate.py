@@ -137,7 +137,7 @@ class Integration:
         """
         model, factored, last, share = self._model, None, math.inf, 1.0
         begun, change, fresh = after.stand(), np.zeros(0), False
-        tolerance = model.tolerance(step)
+        tolerance = model.tolerance(step, self._strains)
         for _ in range(_MOST):
             try:
                 g = model.residual(time, step, self._now, after, self._strains)

@@ -50,7 +50,7 @@ class FrameModel:
         self.cables = None
         if scene.cables is not None:
             self.cables = FrameCables(scene.cables, skeleton, mesh, parts)
-        stiffest = float(mesh.stiffness[:, 0].max())
+        self._stiffest = stiffest = float(mesh.stiffness[:, 0].max())
         slides = [RigidSlide(mesh, *pair, STIFFNESS * stiffest) for pair in skeleton.slides]
         self._beam_slides: list[Slide] = []
         if beam is not None:
@@ -66,9 +66,8 @@ class FrameModel:
             end = skeleton.end_of(self.layout.joints[number].first)
             self.loads[mesh.home[end.frame] : mesh.home[end.frame] + 3] += force
             self._loaded.append((end.frame, pose.place[end.frame].copy(), force))
-        self._round_off = 4.0 * float(np.finfo(float).eps) * math.sqrt(self.size)
-        self._tolerance = residual_tolerance(scene, self.layout, self._round_off)
-        self._heaviest = float(max(mesh.point_mass.max(), 2.0 * mesh.mass.max()))
+        self._tolerance = residual_tolerance(scene, self.layout, 0.0)
+        self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
         lines = 0 if self.cables is None else self.cables.points
         ends = [] if self.layout.net is None else list(self.layout.net.bodies)
         sizes = 3 * len(mesh.point_mass), 3 * lines, len(angle), 3 * len(ends), 3 * bool(ends)
@@ -96,12 +95,16 @@ class FrameModel:
         """
         return max((slide.size(pose) for slide in self.slides), default=0.0)
 
-    def tolerance(self, step: float) -> float:
-        """Residual norm at which Newton stops in a step (s), N: in short ones accelerations of
-        points of order 1 m are rounded to eps / (beta h^2).
+    def tolerance(self, step: float, strains: Strains) -> float:
+        """Residual norm at which Newton stops in a step (s), N; not below what round-off leaves of
+        coordinates of order 1 m: of inertia, of the rods with their damping, of slides.
         """
         inertia = self._heaviest * self.coefficients.acceleration_by_place(step)
-        return max(self._tolerance, self._round_off * inertia)
+        rods = self._stiffest * (1.0 + self.mesh.tau * strains.lead)
+        slides = STIFFNESS * self._stiffest if self.slides else 0.0
+        small = 4.0 * float(np.finfo(float).eps)
+        reached = small * (math.sqrt(self.size) * (inertia + rods) + slides)
+        return max(self._tolerance, reached)
 
     def residual(
         self, time: float, step: float, start: State, now: State, strains: Strains

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from ringsim import simulation
 from ringsim.analysis.campaign_notes import budget_lines
 from ringsim.campaign.cases import run_cases
 from ringsim.campaign.specification import load_campaign
 from ringsim.dataset import to_dataset
+from ringsim.engine import integrate
 from ringsim.outputs.error_bars import error_bars, rules
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
@@ -140,11 +140,11 @@ def attempts(monkeypatch):
     def prepare(*endings: Outcome) -> list[Solver]:
         left, seen = list(endings), []
 
-        def attempt(scene: Scene, begin: tuple[float, float], watch: object) -> Outcome:
+        def attempt(scene: Scene, watch: object) -> Outcome:
             seen.append(scene.solver)
             return left.pop(0)
 
-        monkeypatch.setattr(simulation, "_attempt", attempt)
+        monkeypatch.setattr(integrate, "solve", attempt)
         return seen
 
     return prepare

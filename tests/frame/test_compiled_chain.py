@@ -65,9 +65,8 @@ class Case:
         return self.chain.state(self.ropes, self.points, self.rates, self.wound, self.wound_rate)
 
 
-CASES = [(seed, jam, cut) for seed in range(3) for jam in (False, True) for cut in (False, True)]
-    (seed, jammed, cut) for seed in range(3) for jammed in (False, True) for cut in (False, True)
-]
+BOTH = (False, True)
+CASES = [(seed, jammed, cut) for seed in range(3) for jammed in BOTH for cut in BOTH]
 
 
 @pytest.mark.parametrize(("seed", "jammed", "cut"), CASES)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ringsim import simulation
+from ringsim.engine import integrate
 from ringsim.execution.solve import solve
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
@@ -55,7 +56,7 @@ def test_the_last_start_counts_unless_it_ran_out_of_its_smaller_steps(
     def ending(scene: Scene, watch: object) -> Outcome:
         return Outcome(Status.DIVERGED, "so", {}, {"steps": np.array(1)}, left.pop(0))
 
-    monkeypatch.setattr(simulation, "solve", ending)
+    monkeypatch.setattr(integrate, "solve", ending)
     assert simulation.run(RING).cause is counts
 
 

@@ -12,6 +12,7 @@ from ringsim.analysis.campaign_notes import restart_lines
 from ringsim.campaign import accuracy
 from ringsim.cli import cli
 from ringsim.dataset import to_dataset
+from ringsim.engine import integrate
 from ringsim.parts.solver import Solver
 from ringsim.scene import load_scene
 from ringsim.variables import COUNTS, Outcome, Status
@@ -39,7 +40,7 @@ class Endings:
 def endings(monkeypatch):
     def install(*statuses: Status, steps: int = 10) -> Endings:
         prepared = Endings(*statuses, steps=steps)
-        monkeypatch.setattr(simulation, "solve", prepared)
+        monkeypatch.setattr(integrate, "solve", prepared)
         return prepared
 
     return install
