@@ -80,6 +80,7 @@ def prepare_run_frame(scene: Scene) -> None:
     InputError
         If it cannot represent the scene.
     """
+    _refuse_other_rods(scene)
     choose_folder()
     from ringsim.frame.integrate import solve
 
@@ -107,10 +108,20 @@ def why_not_frame(scene: Scene) -> str:
     from ringsim.frame.model import FrameModel
 
     try:
+        _refuse_other_rods(scene)
         FrameModel(scene)
     except InputError as error:
         return str(error)
     return ""
+
+
+def _refuse_other_rods(scene: Scene) -> None:
+    """The frame engine's elements are geometrically exact, whatever a scene asks for."""
+    if (kind := kind_of(scene.rods)) != "geometrically-exact":
+        raise InputError(
+            f'rods.kind = "{kind}": fidelity = "frame" has geometrically-exact rods only: leave '
+            'rods.kind out, or choose fidelity = "full"'
+        )
 
 
 def _run(

@@ -171,8 +171,7 @@ def to_markdown(whole: xr.Dataset) -> str:
     """A judged map as a Markdown text."""
     head = ["panel", "axis", "all cells ok", "any cell ok", "below", "above"]
     parts = ["# Stability map", summary(whole), *(_checks(whole) if "check" in whole else ())]
-    parts += engines_text(whole)
-    parts += ["![How each cell ended](stability.png)"]
+    parts += ["![How each cell ended](stability.png)", *engines_text(whole)]
     parts += ["## Borders", markdown_table(head, borders(whole))]
     parts += ["## What lies beyond", _causes(whole)]
     if suspects := np.flatnonzero(whole["verdict"] == WRONG).tolist():
