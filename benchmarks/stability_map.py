@@ -1,6 +1,7 @@
 """Map where the solver is sound: 520 runs over stiffness, masses, friction, fold angle, steps, ...
 
-Run: python benchmarks/stability_map.py [--quick] [--workers N] [--out DIR]
+Run: python benchmarks/stability_map.py [--quick] [--fidelity full|frame|both] [--workers N]
+                                        [--out DIR]
 
 docs/stability.md is what it wrote.  Every panel spans the range from harmless to absurd.  Rings
 are small where an axis does not need more, and start half open where the stowed end is not the
@@ -15,7 +16,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ringsim.campaign.panels import Panel, Sweep
+from ringsim.campaign.panels import Panel, Sweep, by_engines
 from ringsim.cli.stability import draw_map
 from ringsim.scene import load_scene
 
@@ -207,8 +208,9 @@ QUICK = (
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--quick", action="store_true", help="a dozen cells instead of all")
+    parser.add_argument("--fidelity", choices=["full", "frame", "both"], default="full")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("runs/stability"))
     asked = parser.parse_args()
-    panels = QUICK if asked.quick else PANELS
+    panels = by_engines(QUICK if asked.quick else PANELS, asked.fidelity)
     sys.exit(draw_map(asked.out, panels, asked.workers, percent=10.0))

@@ -28,7 +28,7 @@ from ringsim.variables import Cause, Fidelity, Outcome, Status
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIDELITIES", "run", "run_frame", "run_ideal", "simulate"]
+__all__ = ["FIDELITIES", "run", "run_frame", "run_ideal", "simulate", "why_not_frame"]
 
 Watch = Callable[[Instant], None]
 """What is shown every accepted state of a run."""
@@ -82,6 +82,7 @@ def prepare_run_frame(scene: Scene) -> None:
     InputError
         If it cannot represent the scene.
     """
+    _refuse_other_rods(scene)
     choose_folder()
     from ringsim.frame.integrate import solve
 
@@ -101,6 +102,28 @@ def prepare_run_frame(scene: Scene) -> None:
     parts = (getattr(scene, name) for name in ("rods", *sorted(type(scene).parts())))
     kinds = [kind_of(each) for each in parts if hasattr(each, "kind")]
     compile_once((sorted(holds(scene)), kinds), compiling)
+
+
+def why_not_frame(scene: Scene) -> str:
+    """Why the frame engine cannot represent a scene; empty if it can."""
+    choose_folder()
+    from ringsim.frame.model import FrameModel
+
+    try:
+        _refuse_other_rods(scene)
+        FrameModel(scene)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def _refuse_other_rods(scene: Scene) -> None:
+    """The frame engine's elements are geometrically exact, whatever a scene asks for."""
+    if (kind := kind_of(scene.rods)) != "geometrically-exact":
+        raise InputError(
+            f'rods.kind = "{kind}": fidelity = "frame" has geometrically-exact rods only: leave '
+            'rods.kind out, or choose fidelity = "full"'
+        )
 
 
 def _run(

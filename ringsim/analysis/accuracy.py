@@ -13,8 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from ringsim.analysis.errors import OUTPUTS, Array, Errors, largest
-from ringsim.analysis.ladder import PATHS, STANDING, Rung
+from ringsim.analysis.errors import GROUPS, OUTPUTS, Array, Errors, largest
+from ringsim.analysis.ladder import FRAME, IDEAL, PATHS, STANDING, Rung
 from ringsim.outputs import VARIABLES
 
 TARGETS = (1e-2, 1e-3, 1e-4)
@@ -24,7 +24,8 @@ WORTH_A_CHANGE = 0.9
 """Cost of another setting over that of the scene's own up to which it is worth a change: smaller
 differences are within the fit of the cost and the luck of single steps."""
 _OTHER_MODELS = ("fidelity", "formulation", "constant step")
-"""Ladders without the scene's own model, rods and step control: they are not recommended."""
+"""Ladders without the scene's own model, rods and step control: they are not recommended.  The
+frame engine's model is the scene's own."""
 _SAME = ("solver.step_control", "rods.kind")
 _SMALLER = (
     "solver.step", "solver.tolerance", "solver.deviation_tolerance", "solver.newton_tolerance",
@@ -45,7 +46,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     """Errors, orders, cost and the efficient frontier of a ladder.
 
     ``results`` are ``NEEDED`` variables over ``rung``, one entry for each of the ``rungs``, those
-    of the reference among them.
+    of the reference among them.  The reference is the limit of the full engine's runs, for all.
 
     Returns
     -------
@@ -53,7 +54,9 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         Variables over ``rung``, ``output``, ``graded`` (ladders with an order), ``target`` and
         ``truth``, described by their ``long_name`` and ``units``.  ``order`` is NaN where errors
         come near the reference's own, ``reference`` for series (of the asynchrony it is the largest
-        value); ``frontier`` and ``cheapest`` are among settings of the scene's own model.
+        value); ``frontier`` and ``cheapest`` are among settings of the scene's own model, of both
+        engines.  With rungs of the frame engine ``engines_differ`` says how far its limit is from
+        that of the full one, and ``frame_uncertainty`` how well it is known.
 
     Raises
     ------
@@ -73,6 +76,10 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     choice = np.array([ladder not in _OTHER_MODELS for ladder in ladders])
     ranked = np.where(choice[:, None], good, np.nan)
     graded, orders = errors.orders()
+    engines = _engines(errors, results, rungs)
+    if engines is not None:
+        names, more = engines.orders
+        graded, orders = [*graded, *names], np.vstack([orders, more])
     within = ranked <= np.array(TARGETS)[:, None, None]
     costs = np.where(within, in_favour(cost, ladders)[:, None], np.inf)
     pick = np.where(within.any(axis=1), costs.argmin(axis=1), -1)
@@ -96,9 +103,17 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
         ("status", one, results.status.to_numpy(), "how the run ended", ""),
         ("ladder", one, ladders, "what is varied", ""),
         ("label", one, [rung.label for rung in rungs], "the setting", ""),
+        ("fidelity", one, [rung.fidelity for rung in rungs], "the engine", ""),
         *((v.name, one, counts[v.name], v.long_name, v.units)
           for v in (VARIABLES[name] for name in counts)),
     ]  # fmt: skip
+    if engines is not None:
+        rows += [
+            ("engines_differ", ("output",), engines.apart,
+             "distance of the limits of both engines, relative", "1"),
+            ("frame_uncertainty", ("output",), engines.uncertainty,
+             "uncertainty of the frame engine's limit, relative", "1"),
+        ]  # fmt: skip
     if "reason" in results:
         rows.append(("reason", one, results.reason.to_numpy().astype(str), "why", ""))
     for path in PATHS:
@@ -120,6 +135,39 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     if truths:
         found["truth"] = [f"{truth.output}: {truth.source}" for truth in truths]
     return found
+
+
+class _Engines(NamedTuple):
+    """The limit of the frame engine's runs against that of the full one's, shapes (output,)."""
+
+    apart: Array
+    uncertainty: Array
+    orders: tuple[list[str], Array]
+
+
+def _engines(full: Errors, results: xr.Dataset, rungs: Sequence[Rung]) -> _Engines | None:
+    """How far the engines' limits are apart; None without enough runs of the frame engine."""
+    try:
+        frame = Errors(results, rungs, FRAME)
+    except ValueError:
+        return None
+    apart = {}
+    for name in (name for name in full.of if name in OUTPUTS and name in frame.of):
+        both = (name, "asynchrony_max") if name == "asynchrony" else (name,)
+        pairs = [(full.best_of(each).value, frame.best_of(each).value) for each in both]
+        # Of series what both have: each ends with its own engine's deployment.
+        apart[name] = max(float(abs(a - b).max()) / full.scale(name, a) for a, b in pairs)
+    for group, members in GROUPS.items():
+        if present := [m for m in members if m in apart]:
+            apart[group] = max(apart[m] for m in present)
+    names, orders = frame.orders()
+    columns = [list(frame.of).index(name) if name in frame.of else -1 for name in full.of]
+    orders = np.column_stack([orders, np.full(len(orders), np.nan)])[:, columns]
+    return _Engines(
+        np.array([apart.get(name, np.nan) for name in full.of]),
+        np.array([frame.uncertainty.get(name, np.nan) for name in full.of]),
+        ([f"{FRAME}, {name}" for name in names], orders),
+    )
 
 
 def settings_at(found: xr.Dataset, rung: int) -> dict[str, Any]:
@@ -150,7 +198,7 @@ def bounds(error: Array, rungs: Sequence[Rung], uncertainty: Array) -> Array:
 
 def _refines(fine: Rung, coarse: Rung) -> bool:
     """Whether a setting is finer in something and coarser in nothing."""
-    if "fidelity" in (fine.ladder, coarse.ladder):
+    if fine.fidelity != coarse.fidelity:
         return False
     a, b = fine.values, coarse.values
     if any(a[path] != b[path] for path in _SAME):
@@ -162,26 +210,23 @@ def _refines(fine: Rung, coarse: Rung) -> bool:
 def typical_cost(seconds: Array, work: Array, rungs: Sequence[Rung]) -> Array:
     """Processor time of each setting without the scatter of single timings, shape (rung,), s.
 
-    Every piece of work costs the same within a ladder, but for a factor for the rods' formulation
+    Every piece of work costs the same within an engine, but for a factor for the rods' formulation
     and elements: fitted to the measured ``seconds``, shape (rung,), and the counts of ``work``,
-    shape (rung, kinds).  A fidelity keeps its own time.
+    shape (rung, kinds).  The ideal ring keeps its own time.
     """
     cost, measured = seconds.copy(), np.isfinite(seconds)
-    sizes = [
-        () if r.ladder == "fidelity" else (r.values["rods.kind"], r.values["rods.elements"])
-        for r in rungs
-    ]
-    commonest = max(sizes, key=sizes.count)
-    own = np.array([size == commonest for size in sizes]) & measured
-    scale = 1.0 / np.maximum(seconds[own], 1e-9)  # relative errors count
-    shares, _ = nnls(work[own] * scale[:, None], np.ones(own.sum()))
-    plain = work @ shares
-    if not (plain[own] > 0.0).all():
-        return cost
-    for size in set(sizes) - {()}:
-        members = np.array([each == size for each in sizes]) & measured & (plain > 0.0)
-        if members.any():
-            cost[members] = plain[members] * np.median(seconds[members] / plain[members])
+    sizes = [(r.fidelity, r.values["rods.kind"], r.values["rods.elements"]) for r in rungs]
+    for engine in {rung.fidelity for rung in rungs} - {IDEAL}:
+        mine = [size for size in sizes if size[0] == engine]
+        commonest = max(mine, key=mine.count)
+        own = np.array([size == commonest for size in sizes]) & measured
+        scale = 1.0 / np.maximum(seconds[own], 1e-9)  # relative errors count
+        shares, _ = nnls(work[own] * scale[:, None], np.ones(own.sum()))
+        plain = work @ shares
+        for size in set(mine) if (plain[own] > 0.0).all() else ():
+            members = np.array([each == size for each in sizes]) & measured & (plain > 0.0)
+            if members.any():
+                cost[members] = plain[members] * np.median(seconds[members] / plain[members])
     return cost
 
 

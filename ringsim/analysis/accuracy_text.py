@@ -5,7 +5,7 @@ import xarray as xr
 
 from ringsim.analysis.accuracy import settings_at
 from ringsim.analysis.errors import GROUPS, OUTPUTS
-from ringsim.analysis.ladder import STANDING
+from ringsim.analysis.ladder import FRAME, IDEAL, STANDING
 from ringsim.tables import markdown_table
 from ringsim.variables import Status
 
@@ -31,6 +31,11 @@ _ORDERS = (
     "of elements to the next, with fine steps. A dash where errors or changes are too small to "
     "tell, or hardly change:"
 )
+_ENGINES = (
+    "How far the engines differ: the distance of the limits of their finest runs, relative, and "
+    "how uncertain either limit is (that of the full engine is the reference of all errors). What "
+    "is larger than both uncertainties together, bold, is a difference of the engines themselves:"
+)
 _TRUTHS = (
     "Distance from values that do not come from this model (they hold for rigid rods; the rest is "
     "the effect of the rods' elasticity):"
@@ -46,6 +51,8 @@ def tables(found: xr.Dataset, title: str) -> str:
     parts = [f"# {title}", *filter(None, [found.attrs.get("remarks")])]
     parts += [_ADVICE, _advice(found), _COSTS, _errors(single)]
     parts += [_ORDERS, _orders(single)]
+    if "engines_differ" in found:
+        parts += [_ENGINES, _engines(single)]
     if "from_truth" in found:
         parts += [_TRUTHS, _truths(found)]
     failed = [k for k in _distinct(found) if found.status.values[k] != Status.OK]
@@ -57,15 +64,15 @@ def tables(found: xr.Dataset, title: str) -> str:
 
 def in_words(found: xr.Dataset, rung: int) -> str:
     """A setting as the overrides that give it."""
-    if found.ladder.values[rung] == "fidelity":
-        return "`--fidelity ideal`"
-    standing = settings_at(found, _standing(found))
+    standing, fidelity = settings_at(found, _standing(found)), found.fidelity.values[rung]
     picked = {p: v for p, v in settings_at(found, rung).items() if v != standing[p]}
-    return " ".join(f"`--set {path}={value}`" for path, value in picked.items()) or STANDING
+    words = [f"`--fidelity {fidelity}`"] if fidelity in (FRAME, IDEAL) else []
+    words += [f"`--set {path}={value}`" for path, value in picked.items()]
+    return " ".join(words) or STANDING
 
 
 def _advice(found: xr.Dataset) -> str:
-    ideal = np.flatnonzero(found.ladder.values == "fidelity")
+    ideal = np.flatnonzero(found.fidelity.values == IDEAL)
     targets, rows = found.target.values.tolist(), []
     for name, column in zip(_names(found), found.output, strict=True):
         of = found.sel(output=column)
@@ -104,6 +111,19 @@ def _orders(found: xr.Dataset) -> str:
     return markdown_table(["ladder", "theory", *_names(found)], rows)
 
 
+def _engines(found: xr.Dataset) -> str:
+    apart, full, frame = (
+        found[name].values for name in ("engines_differ", "uncertainty", "frame_uncertainty")
+    )
+    rows = [
+        [name, f"**{d:.1e}**" if d > u + v else f"{d:.1e}", f"{u:.1e}", f"{v:.1e}"]
+        for name, d, u, v in zip(_names(found), apart, full, frame, strict=True)
+        if np.isfinite(d)
+    ]
+    head = ["output", "engines differ by", "uncertainty, full", "uncertainty, frame"]
+    return markdown_table(head, rows)
+
+
 def _truths(found: xr.Dataset) -> str:
     rows = []
     for of in (found.sel(truth=name) for name in found.truth):
@@ -120,14 +140,15 @@ def _names(found: xr.Dataset) -> list[str]:
 def _distinct(found: xr.Dataset) -> list[int]:
     """The first rung of each setting."""
     seen: dict[tuple[object, ...], int] = {}
-    for rung, ladder in enumerate(found.ladder.values):
-        seen.setdefault((ladder == "fidelity", *settings_at(found, rung).values()), rung)
+    for rung, fidelity in enumerate(found.fidelity.values):
+        seen.setdefault((fidelity, *settings_at(found, rung).values()), rung)
     return list(seen.values())
 
 
 def _name(found: xr.Dataset, rung: int) -> str:
     ladder, label = found.ladder.values[rung], found.label.values[rung]
-    return str(label) if ladder == label else f"{ladder}: {label}"
+    engine = f"{FRAME}, " if found.fidelity.values[rung] == FRAME else ""
+    return str(label) if ladder == label else f"{engine}{ladder}: {label}"
 
 
 def _end(found: xr.Dataset, rung: int) -> str:

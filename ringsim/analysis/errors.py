@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.ladder import Rung, references
+from ringsim.analysis.ladder import IDEAL, Rung, references
 from ringsim.variables import GOALS
 
 Array = NDArray[np.float64]
@@ -120,11 +120,17 @@ class Errors:
     where it is one number, in the output's unit; ``good``, shape (rung,): which rungs ended well.
     """
 
-    def __init__(self, results: xr.Dataset, rungs: Sequence[Rung]) -> None:
-        """Compare results over ``rung``; raises ValueError if too few references ended well."""
-        self.results, self._rungs = results, rungs
+    def __init__(self, results: xr.Dataset, rungs: Sequence[Rung], fidelity: str = "full") -> None:
+        """Compare results over ``rung`` with the limit of a fidelity's.
+
+        Raises
+        ------
+        ValueError
+            If too few of its references ended well.
+        """
+        self.results, self._rungs, self._fidelity = results, rungs, fidelity
         self.good = ((results.status == 0) & results.outcome.isin(GOALS)).to_numpy()
-        self._in_time, self._in_space = references(rungs, self.good)
+        self._in_time, self._in_space = references(rungs, self.good, fidelity)
         places = self._in_time + self._in_space
         ends = results[["deployment_time", "final_time"]].isel(rung=places).min(skipna=False)
         deployed = float(ends.deployment_time)
@@ -135,8 +141,8 @@ class Errors:
         for name in (name for name in OUTPUTS if name in results):
             if np.isfinite(largest(self.until_the_end(name).isel(rung=places))).all():
                 self._judge(name)
-        full = np.array([rung.ladder != "fidelity" for rung in rungs])
-        self.of["energy"] = np.where(full & self.good, results.energy_error, np.nan)
+        flexible = np.array([rung.fidelity != IDEAL for rung in rungs])
+        self.of["energy"] = np.where(flexible & self.good, results.energy_error, np.nan)
         self.uncertainty["energy"] = 0.0
         for group, members in GROUPS.items():
             if present := [m for m in members if m in self.of]:
@@ -173,7 +179,8 @@ class Errors:
             self.best[name] = float(best.value)
 
     def orders(self) -> tuple[list[str], Array]:
-        """Names of the ladders that may have an order, and those orders, shape (ladder, output).
+        """Names of the fidelity's ladders that may have an order, and those orders, shape (ladder,
+        output).
 
         Steps show the slope of their errors against the limit of the steps, whatever the elements
         are; elements and formulations that of the changes from level to level, which all share the
@@ -182,7 +189,8 @@ class Errors:
         ladders: dict[str, list[int]] = {}
         for k, rung in enumerate(self._rungs):
             # Longer steps than the scene's own are too long to show an order.
-            if rung.size > 0.0 and not (rung.ladder == "steps" and rung.size > 1.0):
+            too_long = rung.ladder == "steps" and rung.size > 1.0
+            if rung.size > 0.0 and not too_long and rung.fidelity == self._fidelity:
                 ladders.setdefault(rung.ladder, []).append(k)
         found = np.full((len(ladders), len(self.of)), np.nan)
         for row, (name, own) in enumerate(ladders.items()):

@@ -3,7 +3,7 @@
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -25,18 +25,19 @@ CHOICES = (*GROUPS, *OUTPUTS, "energy")
 
 
 class Setting(Model):
-    """One setting by scene path, with its measured errors and cost."""
+    """An engine and one setting by scene path, with measured errors and cost."""
 
     model_config = ConfigDict(extra="ignore")  # files of earlier versions hold more
     seconds: float
     """Processor time of a run, s."""
+    fidelity: Literal["full", "frame"] = "full"
     values: dict[str, Any]
     errors: dict[str, float]
     """What the setting is good for, relative, by output and group of outputs."""
 
 
 class Evidence(Model):
-    """The settings of one scene that are worth their cost, cheapest first.
+    """The settings of one scene and either engine that are worth their cost, cheapest first.
 
     The scene's own setting comes before others that are hardly cheaper.
     """
@@ -47,17 +48,25 @@ class Evidence(Model):
     """See :func:`kind_of_scene`."""
     settings: Annotated[tuple[Setting, ...], ListIn, Field(min_length=1)]
 
-    def pick(self, accuracy: float, of: str = JUDGED_BY) -> Setting:
-        """The cheapest setting that is good for a relative error of one of ``CHOICES``.
+    def pick(self, accuracy: float, of: str = JUDGED_BY, fidelity: str | None = None) -> Setting:
+        """The cheapest setting of a fidelity, of any if None, that is good for a relative error of
+        one of ``CHOICES``.
 
         Raises InputError if none is, or the scene has no such output.
         """
-        errors = [setting.errors.get(of, np.inf) for setting in self.settings]
+        settings = [s for s in self.settings if fidelity in (None, s.fidelity)]
+        if not settings:
+            raise InputError(
+                f"--fidelity {fidelity}: no settings of it were measured with {self.scene}: give "
+                "--evidence from ringsim accuracy on a scene that it represents, or leave out "
+                "--fidelity"
+            )
+        errors = [setting.errors.get(of, np.inf) for setting in settings]
         if min(errors) == np.inf:
-            there = ", ".join(name for name in CHOICES if name in self.settings[0].errors)
+            there = ", ".join(name for name in CHOICES if name in settings[0].errors)
             raise InputError(f"--of {of}: {self.scene} has no such output: choose from {there}")
         if min(errors) <= accuracy:
-            return next(s for s, e in zip(self.settings, errors, strict=True) if e <= accuracy)
+            return next(s for s, e in zip(settings, errors, strict=True) if e <= accuracy)
         best = float(f"{1.006 * min(errors):.2e}")  # rounded up, so that asking for it succeeds
         raise InputError(
             f"--accuracy {accuracy:g}: the best setting measured with {self.scene} is good for "
@@ -93,7 +102,8 @@ def kind_of_scene(scene: Scene) -> dict[str, Any]:
 
 
 def evidence_of(found: xr.Dataset) -> Evidence:
-    """The settings of a study that some accuracy picks: each is best so far in some output.
+    """The settings of a study that some accuracy picks: each is best so far in some output, among
+    those of its engine.
 
     ``found`` is from :func:`ringsim.analysis.accuracy.judge`; its attribute ``scene`` is its scene.
     """
@@ -101,11 +111,12 @@ def evidence_of(found: xr.Dataset) -> Evidence:
     usable = found.eligible.values & np.isfinite(found.bound.values).any(axis=1)
     cost = np.where(usable, in_favour(found.cost.values, found.ladder.values), np.inf)
     settings: list[Setting] = []
-    best: dict[str, float] = {}
+    known: dict[str, dict[str, float]] = {}
     for rung in np.argsort(cost, kind="stable")[: usable.sum()].tolist():
         bounds = found.bound[rung].to_series().dropna().items()
         # Rounded up: a setting is good for no less.
         errors = {str(name): float(f"{1.0049 * e:.2e}") for name, e in bounds}
+        best = known.setdefault(found.fidelity.values[rung], {})
         if better := {name: e for name, e in errors.items() if e < best.get(name, np.inf)}:
             best |= better
             values = settings_at(found, rung)
@@ -113,7 +124,10 @@ def evidence_of(found: xr.Dataset) -> Evidence:
             if values["solver.deviation_tolerance"] >= NO_DEVIATIONS:
                 del values["solver.deviation_tolerance"]  # another scene may follow them
             seconds = float(f"{found.cost.values[rung]:.3g}")
-            settings.append(Setting(seconds=seconds, values=values, errors=errors))
+            fidelity = found.fidelity.values[rung]
+            settings.append(
+                Setting(seconds=seconds, fidelity=fidelity, values=values, errors=errors)
+            )
     return Evidence(scene=scene.name, kind=kind_of_scene(scene), settings=tuple(settings))
 
 

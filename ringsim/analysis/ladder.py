@@ -4,10 +4,11 @@ Rungs differ in numerical settings only: step size, elements, rod formulation, d
 integrator, Newton's tolerance, fidelity.  Ladders that are to show an order of convergence
 ("steps", "constant step", "elements", "formulation") solve each step to a tight tolerance, so
 that only the setting they vary has an effect; the others are settings that a user might choose.
+The frame engine has rungs of its own (``by_frames``) with the settings of the full one.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ PATHS = (
 )  # fmt: skip
 """Scene paths that a ladder varies."""
 STANDING = "as it stands"
+FRAME, IDEAL = "frame", "ideal"
 GRADED = ("steps", "elements")
 """Ladders that the reference is made of."""
 _HALVINGS = {"x 2": -1, "x 1": 0, "x 1/2": 1, "x 1/4": 2, "x 1/8": 3, "x 1/16": 4}
@@ -46,7 +48,7 @@ on the number of elements."""
 
 @dataclass(frozen=True)
 class Rung:
-    """One setting: a value for each of ``PATHS``.
+    """One setting: a value for each of ``PATHS``, and a fidelity.
 
     ``ladder`` says what it varies ("as it stands", "steps", "constant step", "elements",
     "formulation", "dissipation", "newton", "setting", or "fidelity"), ``label`` is unique in a
@@ -58,6 +60,19 @@ class Rung:
     label: str
     size: float
     values: Mapping[str, Any]
+    fidelity: str = "full"
+
+
+def by_frames(rungs: Sequence[Rung]) -> list[Rung]:
+    """What the frame engine is tried with, of the rungs of the full one.
+
+    All steps and elements, which tell its own order and limit, and all settings to choose from.
+    """
+    names = {STANDING: "setting", **{name: name for name in (*GRADED, "setting")}}
+    return [
+        replace(rung, ladder=names[rung.ladder], fidelity=FRAME)
+        for rung in rungs if rung.ladder in names
+    ]  # fmt: skip
 
 
 def ladder(scene: Scene, most: int = 4) -> list[Rung]:
@@ -141,15 +156,20 @@ def left_out(scene: Scene) -> list[str]:
 
 
 def references(
-    rungs: Sequence[Rung], good: Sequence[bool] | NDArray[np.bool_] | None = None
+    rungs: Sequence[Rung],
+    good: Sequence[bool] | NDArray[np.bool_] | None = None,
+    fidelity: str = "full",
 ) -> tuple[list[int], list[int]]:
-    """Places of the finest three rungs whose steps halve, and of those whose elements double.
+    """Places of a fidelity's finest three rungs whose steps halve, and whose elements double.
 
     The first of these has as many elements as the steps' rungs, and there are two at least.
     ``good`` says which rungs may be used, all of them if None.  ValueError if too few may.
     """
     usable = [True] * len(rungs) if good is None else list(good)
-    own = {name: [k for k, r in enumerate(rungs) if r.ladder == name] for name in GRADED}
+    own = {
+        name: [k for k, r in enumerate(rungs) if (r.ladder, r.fidelity) == (name, fidelity)]
+        for name in GRADED
+    }
     # Nobody would believe a reference that is coarser than the scene's own steps.
     in_time = [k for k in own["steps"] if rungs[k].size <= 1.0 and usable[k]]
     in_space = [k for k in own["elements"] if usable[k]]

@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.errors import held
+from ringsim.analysis.stability_engines import JUDGED, engines_text
 from ringsim.outputs import VARIABLES
 from ringsim.parts.solver import Solver
 from ringsim.tables import markdown_table
@@ -37,7 +38,7 @@ _LONGEST_REASON = 300
 
 _SCALARS = (
     "energy_error", "constraint_error", "restarts", "steps", "cpu_time", "deployment_time",
-    "final_time", "peak_tension",
+    "final_time", "peak_tension", "asynchrony_max", *(f"{name}_error" for name in JUDGED),
 )  # fmt: skip
 _MEANING = {name: (VARIABLES[name].units, VARIABLES[name].long_name) for name in _SCALARS} | {
     "status": ("1", VARIABLES["status"].long_name),
@@ -170,7 +171,7 @@ def to_markdown(whole: xr.Dataset) -> str:
     """A judged map as a Markdown text."""
     head = ["panel", "axis", "all cells ok", "any cell ok", "below", "above"]
     parts = ["# Stability map", summary(whole), *(_checks(whole) if "check" in whole else ())]
-    parts += ["![How each cell ended](stability.png)"]
+    parts += ["![How each cell ended](stability.png)", *engines_text(whole)]
     parts += ["## Borders", markdown_table(head, borders(whole))]
     parts += ["## What lies beyond", _causes(whole)]
     if suspects := np.flatnonzero(whole["verdict"] == WRONG).tolist():

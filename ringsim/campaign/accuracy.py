@@ -9,11 +9,22 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.accuracy import NEEDED, Truth, judge
-from ringsim.analysis.ladder import PATHS, Rung, ladder, left_out, references, standing
+from ringsim.analysis.ladder import (
+    FRAME,
+    IDEAL,
+    PATHS,
+    Rung,
+    by_frames,
+    ladder,
+    left_out,
+    references,
+    standing,
+)  # fmt: skip
 from ringsim.campaign.cases import run_cases
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.simulation import why_not_frame
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 from ringsim.theory.one_coordinate import OneCoordinate, opening_time
 from ringsim.variables import GOALS, Fate, Status
@@ -33,12 +44,12 @@ def run_ladder(
 
     A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
     cheapest run of the reference goes first, then the whole reference, then the rest, so that a
-    scene which cannot be studied costs little.  The ideal fidelity is a setting too, where it can
-    represent the scene.  ``folder`` holds the campaigns, and a study that was interrupted goes on,
-    also with rungs that took longer than ``timeout``, the longest time of one rung, s;
-    ``most_elements`` (4 or 8) is how many times more than the scene's are tried.  What the study
-    had to do without is in the attribute ``remarks``.  InputError if the scene is refused,
-    ReferenceRunError if too few runs for a reference end well.
+    scene which cannot be studied costs little.  The frame engine and the ideal fidelity are
+    settings too, where they can represent the scene.  ``folder`` holds the campaigns, and a study
+    that was interrupted goes on, also with rungs that took longer than ``timeout``, the longest
+    time of one rung, s; ``most_elements`` (4 or 8) is how many times more than the scene's are
+    tried.  What the study had to do without is in the attribute ``remarks``.  InputError if the
+    scene is refused, ReferenceRunError if too few runs for a reference end well.
     """
     plain = {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
     scene = scene.with_values(plain)
@@ -56,13 +67,17 @@ def run_ladder(
         failed |= {places[k]: told for k, told in _failures(own, found).items()}
         _require_references(rungs, failed)
     remarks += [f"{told}; the reference is made of other runs" for told in failed.values()]
+    if why := why_not_frame(scene):
+        remarks.append(f"the frame engine is left out: {why}")
+    else:
+        rungs += by_frames(rungs)
     results = study.run("settings", rungs)
     failed |= _failures(rungs, results)
     _require_references(rungs, failed)
     truths = _quadrature(scene)
     if (ideal := study.ideal()) is not None:
         results = xr.concat([ideal, results], "rung")
-        rungs = [Rung("fidelity", "ideal", 0.0, standing(scene)), *rungs]
+        rungs = [Rung("fidelity", IDEAL, 0.0, standing(scene), IDEAL), *rungs]
         if np.isfinite(ideal.deployment_time.item()):
             source = "one-coordinate equation of the ideal ring"
             mean = ideal.opening_angle.isel(rung=0).mean(("plane", "section")).to_numpy()
@@ -109,26 +124,30 @@ class _Study:
         """Results over the rungs, those that earlier stages ran among them."""
         shared = [path for path in self.scene.structure.shaping if path in PATHS]
         paths = [path for path in PATHS if path not in shared]
-        keys = [tuple(rung.values[path] for path in PATHS) for rung in rungs]
-        missing: dict[tuple[str, bool], dict[tuple[object, ...], Rung]] = {}
+        keys = [(rung.fidelity, *(rung.values[path] for path in PATHS)) for rung in rungs]
+        missing: dict[tuple[str, bool, str], dict[tuple[object, ...], Rung]] = {}
         for key, rung in zip(keys, rungs, strict=True):
             if key not in self.known:
                 missing.setdefault(self._campaign(stage, rung), {})[key] = rung
-        for (name, stress), own in missing.items():
+        for (name, stress, fidelity), own in missing.items():
             given = {path: next(iter(own.values())).values[path] for path in shared}
             scene = self.scene.with_values(given | {"record.stress": stress})
             cases = [{path: rung.values[path] for path in paths} for rung in own.values()]
             title = f"Settings of {scene.name} against each other ({name})"
-            found = _needed(self.cases(name, scene, cases, title=title))
+            found = _needed(self.cases(name, scene, cases, title=title, fidelity=fidelity))
             self.known |= {key: found.isel(rung=[k]) for k, key in enumerate(own)}
         return xr.concat([self.known[key] for key in keys], "rung")
 
-    def _campaign(self, stage: str, rung: Rung) -> tuple[str, bool]:
-        """Name and ``record.stress`` of a rung's campaign: all in one have results of one shape."""
+    def _campaign(self, stage: str, rung: Rung) -> tuple[str, bool, str]:
+        """Name, ``record.stress`` and fidelity of a rung's campaign: all in one have results of one
+        shape.
+        """
+        if rung.fidelity == FRAME:
+            return f"{stage}-{FRAME}", True, FRAME
         if kind_of(self.scene.structure) == "planar-truss":  # a strain for each of its elements
-            return f"{stage}-elements-{rung.values['rods.elements']}", False
+            return f"{stage}-elements-{rung.values['rods.elements']}", False, rung.fidelity
         stressed = rung.values["rods.kind"] != "ancf"  # whose elements report no forces
-        return (stage, True) if stressed else (f"{stage}-unstressed", False)
+        return stage if stressed else f"{stage}-unstressed", stressed, rung.fidelity
 
     def ideal(self) -> xr.Dataset | None:
         """The ideal fidelity's answer as one rung; None if it cannot represent the scene."""
@@ -138,7 +157,7 @@ class _Study:
         except InputError:
             return None
         case, title = {"solver.tolerance": plain.solver.tolerance}, f"{plain.name} with rigid rods"
-        return _needed(self.cases("ideal", plain, [case], title=title, fidelity="ideal"))
+        return _needed(self.cases("ideal", plain, [case], title=title, fidelity=IDEAL))
 
 
 def _needed(file: Path) -> xr.Dataset:

@@ -7,7 +7,7 @@ given, panels are chosen from what the scene holds, around its own values.
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ringsim.overrides import field_at
 from ringsim.refusal import InputError
 from ringsim.sampling.table import refuse_fixed
 from ringsim.scene import Scene
+from ringsim.simulation import why_not_frame
 from ringsim.units import unit_at
 from ringsim.variables import PLANES
 
@@ -61,17 +62,43 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Panel:
-    """All pairs of the values of two axes, on one scene; ``name`` is that of its folder."""
+    """All pairs of the values of two axes, on one scene, by an engine; ``name`` is that of its
+    folder.
+    """
 
     name: str
     title: str
     scene: Scene
     x: Sweep
     y: Sweep
+    fidelity: str = "full"
 
     def cells(self) -> Iterator[tuple[float, float]]:
         """Values of both axes for each cell."""
         return itertools.product(self.x.values, self.y.values)
+
+
+def by_engines(panels: Sequence[Panel], fidelity: str) -> list[Panel]:
+    """Panels by the engine "full" or "frame", or by "both" side by side with their error bars.
+
+    The full engine takes those that the frame engine cannot represent; InputError if it is to take
+    all.
+    """
+    reasons = [why_not_frame(panel.scene) if fidelity != "full" else "" for panel in panels]
+    if all(reasons):
+        raise InputError(f"--fidelity {fidelity}: {reasons[0]}")
+    found = []
+    for panel, refused in zip(panels, reasons, strict=True):
+        if fidelity == "full" or refused:
+            found.append(panel)
+            continue
+        both = fidelity == "both"
+        values = {"solver.error_bars": True} if both else {}  # by which cells are told apart
+        own = replace(panel, scene=panel.scene.with_values(values))
+        name, title = f"{panel.name}-frame", f"{panel.title}, frame engine"
+        found += [own] if both else []
+        found.append(replace(own, name=name, title=title, fidelity="frame"))
+    return found
 
 
 def panels_over(scene: Scene, over: Sequence[str], points: int) -> list[Panel]:

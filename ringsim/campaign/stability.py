@@ -9,6 +9,7 @@ from pathlib import Path
 import xarray as xr
 
 from ringsim.analysis.stability import cells_of, checked, chosen_for_check, joined
+from ringsim.analysis.stability_engines import compared
 from ringsim.campaign.cases import run_cases
 from ringsim.campaign.panels import Panel
 from ringsim.parts.solver import MOST_STEPS
@@ -33,7 +34,8 @@ class _Piece:
 def run_map(folder: Path, panels: Sequence[Panel], workers: int) -> xr.Dataset:
     """Run all cells that are still missing, each panel in a folder of its own.
 
-    Returns the judged map (``ringsim.analysis.stability.joined``).  InputError if a scene refuses a
+    Returns the judged map (``ringsim.analysis.stability.joined``), in which panels of both engines
+    are compared (``ringsim.analysis.stability_engines``).  InputError if a scene refuses a
     value, KeyboardInterrupt if a signal stopped it: the same call goes on.
     """
     found = []
@@ -41,10 +43,11 @@ def run_map(folder: Path, panels: Sequence[Panel], workers: int) -> xr.Dataset:
         words = {
             "name": panel.name, "title": panel.title, "x_label": panel.x.label,
             "x_units": panel.x.units, "y_label": panel.y.label, "y_units": panel.y.units,
+            "fidelity": panel.fidelity,
         }  # fmt: skip
         parts = [_run(folder, piece, workers) for piece in _pieces(panel)]
         found.append((words, xr.concat(parts, dim="cell")))
-    return joined(found)
+    return compared(joined(found))
 
 
 def run_check(
@@ -66,7 +69,8 @@ def run_check(
             how = [(1 + int(restarts[k]), float(taken[k])) for k in mine]
             # Another choice of cells is another campaign.
             mark = hashlib.sha256(repr(([cell[:2] for cell in own], how)).encode()).hexdigest()[:6]
-            again = replace(piece, name=f"{piece.name}-check-{mark}", cells=own)
+            scene = piece.scene.with_values({"solver.error_bars": False})  # nobody asks for them
+            again = replace(piece, name=f"{piece.name}-check-{mark}", scene=scene, cells=own)
             finer.append(_run(folder, again, workers, finer=how))
     return checked(whole, which, xr.concat(finer, dim="cell")) if finer else whole
 
@@ -109,7 +113,7 @@ def _run(
     title, timeout = f"Stability map: {piece.panel.title}", TIMEOUT * (_PATIENCE if finer else 1.0)
     file = run_cases(
         folder / piece.panel.name, piece.name, piece.scene, rows, workers=workers, title=title,
-        timeout=timeout,
+        timeout=timeout, fidelity=piece.panel.fidelity,
     )  # fmt: skip
     x, y, _ = zip(*piece.cells, strict=True)
     with xr.open_dataset(file) as campaign:

@@ -19,16 +19,15 @@ from ringsim.scene import Scene, load_scene
 @SETTINGS
 @click.option("--out", metavar="FILE", type=PATH, help="netCDF file to write (default SCENE.nc).")
 @click.option(
-    "--fidelity", type=click.Choice(["full", "frame", "ideal", "both"]), default="full",
-    show_default=True,
+    "--fidelity", type=click.Choice(["full", "frame", "ideal", "both"]),
     help="Full model; the same in joint coordinates (frame: closed and open rings, several times "
     "as fast); the ideal ring of rigid rods (no asynchrony, no stress); full and frame (both), "
-    "with a table of their differences.",
+    "with a table of their differences.  [default: full, or what --accuracy picks]",
 )  # fmt: skip
 @click.option(
     "--accuracy", metavar="ERROR", type=click.FloatRange(1e-8, 1.0),
     help="Relative error of deployment time and opening angle to aim at: picks the "
-    "cheapest settings measured to give it.",
+    "cheapest settings, and engine, measured to give it.",
 )  # fmt: skip
 @click.option(
     "--of", metavar="OUTPUT",
@@ -41,14 +40,15 @@ from ringsim.scene import Scene, load_scene
 @click.option("--plot", is_flag=True, help="Draw figures beside the netCDF file.")
 @PLOT_FORMAT
 def command(
-    scene: str, settings: dict[str, Any], out: Path | None, fidelity: str,
+    scene: str, settings: dict[str, Any], out: Path | None, fidelity: str | None,
     accuracy: float | None, of: str | None, evidence: Path | None, *, plot: bool,
     formats: tuple[str, ...] | None,
 ) -> int:  # fmt: skip
     """Run SCENE (a built-in name or a TOML file) and write SCENE.nc."""
     chosen = load_scene(scene)
     if accuracy is not None:
-        chosen = _with_accuracy(chosen, accuracy, of, evidence, settings, fidelity)
+        chosen, fidelity = _with_accuracy(chosen, accuracy, of, evidence, settings, fidelity)
+    fidelity = fidelity or "full"
     for name, value in (("--of", of), ("--evidence", evidence)):
         if value is not None and accuracy is None:
             raise InputError(f"{name} {value}: says nothing without --accuracy; give both")
@@ -130,27 +130,32 @@ def _restarted(values: dict[str, Any], asked: Solver) -> str:
 
 def _with_accuracy(
     scene: Scene, accuracy: float, of: str | None, file: Path | None, given: dict[str, Any],
-    fidelity: str,
-) -> Scene:  # fmt: skip
-    """The scene with the cheapest settings that were measured to be so accurate."""
+    fidelity: str | None,
+) -> tuple[Scene, str]:  # fmt: skip
+    """The scene with the cheapest settings that were measured to be so accurate, and their engine,
+    which is ``fidelity`` unless that is None.
+    """
     from ringsim.analysis.evidence import CHOICES, JUDGED_BY, evidence_for, read_evidence
+    from ringsim.simulation import why_not_frame
 
-    if fidelity != "full":
+    if fidelity in ("ideal", "both"):
         raise InputError(
-            f"--accuracy {accuracy:g}: its settings were measured with the full model, not with "
-            f"--fidelity {fidelity}: leave out one of the two"
+            f"--accuracy {accuracy:g}: its settings were measured with the full model and the "
+            f"frame engine, not with --fidelity {fidelity}: leave out one of the two"
         )
     if (output := of or JUDGED_BY) not in CHOICES:
         raise InputError(f"--of {output}: must be one of {', '.join(CHOICES)}")
     changed = scene.with_values(given)
     known = read_evidence(file) if file is not None else evidence_for(changed)
     known.require_like(changed)
-    picked = known.pick(accuracy, output)
+    picked = known.pick(accuracy, output, fidelity)
+    if picked.fidelity == "frame" and fidelity is None and why_not_frame(changed):
+        picked = known.pick(accuracy, output, "full")
     if clash := sorted(set(picked.values) & set(given)):
         raise InputError(f"--set {clash[0]}: --accuracy chooses it: leave out one of the two")
     values = known.values_for(picked, changed)
     words = ", ".join(f"{path} = {value}" for path, value in values.items())
     errors = ", ".join(f"{name.replace('_', ' ')} {e:.2g}" for name, e in picked.errors.items())
-    click.echo(f"settings for {accuracy:g}: {words}")
+    click.echo(f"settings for {accuracy:g}: fidelity = {picked.fidelity}, {words}")
     click.echo(f"  measured with {known.scene} to be good for: {errors}")
-    return scene.with_values(values)
+    return scene.with_values(values), picked.fidelity

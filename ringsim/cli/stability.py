@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ringsim.campaign.panels import Panel, panels_over
+from ringsim.campaign.panels import Panel, by_engines, panels_over
 from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.files import write_text
@@ -37,9 +37,17 @@ from ringsim.scene import load_scene
     default=10.0, show_default=True,
     help="Share of the ok cells that are run again with smaller steps.",
 )  # fmt: skip
+@click.option(
+    "--fidelity",
+    type=click.Choice(["full", "frame", "both"]),
+    default="full",
+    show_default=True,
+    help="Engine of the runs; both: side by side, with their error bars and a mark on cells in "
+    "which they differ.",
+)
 def command(
     scene: str, settings: dict[str, Any], over: tuple[str, ...], points: int, out: Path | None,
-    workers: int, percent: float,
+    workers: int, percent: float, fidelity: str,
 ) -> int:  # fmt: skip
     """Map around SCENE: which pairs of values run well, and how runs end elsewhere.
 
@@ -50,7 +58,7 @@ def command(
     input; 3 some cells are wrong.
     """
     chosen = load_scene(scene).with_values(settings)
-    panels = panels_over(chosen, over, points)
+    panels = by_engines(panels_over(chosen, over, points), fidelity)
     for panel in panels:
         x, y = (f"--over {s.label}={s.values[0]:g}..{s.values[-1]:g}" for s in (panel.x, panel.y))
         click.echo(f"{panel.title}: {x} {y}: {len(list(panel.cells()))} cells")

@@ -25,9 +25,9 @@ _LOOKS = {
 def accuracy(found: xr.Dataset) -> Figure:
     """One panel an output: relative error over processor time.
 
-    The line is the frontier: what settings are good for, which is no less than the error of any
-    finer one.  The ideal ring is named in words: it is too cheap for the axis.  ``found`` is from
-    ``ringsim.analysis.accuracy.judge``.
+    The line is the frontier of both engines: what settings are good for, which is no less than the
+    error of any finer one.  Hollow marks are runs of the frame engine.  The ideal ring is named in
+    words: it is too cheap for the axis.  ``found`` is from ``ringsim.analysis.accuracy.judge``.
     """
     titles = OUTPUTS | {"energy": "energy balance"}
     outputs = [name for name in titles if name in found.output.values]
@@ -48,24 +48,26 @@ def accuracy(found: xr.Dataset) -> Figure:
 
 def _panel(axes: Axes, found: xr.Dataset) -> None:
     cost, error, ladder = found.cost.values, found.error.values, found.ladder.values
-    drawn = np.isfinite(error) & (error > 0.0)
+    drawn, frame = np.isfinite(error) & (error > 0.0), found.fidelity.values == "frame"
     axes.loglog()
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     style.plain_numbers(axes.xaxis)
     for name, (colour, marker) in _LOOKS.items():
-        own = (ladder == name) & drawn
-        if (ladder == name).any():
-            size, order = (150, 4) if marker == "*" else (34, 3)
-            axes.scatter(
-                cost[own], error[own], s=size, color=colour, marker=marker, label=name,
-                linewidths=0.0, alpha=0.9, zorder=order,
-            )  # fmt: skip
+        for hollow in (False, True):
+            there = (ladder == name) & (frame == hollow)
+            if there.any():
+                own, (size, order) = there & drawn, (150, 4) if marker == "*" else (34, 3)
+                axes.scatter(
+                    cost[own], error[own], s=size, marker=marker, edgecolors=colour,
+                    facecolors="none" if hollow else colour, linewidths=1.0 if hollow else 0.0,
+                    label=f"frame: {name}" if hollow else name, alpha=0.9, zorder=order,
+                )  # fmt: skip
     best = found.isel(rung=found.frontier.values & (error > 0.0)).sortby("cost")
     axes.step(
         best.cost, best.bound, where="post", color=style.INK, linewidth=1.1,
         label="frontier: good for", zorder=2,
     )  # fmt: skip
-    floor, ideal = float(found.uncertainty), ladder == "fidelity"
+    floor, ideal = float(found.uncertainty), found.fidelity.values == "ideal"
     known = error[drawn & ~ideal]
     if known.size or floor > 0.0:
         lowest = min(known.min(initial=np.inf), 0.5 * floor or np.inf)
@@ -74,6 +76,11 @@ def _panel(axes: Axes, found: xr.Dataset) -> None:
         (low := axes.get_ylim()[0]), max(floor, low), color=style.PALE, zorder=0.5, linewidth=0.0,
         label="uncertainty of the reference",
     )  # fmt: skip
+    if "engines_differ" in found:
+        axes.axhline(
+            float(found.engines_differ), color=style.GREY, linewidth=0.9, linestyle=":", zorder=1,
+            label="engines differ by",
+        )  # fmt: skip
     for k in np.flatnonzero(ideal & np.isfinite(error)):
         axes.text(
             0.97, 0.88, f"ideal ring: {error[k]:.1e} in {cost[k]:.2g} s", ha="right", va="top",

@@ -1,6 +1,7 @@
 """The stability map: a panel for each pair of axes, a square for each cell."""
 
 import textwrap
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -10,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from ringsim.analysis.stability import OK, WRONG, axis_label
+from ringsim.analysis.stability_engines import AGREE, ENGINES
 from ringsim.plots import style
 
 _AGAIN = "ok, after a new start"
@@ -34,15 +36,18 @@ _LOOKS: dict[str, tuple[str, str]] = {
 }
 """Colour and letter of each kind of cell; the letter tells what the colour may not."""
 _OTHER = ("#5e5e5e", "?")
+_OUTLINE: Any = {"facecolor": "none", "edgecolor": style.INK, "linewidth": 2.0}
 
 
 @style.styled
 def stability(whole: xr.Dataset) -> Figure:
     """Panels over the values of two axes, which are listed, not to scale.
 
+    Panels of both engines stand side by side, and cells in which they differ have a frame.
     ``whole`` is a judged map (``ringsim.analysis.stability.joined``).
     """
-    figure, panels, columns = style.new_panels(whole.sizes["group"], 4.5, 3.5, 1.0)
+    most = 2 if ENGINES in whole else 3
+    figure, panels, columns = style.new_panels(whole.sizes["group"], 4.5, 3.5, 1.0, most=most)
     seen: set[str] = set()
     for number, axes in enumerate(panels):
         cells = whole.isel(cell=(whole["of_group"] == number).values, group=number)
@@ -53,6 +58,8 @@ def stability(whole: xr.Dataset) -> Figure:
         colour, letter = _LOOKS.get(word, _OTHER)
         label = f"{letter}  {word}".strip()
         handles.append(Patch(facecolor=colour, edgecolor=style.GREY, label=label))
+    if ENGINES in whole:
+        handles.append(Patch(label="the engines differ", **_OUTLINE))
     most = min(len(handles), 2 * columns + 1)
     figure.legend(handles=handles, loc="outside lower center", ncols=most)
     style.title(figure, f"Stability map: {whole.sizes['cell']} runs and how they ended")
@@ -69,6 +76,11 @@ def _panel(axes: Axes, cells: xr.Dataset, kinds: list[str]) -> None:
         # Dark by the eye's weights of red, green and blue.
         ink = "white" if np.dot(to_rgb(colour), (0.3, 0.59, 0.11)) < 0.47 else style.INK
         axes.text(left, below, letter, ha="center", va="center", fontsize=8, color=ink, zorder=3)
+    differ = ~cells[ENGINES].isin(["", AGREE]).values if ENGINES in cells else np.zeros(len(kinds))
+    for k in np.flatnonzero(differ).tolist():
+        axes.add_patch(
+            Rectangle((column[k] - 0.43, row[k] - 0.43), 0.86, 0.86, zorder=4, **_OUTLINE)
+        )
     axes.set(xlim=(-0.5, len(x) - 0.5), ylim=(-0.5, len(y) - 0.5))
     axes.set_xticks(range(len(x)), [_short(v) for v in x], fontsize=8)
     axes.set_yticks(range(len(y)), [_short(v) for v in y], fontsize=8)

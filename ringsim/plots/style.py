@@ -36,10 +36,10 @@ styled = matplotlib.style.context(Path(__file__).with_name("figures.mplstyle"))
 
 
 def new_panels(
-    count: int, width: float, height: float, legend: float, *, sharex: bool = False
+    count: int, width: float, height: float, legend: float, *, sharex: bool = False, most: int = 3
 ) -> tuple[Figure, list[Axes], int]:
-    """A figure of ``count`` panels in rows of three, and its number of columns; sizes in inch."""
-    columns = min(3, count)
+    """A figure of ``count`` panels, ``most`` in a row, and its number of columns; sizes in inch."""
+    columns = min(most, count)
     rows = -(-count // columns)
     figure = Figure(figsize=(width * columns, height * rows + legend))
     panels = figure.subplots(rows, columns, sharex=sharex, squeeze=False).ravel().tolist()

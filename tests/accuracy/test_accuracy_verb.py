@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import tomli_w
 import xarray as xr
 from click.testing import CliRunner, Result
 
+from ringsim import simulation
 from ringsim.analysis.evidence import evidence_for, read_evidence
 from ringsim.cli import cli
 from ringsim.scene import builtin_scenes, load_scene
@@ -34,11 +36,34 @@ def test_settings_are_picked_and_told(tmp_path: Path) -> None:
     out = tmp_path / "run.nc"
     found = ringsim("run", "ring18", *SMALL, "--accuracy", "0.05", "--out", str(out))
     assert found.exit_code == 0, found.output
-    assert "settings for 0.05: solver.step = 0.2, solver.tolerance" in found.output
+    assert "settings for 0.05: fidelity = full, solver.step = 0.2, solver.tolerance" in found.output
     assert "measured with ring18 to be good for: deployment time" in found.output
     picked = evidence_for(load_scene("ring18")).pick(0.05)
     with xr.open_dataset(out) as dataset:
         assert f"tolerance = {picked.values['solver.tolerance']}" in dataset.attrs["scene"]
+
+
+@pytest.mark.parametrize(
+    ("words", "represented", "engine"),
+    [([], True, "frame"), (["--fidelity", "full"], True, "full"), ([], False, "full")],
+    ids=["cheapest", "asked-for", "not-represented"],
+)
+def test_the_cheaper_engine_runs_unless_it_cannot_or_may_not(
+    words: list[str], represented: bool, engine: str, tmp_path: Path, monkeypatch
+) -> None:
+    known = evidence_for(load_scene("ring18"))
+    cheap = known.settings[0].model_copy(update={"fidelity": "frame", "seconds": 0.01})
+    both = known.model_copy(update={"settings": (cheap, *known.settings)})
+    file, out = tmp_path / "settings.toml", tmp_path / "run.nc"
+    file.write_text(tomli_w.dumps(both.model_dump()))
+    if not represented:
+        monkeypatch.setattr(simulation, "why_not_frame", lambda scene: "it cannot")
+    asked = ["--accuracy", "0.05", "--evidence", str(file), "--out", str(out)]
+    found = ringsim("run", "ring18", *SMALL, *asked, *words)
+    assert found.exit_code == 0, found.output
+    assert f"settings for 0.05: fidelity = {engine}, " in found.output
+    with xr.open_dataset(out) as dataset:
+        assert dataset.attrs["fidelity"] == engine
 
 
 @pytest.mark.parametrize(
@@ -50,6 +75,7 @@ def test_settings_are_picked_and_told(tmp_path: Path) -> None:
         (["--of", "loads"], "without --accuracy"),
         (["--accuracy", "0.05", "--set", "solver.step_control=constant"], "step_control"),
         (["--accuracy", "0.05", "--fidelity", "ideal"], "leave out one"),
+        (["--accuracy", "0.05", "--fidelity", "both"], "leave out one"),
         (["--accuracy", "0.05", "--set", "solver.tolerance=1e-3"], "--accuracy chooses it"),
         (["--evidence", "none.toml"], "without --accuracy"),
         (["--accuracy", "0.01", "--evidence", "none.toml"], "there is no such file"),
@@ -101,6 +127,7 @@ def test_a_study_from_end_to_end(tmp_path: Path) -> None:
         error = study.error.sel(output="deployment_time")
         assert float(error.where(study.ladder == "as it stands").min()) < 2e-4
         assert 0.9 < float(study.order.sel(graded="steps", output="energy")) < 3.0
+        assert float(study.engines_differ.sel(output="motion")) < 1e-3
         assert (study.bound >= study.error).where(study.error.notnull(), True).all()
     own = read_evidence(folder / "settings.toml")
     wanted = own.settings[-1].errors["motion"]

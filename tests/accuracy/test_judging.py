@@ -10,12 +10,15 @@ import xarray as xr
 from ringsim.analysis.accuracy import NEEDED, Truth, judge
 from ringsim.analysis.accuracy_text import in_words, tables
 from ringsim.analysis.evidence import evidence_for, evidence_of, read_evidence
-from ringsim.analysis.ladder import PATHS, ladder, references
+from ringsim.analysis.ladder import PATHS, Rung, by_frames, ladder, references
 from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
 
 SCENE = load_scene("ring18")
 RUNGS = ladder(SCENE)
+BOTH = [*RUNGS, *by_frames(RUNGS)]
+APART, CHEAPER = 2e-4, 10.0
+"""How far the frame engine of the made-up study is off, and how much less it costs."""
 TRUE_TIME, TRUE_STRESS = 10.0, 2e6
 
 
@@ -28,12 +31,14 @@ def errors_of(values: dict[str, object]) -> tuple[float, float]:
     return in_time, 1e-6 / float(values["rods.elements"]) ** 2
 
 
-def made_up() -> xr.Dataset:
+def made_up(rungs: list[Rung] = RUNGS) -> xr.Dataset:
     times = np.linspace(0.0, 12.0, 121)
     rows = []
-    for number, rung in enumerate(RUNGS):
+    for number, rung in enumerate(rungs):
         scatter = 1.0 + 0.05 * (-1.0) ** number
-        error = sum(errors_of(dict(rung.values)))
+        of_method = error = sum(errors_of(dict(rung.values)))
+        if rung.fidelity == "frame":
+            scatter, error = scatter / CHEAPER, of_method + APART
         angle = np.clip(90.0 + 9.0 * times * (1.0 + error), None, 180.0)
         known = times <= TRUE_TIME * (1.0 + error)
         rows.append(
@@ -44,10 +49,10 @@ def made_up() -> xr.Dataset:
                 "asynchrony_max": TRUE_TIME * (1.0 + error),
                 "peak_rod_stress": TRUE_STRESS * (1.0 - error),
                 "energy_error": error,
-                "cpu_time": scatter * float(rung.values["rods.elements"]) / np.sqrt(error),
-                "steps": 100.0 / np.sqrt(error),
-                "jacobians": 100.0 / np.sqrt(error),
-                "newton_iterations": 300.0 / np.sqrt(error),
+                "cpu_time": scatter * float(rung.values["rods.elements"]) / np.sqrt(of_method),
+                "steps": 100.0 / np.sqrt(of_method),
+                "jacobians": 100.0 / np.sqrt(of_method),
+                "newton_iterations": 300.0 / np.sqrt(of_method),
                 "status": 0,
                 "outcome": 1,
                 "final_time": 12.0,
@@ -212,3 +217,80 @@ def test_every_rung_of_every_scene_is_a_scene(name: str) -> None:
         assert set(rung.values) == set(PATHS)
         scene.with_values(dict(rung.values))
     assert evidence_for(scene).scene == name
+
+
+@pytest.fixture(scope="module")
+def engines() -> xr.Dataset:
+    return judge(made_up(BOTH), BOTH, []).assign_attrs(scene=SCENE.to_toml())
+
+
+def test_the_full_engine_is_judged_as_without_the_other(
+    study: xr.Dataset, engines: xr.Dataset
+) -> None:
+    full = engines.isel(rung=slice(len(RUNGS)), graded=slice(study.sizes["graded"]))
+    for name in ("error", "bound", "uncertainty", "reference", "order", "cost"):
+        np.testing.assert_array_equal(full[name], study[name])
+
+
+def test_how_far_engines_differ_is_told_beside_what_is_uncertain(engines: xr.Dataset) -> None:
+    for output in ("deployment_time", "peak_rod_stress", "asynchrony", "loads"):
+        differ = float(engines.engines_differ.sel(output=output))
+        assert differ == pytest.approx(APART, rel=1e-2)
+        stated = (
+            engines.uncertainty.sel(output=output),
+            engines.frame_uncertainty.sel(output=output),
+        )
+        assert differ > float(sum(stated))
+    assert float(engines.order.sel(graded="frame, steps", output="deployment_time")) == (
+        pytest.approx(2.0, abs=0.1)
+    )
+    text = tables(engines, "A study")
+    assert "| deployment time | **2.0e-04** |" in text
+    assert "| frame, steps: x 1/16 |" in text
+    assert "engines_differ" not in judge(made_up(), RUNGS, [])
+
+
+def test_one_frontier_has_both_engines(engines: xr.Dataset) -> None:
+    """The cheap engine where its distance from the other is small enough, else the full one."""
+    of = engines.sel(output="deployment_time")
+    engine = {t: of.fidelity.values[int(of.cheapest.sel(target=t))] for t in of.target.values}
+    assert engine == {1e-2: "frame", 1e-3: "frame", 1e-4: "full"}
+    assert set(of.fidelity.values[of.frontier.values]) == {"full", "frame"}
+    picked = int(of.cheapest.sel(target=1e-2))
+    assert in_words(engines, picked).startswith("`--fidelity frame`")
+
+
+def test_an_engine_proves_nothing_about_the_other(engines: xr.Dataset) -> None:
+    """Coarse steps of one engine are not judged by fine ones of the other."""
+    of, differ = engines.sel(output="deployment_time"), 0.99 * APART
+    frame = of.fidelity == "frame"
+    assert float(of.bound.where(frame).min()) > differ > float(of.bound.where(~frame).min())
+
+
+def test_evidence_has_settings_of_both_engines(engines: xr.Dataset) -> None:
+    evidence = evidence_of(engines)
+    assert [evidence.pick(e).fidelity for e in (1e-2, 1e-4)] == ["frame", "full"]
+    kept = evidence.pick(1e-2, fidelity="full")
+    assert kept.fidelity == "full"
+    assert kept == evidence_of(judge(made_up(), RUNGS, []).assign_attrs(engines.attrs)).pick(1e-2)
+    with pytest.raises(InputError, match="best setting"):
+        evidence.pick(1e-4, fidelity="frame")
+
+
+def test_evidence_of_old_is_of_the_full_engine(engines: xr.Dataset, tmp_path) -> None:
+    file, old = tmp_path / "settings.toml", evidence_of(engines).model_dump()
+    for setting in old["settings"]:
+        del setting["fidelity"]
+    file.write_text(tomli_w.dumps(old))
+    assert {setting.fidelity for setting in read_evidence(file).settings} == {"full"}
+    with pytest.raises(InputError, match="no settings of it were measured with ring18"):
+        read_evidence(file).pick(1e-2, fidelity="frame")
+
+
+def test_a_frame_engine_without_a_limit_is_judged_all_the_same() -> None:
+    results = made_up(BOTH)
+    finest = next(k for k, r in enumerate(BOTH) if (r.fidelity, r.label) == ("frame", "x 1/4"))
+    results.status[finest] = 2
+    found = judge(results, BOTH, [])
+    assert "engines_differ" not in found
+    assert np.isfinite(found.error.sel(output="motion")[finest + 1])

@@ -14,7 +14,7 @@ import xarray as xr
 from ringsim.analysis.accuracy import NEEDED
 from ringsim.analysis.accuracy_text import tables
 from ringsim.analysis.errors import limit
-from ringsim.analysis.ladder import ladder, left_out, references
+from ringsim.analysis.ladder import GRADED, ladder, left_out, references
 from ringsim.campaign import accuracy
 from ringsim.campaign.accuracy import ReferenceRunError, run_ladder
 from ringsim.refusal import InputError
@@ -37,7 +37,8 @@ def study(tmp_path, monkeypatch):
     """Runs a study of the made-up model, in which some settings fail."""
 
     def study(failing: list[Mapping[str, Any]], most: int = 4) -> xr.Dataset:
-        def run_cases(folder, name, scene, cases, **_):
+        def run_cases(folder, name, scene, cases, *, fidelity, **_):
+            assert ("frame" in name) == (fidelity == "frame")
             rows = []
             for case in cases:
                 exact, bad = scene.with_values(dict(case)), [f for f in failing if f == dict(case)]
@@ -121,6 +122,16 @@ def test_studies_with_eight_elements_go_on_from_others():
     new = [r for r in eight if r not in four]
     assert [r.label for r in new[1:]] == [r.label for r in eight[-2:]]
     assert references(eight)[1][:-1] == references(four)[1]
+
+
+def test_both_engines_run_the_same_steps_and_elements(study):
+    found = study([])
+    label = {
+        engine: set(found.label.values[(found.fidelity == engine) & found.ladder.isin(GRADED)])
+        for engine in ("full", "frame")
+    }
+    assert label["full"] == label["frame"]
+    assert float(found.engines_differ.sel(output="deployment_time")) == 0.0
 
 
 def test_two_levels_are_not_extrapolated():

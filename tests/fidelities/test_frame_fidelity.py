@@ -39,6 +39,8 @@ def test_a_result_tells_which_engine_answered() -> None:
 def test_what_the_frame_engine_cannot_represent_is_refused_with_the_cure(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r'fidelity = "frame" does not represent .*"full"'):
         run_frame(load_scene("planar-truss"))
+    with pytest.raises(InputError, match="geometrically-exact rods only"):
+        run_frame(SHORT.with_values({"rods.kind": "ancf"}))
     out = str(tmp_path / "run.nc")
     printed = called("run", "planar-truss", "--fidelity", "frame", "--out", out, code=2)
     assert len(printed.strip().splitlines()) == 1

@@ -24,6 +24,7 @@ from ringsim.analysis.stability import (
     summary,
     to_markdown,
 )
+from ringsim.analysis.stability_engines import compared
 from ringsim.parts.solver import Solver
 from ringsim.plots.stability import stability
 from ringsim.variables import Cause, Fate, Status
@@ -62,8 +63,10 @@ GOOD = next(iter(ENDS))
 TIME_PROMISE, _, TENSION_PROMISE = PROMISES.values()
 WORDS = {
     "name": "g", "title": "group", "x_label": "stiffness", "x_units": "N", "y_label": "speed",
-    "y_units": "m/s",
+    "y_units": "m/s", "fidelity": "full",
 }  # fmt: skip
+OTHER = WORDS | {"name": "g-frame", "title": "group, frame engine", "fidelity": "frame"}
+CUT_OFF = "solver.end_time = 4 s was reached with 0 of 4 V-joints locked"
 
 
 def cells(*reasons: str, **values: list[float]) -> xr.Dataset:
@@ -129,7 +132,7 @@ def test_borders_name_the_ranges_and_what_lies_beyond() -> None:
         GOOD,
         GOOD,
         GOOD,
-        "solver.end_time = 4 s was reached with 0 of 4 V-joints locked",
+        CUT_OFF,
     ]
     group = cells(*ends, *ends[1:], GOOD)
     group["x"].values[:] = [1, 2, 3, 4, 5] * 2
@@ -150,6 +153,47 @@ def test_text_and_figure_tell_every_kind_of_cell() -> None:
     assert legend == ["ok", "r  ok, after a new start", "t  cut off", "N  Newton",
                       "T  time limit", "!  wrong"]  # fmt: skip
     assert "Stiffness (N)" in [axes.get_xlabel() for axes in figure.axes]
+
+
+BARS = {"deployment_time_error": [0.1], "peak_tension_error": [0.2]}
+
+
+@pytest.mark.parametrize(
+    ("reason", "changed", "word"),
+    [
+        (GOOD, {}, "agree"),
+        (GOOD, {"deployment_time": [3.19]}, "agree"),
+        (GOOD, {"deployment_time": [3.21]}, "deployment_time"),
+        (GOOD, {"peak_tension": [10.41]}, "peak_tension"),
+        (GOOD, {"peak_tension": [99.0], "peak_tension_error": [np.nan]}, "agree"),
+        (CUT_OFF, {}, "outcome"),
+        (NEWTON, {"deployment_time": [99.0]}, "status"),
+    ],
+)
+def test_engines_differ_by_their_ends_or_beyond_both_error_bars(reason, changed, word) -> None:
+    full, frame = cells(GOOD, **BARS), cells(reason, **(BARS | changed))
+    found = compared(joined([(WORDS, full), (OTHER, frame)]))
+    assert found["engines"].values.tolist() == [word, word]
+    text = to_markdown(found)
+    assert f"In {int(word != 'agree')} of them they differ" in text
+    assert ("| group | 0, 0 |" in text) == (word != "agree")
+
+
+def test_cells_in_which_engines_differ_have_a_frame_in_the_figure() -> None:
+    pair = (WORDS, cells(GOOD, GOOD, GOOD)), (OTHER, cells(GOOD, NEWTON, GOOD))
+    figure = stability(compared(joined(pair)))
+    legend = [entry.get_text() for entry in figure.legends[0].get_texts()]
+    assert legend == ["ok", "N  Newton", "the engines differ"]
+    for panel in figure.axes[:2]:
+        frames = [patch for patch in panel.patches if patch.get_width() < 1.0]
+        assert [(patch.get_x() + 0.43, patch.get_y() + 0.43) for patch in frames] == [(1.0, 0.0)]
+
+
+def test_maps_of_one_engine_compare_nothing() -> None:
+    for words in (WORDS, OTHER):
+        found = compared(joined([(words, cells(GOOD))]))
+        assert "engines" not in found
+        assert "engines" not in to_markdown(found)
 
 
 def test_the_benchmarks_map_is_large_and_its_cells_are_valid() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 from ringsim.analysis.stability import ENDED, OK
-from ringsim.campaign.panels import Panel, panels_over, sweep_of
+from ringsim.campaign.panels import Panel, by_engines, panels_over, sweep_of
 from ringsim.campaign.stability import _pieces
 from ringsim.cli import cli
 from ringsim.refusal import InputError
@@ -65,6 +66,36 @@ def test_text_and_figure_are_written(mapped) -> None:
     text = (out / "stability.md").read_text(encoding="utf-8")
     assert f"| panel 1 | {SPEED} (m/s) | 1 .. 1 | 1 .. 1 | cut off | - |" in text
     assert (out / "stability.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_frame_engine_has_a_map_like_it(mapped, tmp_path) -> None:
+    words = [*mapped[1][: mapped[1].index("--out")], "--out", str(tmp_path)]
+    done = stability(*words, "--fidelity", "frame")
+    assert done.return_value == 0, done.output
+    files = (folder / "stability.nc" for folder in (mapped[0], tmp_path))
+    full, frame = (xr.load_dataset(file) for file in files)
+    assert frame["fidelity"].values.tolist() == ["frame"]
+    assert frame["verdict"].values.tolist() == full["verdict"].values.tolist()
+    np.testing.assert_allclose(frame.deployment_time, full.deployment_time, rtol=5e-3)
+
+
+def test_both_engines_stand_side_by_side_with_error_bars() -> None:
+    panels = panels_over(load_scene("truss2"), [], points=2)
+    found = by_engines(panels, "both")
+    assert [panel.fidelity for panel in found] == ["full", "frame"] * len(panels)
+    assert all(panel.scene.solver.error_bars for panel in found)
+    assert len({panel.name for panel in found}) == len(found)
+    assert by_engines(panels, "full") == panels
+    assert not any(panel.scene.solver.error_bars for panel in by_engines(panels, "frame"))
+
+
+def test_what_the_frame_engine_cannot_represent_is_left_to_the_full_one() -> None:
+    ring, truss = (panels_over(load_scene(n), [], points=2)[0] for n in ("truss2", "planar-truss"))
+    found = by_engines([ring, truss], "frame")
+    assert [panel.fidelity for panel in found] == ["frame", "full"]
+    for refused in (truss, replace(ring, scene=ring.scene.with_values({"rods.kind": "ancf"}))):
+        with pytest.raises(InputError, match=r'--fidelity both: .*choose fidelity = "full"'):
+            by_engines([refused], "both")
 
 
 def test_the_same_command_goes_on_without_running_anything_again(mapped) -> None:
