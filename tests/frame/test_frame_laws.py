@@ -1,0 +1,42 @@
+"""Every law by both engines: short runs with the same constant steps.
+
+Both integrate by the same scheme and have the same rods, so that they are much closer than either
+is to the truth: what they differ by must be within what their steps leave (a third of what twice
+the step changes).  Beside that 1e-4 of the largest value is allowed for what they do differently:
+rotary inertia (about its own axis a rod has none in frames), Newton's tolerance, and gaps of
+penalties.  Found are 1e-9 to 1e-6 of angles, and 1e-7 to 1e-4 of tensions and stresses.
+"""
+
+import pytest
+
+from engine_pairs import apart
+from law_scenes import CABLES, FORCES, of_cables, of_forces
+from ringsim.scene import Scene
+
+FLOOR = 1e-4
+SLOW = {
+    "forces": {"viscous-sections", "force-sections", "net", "rigid-free", "arc-2-free", "damped-net"},
+    "cables": {"last", "capstan-pulleys", "frictionless", "stall", "feedback", "locked", "constant",
+               "arc-2-flexible", "boom-and-net", "late-lower", "taut"},
+}  # fmt: skip
+"""Near kin of what runs by default."""
+
+
+def named(kind: str, scenes: dict[str, dict[str, object]]) -> list[object]:
+    marks = {name: pytest.mark.slow if name in SLOW[kind] else () for name in scenes}
+    return [pytest.param(v, id=name, marks=marks[name]) for name, v in scenes.items()]
+
+
+def check(scene: Scene) -> None:
+    for name, found in apart(scene).items():
+        assert found.difference <= sum(found.errors) + FLOOR * found.largest, name
+
+
+@pytest.mark.parametrize("values", named("forces", FORCES))
+def test_rings_under_forces(values: dict[str, object]) -> None:
+    check(of_forces(values))
+
+
+@pytest.mark.parametrize("values", named("cables", CABLES))
+def test_rings_on_cables(values: dict[str, object]) -> None:
+    check(of_cables(values))
