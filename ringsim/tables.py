@@ -1,4 +1,4 @@
-"""Tables in Markdown."""
+"""Tables, in Markdown and for terminals."""
 
 from collections.abc import Iterable, Sequence
 
@@ -17,3 +17,10 @@ def markdown_table(head: Sequence[object], rows: Iterable[Sequence[object]]) -> 
     """A table as GitHub reads it; cells are written as they are, but ``|`` and line breaks."""
     cells = [[" ".join(str(cell).split()).replace("|", "\\|") for cell in row] for row in rows]
     return str(tabulate(cells, list(map(str, head)), _NARROW, disable_numparse=True, stralign=None))
+
+
+def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """The lines of a table for a terminal, numbers to the right of what they are of."""
+    sides = ["left", *["right"] * (len(head) - 1)]
+    text = tabulate(list(rows), head, "simple", disable_numparse=True, colalign=sides)
+    return str(text).splitlines()

@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from ringsim.analysis.requirements import to_json
 from ringsim.campaign.specification import Campaign, flat
 from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError, show
@@ -21,7 +22,8 @@ from ringsim.storage.merge import write_merged
 from ringsim.storage.netcdf import DESIGN, OutputTable, provenance, read_design, write_design
 from ringsim.units import LEFT_OUT
 
-_KEPT = ("identity", "seed", "solver", "campaign", "campaign_name", "scene", "output")
+_KEPT = ("identity", "seed", "solver", "campaign", "campaign_name", "scene", "output", "design",
+         "requirements")  # fmt: skip
 """Attributes of the design that a merged file has, too."""
 
 
@@ -102,6 +104,7 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str) -> None:
         "seed": wanted.seed, "solver": solver, "scene": campaign.scene.to_toml(),
         "campaign": campaign.text, "campaign_name": wanted.name,
         "output": wanted.output.model_dump_json(),
+        "design": wanted.design.model_dump_json(), "requirements": to_json(wanted.requirements),
     }  # fmt: skip
     content = json.dumps(_decisive(table, attributes), sort_keys=True)
     attributes["identity"] = hashlib.sha256(content.encode()).hexdigest()[:32]
@@ -177,7 +180,9 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
     """
     path, design = campaign.path / MERGED, campaign.attributes
     made = provenance(name=design["campaign_name"], title=design["title"], action="merged")
-    attributes = made | {name: design[name] for name in _KEPT} | {"execution": execution}
+    attributes = (
+        made | {name: design[name] for name in _KEPT if name in design} | {"execution": execution}
+    )
     attributes["history"] += f"\n{design['history']}"
     output = OutputTable.model_validate_json(design["output"])
     with writing(path, GO_ON), locked(campaign.path / "lock-merge", wait=True):

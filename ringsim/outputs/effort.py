@@ -11,6 +11,7 @@ class Effort(Output):
     """Counts of the last attempt; ``ringsim.stepping.restarts`` adds those of all attempts."""
 
     rank = 70
+    of_antenna = False
     variables = (
         _number("steps", "time steps of the last attempt", ("steps", "10d")),
         _number("repeated_steps", "steps that were repeated with a smaller one"),

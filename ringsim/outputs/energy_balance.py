@@ -9,6 +9,7 @@ class EnergyBalance(Output):
     """Kinetic and elastic energy, work of loads and winches, what was lost, and the imbalance."""
 
     rank = 60
+    of_antenna = False
     variables = (
         Variable("kinetic_energy", ("time",), "J", "kinetic energy"),
         Variable(

@@ -56,6 +56,8 @@ class Output:
     """Variables that tell when and where the value in its summary was."""
     limit: ClassVar[str] = ""
     """Field of ``ringsim.parts.limits.Limits`` that its largest reading must not pass."""
+    of_antenna: ClassVar[bool] = True
+    """Whether it tells of the antenna, so that engines are compared by it, not of the run."""
     rank: ClassVar[int] = 50
     """Place among the outputs in files and summaries; the smaller the earlier."""
 

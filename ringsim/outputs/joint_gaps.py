@@ -7,6 +7,7 @@ class JointGaps(Output):
     """Largest distance of points that a joint should hold together."""
 
     rank = 61
+    of_antenna = False
     variables = (
         Variable("constraint_violation", ("time",), "m", "largest gap in any joint"),
         Variable(
