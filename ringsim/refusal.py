@@ -103,7 +103,10 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
             hint = getattr(owner, "gone", {}).get(key) or _other_kinds_key(path, owner)
             if not hint and owner is not None and (inner := list(_below(key, owner))):
                 hint = f"did you mean {' or '.join(inner[:MOST_NAMED])}?"
-            hint = hint or known_or_nearest(key, owner.model_fields if owner else ())
+            keys = owner.model_fields if owner else {}
+            # A key that is a word of Python has another name in the model.
+            known = [each.alias or name for name, each in keys.items()]
+            hint = hint or known_or_nearest(key, known)
             return f"{where} is not a known key ({hint})"
         case "union_tag_invalid":
             given = value.get("kind") if isinstance(value, dict) else limits["tag"]

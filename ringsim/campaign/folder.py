@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.analysis.requirements import to_json
 from ringsim.campaign.specification import SOLVERS, Campaign, flat
 from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError, show
@@ -26,8 +27,8 @@ from ringsim.units import LEFT_OUT
 from ringsim.variables import Fidelity
 
 _KEPT = (
-    "identity", "seed", "solver", "campaign", "campaign_name", "scene", "output", "check_every",
-    "judge", "max_difference",
+    "identity", "seed", "solver", "campaign", "campaign_name", "scene", "output", "design",
+    "requirements", "check_every", "judge", "max_difference",
 )  # fmt: skip
 """Attributes of the design that a merged file has, too."""
 
@@ -125,6 +126,7 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str
         "seed": wanted.seed, "solver": solver, "scene": campaign.scene.to_toml(),
         "campaign": campaign.text, "campaign_name": wanted.name,
         "output": wanted.output.model_dump_json(),
+        "design": wanted.design.model_dump_json(), "requirements": to_json(wanted.requirements),
     }  # fmt: skip
     if wanted.check_every:
         attributes |= {

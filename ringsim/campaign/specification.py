@@ -9,9 +9,11 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from ringsim.analysis.engines import compared
+from ringsim.analysis.requirements import Requirements
 from ringsim.choice import kinds_of
 from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
+from ringsim.outputs.family import VARIABLES, holds
 from ringsim.overrides import place_of
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.sampling.columns import Table
@@ -91,6 +93,8 @@ class Specification(Model):
     """One sample in so many states its error bars (``solver.error_bars``); 0 for none."""
     max_failed: Annotated[int, Field(ge=0)] | None = None
     """The campaign stops when more samples than this have failed."""
+    requirements: Requirements = Field(default_factory=dict)
+    """What outputs must be, how probably, and how surely; ``ringsim analyse`` judges it."""
     output: OutputTable = OutputTable()
 
     @model_validator(mode="after")
@@ -181,4 +185,10 @@ def load_campaign(
         scene = base.with_values(specification.set)
     except InputError as error:
         raise InputError(f"{path.name}: {key}: {error}") from None
+    for name in specification.requirements:
+        if absent := sorted(set(VARIABLES[name].needs) - holds(scene)):
+            raise InputError(
+                f"{path.name}: requirements.{name}: runs of this scene have no such output, "
+                f"because it has no {absent[0]}: leave it out, or add that to the scene"
+            )
     return Campaign(path, text, specification, scene)

@@ -86,6 +86,29 @@ def test_sobol_points_are_balanced_at_powers_of_two(base):
     assert sorted(intervals.tolist()) == list(range(64))
 
 
+@pytest.mark.parametrize("kind", ["latin-hypercube", "sobol"])
+def test_replicates_are_whole_designs_of_their_own(kind, base):
+    force = values(drawn(base, {"kind": kind, "samples": 64, "replicates": 4}), "loads.force")
+    for number in range(4):
+        intervals = np.floor((force[number::4] - 0.01) / 0.01 * 16).astype(int)
+        assert sorted(intervals.tolist()) == list(range(16))
+    assert len(np.unique(force)) == 64
+    alone = values(drawn(base, {"kind": kind, "samples": 16}), "loads.force")
+    assert np.array_equal(force[::4], alone)  # the first has the campaign's own seed
+
+
+def test_a_sobol_design_with_replicates_grows(base):
+    small, large = (
+        drawn(base, {"kind": "sobol", "samples": count, "replicates": 4}) for count in (32, 64)
+    )
+    assert large.starts_with(small)
+
+
+def test_samples_that_replicates_do_not_divide_are_refused():
+    with pytest.raises(ValueError, match="multiple of replicates = 8, for example 96"):
+        DESIGN.validate_python({"kind": "sobol", "samples": 100, "replicates": 8})
+
+
 def test_grid_crosses_all_levels(base):
     inputs = THREE | {"rods.elements": {"kind": "discrete", "values": [1, 2, 4]}}
     table = drawn(base, {"kind": "grid", "levels": {"loads.force": 5, "net.stiffness": 2}}, inputs)

@@ -22,6 +22,10 @@ class Design(Model):
 
     correlated: ClassVar[bool] = True
     """Whether factors may depend on each other."""
+    population: ClassVar[bool] = True
+    """Whether its samples stand for the distributions of the inputs, so that they have a mean."""
+    independent: ClassVar[bool] = False
+    """Whether every sample is drawn apart from the others; else only replicates are."""
     cure: ClassVar[str] = "change or truncate the inputs"
     """What helps against samples that the scene refuses."""
 

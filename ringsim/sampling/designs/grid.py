@@ -22,6 +22,7 @@ class Grid(Design):
     """
 
     correlated: ClassVar[bool] = False
+    population: ClassVar[bool] = False
 
     kind: Literal["grid"] = "grid"
     levels: Levels | dict[str, Levels] = 3

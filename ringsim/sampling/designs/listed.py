@@ -27,6 +27,7 @@ class Listed(Design):
     is taken: the design or the result of another campaign can be listed as it is.
     """
 
+    population: ClassVar[bool] = False
     cure: ClassVar[str] = "correct it there"
 
     kind: Literal["list"] = "list"

@@ -1,6 +1,6 @@
 """Independent random samples."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from ringsim.sampling.distributions.family import Array, inside
 
 class RandomDesign(Design):
     """Plain Monte Carlo: sample i depends on the campaign's seed and on i alone."""
+
+    independent: ClassVar[bool] = True
 
     kind: Literal["random"] = "random"
     samples: Samples

@@ -5,11 +5,11 @@ from typing import Literal
 import numpy as np
 
 from ringsim.refusal import InputError
-from ringsim.sampling.designs.family import Design, Factors, Samples
-from ringsim.sampling.distributions.family import Array, inside
+from ringsim.sampling.designs.replicated import Replicated
+from ringsim.sampling.distributions.family import Array
 
 
-class Sobol(Design):
+class Sobol(Replicated):
     """Low-discrepancy sequence with linear matrix scrambling and a digital shift.
 
     Balanced at powers of two; fewer samples are the first ones of the next power of two.
@@ -17,17 +17,16 @@ class Sobol(Design):
     """
 
     kind: Literal["sobol"] = "sobol"
-    samples: Samples
 
-    def points(self, factors: Factors, seed: int) -> Array:
-        """The first points of the sequence that belongs to the seed."""
+    def replicate(self, samples: int, axes: int, stream: np.random.Generator) -> Array:
+        """The first points of the sequence that belongs to the stream."""
         from scipy.stats import qmc
 
-        if len(factors) > qmc.Sobol.MAXDIM:
+        if axes > qmc.Sobol.MAXDIM:
             raise InputError(
-                f"design.kind = sobol has at most {qmc.Sobol.MAXDIM} inputs, not {len(factors)}: "
+                f"design.kind = sobol has at most {qmc.Sobol.MAXDIM} inputs, not {axes}: "
                 'use kind = "random"'
             )
-        engine = qmc.Sobol(d=len(factors), scramble=True, rng=np.random.default_rng(seed), bits=30)
-        power = (self.samples - 1).bit_length()
-        return inside(engine.random_base2(power)[: self.samples])
+        engine = qmc.Sobol(d=axes, scramble=True, rng=stream, bits=30)
+        points: Array = engine.random_base2((samples - 1).bit_length())[:samples]
+        return points

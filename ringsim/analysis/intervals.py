@@ -1,0 +1,174 @@
+"""Intervals of means, spreads and quantiles of independent samples, and of replicates of designs.
+
+Points of one Sobol or Latin hypercube design depend on each other: what scatters independently is
+its replicates.  All functions take the samples along the last axis.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binom, bootstrap, t
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+"""Lower and upper end; NaN where there is none."""
+LEVEL = 0.95
+"""Level of all two-sided intervals."""
+NONE: Interval = (np.nan, np.nan)
+RESAMPLES = 1999
+LARGE = 2000
+"""Samples from which on the normal limit is taken: there it differs from the bootstrap by less than
+the bootstrap from itself with another seed, and scipy's takes a time of the square of the samples.
+"""
+_LEAST = 8
+"""Samples below which bootstrap intervals are too short, Efron and Tibshirani (1993)."""
+_BATCH = 1 << 23
+"""Numbers that the bootstrap holds at once, about."""
+
+
+def spread(values: Array, axis: int = -1) -> Array:
+    """Standard deviation with n - 1 in the denominator."""
+    return np.asarray(np.std(values, axis=axis, ddof=1))
+
+
+def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:
+    """Interval of the mean (``np.mean``) or of the ``spread`` of independent samples.
+
+    Bootstrap with bias correction and acceleration (BCa), Efron (1987); from LARGE samples on the
+    normal limit.  NaN below 8 samples.
+    """
+    count = values.shape[-1]
+    if count < _LEAST:
+        none = np.full(values.shape[:-1], np.nan)
+        return none, none
+    if count > LARGE:
+        return _limit(values, statistic)
+    alike = values.min(axis=-1) == values.max(axis=-1)
+    # Values that are all alike have no bootstrap distribution: they are told as they are.
+    told = np.where(alike[..., None], np.arange(count), values)
+    batch = max(1, _BATCH // values.size)
+    found = bootstrap(
+        (told,), statistic, n_resamples=RESAMPLES, batch=batch, axis=-1, vectorized=True,
+        confidence_level=LEVEL, method="BCa", rng=np.random.default_rng(0),
+    ).confidence_interval  # fmt: skip
+    known = statistic(values, axis=-1)
+    return np.where(alike, known, found.low), np.where(alike, known, found.high)
+
+
+def _limit(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:
+    """The normal limit; of the spread's logarithm, whose variance the fourth moment gives."""
+    count, deviation = values.shape[-1], spread(values)
+    wide = t.ppf(0.5 + LEVEL / 2, count - 1)
+    if statistic is np.mean:
+        half, mean = wide * deviation / np.sqrt(count), values.mean(axis=-1)
+        return mean - half, mean + half
+    fourth = np.mean((values - values.mean(axis=-1, keepdims=True)) ** 4, axis=-1)
+    safe = np.where(deviation > 0, deviation, 1.0)
+    log = wide * np.sqrt(np.maximum(fourth / safe**4 - 1.0, 0.0) / count) / 2
+    return deviation * np.exp(-log), deviation * np.exp(log)
+
+
+def ranks(count: int, probability: float) -> tuple[int, int] | None:
+    """Ranks, from 1, between which a quantile lies with at least LEVEL; None if there are none.
+
+    The closest pair of ranks, for any continuous distribution; of those as close the one with the
+    most equal tails.  Source: David and Nagaraja, Order Statistics (2003), section 7.1.
+
+    >>> ranks(100, 0.5), ranks(58, 0.05), ranks(59, 0.05)
+    ((40, 60), None, (1, 10))
+    """
+    most = int(binom.ppf(1.0 - 1e-6, count, probability)) + 1
+    least = max(1, int(binom.ppf(1e-6, count, probability)))
+    below = np.asarray(binom.cdf(np.arange(least - 1, min(most, count)), count, probability))
+    # below[k] is the probability that rank least + k lies above the quantile.
+    best: tuple[float, ...] | None = None
+    for low in range(len(below)):
+        high = int(np.searchsorted(below, below[low] + LEVEL))
+        if high < len(below):
+            tails = abs(below[low] - (1.0 - below[high]))
+            best = min(filter(None, [best, (high - low, tails, low)]))
+    if best is None:
+        return None
+    return least + int(best[2]), least + int(best[2] + best[0])
+
+
+def quantile_of_independent(values: Array, probability: float) -> tuple[Array, Array]:
+    """Interval of a quantile of independent samples between two of their values."""
+    if (found := ranks(values.shape[-1], probability)) is None:
+        none = np.full(values.shape[:-1], np.nan)
+        return none, none
+    ordered = np.sort(values, axis=-1)
+    return ordered[..., found[0] - 1], ordered[..., found[1] - 1]
+
+
+def of_replicates(
+    values: Array, replicate: NDArray[np.int64], statistic: Callable[..., Any]
+) -> tuple[Array, Array]:
+    """Interval of the mean or of the ``spread`` from independent replicates of a design.
+
+    Jackknife that leaves out one replicate at a time, with Student's t; of the spread's logarithm.
+    ``replicate``, shape (n,), tells to which one each sample belongs.  NaN for a single one.
+    Source: Shao and Tu, The Jackknife and Bootstrap (1995), section 2.
+    """
+    centre, scatter, count = _jackknife(values, replicate, statistic)
+    half = _wide(count) * scatter
+    if statistic is np.mean:
+        return centre - half, centre + half
+    return centre * np.exp(-half), centre * np.exp(half)
+
+
+def _jackknife(
+    values: Array, replicate: NDArray[np.int64], statistic: Callable[..., Any]
+) -> tuple[Array, Array, int]:
+    """Estimate, its standard error (of the logarithm unless it is the mean), and replicates."""
+    which = np.unique(replicate)
+    centre = np.asarray(statistic(values, axis=-1))
+    if len(which) < 2:
+        return centre, np.full(centre.shape, np.nan), len(which)
+    left_out = np.array([statistic(values[..., replicate != r], axis=-1) for r in which])
+    if statistic is not np.mean:
+        # Where one replicate has all the spread there is no telling; none at all is no doubt.
+        left_out = np.log(np.where(left_out > 0, left_out, np.where(centre > 0, np.nan, 1.0)))
+    squares = ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
+    return centre, np.sqrt(squares * (len(which) - 1) / len(which)), len(which)
+
+
+def _wide(replicates: int) -> float:
+    return float(t.ppf(0.5 + LEVEL / 2, replicates - 1)) if replicates > 1 else np.nan
+
+
+def quantile_of_replicates(
+    values: Array, replicate: NDArray[np.int64], probability: float
+) -> tuple[Array, Array]:
+    """Interval of a quantile from independent replicates of a design.
+
+    The shares of the replicates below the quantile scatter; what their interval leaves open is
+    read off the distribution of all samples.  NaN if it reaches beyond that.
+    Source: Woodruff, J. Am. Statistical Association 47 (1952).
+    """
+    middle = np.quantile(values, probability, axis=-1, keepdims=True)
+    _, scatter, count = _jackknife((values <= middle).astype(float), replicate, np.mean)
+    half, size = _wide(count) * scatter, values.shape[-1]
+    ordered = np.sort(values, axis=-1)
+    ends = []
+    for level in (probability - half, probability + half):
+        place = level * size - 0.5  # the k-th of n values stands for the level (k - 1/2) / n
+        known = np.isfinite(place) & (place >= 0) & (place <= size - 1)
+        low = np.floor(np.where(known, place, 0)).astype(int)
+        first, second = (
+            np.take_along_axis(ordered, np.minimum(low + k, size - 1)[..., None], -1)[..., 0]
+            for k in (0, 1)
+        )
+        ends.append(np.where(known, first + (place - low) * (second - first), np.nan))
+    beyond = np.isnan(ends[0] + ends[1])
+    low, high = (np.where(beyond, np.nan, end) for end in ends)
+    return low, high
+
+
+def standard_error(values: Array, replicate: NDArray[np.int64] | None) -> float:
+    """Standard error of the mean of independent samples, or of independent replicates."""
+    if replicate is None:
+        return float(spread(values) / len(values) ** 0.5) if len(values) > 1 else np.nan
+    return float(_jackknife(values, replicate, np.mean)[1])

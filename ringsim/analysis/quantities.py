@@ -1,0 +1,44 @@
+"""The numbers of a result that statistics and requirements are about."""
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ringsim.outputs import COORDINATES, OUTPUTS
+from ringsim.outputs.family import Array
+from ringsim.variables import Status, Variable
+
+Mask = NDArray[np.bool_]
+"""One truth for each sample."""
+
+
+def quantities() -> dict[str, Variable]:
+    """All numbers without dimensions that tell of the antenna, and are no places."""
+    places = COORDINATES.keys() - {"time"}
+    return {
+        each.name: each
+        for output in OUTPUTS if output.of_antenna
+        for each in output.variables
+        if not each.dims and each.flags is None and each.dtype != "str"
+        and each.name.rpartition("_")[2] not in places
+    }  # fmt: skip
+
+
+def numbers(campaign: xr.Dataset, name: str) -> Array:
+    """A variable over samples as floats, NaN where it is missing, or the variable itself is."""
+    if name not in campaign:
+        return np.full(campaign.sizes["sample"], np.nan)
+    values = campaign[name].to_numpy().astype(float)
+    known = quantities().get(name)
+    # Missing counts are negative.
+    return np.where(values < 0, np.nan, values) if known and known.dtype == "i4" else values
+
+
+def good(campaign: xr.Dataset) -> Mask:
+    """Which samples have numbers that hold."""
+    return np.asarray(campaign["status"].to_numpy() == Status.OK)
+
+
+def lost(campaign: xr.Dataset) -> Mask:
+    """Which samples have run and given no numbers that hold."""
+    return np.asarray(campaign["status"].to_numpy() >= Status.SOLVER_FAILED)

@@ -1,0 +1,40 @@
+"""Opening what ringsim has stored: campaigns and runs, by folder or by file."""
+
+from pathlib import Path
+
+import xarray as xr
+
+from ringsim.refusal import InputError
+
+MERGED = "campaign.nc"
+
+
+def open_stored(path: Path) -> xr.Dataset:
+    """The dataset in a file, or of the campaign in a folder, loaded only as far as it is used.
+
+    InputError if there is none, or it is not merged yet; close it, or use it in ``with``.
+    """
+    file = path
+    if path.is_dir():
+        file = path / MERGED
+        if not file.exists():
+            inside = (path / "design.nc").exists()
+            cure = (
+                f"its results are not merged yet: give ringsim merge {path} first"
+                if inside
+                else "there is no campaign in it: give the folder that ringsim campaign named"
+            )
+            raise InputError(f"{path}: this folder holds no {MERGED}: {cure}")
+    try:
+        return xr.open_dataset(file, engine="netcdf4")
+    except FileNotFoundError:
+        raise InputError(
+            f"{file}: there is no such file or folder: check its name, and the folder that you are "
+            "in"
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"{file}: cannot be read as a netCDF file: {reason}; give a file that ringsim has "
+            "written"
+        ) from None

@@ -1,0 +1,248 @@
+"""What the samples of a campaign say about its population: estimates, intervals, verdicts."""
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ringsim.analysis import intervals
+from ringsim.analysis.binomial import share_interval
+from ringsim.analysis.design import Placement, placement
+from ringsim.analysis.intervals import NONE, Array, Interval
+from ringsim.analysis.quantities import good, lost, numbers, quantities
+from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
+from ringsim.analysis.verdicts import judge
+from ringsim.refusal import InputError
+from ringsim.variables import Fate, Status
+
+QUANTILES = {"quantile_05": 0.05, "median": 0.5, "quantile_95": 0.95}
+STATISTICS = ("mean", "standard_deviation", *QUANTILES, "minimum", "maximum")
+PARTS = (0.25, 0.5, 0.75, 1.0)
+"""Shares of the samples, the first ones, after which estimates are told as well."""
+COUNTED = ("used", "lost", "without_value", "not_run")
+SOURCES = ("sampling", "numerical", "engines")
+"""What makes a mean wrong: few samples, steps and elements, and the choice of the engine."""
+CHECKED = "_checked"
+"""How names of the other engine's answers end in the file of a campaign."""
+_FEW = 10
+"""Samples of a kind, and of other kinds, below which Student's t does not fit their share."""
+
+
+def analyse(
+    campaign: xr.Dataset, requirements: Mapping[str, Requirement | Mapping[str, Any]] | None = None
+) -> xr.Dataset:
+    """Statistics of all outputs of a merged campaign, its outcomes, and verdicts on requirements.
+
+    Parameters
+    ----------
+    campaign
+        As ``ringsim campaign`` merges it: dimension ``sample``, variable ``status``.
+    requirements
+        By output, for example ``{"asynchrony_max": {"max": 10.0, "probability": 0.99,
+        "confidence": 0.9}}``; those of the campaign file if None.
+
+    Returns
+    -------
+    xarray.Dataset
+        For every output NAME ``NAME`` (statistic), ``NAME_interval`` (statistic, bound),
+        ``NAME_convergence`` (part, statistic), ``NAME_error_of_mean`` (source), all in its unit,
+        and ``NAME_samples`` (counted); ``outcome_...`` along ``kind``; verdicts along
+        ``requirement``.  NaN stands for what the samples do not tell; ``intervals`` among the
+        attributes says what intervals are from, or why there are none.
+
+    InputError if it is no campaign, or a requirement cannot be judged by it.
+    """
+    if "sample" not in campaign.dims or "status" not in campaign:
+        raise InputError(
+            "only a campaign can be analysed, and this holds no samples: give the folder that "
+            "ringsim campaign has written, or its campaign.nc"
+        )
+    placed = placement(campaign)
+    if requirements is None:
+        requirements = json.loads(campaign.attrs.get("requirements", "{}"))
+    plain = {k: v for k, v in requirements.items() if not isinstance(v, Requirement)}
+    wanted = {
+        **{k: v for k, v in requirements.items() if isinstance(v, Requirement)},
+        **read_requirements(plain, "requirements"),
+    }
+    found = xr.Dataset(
+        coords={
+            "statistic": list(STATISTICS), "bound": ["lower", "upper"], "part": list(PARTS),
+            "counted": list(COUNTED), "source": list(SOURCES),
+        },
+        attrs={
+            "title": campaign.attrs.get("title", ""),
+            "campaign_identity": campaign.attrs.get("identity", ""),
+            "samples": campaign.sizes["sample"], "design": placed.kind, "intervals": placed.told,
+        },
+    )  # fmt: skip
+    found["part"].attrs = {"long_name": "share of the samples, the first ones", "units": "1"}
+    for name in quantities():
+        if name in campaign and np.isfinite(numbers(campaign, name)[good(campaign)]).any():
+            found = found.assign(_output(campaign, name, placed))
+    found = found.merge(_outcomes(campaign, placed), combine_attrs="override")
+    if wanted:
+        found = found.merge(judge(campaign, wanted, placed), combine_attrs="override")
+    return found
+
+
+def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any]:
+    """All variables about one output."""
+    values, ok = numbers(campaign, name), good(campaign)
+    known = ok & np.isfinite(values)
+    place = np.arange(len(values))
+    used, index = values[known], campaign["sample"].to_numpy()[known]
+    counts = [known.sum(), lost(campaign).sum(), (ok & ~known).sum()]
+    parts = [used[place[known] < round(part * len(values))] for part in PARTS]
+    about = campaign[name].attrs.get("long_name", name)
+    units = {"units": quantities()[name].units}
+
+    def told(words: str) -> dict[str, str]:
+        return units | {"long_name": f"{words} of: {about}"}
+
+    errors = _errors(campaign, name, known, index, placed)
+    return {
+        name: ("statistic", estimates(used, placed), told("estimates")),
+        f"{name}_interval": (
+            ("statistic", "bound"), interval_of(used, index, placed), told("intervals of 95 %"),
+        ),
+        f"{name}_convergence": (
+            ("part", "statistic"), np.array([estimates(part, placed) for part in parts]),
+            told("estimates from the first samples"),
+        ),
+        f"{name}_samples": (
+            "counted", np.array([*counts, len(values) - sum(counts)], dtype="i8"),
+            told("samples") | {"units": "1"},
+        ),
+        f"{name}_error_of_mean": ("source", errors, told("error of the mean by its source")),
+    }  # fmt: skip
+
+
+def estimates(values: Array, placed: Placement) -> Array:
+    """All statistics of some values, in their order; NaN where a design or too few have none."""
+    found = dict.fromkeys(STATISTICS, np.nan)
+    if len(values):
+        found |= {"minimum": values.min(), "maximum": values.max()}
+        if placed.population:
+            found |= {"mean": values.mean()}
+            found |= dict(zip(QUANTILES, np.quantile(values, [*QUANTILES.values()]), strict=True))
+            found["standard_deviation"] = (
+                float(intervals.spread(values)) if len(values) > 1 else np.nan
+            )
+    return np.array([*found.values()], dtype=float)
+
+
+def interval_of(values: Array, samples: NDArray[np.int64], placed: Placement) -> Array:
+    """Intervals of all statistics as the design allows them, shape (statistic, 2)."""
+    found: dict[str, Any] = dict.fromkeys(STATISTICS, NONE)
+    if placed.has_intervals and len(values) > 1:
+        moments: dict[str, Callable[..., Any]] = {
+            "mean": np.mean,
+            "standard_deviation": intervals.spread,
+        }
+        replicate = placed.replicate_of(samples)
+        for name, statistic in moments.items():
+            found[name] = (
+                intervals.of_independent(values, statistic)
+                if replicate is None
+                else intervals.of_replicates(values, replicate, statistic)
+            )
+        for name, level in QUANTILES.items():
+            found[name] = (
+                intervals.quantile_of_independent(values, level)
+                if replicate is None
+                else intervals.quantile_of_replicates(values, replicate, level)
+            )
+    return np.array([*found.values()], dtype=float)
+
+
+def _errors(
+    campaign: xr.Dataset, name: str, known: NDArray[np.bool_], index: NDArray[np.int64],
+    placed: Placement,
+) -> Array:  # fmt: skip
+    """Standard error of the mean, error bars and difference of engines, shape (source,).
+
+    The latter two as root mean squares over the samples that have them: those of neighbouring
+    samples are alike, so that they do not average out.
+    """
+    values = numbers(campaign, name)
+    sampling = np.nan
+    if placed.has_intervals:
+        sampling = intervals.standard_error(values[known], placed.replicate_of(index))
+    bars = numbers(campaign, f"{name}_error")[known]
+    apart = np.full(0, np.nan)
+    if f"status{CHECKED}" in campaign and f"{name}{CHECKED}" in campaign:
+        both = known & (campaign[f"status{CHECKED}"].to_numpy() == Status.OK)
+        apart = (values - numbers(campaign, f"{name}{CHECKED}"))[both]
+    return np.array([sampling, _root_mean_square(bars), _root_mean_square(apart)])
+
+
+def _root_mean_square(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+
+
+def _outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
+    """Counts and shares of what the antenna did, and of how runs were lost, along ``kind``.
+
+    Shares of outcomes are of the samples whose numbers hold, those of lost ones of all that ran.
+    """
+    ok, gone, index = good(campaign), lost(campaign), campaign["sample"].to_numpy()
+    fates = campaign[OUTCOME].to_numpy() if OUTCOME in campaign else np.full(len(ok), Fate.NONE)
+    status = campaign["status"].to_numpy()
+    rows: dict[str, tuple[NDArray[np.bool_], NDArray[np.bool_]]] = {}
+    for fate in Fate:
+        word = fate.word if fate != Fate.NONE else "unknown"
+        rows[word] = (ok & (np.maximum(fates, 0) == fate), ok)
+    for code in Status:
+        rows[f"lost: {code.word}"] = (gone & (status == code), ok | gone)
+    rows = {word: (own, of) for word, (own, of) in rows.items() if own.any()}
+    shares = np.full((len(rows), len(PARTS)), np.nan)
+    ends = np.full((len(rows), 2), np.nan)
+    for k, (own, of) in enumerate(rows.values()):
+        for part, share in enumerate(PARTS):
+            first = slice(round(share * len(ok)))
+            if of[first].any():
+                shares[k, part] = own[first].sum() / of[first].sum()
+        ends[k] = _share_interval(own[of], index[of], placed)
+    counts = [(own.sum(), of.sum()) for own, of in rows.values()]
+    of_kind = {"long_name": "share of the kind", "units": "1"}
+    population = placed.population
+    return xr.Dataset(
+        {
+            "outcome_samples": (
+                "kind", np.array([n for n, _ in counts], dtype="i8"),
+                {"long_name": "samples of the kind", "units": "1"},
+            ),
+            "outcome_of": (
+                "kind", np.array([n for _, n in counts], dtype="i8"),
+                {"long_name": "samples of which the share is", "units": "1"},
+            ),
+            "outcome_share": ("kind", shares[:, -1] if population else ends[:, 0], of_kind),
+            "outcome_share_interval": (
+                ("kind", "bound"), ends,
+                {"long_name": "interval of 95 % of the share", "units": "1"},
+            ),
+            "outcome_share_convergence": (
+                ("kind", "part"), shares if population else np.full_like(shares, np.nan),
+                {"long_name": "share among the first samples", "units": "1"},
+            ),
+        },
+        coords={"kind": np.array([*rows], dtype=object)},
+    )  # fmt: skip
+
+
+def _share_interval(
+    own: NDArray[np.bool_], samples: NDArray[np.int64], placed: Placement
+) -> Interval:
+    """Interval of a share as the design allows it."""
+    if not placed.has_intervals or not len(own):
+        return NONE
+    replicate, count = placed.replicate_of(samples), int(own.sum())
+    if replicate is None or min(count, len(own) - count) < _FEW:
+        return share_interval(count, len(own))
+    low, high = intervals.of_replicates(own.astype(float), replicate, np.mean)
+    return max(0.0, float(low)), min(1.0, float(high))

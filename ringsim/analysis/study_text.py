@@ -1,0 +1,151 @@
+"""An analysis of a campaign as lines for people."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from ringsim.analysis.quantities import quantities
+from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
+from ringsim.analysis.verdicts import Verdict
+from ringsim.tables import text_table
+
+
+def told(analysis: xr.Dataset) -> list[str]:
+    """All lines: requirements, outcomes, outputs, errors."""
+    counts = f"{analysis.attrs['samples']} samples, design {analysis.attrs['design'] or 'unknown'}"
+    title = analysis.attrs["title"]
+    lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
+    for part in (_requirements, _outcomes, _outputs, _errors):
+        if more := list(part(analysis)):
+            lines += ["", *more]
+    return lines
+
+
+def _requirements(analysis: xr.Dataset) -> Iterator[str]:
+    if "requirement" not in analysis.dims:
+        return
+    rows, notes = [], list[str]()
+    for name in analysis["requirement"].values:
+        one = {str(n): v.item() for n, v in analysis.sel(requirement=name).items() if not v.dims}
+        verdict, worst = Verdict(one["verdict"]), Verdict(one["verdict_worst_case"])
+        further = one["further_samples"]
+        rows.append((
+            one["requirement_text"], f"{one['probability_required']:g}",
+            f"{one['confidence_required']:g}", _words(verdict), _number(one["probability"]),
+            _interval(one["probability_lower"], one["probability_upper"]),
+            str(one["samples_used"]), str(one["samples_violating"]), str(one["samples_lost"]),
+            _words(worst) if one["samples_lost"] else "-", str(further) if further > 0 else "-",
+        ))  # fmt: skip
+        if further > 0:
+            notes.append(f"{name}: {further} further samples without a violation would show it")
+        if missing := one["samples_without_value"]:
+            notes.append(
+                f"{name}: {missing} of the violations are samples without a value, whose antenna "
+                "did not get so far"
+            )
+    head = (
+        "requirement", "probability", "confidence", "verdict", "estimate", "one-sided bounds",
+        "used", "violating", "lost", "if lost ones violate", "further",
+    )  # fmt: skip
+    yield from text_table(head, rows)
+    yield from notes
+
+
+def _words(verdict: Verdict) -> str:
+    return verdict.word.replace("_", " ")
+
+
+def _outcomes(analysis: xr.Dataset) -> Iterator[str]:
+    rows = [
+        (
+            str(kind), f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}",
+            _number(one["outcome_share"].item()), _interval(*one["outcome_share_interval"].values),
+            *map(_number, one["outcome_share_convergence"].values[:-1]),
+        )
+        for kind in analysis["kind"].values
+        for one in [analysis.sel(kind=kind)]
+    ]  # fmt: skip
+    head = ("outcome", "samples", "share", "95 % interval", *_parts())
+    yield from text_table(head, rows)
+
+
+def _parts() -> list[str]:
+    return [f"first {part:.0%}" for part in PARTS[:-1]]
+
+
+def _outputs(analysis: xr.Dataset) -> Iterator[str]:
+    rows = []
+    for name in outputs_in(analysis):
+        used, lost, absent, _ = (str(n) for n in analysis[f"{name}_samples"].values)
+        units = analysis[name].attrs["units"]
+        values = analysis[name].values
+        least, most = values[-2:]
+        # So many that the range has four of its own.
+        larger = max(abs(least), abs(most)) / (most - least) if most > least else 1.0
+        fine = max(4, int(np.log10(larger)) + 4)
+        for k, statistic in enumerate(STATISTICS):
+            value = values[k]
+            # What is alike in all samples takes one row.
+            if np.isnan(value) or (least == most and statistic != "maximum"):
+                continue
+            digits = 4 if statistic == "standard_deviation" else fine
+            low, high = analysis[f"{name}_interval"].values[k]
+            first = analysis[f"{name}_convergence"].values[:-1, k]
+            rows.append((
+                name, "" if units == "1" else units,
+                "all" if least == most else statistic.replace("_", " "), _number(value, digits),
+                _interval(low, high, digits), *(_number(v, digits) for v in first),
+                used, lost, absent,
+            ))  # fmt: skip
+    head = (
+        "output", "unit", "statistic", "estimate", "95 % interval", *_parts(), "used", "lost",
+        "no value",
+    )  # fmt: skip
+    if rows:
+        yield from text_table(head, rows)
+
+
+def outputs_in(analysis: xr.Dataset) -> list[str]:
+    """The outputs that an analysis is about."""
+    return [name for name in quantities() if name in analysis]
+
+
+def _errors(analysis: xr.Dataset) -> Iterator[str]:
+    rows = []
+    for name in outputs_in(analysis):
+        errors = analysis[f"{name}_error_of_mean"].values
+        if np.isfinite(errors).any() and np.isfinite(analysis[name].values[0]):
+            rows.append(
+                (
+                    name,
+                    analysis[name].attrs["units"],
+                    *(_number(e, 2) for e in errors),
+                    dominating(errors),
+                )
+            )
+    head = (
+        "error of the mean of", "unit", "sampling (standard error)", "numerical (error bars)",
+        "engines (difference)", "dominates",
+    )  # fmt: skip
+    if rows:
+        yield from text_table(head, rows)
+
+
+def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:
+    """The source that dominates, as far as they are known; empty below two."""
+    known = np.isfinite(errors)
+    if known.sum() < 2:
+        return "-"
+    unknown = [name for name, k in zip(SOURCES, known, strict=True) if not k]
+    found = SOURCES[int(np.nanargmax(errors))]
+    return f"{found} ({', '.join(unknown)} unknown)" if unknown else found
+
+
+def _number(value: float, digits: int = 4) -> str:
+    return f"{value:.{digits}g}" if np.isfinite(value) else "-"
+
+
+def _interval(low: float, high: float, digits: int = 4) -> str:
+    known = np.isfinite([low, high]).any()
+    return f"{_number(low, digits)} .. {_number(high, digits)}" if known else "-"

@@ -1,0 +1,159 @@
+"""Verdicts on requirements: met, not met, or not yet shown, with exact bounds."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.stats import t
+
+from ringsim.analysis.binomial import samples_needed, share_bounds
+from ringsim.analysis.design import Placement
+from ringsim.analysis.intervals import Interval, standard_error
+from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
+from ringsim.analysis.requirements import OUTCOME, Requirement
+from ringsim.refusal import InputError, known_or_nearest
+from ringsim.variables import GOALS, Code, Fate, flags_of
+
+
+class Verdict(Code):
+    """What samples say about a requirement."""
+
+    NOT_MET = 0
+    """The upper bound of the probability is below the one required."""
+    NOT_YET_SHOWN = 1
+    MET = 2
+    """The lower bound of the probability is at least the one required."""
+    NO_POPULATION = 3
+    """The design stands for no population: only violations can be counted."""
+
+
+def violations(campaign: xr.Dataset, name: str, wanted: Requirement) -> Mask:
+    """Which samples violate a requirement, of those that have numbers that hold.
+
+    One without a value violates it: an antenna that never deploys has no deployment time.
+    """
+    if name == OUTCOME:
+        codes = campaign[OUTCOME].to_numpy()
+        broken = codes != Fate[str(wanted.is_).upper()]
+    else:
+        values = numbers(campaign, name)
+        low = -np.inf if wanted.min is None else wanted.min
+        high = np.inf if wanted.max is None else wanted.max
+        broken = ~((values >= low) & (values <= high))
+    return np.asarray(good(campaign) & broken)
+
+
+def bounds(
+    kept: Mask, samples: NDArray[np.int64], confidence: float, placed: Placement
+) -> Interval:  # fmt: skip
+    """One-sided bounds of the probability that samples keep to a requirement.
+
+    Those after Clopper and Pearson; where the replicates of a design scatter by more than
+    independent samples would, those of Student's t from the replicates.
+    """
+    low, high = share_bounds(int(kept.sum()), len(kept), confidence)
+    replicate = placed.replicate_of(samples)
+    if replicate is not None and placed.replicates > 1:
+        share, count = float(kept.mean()), len(np.unique(replicate))
+        error = standard_error(kept.astype(float), replicate)
+        half = float(t.ppf(confidence, count - 1)) * error if count > 1 else 0.0
+        low, high = max(0.0, min(low, share - half)), min(1.0, max(high, share + half))
+    return low, high
+
+
+def judge(
+    campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement
+) -> xr.Dataset:
+    """The verdict on every requirement, along ``requirement``."""
+    columns: dict[str, list[float]] = {name: [] for name in _MEANING}
+    for name, wanted in requirements.items():
+        _require_values(campaign, name)
+        for key, value in _judged(campaign, name, wanted, placed).items():
+            columns[key].append(value)
+    known = {
+        name: ("requirement", values, {"long_name": words, "units": "1"})
+        for name, (words, _) in _MEANING.items()
+        for values in [np.array(columns[name], dtype=_MEANING[name][1])]
+    }
+    told = [each.told(name) for name, each in requirements.items()]
+    found = xr.Dataset(known, coords={"requirement": np.array([*requirements], dtype=object)})
+    found["requirement_text"] = (
+        "requirement", np.array(told, dtype=object), {"long_name": "requirement in words"}
+    )  # fmt: skip
+    for name in ("verdict", "verdict_worst_case"):
+        found[name].attrs |= flags_of(Verdict)
+    return found
+
+
+_MEANING = {
+    "probability_required": ("probability required", "f8"),
+    "confidence_required": ("confidence required of each bound", "f8"),
+    "verdict": ("verdict from the samples with numbers that hold", "i1"),
+    "verdict_worst_case": ("verdict if all lost samples violated the requirement", "i1"),
+    "probability": ("share of the samples used that keep to the requirement", "f8"),
+    "probability_lower": ("one-sided lower bound of the probability", "f8"),
+    "probability_upper": ("one-sided upper bound of the probability", "f8"),
+    "samples_used": ("samples with numbers that hold", "i8"),
+    "samples_lost": ("samples whose run failed", "i8"),
+    "samples_violating": ("samples used that violate the requirement", "i8"),
+    "samples_without_value": ("of these, samples without a value", "i8"),
+    "further_samples": ("further samples, none violating, that would show it; -1: none", "i8"),
+}  # fmt: skip
+
+
+def _require_values(campaign: xr.Dataset, name: str) -> None:
+    """Refuse (InputError) an output that the runs do not compute: it would seem violated."""
+    if name not in campaign:
+        known = [OUTCOME, *(each for each in quantities() if each in campaign)]
+        raise InputError(
+            f"requirement on {name}: the file has no such output ({known_or_nearest(name, known)})"
+        )
+    if name != OUTCOME and OUTCOME in campaign:
+        done = good(campaign) & np.isin(campaign[OUTCOME].to_numpy(), GOALS)
+        if len(none := np.flatnonzero(done & np.isnan(numbers(campaign, name)))):
+            raise InputError(
+                f"requirement on {name}: {len(none)} samples reached their goal without a value of "
+                f"it, the first is {campaign['sample'].to_numpy()[none[0]]}: their model does not "
+                "compute it; require another output, or use the full fidelity"
+            )
+
+
+def _judged(
+    campaign: xr.Dataset, name: str, wanted: Requirement, placed: Placement
+) -> dict[str, float]:
+    used, gone = good(campaign), lost(campaign)
+    broken = violations(campaign, name, wanted)
+    absent = used & np.isnan(numbers(campaign, name)) if name != OUTCOME else ~used & used
+    count, bad, missing = (int(each.sum()) for each in (used, broken, gone))
+    place = campaign["sample"].to_numpy()
+    low, high = 0.0, 1.0
+    verdict = worst = Verdict.NOT_YET_SHOWN
+    if count:
+        low, high = bounds(~broken[used], place[used], wanted.confidence, placed)
+        verdict = _verdict(low, high, wanted.probability)
+    if count + missing:
+        run = used | gone
+        ends = bounds(~(broken | gone)[run], place[run], wanted.confidence, placed)
+        worst = _verdict(*ends, wanted.probability)
+    further = -1
+    if verdict == Verdict.NOT_YET_SHOWN:
+        needed = samples_needed(bad, wanted.probability, wanted.confidence)
+        further = needed - count if needed > count else -1
+    if not placed.population:
+        verdict = worst = Verdict.NO_POPULATION
+        low, high, further = np.nan, np.nan, -1
+    return {
+        "probability_required": wanted.probability, "confidence_required": wanted.confidence,
+        "verdict": verdict, "verdict_worst_case": worst,
+        "probability": 1.0 - bad / count if count else np.nan,
+        "probability_lower": low, "probability_upper": high,
+        "samples_used": count, "samples_lost": missing, "samples_violating": bad,
+        "samples_without_value": int(absent.sum()), "further_samples": further,
+    }  # fmt: skip
+
+
+def _verdict(low: float, high: float, probability: float) -> Verdict:
+    if low >= probability:
+        return Verdict.MET
+    return Verdict.NOT_MET if high < probability else Verdict.NOT_YET_SHOWN

@@ -1,0 +1,108 @@
+"""``ringsim analyse`` from a campaign file to verdicts, with a stand-in for the solver."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+from made import campaign
+from ringsim.cli.analyse import command
+from ringsim.refusal import InputError
+
+CAMPAIGN = """
+name = "study"
+scene = "ring18"
+design = { kind = "sobol", samples = 64, replicates = 8 }
+[set]
+"structure.sections" = 6
+boom = "none"
+[inputs]
+"loads.force" = { kind = "uniform", low = 0.01, high = 0.013 }
+[requirements]
+outcome = { is = "deployed", probability = 0.9, confidence = 0.9 }
+deployment_time = { max = 30.0, probability = 0.9, confidence = 0.9 }
+"""
+STAND_IN = '''
+import numpy as np
+from ringsim.variables import Fate, Outcome, Status
+
+def run(scene):
+    """Fails above a force of 0.012 N, stalls above 0.0115 N."""
+    force = scene.loads.force
+    if force > 0.012:
+        return Outcome(Status.SOLVER_FAILED, "on purpose")
+    if force > 0.0115:
+        return Outcome(Status.OK, "at rest", {}, {"outcome": np.array(Fate.STALLED)})
+    values = {"outcome": np.array(Fate.DEPLOYED), "deployment_time": np.array(0.2 / force)}
+    return Outcome(Status.OK, "all open", {}, values)
+'''
+
+
+def analyse(*arguments):
+    return CliRunner().invoke(command, [*map(str, arguments)], catch_exceptions=False)
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "stand_in.py").write_text(STAND_IN)
+    (folder / "study.toml").write_text(CAMPAIGN)
+    line = [sys.executable, "-m", "ringsim", "campaign", "study.toml", "--workers", "0"]
+    done = subprocess.run(
+        [*line, "--solver", "stand_in:run"], cwd=folder, capture_output=True, text=True,
+        check=False, env=os.environ | {"PYTHONPATH": f"{Path(__file__).parents[2]}:{folder}"},
+    )  # fmt: skip
+    assert (folder / "runs/study/campaign.nc").exists(), done.stderr
+    return folder / "runs/study"
+
+
+def test_a_campaign_is_judged_by_the_requirements_of_its_file(study, tmp_path):
+    done = analyse(study, "--out", tmp_path / "analysis.nc")
+    assert done.exit_code == 0
+    assert "8 independent replicates" in done.output
+    assert "deployment_time <= 30 s" in done.output
+    found = xr.load_dataset(tmp_path / "analysis.nc")
+    # A third of the forces fails, a sixth stalls, half deploys.
+    lost, used = found.samples_lost.values, found.samples_used.values
+    assert lost[0] == pytest.approx(64 / 3, abs=2)
+    assert (lost + used == 64).all()
+    assert found.samples_violating.values[0] == pytest.approx(64 / 6, abs=2)
+    assert (found.samples_violating[0] == found.samples_violating[1]).all()
+    assert found.verdict.values.tolist() == [0, 0]
+    low, high = found.deployment_time_interval.sel(statistic="mean").values
+    # Mean of 0.2 / force between 0.01 and 0.0115 N.
+    assert low < 0.2 / 0.0015 * 0.13976194237515868 < high
+
+
+def test_a_requirement_of_the_command_line_replaces_the_file_s(study):
+    done = analyse(study, "--require", "outcome: is deployed, probability 0.5, confidence 0.9")
+    line = next(line for line in done.output.splitlines() if line.startswith("outcome is deployed"))
+    assert " met " in line
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda folder: None, "no such file or folder"),
+        (lambda folder: folder.mkdir(), "no campaign in it"),
+        (lambda folder: (folder.mkdir(), (folder / "design.nc").touch()), "ringsim merge"),
+        (lambda folder: folder.write_text("text"), "cannot be read as a netCDF file"),
+        (lambda folder: xr.Dataset({"status": 0}).to_netcdf(folder), "holds no samples"),
+    ],
+)
+def test_what_is_no_campaign_is_refused(make, words, tmp_path):
+    make(tmp_path / "given")
+    with pytest.raises(InputError, match=words):
+        analyse(tmp_path / "given")
+
+
+def test_the_output_needs_a_name_of_netcdf(tmp_path):
+    campaign([1.0, 2.0]).to_netcdf(tmp_path / "campaign.nc")
+    with pytest.raises(InputError, match="must end with"):
+        analyse(tmp_path, "--out", tmp_path / "analysis.txt")

@@ -1,0 +1,124 @@
+"""Intervals of 95 % hold the truth in 92 to 98 of 100 campaigns, for every design."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made import points, response
+from ringsim.analysis import intervals
+from ringsim.analysis.binomial import samples_needed, share_bounds, share_interval
+from ringsim.analysis.design import Placement
+from ringsim.analysis.study import STATISTICS, interval_of
+
+CAMPAIGNS = 1000
+
+
+@pytest.fixture(scope="module")
+def truth():
+    grid = (np.arange(160) + 0.5) / 160
+    values = response(np.stack(np.meshgrid(grid, grid, grid), axis=-1)).ravel()
+    return {
+        np.mean: values.mean(), intervals.spread: values.std(),
+        **{p: np.quantile(values, p) for p in (0.05, 0.5, 0.95)},
+        "share": np.mean(values > 2.3),
+    }  # fmt: skip
+
+
+def share_covered(ends, true):
+    low, high = ends
+    known = np.isfinite(low + high)
+    assert known.mean() > 0.9
+    return np.mean((low[known] <= true) & (true <= high[known]))
+
+
+@pytest.mark.parametrize(
+    ("samples", "statistics"),
+    [(100, [np.mean, intervals.spread]), (100, [0.05, 0.5, 0.95])],
+)
+def test_independent_samples_are_covered(samples, statistics, truth):
+    values = response(np.random.default_rng(1).random((CAMPAIGNS, samples, 3)))
+    for each in statistics:
+        if callable(each):
+            ends = intervals.of_independent(values, each)
+        else:
+            ends = intervals.quantile_of_independent(values, each)
+        assert 0.92 <= share_covered(ends, truth[each]) <= 0.98
+
+
+def test_many_independent_samples_are_covered_by_the_normal_limit(truth):
+    samples = intervals.LARGE + 1
+    values = response(np.random.default_rng(2).random((CAMPAIGNS, samples, 3)))
+    for each in (np.mean, intervals.spread):
+        assert 0.92 <= share_covered(intervals.of_independent(values, each), truth[each]) <= 0.98
+
+
+@pytest.mark.parametrize("kind", ["sobol", "latin-hypercube"])
+def test_replicates_of_designs_are_covered(kind, truth):
+    samples, replicates = 256, 8
+    all_points = [points(kind, samples, replicates, seed) for seed in range(CAMPAIGNS)]
+    values, which = response(np.array(all_points)), np.arange(samples) % replicates
+    for each in (np.mean, intervals.spread):
+        ends = intervals.of_replicates(values, which, each)
+        assert 0.92 <= share_covered(ends, truth[each]) <= 0.98
+    for level in (0.05, 0.5, 0.95):
+        ends = intervals.quantile_of_replicates(values, which, level)
+        assert 0.92 <= share_covered(ends, truth[level]) <= 0.98
+    above = (values > 2.3).astype(float)
+    ends = intervals.of_replicates(above, which, np.mean)
+    assert 0.92 <= share_covered(ends, truth["share"]) <= 0.98
+
+
+def test_exact_intervals_of_shares_are_covered():
+    """200 samples and a share of a third: 95 % at least, by construction."""
+    counts = np.random.default_rng(3).binomial(200, 1 / 3, CAMPAIGNS)
+    ends = np.array([share_interval(int(count), 200) for count in counts]).T
+    assert 0.94 <= share_covered(ends, 1 / 3) <= 0.98
+
+
+def test_a_bootstrap_of_one_latin_hypercube_would_be_wrong(truth):
+    """Why it has no intervals: they would be several times too long."""
+    values = response(np.array([points("latin-hypercube", 64, 1, seed) for seed in range(200)]))
+    assert share_covered(intervals.of_independent(values, np.mean), truth[np.mean]) == 1.0
+
+
+@pytest.mark.parametrize("kind", ["grid", "list", ""])
+def test_designs_without_a_population_have_no_intervals(kind):
+    placed = Placement(kind, population=False, independent=False)
+    assert not placed.has_intervals
+    ends = interval_of(np.arange(50.0), np.arange(50), placed)
+    assert ends.shape == (len(STATISTICS), 2)
+    assert np.isnan(ends).all()
+
+
+def test_values_that_are_all_alike_have_an_interval_of_no_length():
+    low, high = intervals.of_independent(np.full((2, 20), 3.0), np.mean)
+    assert low.tolist() == high.tolist() == [3.0, 3.0]
+
+
+def test_few_samples_have_no_interval():
+    assert np.isnan(intervals.of_independent(np.arange(7.0), np.mean)[0])
+    assert intervals.ranks(58, 0.95) is None
+    assert np.isnan(intervals.quantile_of_independent(np.arange(58.0), 0.95)).all()
+    one = np.zeros(16, dtype=int)
+    assert np.isnan(intervals.of_replicates(np.arange(16.0), one, np.mean)).all()
+
+
+def test_ranks_of_a_large_campaign_hold_the_level():
+    from scipy.stats import binom
+
+    low, high = intervals.ranks(100_000, 0.05)
+    held = binom.cdf(high - 1, 100_000, 0.05) - binom.cdf(low - 1, 100_000, 0.05)
+    assert 0.95 <= held <= 0.951
+    assert low < 5000 < high
+
+
+@pytest.mark.parametrize(
+    ("violations", "probability", "confidence", "samples"),
+    [(0, 0.99, 0.9, 230), (0, 0.99865, 0.9, 1705), (0, 0.9, 0.95, 29), (1, 0.99, 0.9, 388)],
+)
+def test_samples_that_show_a_probability(violations, probability, confidence, samples):
+    assert samples_needed(violations, probability, confidence) == samples
+    for count, shown in ((samples, True), (samples - 1, False)):
+        low, _ = share_bounds(count - violations, count, confidence)
+        assert (low >= probability) == shown

@@ -1,0 +1,72 @@
+"""Requirements are read from files and command lines; wrong ones are told with the cure."""
+
+from __future__ import annotations
+
+import pytest
+
+from ringsim.analysis.requirements import parse_requirements, read_requirements
+from ringsim.campaign.specification import load_campaign
+from ringsim.refusal import InputError
+
+SHOWN = {"probability": 0.99, "confidence": 0.9}
+
+
+def test_both_ways_of_writing_read_alike():
+    table = {"outcome": {"is": "deployed", **SHOWN}, "asynchrony_max": {"max": 10, **SHOWN}}
+    texts = [
+        "outcome: is deployed, probability 0.99, confidence 0.9",
+        "asynchrony_max=max=10, probability = 0.99, confidence=0.9",
+    ]
+    assert parse_requirements(texts) == read_requirements(table, "file")
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"asynchrony_mx": {"max": 1.0, **SHOWN}}, r"did you mean asynchrony_max\?"),
+        ({"asynchrony": {"max": 1.0, **SHOWN}}, "value for each time.*asynchrony_max"),
+        ({"peak_tension": {"max": 1.0, "probability": 0.9}}, "confidence is missing"),
+        ({"peak_tension": SHOWN}, "give max or min, in N"),
+        ({"peak_tension": {"maximum": 1.0, **SHOWN}}, r"did you mean max\?"),
+        ({"peak_tension": {"max": 1.0, "min": 2.0, **SHOWN}}, "min = 2 must be below max = 1"),
+        ({"peak_tension": {"is": "deployed", **SHOWN}}, "only the outcome is a word"),
+        ({"peak_tension": {"max": "much", **SHOWN}}, "must be a finite number"),
+        ({"peak_tension": {"max": 1.0, "probability": 1.0, "confidence": 0.9}}, "must be below 1"),
+        ({"peak_tension": {"max": 1.0, "probability": 0.9, "confidence": 9}}, "must be below 1"),
+        ({"outcome": {"max": 1.0, **SHOWN}}, 'as is = "deployed"'),
+        ({"outcome": {"is": "deplyed", **SHOWN}}, r"did you mean deployed\?"),
+        ({"peak_tension": 5.0}, "must be a table"),
+    ],
+)
+def test_wrong_requirements_are_told_with_the_cure(table, words):
+    with pytest.raises(InputError, match=rf"study\.toml: requirements\..*{words}"):
+        read_requirements(table, "study.toml")
+
+
+@pytest.mark.parametrize(
+    ("texts", "words"),
+    [
+        (["asynchrony_max"], "must read NAME: KEY VALUE"),
+        (["asynchrony_max: 10"], "must read NAME: KEY VALUE"),
+        (["outcome: is deployed", "outcome: is folded"], "given twice"),
+    ],
+)
+def test_wrong_texts_are_told_with_an_example(texts, words):
+    with pytest.raises(InputError, match=words):
+        parse_requirements(texts)
+
+
+def test_a_campaign_refuses_what_its_scene_does_not_tell(tmp_path):
+    file = tmp_path / "study.toml"
+    text = """
+        name = "study"
+        scene = "ring18"
+        design = { kind = "random", samples = 2 }
+        [requirements]
+        peak_tension = { max = 10.0, probability = 0.99, confidence = 0.9 }
+        """
+    file.write_text(text)
+    with pytest.raises(InputError, match=r"requirements\.peak_tension: .* it has no cables"):
+        load_campaign(file)
+    file.write_text(text.replace("peak_tension", "asynchrony_max"))
+    assert load_campaign(file).specification.requirements["asynchrony_max"].max == 10.0

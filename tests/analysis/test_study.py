@@ -1,0 +1,216 @@
+"""What the analysis of a campaign tells, beside every number how many samples it is from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from made import campaign, points, response
+from ringsim.analysis.requirements import to_json
+from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import told
+from ringsim.analysis.verdicts import Verdict
+from ringsim.refusal import InputError
+from ringsim.variables import Fate, Status
+
+MOST_TEN = {"asynchrony_max": {"max": 10.0, "probability": 0.99, "confidence": 0.9}}
+
+
+def verdict(found, name="asynchrony_max", which="verdict"):
+    return Verdict(int(found[which].sel(requirement=name)))
+
+
+def text_of(found):
+    return "\n".join(told(found))
+
+
+def test_estimates_are_those_of_numpy():
+    values = response(points("random", 200, 1, 0))
+    found = analyse(campaign(values))
+    own = found.asynchrony_max
+    assert own.sel(statistic="mean").item() == pytest.approx(values.mean(), rel=1e-14)
+    assert own.sel(statistic="standard_deviation").item() == pytest.approx(values.std(ddof=1))
+    assert own.sel(statistic="quantile_95").item() == np.quantile(values, 0.95)
+    assert own.attrs["units"] == found.asynchrony_max_interval.attrs["units"] == "degree"
+    first = found.asynchrony_max_convergence.sel(part=0.25, statistic="median").item()
+    assert first == np.median(values[:50])
+    assert found.asynchrony_max_samples.values.tolist() == [200, 0, 0, 0]
+    inside = found.asynchrony_max_interval.sel(statistic="mean").values
+    assert inside[0] < own.sel(statistic="mean") < inside[1]
+
+
+def test_every_variable_has_a_unit_and_says_what_it_is():
+    found = analyse(campaign(np.arange(300.0)), MOST_TEN)
+    for name, variable in found.data_vars.items():
+        assert variable.attrs["long_name"], name
+        assert variable.dtype.kind == "O" or variable.attrs["units"], name
+
+
+def test_an_analysis_is_written_and_read_again(tmp_path):
+    from ringsim.dataset import save
+
+    found = analyse(campaign(np.arange(300.0)), MOST_TEN)
+    save(found, tmp_path / "analysis.nc")
+    xr.testing.assert_identical(found.load(), xr.load_dataset(tmp_path / "analysis.nc"))
+
+
+@pytest.mark.parametrize(("count", "found"), [(230, Verdict.MET), (229, Verdict.NOT_YET_SHOWN)])
+def test_230_samples_without_a_violation_show_99_of_100(count, found):
+    shown = analyse(campaign(np.full(count, 9.0)), MOST_TEN)
+    assert verdict(shown) == found
+    assert shown.further_samples.item() == (1 if count == 229 else -1)
+    bound = shown.probability_lower.item()
+    assert bound == pytest.approx(0.1 ** (1 / count), rel=1e-9)  # closed form of no violation
+
+
+def test_too_many_violations_are_not_met():
+    values = np.where(np.arange(100) < 10, 11.0, 9.0)
+    found = analyse(campaign(values), MOST_TEN)
+    assert verdict(found) == Verdict.NOT_MET
+    assert found.samples_violating.item() == 10
+    assert found.further_samples.item() == -1
+    assert "not met" in text_of(found)
+
+
+def test_lost_samples_count_neither_way_and_the_worst_case_is_told():
+    status = np.where(np.arange(240) < 10, Status.TIMEOUT, Status.OK)
+    values = np.where(status == Status.OK, 9.0, np.nan)
+    found = analyse(campaign(values, status=status, outcome=np.where(status, 0, 1)), MOST_TEN)
+    assert verdict(found) == Verdict.MET
+    assert verdict(found, which="verdict_worst_case") == Verdict.NOT_MET
+    assert (found.samples_used.item(), found.samples_lost.item()) == (230, 10)
+    assert found.asynchrony_max_samples.values.tolist() == [230, 10, 0, 0]
+    assert found.outcome_samples.sel(kind="lost: timeout").item() == 10
+    assert found.outcome_of.sel(kind="lost: timeout").item() == 240
+    assert found.outcome_share.sel(kind="deployed").item() == 1.0
+
+
+def test_an_antenna_that_never_deploys_violates_a_deployment_time():
+    outcome = np.where(np.arange(50) < 5, Fate.STALLED, Fate.DEPLOYED)
+    times = np.where(outcome == Fate.DEPLOYED, 8.0, np.nan)
+    made = campaign(np.full(50, 9.0), outcome=outcome, deployment_time=times)
+    wanted = {"deployment_time": {"max": 10.0, "probability": 0.99, "confidence": 0.9}}
+    found = analyse(made, wanted)
+    assert found.samples_violating.item() == found.samples_without_value.item() == 5
+    assert verdict(found, "deployment_time") == Verdict.NOT_MET
+    assert found.deployment_time_samples.values.tolist() == [45, 0, 5, 0]
+    assert "5 of the violations are samples without a value" in text_of(found)
+
+
+def test_samples_that_have_not_run_are_neither_used_nor_lost():
+    status = np.where(np.arange(40) < 10, -1, Status.OK)
+    found = analyse(campaign(np.full(40, 1.0), status=status), MOST_TEN)
+    assert found.asynchrony_max_samples.values.tolist() == [30, 0, 0, 10]
+    assert found.samples_used.item() == 30
+    assert verdict(found, which="verdict_worst_case") == Verdict.NOT_YET_SHOWN
+
+
+def test_requirements_of_the_file_are_judged_and_outcomes_are():
+    from ringsim.analysis.requirements import read_requirements
+
+    made = campaign(np.full(300, 9.0))
+    wanted = MOST_TEN | {"outcome": {"is": "deployed", "probability": 0.9, "confidence": 0.9}}
+    made.attrs["requirements"] = to_json(read_requirements(wanted, "test"))
+    found = analyse(made)
+    assert found.requirement.values.tolist() == ["asynchrony_max", "outcome"]
+    assert verdict(found, "outcome") == Verdict.MET
+    assert found.requirement_text.values.tolist() == [
+        "asynchrony_max <= 10 degree", "outcome is deployed"
+    ]  # fmt: skip
+
+
+def test_outcomes_are_rows_with_exact_intervals():
+    outcome = np.where(np.arange(100) < 7, Fate.PARTLY_DEPLOYED, Fate.DEPLOYED)
+    found = analyse(campaign(np.full(100, 9.0), outcome=outcome))
+    own = found.sel(kind="partly_deployed")
+    assert own.outcome_share.item() == pytest.approx(0.07)
+    # Clopper and Pearson's interval of 7 of 100, from their tables.
+    np.testing.assert_allclose(own.outcome_share_interval.values, [0.0286, 0.1389], atol=1e-4)
+    assert own.outcome_share_convergence.values[0] == pytest.approx(7 / 25)
+
+
+@pytest.mark.parametrize("kind", ["sobol", "latin-hypercube"])
+def test_one_design_has_estimates_but_no_intervals_and_replicates_have_both(kind):
+    for replicates in (1, 8):
+        values = response(points(kind, 256, replicates, 0))
+        design = {"kind": kind, "samples": 256, "replicates": replicates}
+        found = analyse(campaign(values, design=design), MOST_TEN)
+        assert found.asynchrony_max.sel(statistic="mean").item() == values.mean()
+        known = np.isfinite(found.asynchrony_max_interval.sel(statistic="median"))
+        assert known.all() == (replicates == 8)
+        assert ("no intervals" in text_of(found)) == (replicates == 1)
+    assert "design.replicates = 8" not in text_of(found)
+
+
+def test_replicates_that_scatter_more_than_independent_samples_widen_the_bounds():
+    values = np.where(np.arange(800) % 8 == 0, 11.0, 9.0)  # one replicate violates throughout
+    design = {"kind": "sobol", "samples": 800}
+    wanted = {"asynchrony_max": {"max": 10.0, "probability": 0.8, "confidence": 0.95}}
+    alone, parted = (
+        analyse(campaign(values, design=design | {"replicates": each}), wanted) for each in (1, 8)
+    )
+    assert verdict(alone) == Verdict.MET
+    assert verdict(parted) == Verdict.NOT_YET_SHOWN
+
+
+@pytest.mark.parametrize("kind", ["grid", "list"])
+def test_grids_and_lists_have_extremes_only(kind):
+    found = analyse(campaign(np.arange(30.0), design={"kind": kind}), MOST_TEN)
+    assert found.asynchrony_max.sel(statistic="maximum").item() == 29.0
+    assert np.isnan(found.asynchrony_max.sel(statistic="mean"))
+    assert np.isnan(found.outcome_share).all()
+    assert verdict(found) == Verdict.NO_POPULATION
+    assert found.samples_violating.item() == 19
+    assert "stands for no population" in text_of(found)
+
+
+def test_an_older_file_tells_its_design_in_its_text():
+    made = campaign(response(points("random", 60, 1, 0)))
+    del made.attrs["design"]
+    made.attrs["campaign"] = 'design = { kind = "random", samples = 60 }'
+    assert analyse(made).attrs["design"] == "random"
+    del made.attrs["campaign"]
+    assert "does not tell its design" in analyse(made).attrs["intervals"]
+
+
+def test_errors_stand_side_by_side():
+    values = np.random.default_rng(0).normal(9.0, 1.0, 100)
+    bars = np.where(np.arange(100) % 8 == 0, 0.5, np.nan)
+    more = {
+        "asynchrony_max_error": bars, "asynchrony_max_checked": values + 0.02,
+        "status_checked": np.where(np.arange(100) < 50, 0, -1),
+    }  # fmt: skip
+    found = analyse(campaign(values, **more))
+    sampling, numerical, engines = found.asynchrony_max_error_of_mean.values
+    assert sampling == pytest.approx(values.std(ddof=1) / 10)
+    assert numerical == pytest.approx(0.5)
+    assert engines == pytest.approx(0.02)
+    assert told(found)[-1].split()[-1] == "numerical"
+    alone = analyse(campaign(values, asynchrony_max_error=bars))
+    assert "numerical (engines unknown)" in told(alone)[-1]
+
+
+def test_a_campaign_of_which_every_run_failed_is_told():
+    status = np.full(12, Status.DIVERGED)
+    found = analyse(campaign(np.full(12, np.nan), status=status, outcome=np.zeros(12)), MOST_TEN)
+    assert verdict(found) == Verdict.NOT_YET_SHOWN
+    assert found.outcome_share.sel(kind="lost: diverged").item() == 1.0
+    assert "12 of 12" in text_of(found)
+
+
+@pytest.mark.parametrize(
+    ("made", "wanted", "words"),
+    [
+        (xr.Dataset({"status": 0}), None, "only a campaign can be analysed"),
+        (
+            campaign([1.0, 2.0]),
+            {"peak_tension": MOST_TEN["asynchrony_max"]},
+            "the file has no such output",
+        ),
+        (campaign([1.0, np.nan]), MOST_TEN, "1 samples reached their goal without a value"),
+    ],
+)
+def test_what_cannot_be_judged_is_refused(made, wanted, words):
+    with pytest.raises(InputError, match=words):
+        analyse(made, wanted)
