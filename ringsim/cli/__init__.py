@@ -15,7 +15,7 @@ VERBS = {
     "scenes": "List the built-in scenes.",
     "check": "Check a scene file and say what it builds.",
     "run": "Run one scene.",
-    "plot": "Draw the figures of a run from its file.",
+    "plot": "Draw the figures of a run or a campaign from its file.",
     "explain": "Say what the variables of a result mean.",
     "campaign": "Run a campaign, or finish an interrupted one.",
     "status": "Tell how far a campaign is.",
