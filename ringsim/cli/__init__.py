@@ -20,6 +20,7 @@ VERBS = {
     "campaign": "Run a campaign, or finish an interrupted one.",
     "status": "Tell how far a campaign is.",
     "merge": "Put the results of a campaign into one file.",
+    "report": "Write one page about a campaign: outcomes, figures, failures, model.",
     "replay": "Run one sample of a campaign again, in the foreground.",
     "stability": "Map where the solver is sound, and how runs end where it is not.",
     "accuracy": "Compare numerical settings of a scene: error against run time.",

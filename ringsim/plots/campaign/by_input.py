@@ -61,7 +61,7 @@ def by_input(campaign: xr.Dataset) -> Figure:
             axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
             axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.set_ylim(low - 0.24 * size, high + 0.1 * size)
-        axes.set_xlabel(_label(campaign[each]), fontsize=9)
+        axes.set_xlabel(_label(campaign[each]), fontsize=9, labelpad=9)
         if number % columns == 0 and name:
             axes.set_ylabel(style.label(campaign[name], width=30), fontsize=9)
     handles, labels = panels[0].get_legend_handles_labels()

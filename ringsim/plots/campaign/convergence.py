@@ -3,6 +3,7 @@
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ringsim.analysis.campaign_samples import campaign_file, scalars, told, values_of
 from ringsim.outputs.family import Array
@@ -46,6 +47,7 @@ def convergence(campaign: xr.Dataset) -> Figure:
         axes.set_title(style.label(campaign[name], width=42), fontsize=9.5, color=style.INK)
         if number + columns >= len(names):
             axes.set_xlabel("Samples")
+        axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
     most = max((len(values_of(campaign, name)[0]) for name in names), default=0)

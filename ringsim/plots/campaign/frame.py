@@ -34,7 +34,8 @@ def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> No
     words = textwrap.fill(caption, int(12.0 * inches))
     if figure.legends:  # what stands outside of the axes twice would stand on one another
         (legend,) = figure.legends
-        legend.set_title(words, prop={"size": 9})
+        legend.set_title(words)
+        legend.get_title().set_fontsize(9)
         legend.get_title().set_color(style.GREY)
     else:
         figure.supxlabel(words, x=0.012, ha="left", fontsize=9, color=style.GREY)

@@ -38,8 +38,8 @@ def lock_order(campaign: xr.Dataset) -> Figure:
     sections, planes = campaign["section"].values, campaign["plane"].values.tolist()
     figure = Figure(figsize=(max(6.4, 0.42 * len(sections) + 2.0), 1.9 * len(planes) + 1.4))
     grid = figure.subplots(len(planes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    looks = (("locks first", style.BLUE, ""), ("locks last", style.ORANGE, "////"),
-             ("does not lock", style.GREY, "...."))  # fmt: skip
+    looks = (("locks first", style.BLUE, ""), ("locks last", style.ORANGE, "//"),
+             ("does not lock", style.GREY, ".."))  # fmt: skip
     drawn = [
         (look, table) for look, table in zip(looks, shares(campaign), strict=True) if table.any()
     ]
