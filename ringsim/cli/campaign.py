@@ -11,12 +11,13 @@ from ringsim.campaign.retry import FAILED, check_settings
 from ringsim.campaign.run import Choices, Share, run_campaign
 from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.campaign.status import plan
-from ringsim.cli.options import PATH, SETTINGS
+from ringsim.cli.options import PATH, PLOT_FORMAT, SETTINGS, require_plot
 from ringsim.execution.local import Local, Serial
 from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
 from ringsim.execution.work import Scheduler
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.refusal import InputError
+from ringsim.storage.merge import NAME as MERGED
 from ringsim.storage.netcdf import DESIGN
 from ringsim.variables import Status
 
@@ -41,12 +42,14 @@ from ringsim.variables import Status
     help="Run the failed samples again, too; with --set only these, with other solver settings.",
 )  # fmt: skip
 @click.option("--dry-run", is_flag=True, help="Show plan and predicted cost; keep nothing.")
+@click.option("--plot", is_flag=True, help="Draw figures beside campaign.nc.")
+@PLOT_FORMAT
 @click.option("--solver", default="", hidden=True)
 @click.option("--judge", default=SOLVERS["full"], hidden=True)
 def command(
     file: Path, workers: int | None, settings: dict[str, Any], samples: int | None,
-    out: Path | None, part: str, *, retry_failed: bool, dry_run: bool, solver: str,
-    judge: str,
+    out: Path | None, part: str, *, retry_failed: bool, dry_run: bool, plot: bool,
+    formats: tuple[str, ...] | None, solver: str, judge: str,
 ) -> int:  # fmt: skip
     """Run the campaign of FILE; the same command again goes on with what is missing.
 
@@ -55,6 +58,7 @@ def command(
     the frame engine differs from the full one by more than max_difference, 130 stopped by a signal.
     """
     size = launched_size()
+    require_plot(formats, plot=plot)
 
     def prepare() -> tuple[Path, tuple[Any, ...]]:
         if size > 1 and workers is not None and not dry_run:
@@ -84,18 +88,33 @@ def command(
         again = FAILED if retry_failed else frozenset[Status]()
         return folder, (wanted.limits, wanted.max_failed, share, again, theirs)
 
+    def draw(folder: Path) -> None:
+        # As long as samples are left, a file would be an older one.
+        if not plot or len(open_folder(folder).survey().missing):
+            return
+        import xarray as xr
+
+        from ringsim.plots.campaign.figures import draw_campaign
+
+        found = xr.load_dataset(folder / MERGED, engine="netcdf4")
+        for picture in draw_campaign(found, folder, formats=formats or ("png",)):
+            click.echo(f"wrote {picture}")
+
     if dry_run:
         prepare()
         return EXIT_DONE
     if size == 1:
-        return _run(Serial() if workers == 0 else Local(workers or 1), prepare)
+        return _run(Serial() if workers == 0 else Local(workers or 1), prepare, draw)
     world = mpi_world()
     with aborting(world):
-        return _run(Mpi(world), prepare)
+        return _run(Mpi(world), prepare, draw)
 
 
-def _run(scheduler: Scheduler, prepare: Callable[[], tuple[Path, tuple[Any, ...]]]) -> int:
-    """Prepare on rank 0 and run on all ranks; what is refused is told once."""
+def _run(
+    scheduler: Scheduler, prepare: Callable[[], tuple[Path, tuple[Any, ...]]],
+    draw: Callable[[Path], None],
+) -> int:  # fmt: skip
+    """Prepare on rank 0, run on all ranks, draw on rank 0; what is refused is told once."""
     prepared: Any = None
     if scheduler.rank == 0:
         try:
@@ -106,7 +125,10 @@ def _run(scheduler: Scheduler, prepare: Callable[[], tuple[Path, tuple[Any, ...]
         if isinstance(prepared := scheduler.from_first(prepared), InputError):
             raise prepared
         folder, choices = prepared
-        return run_campaign(folder, Choices(scheduler, *choices))
+        code = run_campaign(folder, Choices(scheduler, *choices))
+        if scheduler.rank == 0:
+            draw(folder)
+        return code
     except InputError as error:
         if scheduler.rank == 0:
             click.echo(str(error), err=True)

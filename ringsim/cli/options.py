@@ -39,3 +39,11 @@ SETTINGS = click.option(
     help="Replace a value, e.g. loads.force=0.02, rods.young_modulus[3]=1e11, net=none.",
 )  # fmt: skip
 """Gives values by scene path."""
+
+
+def require_plot(formats: tuple[str, ...] | None, *, plot: bool) -> None:
+    """Refuse (InputError) formats of figures that nobody draws."""
+    if formats is not None and not plot:
+        raise InputError(
+            f"--plot-format {','.join(formats)}: says nothing without --plot; give both"
+        )

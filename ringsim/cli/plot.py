@@ -13,9 +13,13 @@ from ringsim.refusal import InputError
 @PLOT_FORMAT
 @click.option("--out", metavar="DIR", type=PATH, help="Folder for the figures (default: FILE's).")
 def command(file: Path, formats: tuple[str, ...] | None, out: Path | None) -> None:
-    """Draw the figures of a run from FILE, which ringsim run or replay --save has written."""
+    """Draw the figures of a run, or of a campaign, from its FILE.
+
+    FILE is what ringsim run, ringsim replay --save, ringsim campaign or ringsim merge has written.
+    """
     import xarray as xr
 
+    from ringsim.plots.campaign.figures import draw_campaign
     from ringsim.plots.run import draw_run
 
     try:
@@ -26,15 +30,16 @@ def command(file: Path, formats: tuple[str, ...] | None, out: Path | None) -> No
             f"{file}: cannot be read as a netCDF file: {reason}; give a file that ringsim run has "
             "written"
         ) from None
-    if "sample" in dataset.dims:
+    campaign = "sample" in dataset.dims
+    needed = {"scene", "campaign"} if campaign else {"scene", "reason"}
+    if not needed <= dataset.attrs.keys() or "status" not in dataset:
         raise InputError(
-            f"{file}: holds {dataset.sizes['sample']} samples of a campaign: write one of them "
-            "with ringsim replay FOLDER SAMPLE --save run.nc, and plot that file"
+            f"{file}: holds neither a run nor a campaign: give a file that ringsim run or ringsim "
+            "campaign has written (campaign.nc)"
         )
-    if not {"scene", "reason"} <= dataset.attrs.keys() or "status" not in dataset:
-        raise InputError(f"{file}: holds no run: give a file that ringsim run has written")
-    drawn = draw_run(dataset, file.parent if out is None else out, file.stem, formats or ("png",))
+    draw = draw_campaign if campaign else draw_run
+    drawn = draw(dataset, file.parent if out is None else out, file.stem, formats or ("png",))
     for picture in drawn:
         click.echo(f"wrote {picture}")
     if not drawn:
-        click.echo(f"{file}: nothing to draw: the run ended before its first record")
+        click.echo(f"{file}: nothing to draw: no run got as far as its first record")

@@ -7,7 +7,7 @@ import click
 import numpy as np
 
 from ringsim.choice import kind_of
-from ringsim.cli.options import PATH, PLOT_FORMAT, SCENE, SETTINGS
+from ringsim.cli.options import PATH, PLOT_FORMAT, SCENE, SETTINGS, require_plot
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
@@ -52,10 +52,7 @@ def command(
     for name, value in (("--of", of), ("--evidence", evidence)):
         if value is not None and accuracy is None:
             raise InputError(f"{name} {value}: says nothing without --accuracy; give both")
-    if formats is not None and not plot:
-        raise InputError(
-            f"--plot-format {','.join(formats)}: says nothing without --plot; give both"
-        )
+    require_plot(formats, plot=plot)
     chosen = chosen.with_values(settings)
     if fidelity == "ideal" and chosen.record.stress:
         chosen = chosen.with_values({"record.stress": False})

@@ -1,0 +1,116 @@
+"""Which samples of a merged campaign count, what became of each, and which one stands for many."""
+
+import json
+import tomllib
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ringsim.outputs import VARIABLES
+from ringsim.variables import Fate, Status
+
+NUMERICAL = ("energy_error", "constraint_error")
+"""Main numbers that tell about the solution, not about the antenna."""
+_EFFORT = ("wall_time",)
+
+
+def used(campaign: xr.Dataset) -> xr.Dataset:
+    """The samples whose numbers hold; the others are told, and never counted."""
+    return campaign.isel(sample=np.flatnonzero(campaign["status"].to_numpy() == Status.OK))
+
+
+def endings(campaign: xr.Dataset) -> NDArray[np.str_]:
+    """What became of each sample in words: an outcome, or why its numbers do not hold; (sample,).
+
+    >>> codes = {"status": ("sample", [0, 0, 7, -1]), "outcome": ("sample", [1, 3, 0, -1])}
+    >>> endings(xr.Dataset(codes)).tolist()
+    ['deployed', 'stalled', 'failed: memory', 'not run']
+    """
+    status = campaign["status"].to_numpy()
+    fates = campaign["outcome"].to_numpy() if "outcome" in campaign else np.zeros_like(status)
+    known = {int(fate) for fate in Fate}
+    words = []
+    for code, fate in zip(status.tolist(), fates.tolist(), strict=True):
+        if code < 0:
+            words.append("not run")
+        elif Status(code).failed:
+            words.append(f"failed: {Status(code).word.replace('_', ' ')}")
+        else:
+            named = Fate(fate) if fate in known else Fate.NONE
+            words.append("ok" if named == Fate.NONE else named.word.replace("_", " "))
+    return np.array(words, dtype=str)
+
+
+def told(campaign: xr.Dataset, counted: int) -> str:
+    """How many samples a statement counts, and what became of those that it does not.
+
+    ``counted`` are samples that are ``used`` and have the value in question.
+    """
+    words = endings(campaign)
+    good = campaign["status"].to_numpy() == Status.OK
+    left = [f"{count} {word}" for word, count in Counter(words[~good].tolist()).items()]
+    if without := int(good.sum()) - counted:
+        left.append(f"{without} without a value")
+    lost = f"; left out: {', '.join(left)}" if left else "; none lost"
+    return f"{counted} of {len(words)} samples{lost}"
+
+
+def scalars(campaign: xr.Dataset) -> list[str]:
+    """Main numbers of the antenna that some sample has, in the order of summaries."""
+    good = used(campaign)
+    return [
+        name
+        for name, variable in VARIABLES.items()
+        if variable.summary is not None
+        and variable.dtype == "f8"
+        and name not in (*NUMERICAL, *_EFFORT)
+        and name in good
+        and bool(np.isfinite(good[name]).any())
+    ]
+
+
+def values_of(campaign: xr.Dataset, name: str) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Samples that are used and have a finite value, and these values."""
+    good = used(campaign)
+    values = good[name].to_numpy().astype(float)
+    known = np.isfinite(values)
+    return good["sample"].to_numpy()[known], values[known]
+
+
+def judged_by(campaign: xr.Dataset) -> str:
+    """The number by which samples are ordered: asynchrony, or the time if there is none; ""."""
+    names = scalars(campaign)
+    return next((n for n in ("asynchrony_max", "deployment_time") if n in names), "")
+
+
+def median_and_worst(campaign: xr.Dataset) -> tuple[int, int] | None:
+    """The samples in the middle and at the end of that order; None if no sample is used."""
+    if not (name := judged_by(campaign)):
+        samples = used(campaign)["sample"].to_numpy()
+        return (int(samples[0]), int(samples[0])) if len(samples) else None
+    samples, values = values_of(campaign, name)
+    order = np.argsort(values, kind="stable")
+    return int(samples[order[(len(order) - 1) // 2]]), int(samples[order[-1]])
+
+
+def inputs(campaign: xr.Dataset) -> list[str]:
+    """Names of the drawn inputs."""
+    return [str(n) for n, v in campaign.data_vars.items() if v.attrs.get("role") == "input"]
+
+
+def campaign_file(campaign: xr.Dataset) -> dict[str, Any]:
+    """The tables of the campaign's file, which the dataset keeps as text."""
+    return tomllib.loads(str(campaign.attrs.get("campaign", "")))
+
+
+def distribution_of(variable: xr.DataArray) -> dict[str, Any]:
+    """A drawn input's distribution; {"text": ...} where it came out of a list."""
+    text = str(variable.attrs.get("distribution", ""))
+    try:
+        found = json.loads(text)
+    except ValueError:
+        found = None
+    return found if isinstance(found, dict) else {"text": text}

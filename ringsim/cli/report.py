@@ -1,0 +1,42 @@
+"""``ringsim report``: a campaign as one page."""
+
+from pathlib import Path
+
+import click
+
+from ringsim.cli.options import PATH
+from ringsim.files import require_place
+from ringsim.refusal import InputError
+
+
+@click.command()
+@click.argument("folder", metavar="DIR", type=PATH)
+@click.option("--out", metavar="FILE", type=PATH, default=Path("report.html"), show_default=True)
+def command(folder: Path, out: Path) -> None:
+    """Write one page about the campaign in DIR, which holds campaign.nc, or about such a file.
+
+    The page holds all that it shows, and loads nothing: it can be mailed, printed and kept.
+    """
+    import xarray as xr
+
+    from ringsim.report.page import LARGEST, write_report
+    from ringsim.storage.merge import NAME
+
+    require_place(out)
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"--out {out}: the page is HTML: write {out.stem}.html")
+    file = folder / NAME if folder.is_dir() else folder
+    if not file.exists():
+        what = f"holds no {NAME}: merge its results with ringsim merge {folder}"
+        what = what if folder.is_dir() else "there is no such folder: give that of a campaign"
+        raise InputError(f"{folder}: {what}")
+    try:
+        campaign = xr.load_dataset(file, engine="netcdf4")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{file}: cannot be read as a netCDF file: {error}; merge again") from None
+    if "sample" not in campaign.dims or not {"scene", "campaign"} <= campaign.attrs.keys():
+        raise InputError(f"{file}: holds no campaign: give the folder that ringsim campaign named")
+    size = write_report(campaign, out, str(file.parent))
+    click.echo(f"wrote {out} ({size / 1e6:.2f} MB)")
+    if size > LARGEST:
+        click.echo(f"{out}: larger than {LARGEST / 1e6:g} MB, the size it is meant to have")

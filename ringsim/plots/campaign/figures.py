@@ -1,0 +1,97 @@
+"""All figures that apply to a campaign."""
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ringsim.analysis.campaign_samples import inputs, judged_by, scalars, used
+from ringsim.files import writing
+from ringsim.plots import style
+from ringsim.plots.campaign.by_input import by_input
+from ringsim.plots.campaign.convergence import convergence
+from ringsim.plots.campaign.distributions import distributions
+from ringsim.plots.campaign.fan import fan
+from ringsim.plots.campaign.lag_map import lag_map
+from ringsim.plots.campaign.lock_order import lock_order
+from ringsim.plots.campaign.tension import tension
+
+
+class Picture(NamedTuple):
+    """A figure of a campaign, and what it needs."""
+
+    name: str
+    draw: Callable[[xr.Dataset], Figure]
+    words: str
+    """What it shows, for those who cannot see it."""
+    needs: tuple[str, ...] = ()
+    """Variables of which some used sample must have a value."""
+    of: Callable[[xr.Dataset], object] = bool
+    """What must hold beyond that."""
+
+
+PICTURES = (
+    Picture(
+        "distributions", distributions,
+        "Cumulative distribution of each main number, with its limits", of=scalars,
+    ),
+    Picture(
+        "fan", fan, "Deviation of each section from the mean opening angle, over all samples",
+        ("opening_angle", "final_time", "deployment_time"), judged_by,
+    ),
+    Picture(
+        "lag_map", lag_map, "Section by time: lag of the median and of the worst sample",
+        ("opening_angle", "final_time", "deployment_time"), judged_by,
+    ),
+    Picture(
+        "lock_order", lock_order, "How often each V-joint locks first, last and not at all",
+        ("lock_time",),
+    ),
+    Picture("by_input", by_input, "What became of each sample, by each drawn input", of=inputs),
+    Picture(
+        "convergence", convergence, "Mean and 95 % quantile as samples come in", of=scalars,
+    ),
+    Picture(
+        "tension", tension, "Largest tension of each span along the cables",
+        ("cable_tension", "final_time", "deployment_time"),
+    ),
+)  # fmt: skip
+
+
+def figures_of(campaign: xr.Dataset) -> Iterator[tuple[Picture, Figure]]:
+    """Every figure for which the samples of a merged campaign recorded something."""
+    good = used(campaign)
+    for picture in PICTURES:
+        # Of a number that no run has reached the file still has the variable.
+        needed = [good[n] for n in picture.needs if n in good]
+        there = len(needed) == len(picture.needs)
+        if there and picture.needs[:1]:
+            there = bool(np.isfinite(needed[0]).any())
+        if there and picture.of(campaign):
+            yield picture, picture.draw(campaign)
+
+
+def draw_campaign(
+    campaign: xr.Dataset,
+    folder: str | Path,
+    name: str = "campaign",
+    formats: Sequence[str] = ("png",),
+) -> list[Path]:
+    """Write every figure of a merged campaign as NAME-fig-FIGURE.png; see ``draw_run``.
+
+    Returns the files written, none if no sample has run.  InputError if one cannot be written.
+    """
+    folder = Path(folder)
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for picture, figure in figures_of(campaign):
+        for kind in formats:
+            path = folder / f"{name}-fig-{picture.name}.{kind}"
+            with writing(folder):
+                style.write(figure, path)
+            written.append(path)
+    return written

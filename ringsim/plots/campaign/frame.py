@@ -1,0 +1,46 @@
+"""Head, caption and colours that the figures of a campaign share."""
+
+import textwrap
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ringsim.plots import style
+
+QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
+"""What bands show: all samples, nine in ten, the median."""
+LOOKS = {
+    "deployed": (style.BLUE, "o"),
+    "ok": (style.BLUE, "o"),
+    "finished": (style.BLUE, "o"),
+    "folded": (style.SKY, "o"),
+    "partly deployed": (style.ORANGE, "D"),
+    "stalled": (style.VERMILLION, "s"),
+    "overloaded": (style.PURPLE, "^"),
+    "cut off": (style.GREEN, "v"),
+    "not run": (style.GREY, "|"),
+}
+"""Colour and marker of an ending; the marker tells what the colour may not."""
+FAILED = tuple((style.INK, marker) for marker in "x+1234")
+
+
+def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> None:
+    """Subject and campaign above the sheet, the number of samples and their fate below it."""
+    inches = figure.get_size_inches()[0]
+    name = str(campaign.attrs.get("title", "")).strip()
+    style.title(figure, textwrap.fill(f"{subject}: {name}".rstrip(": "), int(10.3 * inches)))
+    words = textwrap.fill(caption, int(12.0 * inches))
+    if figure.legends:  # what stands outside of the axes twice would stand on one another
+        (legend,) = figure.legends
+        legend.set_title(words)
+        legend.get_title().set_fontsize(9)
+        legend.get_title().set_color(style.GREY)
+    else:
+        figure.supxlabel(words, x=0.012, ha="left", fontsize=9, color=style.GREY)
+
+
+def bands(values: NDArray[np.floating]) -> NDArray[np.floating]:
+    """``QUANTILES`` over the first axis, NaN left out; shape (5, ...)."""
+    return np.asarray(np.nanquantile(values, QUANTILES, axis=0))

@@ -1,0 +1,58 @@
+"""One page about a campaign, out of its merged file."""
+
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import xarray as xr
+
+from ringsim.analysis.campaign_notes import budget_lines, override_lines, peak_lines, restart_lines
+from ringsim.analysis.campaign_samples import campaign_file, endings
+from ringsim.files import write_text
+from ringsim.plots.campaign.figures import figures_of
+from ringsim.plots.inline import inline
+from ringsim.report import model, tables
+from ringsim.report.player import player
+
+LARGEST = 2_000_000
+"""Bytes of a page: it is to go by mail."""
+
+
+def write_report(campaign: xr.Dataset, out: Path, folder: str) -> int:
+    """Write the page of a merged campaign, which is in memory; returns its size in bytes.
+
+    ``folder`` is what readers of the page give to ``ringsim replay``.  InputError if the file
+    cannot be written.
+    """
+    text = page(campaign, folder)
+    write_text(out, text)
+    return len(text.encode("utf-8"))
+
+
+def page(campaign: xr.Dataset, folder: str) -> str:
+    """The page as text: nothing in it refers to another file or address."""
+    wanted = campaign_file(campaign)
+    failures, more = tables.failures(campaign, folder)
+    values, head = model.values(campaign)
+    figures = [(p.name, p.words, inline(f, p.name, p.words)) for p, f in figures_of(campaign)]
+    notes = [*restart_lines(campaign), *override_lines(campaign), *budget_lines(campaign)]
+    shell = jinja2.Environment(
+        loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
+        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    design = dict(wanted.get("design", {}))
+    context: dict[str, Any] = {
+        "title": campaign.attrs.get("title", "Campaign"),
+        "name": campaign.attrs.get("campaign_name", ""),
+        "samples": campaign.sizes["sample"], "used": int(tables.used_places(campaign).sum()),
+        "not_run": int((endings(campaign) == "not run").sum()),
+        "design": design.pop("kind", "unknown"), "design_more": design,
+        "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),
+        "outcomes": tables.outcomes(campaign), "statistics": tables.statistics(campaign),
+        "requirements": tables.requirements(campaign), "peaks": peak_lines(campaign),
+        "figures": figures, "player": player(campaign), "failures": failures, "more": more,
+        "truth": tables.truth(campaign), "notes": notes, "inputs": tables.drawn(campaign),
+        "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),
+        "provenance": list(tables.provenance(campaign)),
+    }  # fmt: skip
+    return shell.get_template("page.html.j2").render(context)

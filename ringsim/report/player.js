@@ -1,0 +1,209 @@
+"use strict";
+(() => {
+  const data = JSON.parse(document.getElementById("player-data").textContent);
+  const UNKNOWN = -32768;
+  const ints = (text) =>
+    new Int16Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+  const samples = data.samples.map((each) => ({ ...each, angles: ints(each.angles) }));
+  const ring = { ...data.ring, points: ints(data.ring.points) };
+  const joints = ring.joints;
+  const LOOKS = {
+    diagonals: ["#0072b2", 1.5], bars: ["#b5552a", 1.5], "hinge assemblies": ["#222222", 3],
+    boom: ["#6e6e6e", 5], "net, taut": ["#8fcfb5", 0.9],
+  };
+  const byId = (name) => document.getElementById(name);
+  const canvas = byId("scene"), pen = canvas.getContext("2d");
+  const slider = byId("moment"), button = byId("play"), told = byId("told");
+  let sample = samples[0], time = 0, azimuth = 0.75, elevation = 0.45, playing = false, last = 0;
+
+  const end = () => sample.times[sample.times.length - 1];
+
+  // Opening angles in degree of all V-joints at a time, linear between frames.
+  function anglesAt(moment) {
+    const times = sample.times;
+    let k = 1;
+    while (k < times.length - 1 && times[k] < moment) k += 1;
+    const w = Math.min(1, Math.max(0, (moment - times[k - 1]) / (times[k] - times[k - 1])));
+    const found = [];
+    for (let j = 0; j < joints; j += 1) {
+      const a = sample.angles[(k - 1) * joints + j], b = sample.angles[k * joints + j];
+      found.push(a === UNKNOWN || b === UNKNOWN ? NaN : (a + w * (b - a)) / 100);
+    }
+    return found;
+  }
+
+  // Points of the ring, [x, y, z] in m: the fixed ones, then the V-joints.
+  function pointsAt(angles, mean) {
+    const means = ring.means, all = ring.fixed + 2 * joints;
+    let k = 1;
+    while (k < means.length - 1 && means[k] < mean) k += 1;
+    const w = Math.min(1, Math.max(0, (mean - means[k - 1]) / (means[k] - means[k - 1])));
+    const at = (n) => [0, 1, 2].map((i) => {
+      const a = ring.points[((k - 1) * all + n) * 3 + i], b = ring.points[(k * all + n) * 3 + i];
+      return ring.unit * (a + w * (b - a));
+    });
+    const found = [];
+    for (let n = 0; n < ring.fixed; n += 1) found.push(at(n));
+    for (let j = 0; j < joints; j += 1) {
+      const middle = at(ring.fixed + j), aside = at(ring.fixed + joints + j);
+      const folded = Math.cos((angles[j] * Math.PI) / 360);
+      found.push(middle.map((m, i) => m + folded * aside[i]));
+    }
+    return found;
+  }
+
+  // Orange ahead, grey with the mean, purple behind: safe for the colour-blind.
+  function colour(lag, most) {
+    const share = Math.max(-1, Math.min(1, lag / most)), full = share > 0 ? [200, 90, 0] : [84, 39, 136];
+    const mix = full.map((c) => Math.round(190 + Math.abs(share) ** 0.7 * (c - 190)));
+    return `rgb(${mix})`;
+  }
+
+  const largest = new Map();
+  function mostLag() {
+    if (!largest.has(sample)) {
+      let most = 0.01;
+      for (const moment of sample.times) {
+        const angles = anglesAt(moment), mean = angles.reduce((a, b) => a + b, 0) / joints;
+        for (const angle of angles) if (Math.abs(angle - mean) > most) most = Math.abs(angle - mean);
+      }
+      largest.set(sample, most);
+    }
+    return largest.get(sample);
+  }
+
+  function dot(x, y, size, lag, locked) {
+    pen.globalAlpha = 1;
+    pen.beginPath();
+    pen.arc(x, y, size, 0, 2 * Math.PI);
+    pen.fillStyle = colour(lag, mostLag());
+    pen.fill();
+    if (locked) { pen.lineWidth = 1.5; pen.strokeStyle = "#222"; pen.stroke(); }
+  }
+
+  // The size of the deployed ring, so that it grows into the sheet.
+  const reach = (() => {
+    let flat = 0, high = 0;
+    for (let n = 0; n < ring.points.length; n += 3) {
+      flat = Math.max(flat, Math.hypot(ring.points[n], ring.points[n + 1]));
+      high = Math.max(high, Math.abs(ring.points[n + 2]));
+    }
+    return [ring.unit * flat, ring.unit * high];
+  })();
+
+  function drawRing(width, height, angles, mean) {
+    const points = pointsAt(angles, mean);
+    const [ca, sa, ce, se] = [Math.cos(azimuth), Math.sin(azimuth), Math.cos(elevation), Math.sin(elevation)];
+    const scale = 0.94 * Math.min(width / 2 / reach[0], height / 2 / (reach[0] * Math.abs(se) + reach[1] * ce));
+    const seen = points.map(([x, y, z]) => {
+      const out = ca * x + sa * y;
+      return [width / 2 + scale * (ca * y - sa * x), height / 2 - scale * (ce * z - se * out), ce * out + se * z];
+    });
+    const order = ring.lines.map((line) => [line, seen[line[0]][2] + seen[line[1]][2]]);
+    order.sort((a, b) => a[1] - b[1]);
+    pen.lineCap = "round";
+    for (const [[from, to, group], near] of order) {
+      const [ink, thick] = LOOKS[ring.groups[group]] || ["#6e6e6e", 1.2];
+      pen.globalAlpha = Math.max(0.3, Math.min(1, 0.7 + (0.3 * near) / 2 / reach[0]));
+      pen.strokeStyle = ink;
+      pen.lineWidth = thick;
+      pen.beginPath();
+      pen.moveTo(seen[from][0], seen[from][1]);
+      pen.lineTo(seen[to][0], seen[to][1]);
+      pen.stroke();
+    }
+    const faces = angles.map((angle, j) => [angle, seen[ring.fixed + j]]).sort((a, b) => a[1][2] - b[1][2]);
+    for (const [angle, [x, y]] of faces) dot(x, y, 4.5, angle - mean, angle > 179.99);
+  }
+
+  function drawLag(width, height, angles, mean) {
+    const most = mostLag(), count = data.sections.length, left = 46, low = height - 34, top = 14;
+    const x = (n) => left + ((n + 0.5) * (width - left - 8)) / count;
+    const y = (lag) => (top + low) / 2 - (lag / most) * 0.46 * (low - top);
+    pen.globalAlpha = 1;
+    pen.fillStyle = pen.strokeStyle = "#6e6e6e";
+    pen.lineWidth = 0.8;
+    pen.font = "12px system-ui, sans-serif";
+    for (const lag of [-most, 0, most]) {
+      pen.beginPath(); pen.moveTo(left, y(lag)); pen.lineTo(width, y(lag)); pen.stroke();
+      pen.fillText(lag.toPrecision(2), 4, y(lag) + 4);
+    }
+    const step = Math.ceil(count / (width / 40));
+    data.sections.forEach((name, n) => { if (n % step === 0) pen.fillText(name, x(n) - 4, low + 14); });
+    pen.fillText(`deviation from the mean (degree) by section: ${data.planes.join(" solid, ")} dashed`, left, height - 4);
+    data.planes.forEach((_, plane) => {
+      pen.setLineDash(plane ? [5, 3] : []);
+      pen.beginPath();
+      for (let n = 0; n < count; n += 1) pen.lineTo(x(n), y(angles[plane * count + n] - mean));
+      pen.stroke();
+      pen.setLineDash([]);
+      for (let n = 0; n < count; n += 1) {
+        const angle = angles[plane * count + n];
+        dot(x(n), y(angle - mean), 4.5, angle - mean, angle > 179.99);
+      }
+    });
+  }
+
+  function draw() {
+    const width = canvas.clientWidth, height = canvas.clientHeight, sharp = window.devicePixelRatio || 1;
+    if (canvas.width !== Math.round(width * sharp)) {
+      canvas.width = Math.round(width * sharp);
+      canvas.height = Math.round(height * sharp);
+    }
+    pen.setTransform(sharp, 0, 0, sharp, 0, 0);
+    pen.clearRect(0, 0, width, height);
+    const angles = anglesAt(time), mean = angles.reduce((a, b) => a + b, 0) / joints;
+    (byId("view").value === "ring" ? drawRing : drawLag)(width, height, angles, mean);
+    const spread = Math.max(...angles) - Math.min(...angles);
+    told.textContent = `${time.toFixed(2)} s of ${end().toFixed(2)} s, mean opening angle ` +
+      `${mean.toFixed(1)} degree, asynchrony ${spread.toFixed(2)} degree.`;
+    slider.value = Math.round((1000 * time) / end());
+  }
+
+  function tick(now) {
+    if (!playing) return;
+    // A whole run lasts ten seconds, whatever the run's own clock says.
+    time += (end() * Math.min(100, now - last)) / 10000;
+    last = now;
+    if (time >= end()) { time = end(); setPlaying(false); }
+    draw();
+    if (playing) requestAnimationFrame(tick);
+  }
+
+  function setPlaying(on) {
+    playing = on;
+    button.textContent = on ? "Pause" : "Play";
+    if (!on) return;
+    if (time >= end()) time = 0;
+    last = performance.now();
+    requestAnimationFrame(tick);
+  }
+
+  button.addEventListener("click", () => setPlaying(!playing));
+  byId("view").addEventListener("change", draw);
+  byId("sample").addEventListener("change", (event) => {
+    sample = samples[Number(event.target.value)];
+    time = Math.min(time, end());
+    draw();
+  });
+  slider.addEventListener("input", () => { time = (slider.value / 1000) * end(); draw(); });
+  let held = null;
+  canvas.addEventListener("pointerdown", (event) => {
+    held = [event.clientX, event.clientY];
+    canvas.setPointerCapture(event.pointerId);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    if (held === null) return;
+    azimuth -= (event.clientX - held[0]) / 150;
+    elevation = Math.max(-1.5, Math.min(1.5, elevation + (event.clientY - held[1]) / 150));
+    held = [event.clientX, event.clientY];
+    draw();
+  });
+  for (const word of ["pointerup", "pointercancel"]) canvas.addEventListener(word, () => { held = null; });
+  window.addEventListener("resize", draw);
+  // Half open says more on paper than a folded bundle.
+  const mean = (moment) => anglesAt(moment).reduce((a, b) => a + b, 0) / joints;
+  const middle = (mean(0) + mean(end())) / 2;
+  time = sample.times.find((moment) => mean(moment) >= middle) || end();
+  draw();
+})();

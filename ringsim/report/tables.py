@@ -1,0 +1,169 @@
+"""The tables of a report: plain rows of text, out of a merged campaign."""
+
+import shlex
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ringsim.analysis.campaign_samples import (
+    NUMERICAL,
+    campaign_file,
+    distribution_of,
+    endings,
+    inputs,
+    scalars,
+    values_of,
+)
+from ringsim.refusal import show
+from ringsim.variables import GOALS, Cause, Status
+
+MOST_FAILURES = 100
+"""Rows of the table of failures; the page says how many more there are."""
+_SHOWN = ("title", "source", "execution", "seed", "solver", "identity", "date_created")
+Rows = list[list[str]]
+
+
+def number(value: float) -> str:
+    """As many digits as one reads."""
+    return f"{value:.5g}" if np.isfinite(value) else "-"
+
+
+def outcomes(campaign: xr.Dataset) -> Rows:
+    """Ending, samples, share of all."""
+    words = endings(campaign).tolist()
+    return [[word, str(n), f"{n / len(words):.1%}"] for word, n in Counter(words).most_common()]
+
+
+def statistics(campaign: xr.Dataset) -> Rows:
+    """A row a main number: what, unit, n, lost, mean, deviation, quantiles, extremes."""
+    rows = []
+    for name in scalars(campaign):
+        samples, values = values_of(campaign, name)
+        says, deviation = campaign[name].attrs, values.std(ddof=1) if len(values) > 1 else np.nan
+        low, high = int(values.argmin()), int(values.argmax())
+        rows.append([
+            str(says.get("long_name", name)), str(says.get("units", "1")), str(len(values)),
+            str(campaign.sizes["sample"] - len(values)), number(values.mean()), number(deviation),
+            *(number(q) for q in np.quantile(values, (0.05, 0.5, 0.95))),
+            f"{number(values[low])} ({samples[low]})", f"{number(values[high])} ({samples[high]})",
+        ])  # fmt: skip
+    return rows
+
+
+def requirements(campaign: xr.Dataset) -> Rows:
+    """Number, what is asked, met by how many of those that tell, and how many do not."""
+    rows = []
+    for name, wanted in campaign_file(campaign).get("requirements", {}).items():
+        if not isinstance(wanted, dict) or not {"min", "max", "is"} & wanted.keys():
+            continue
+        if "is" in wanted:
+            words, asked = endings(campaign), wanted["is"]
+            asked = [asked] if isinstance(asked, str) else asked
+            told = words[used_places(campaign)]
+            met, known = int(np.isin(told, [w.replace("_", " ") for w in asked]).sum()), len(told)
+        elif name in campaign:
+            values = values_of(campaign, name)[1]
+            low, high = wanted.get("min", -np.inf), wanted.get("max", np.inf)
+            met, known = int(((low <= values) & (values <= high)).sum()), len(values)
+        else:
+            met = known = 0
+        asked = ", ".join(f"{key} {value}" for key, value in wanted.items())
+        left = campaign.sizes["sample"] - known
+        rows.append([name, asked, f"{met} of {known}", str(left)])
+    return rows
+
+
+def used_places(campaign: xr.Dataset) -> Any:
+    """Whether the numbers of each sample hold."""
+    return campaign["status"].to_numpy() == Status.OK
+
+
+def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
+    """Sample, ending, cause, reason, command that repeats it; and how many are left out.
+
+    Runs that lost their numbers, and sound ones in which the antenna fell short of its goal.
+    """
+    words, goals = endings(campaign), [goal.word for goal in GOALS] + ["ok", "not run"]
+    causes = {int(cause): cause.word.replace("_", " ") for cause in Cause if cause}
+    rows = [
+        [
+            str(sample), words[place], causes.get(int(campaign["cause"][place]), ""),
+            str(campaign["reason"].values[place]), f"ringsim replay {shlex.quote(folder)} {sample}",
+        ]
+        for place, sample in enumerate(campaign["sample"].values.tolist())
+        if words[place] not in goals
+    ]  # fmt: skip
+    rows.sort(key=lambda row: not row[1].startswith("failed"))
+    return rows[:MOST_FAILURES], max(0, len(rows) - MOST_FAILURES)
+
+
+def drawn(campaign: xr.Dataset) -> Rows:
+    """Path, unit, places, distribution, and the values that came out."""
+    rows = []
+    for name in inputs(campaign):
+        variable = campaign[name]
+        says, values = distribution_of(variable), variable.to_numpy()
+        paths = says.pop("shared", None) or [str(variable.attrs.get("path") or name)]
+        says.pop("each_section", None)
+        kind = says.pop("kind", says.pop("text", ""))
+        law = ", ".join([kind, *(f"{key} {_short(value)}" for key, value in says.items())])
+        if values.dtype.kind in "OU":
+            counts = Counter(values.ravel().astype(str).tolist()).most_common(6)
+            extent = ", ".join(f"{word} ({n})" for word, n in counts)
+        else:
+            extent = f"{number(float(values.min()))} to {number(float(values.max()))}"
+        places = variable.shape[1] if variable.ndim > 1 else 1
+        unit = str(variable.attrs.get("units", "1"))
+        rows.append([", ".join(paths), unit, str(places), law, extent])
+    return rows
+
+
+def _short(value: Any) -> str:
+    return number(value) if isinstance(value, float) else show(value)
+
+
+def truth(campaign: xr.Dataset) -> Rows:
+    """What, samples, typical and largest size: errors of balance, error bars, second engines."""
+    rows = []
+    for name in NUMERICAL:
+        if name in campaign:
+            samples, values = values_of(campaign, name)
+            rows += _row(campaign[name], "", samples, values, np.median)
+    for name in scalars(campaign):
+        for suffix, words in (("_error", ""), ("_checked", "difference of the engines: ")):
+            if (other := name + suffix) not in campaign:
+                continue
+            samples, values = values_of(campaign, other)
+            if suffix == "_checked":
+                values = np.abs(values - campaign[name].sel(sample=samples).to_numpy())
+                samples, values = samples[np.isfinite(values)], values[np.isfinite(values)]
+                rows += _row(campaign[name], words, samples, values, _rms)
+            else:
+                rows += _row(campaign[other], words, samples, values, _rms)
+    return rows
+
+
+def _rms(values: Any) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _row(variable: xr.DataArray, words: str, samples: Any, values: Any, typical: Any) -> Rows:
+    if not len(values):
+        return []
+    units, most = str(variable.attrs.get("units", "1")), int(values.argmax())
+    what = words + str(variable.attrs.get("long_name", variable.name))
+    kind = "median" if typical is np.median else "rms"
+    return [[
+        what, units, str(len(values)), f"{float(typical(values)):.2g} ({kind})",
+        f"{values[most]:.2g} (sample {samples[most]})",
+    ]]  # fmt: skip
+
+
+def provenance(campaign: xr.Dataset) -> Iterator[tuple[str, str]]:
+    """Who computed it, when, with what."""
+    for name, value in campaign.attrs.items():
+        if name in _SHOWN or name.endswith("_version") or name in ("history", "git_commit"):
+            yield name.replace("_", " "), str(value)
