@@ -46,6 +46,7 @@ class CableDrive:
         self.ropes = self.chain.start(start.points)
         self.winches = Winches(present)
         self._answered: tuple[tuple[float, bytes, bytes], ChainState, Placed] | None = None
+        self._before: ChainState | None = None
         self.pattern = JacobianPattern(path, self.ropes, len(present) + faults)
         self._size = path.size + self.pattern.unknowns
         self.refusal = ""
@@ -85,7 +86,7 @@ class CableDrive:
 
         ``slopes`` are the derivatives of the cables' ideal paths after the opening angle, m/rad.
         """
-        self._answered = None
+        self._answered = self._before = None
         self.winches.advance(time, state, slopes)
 
     def current(self, position: Array, velocity: Array, time: float) -> ChainState:
@@ -101,6 +102,7 @@ class CableDrive:
         asked = (time, place.tobytes(), rates.tobytes())
         known = self._answered
         if known is None or known[0] != asked or known[1].ropes is not self.ropes:
+            self._before = None if known is None else known[1]
             known = self._answered = asked, *self.evaluate(place, rates, time)
         return known[1:]
 
@@ -126,7 +128,7 @@ class CableDrive:
                 left: Array | float = 1.0
                 if self.winches.answering:
                     left = self.winches.stiffness_left(t, self.ropes, state.paths, state.path_rates)
-                triplets = self.pattern.triplets(state, placed, by_q, by_rate, left)
+                triplets = self.pattern.triplets(state, placed, by_q, by_rate, left, self._before)
         except ValueError as error:
             self.refusal = str(error)
             triplets = self.pattern.empty()
