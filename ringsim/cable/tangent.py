@@ -73,28 +73,13 @@ def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent
     )
 
 
-def friction_rates(state: ChainState, before: ChainState | None) -> Array:
-    """Derivative of each pulley's exponent p = tanh(s / s_slip) after its speed s, in s/m.
-
-    Between iterates of Newton more than s_slip apart, the one ``before`` and this one, it is the
-    secant: tangents are flat on both sides of the passage from one direction to the other, and
-    Newton would jump across it to and fro for ever.
-    """
-    slip, tangents = state.slip_speeds, (1.0 - state.exponents**2) / state.slip_speeds
-    if before is None or before.ropes is not state.ropes:
-        return np.asarray(tangents)
-    apart = state.speeds - before.speeds
-    far = np.abs(apart) > slip
-    return np.where(far, (state.exponents - before.exponents) / np.where(far, apart, 1.0), tangents)
-
-
 def decay_tangent(
-    state: ChainState, tangent: RopeTangent, rope: int, rates: Array
+    state: ChainState, tangent: RopeTangent, rope: int, slopes: Array
 ) -> tuple[Array, Array]:
-    """The decay part of one rope, whose pulleys have these ``friction_rates``: how the shares of
-    its spans change.
+    """The decay part of one rope: how the shares of its spans change.
 
-    Derivatives of each span's tension after each difference of points (N/m) and of velocities
+    ``slopes`` are the derivatives of the pulleys' exponents after the rope's speed, in s/m, shape
+    (pulleys,).  Derivatives of each span's tension after each difference of points (N/m) and of velocities
     (N s/m), shape (n, n, 3) each.
     """
     spans, inner = tangent.spans, state.ropes.inner(rope)
@@ -108,7 +93,7 @@ def decay_tangent(
 
     # Each pulley's p ln(eta) after the differences, shape (pulleys, spans, 3).
     exponent = state.exponents[inner]
-    sensitivity = state.log_decays[inner] * rates[inner]
+    sensitivity = state.log_decays[inner] * slopes[inner]
     steadily = float(state.wound_rates[rope]) + ratio * path_rate
     by_length = (sensitivity * (steadily / path))[:, None] * beyond_less_part
     by_length += (sensitivity * (ratio / path) * (part_rate - part * path_rate))[:, None]

@@ -14,7 +14,7 @@ import numpy as np
 
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.state import ChainState
-from ringsim.cable.tangent import RopeTangent, decay_tangent, friction_rates, rope_tangent
+from ringsim.cable.tangent import RopeTangent, decay_tangent, rope_tangent
 from ringsim.engine.cable_path import CablePath, Placed
 from ringsim.engine.rotations import Array, Indices
 
@@ -83,25 +83,24 @@ class JacobianPattern:
         placed: Placed,
         by_q: float,
         by_rate: float,
+        slopes: Array,
         left: Array | float = 1.0,
-        before: ChainState | None = None,
     ) -> Array:
         """All entries as (row, column, value), shape (entries, 3), until the next call.
 
         ``by_q`` and ``by_rate`` multiply the derivatives after coordinates and after rates;
-        ``left`` is the share of each rope's stiffness that its winches do not answer, ``before``
-        Newton's iterate before this one.
+        ``slopes`` are those of the pulleys' friction (see ``ringsim.cable.turning``), and ``left``
+        is the share of each rope's stiffness that its winches do not answer.
         """
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
         turned = maps.transpose(0, 2, 1)
         directions = np.empty((len(self._tensions), 3, 3))
         shares = np.broadcast_to(left, len(state.natural))
         parts: list[Array] = []
-        rates = friction_rates(state, before)
         for rope in range(len(state.natural)):
             tangent = rope_tangent(state, placed.velocities, rope)
             directions[tangent.spans] = tangent.by_direction
-            parts += self._rope(state, tangent, rope, by_q, by_rate, float(shares[rope]), rates)
+            parts += self._rope(state, tangent, rope, by_q, by_rate, slopes, float(shares[rope]))
         blocks = [
             -maps,
             turned @ state.directions[self._span, :, None],
@@ -126,8 +125,8 @@ class JacobianPattern:
         rope: int,
         by_q: float,
         by_rate: float,
+        slopes: Array,
         left: float,
-        rates: Array,
     ) -> list[Array]:
         """How a rope's span tensions follow its mean tension and the differences of its points."""
         spans, mean = tangent.spans, self._means[rope : rope + 1, None]
@@ -137,10 +136,9 @@ class JacobianPattern:
             _entries(tension, mean, -by_q * state.shares[spans]),
             _entries(mean, difference, -mean_values),
         ]
-        inner = state.ropes.inner(rope)
-        if np.all(rates[inner] * state.slip_speeds[inner] < 1.0 - self.steady**2):
+        if np.all((slopes * state.slip_speeds)[state.ropes.inner(rope)] < 1.0 - self.steady**2):
             return entries
-        by_place, by_velocity = decay_tangent(state, tangent, rope, rates)
+        by_place, by_velocity = decay_tangent(state, tangent, rope, slopes)
         flat = (by_q * by_place + by_rate * by_velocity).reshape(len(tension), -1)
         stiffest = float(np.max(state.tensions[spans] / state.lengths[spans]))
         row, column = np.nonzero(np.abs(flat) > by_q * self.negligible * max(stiffest, 1.0))
