@@ -78,9 +78,9 @@ def decay_tangent(
 ) -> tuple[Array, Array]:
     """The decay part of one rope: how the shares of its spans change.
 
-    ``slopes`` are the derivatives of the pulleys' exponents after the rope's speed, in s/m, shape
-    (pulleys,).  Derivatives of each span's tension after each difference of points (N/m) and of velocities
-    (N s/m), shape (n, n, 3) each.
+    Derivatives of each span's tension after each difference of points (N/m) and of velocities
+    (N s/m), shape (n, n, 3) each; ``slopes`` are those of the pulleys' exponents after the rope's
+    speed, in s/m, shape (pulleys,).
     """
     spans, inner = tangent.spans, state.ropes.inner(rope)
     length, rate, unit = state.lengths[spans], state.rates[spans], state.directions[spans]

@@ -19,7 +19,11 @@ class Turning:
 
     def __init__(self) -> None:
         self._ropes: Ropes | None = None
-        self._seen = self._stayed = np.empty(0)
+        self._seen = np.empty((2, 0))
+        """Last speed on either side, m/s."""
+        self._back = np.empty(0, dtype=bool)
+        self._stayed = np.empty(0)
+        """Iterates on one side in a row, less one."""
 
     def forget(self) -> None:
         """Begin a step."""
@@ -27,13 +31,10 @@ class Turning:
 
     def note(self, state: ChainState) -> None:
         """Remember an iterate."""
-        speeds = state.speeds
+        speeds, back = state.speeds, np.asarray(state.speeds < 0.0)
         if self._ropes is not state.ropes:
-            self._ropes = state.ropes
-            # Last speed on either side (m/s), and iterates on one side in a row less one.
-            self._seen = np.full((2, len(speeds)), np.nan)
-            self._back, self._stayed = speeds < 0.0, -np.ones(len(speeds))
-        back = speeds < 0.0
+            self._ropes, self._seen = state.ropes, np.full((2, len(speeds)), np.nan)
+            self._back, self._stayed = back, -np.ones(len(speeds))
         self._stayed = np.where(back == self._back, self._stayed + 1.0, 0.0)
         self._back = back
         self._seen[back.astype(int), np.arange(len(speeds))] = speeds
@@ -41,9 +42,9 @@ class Turning:
     def slopes(self, state: ChainState) -> Array:
         """Slope of p of each pulley at the iterate noted last, s/m, shape (pulleys,)."""
         slip = state.slip_speeds
-        tangents = np.asarray((1.0 - state.exponents**2) / slip)
         if self._ropes is not state.ropes:
-            return tangents
+            return state.exponent_slopes
         other = self._seen[1 - self._back.astype(int), np.arange(len(slip))]
         secants = (state.exponents - np.tanh(other / slip)) / (state.speeds - other)
-        return np.fmax(tangents, secants * 0.5**self._stayed)  # fmax: NaN where never seen
+        # fmax: NaN where the other side was never seen.
+        return np.asarray(np.fmax(state.exponent_slopes, secants * 0.5**self._stayed))
