@@ -33,7 +33,7 @@ class DenseDrive:
     ) -> Any:
         state, placed = drive._answer(q, q_t, t)
         drive.pattern.steady, drive.pattern.negligible = np.inf, 0.0
-        entries = drive.pattern.triplets(state, placed, f, g)
+        entries = drive.pattern.triplets(state, placed, f, g, state.exponent_slopes)
         own = drive.path.size
         size = own + drive.auxiliary
         whole = np.zeros((size, size))

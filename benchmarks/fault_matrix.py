@@ -1,27 +1,33 @@
 """What becomes of a ring whose motor and whose structure fail: every pair of faults.
 
-Run: python benchmarks/fault_matrix.py [--sections 2 6 18] [--out docs/faults.md]
+Run: python benchmarks/fault_matrix.py [--sections 2 6 18] [--planes upper lower]
+    [--out docs/faults.md]
 
 The lower winch stops half-way, starts 3 s late or stalls at a tension that is half the peak of the
 sound run, while a V-joint sticks, a pulley jams or a cable parts in either plane.  The page tells
-the outcome of each, its energy error, and its cost over that of the sound run.
+the outcome of each, its energy error, and its cost over that of the sound run; what stands there of
+other numbers of sections stays.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from ringsim import load_scene, simulate
 from ringsim.scene import Scene
 from ringsim.tables import markdown_table
-from ringsim.variables import Fate, Status
+from ringsim.variables import PLANES, Fate, Status
 
 MOTORS = ("sound", "stopped", "late", "weak")
 DAMAGES = ("none", "stuck", "jammed", "cut")
+TITLE = """# What becomes of a ring with two faults
+
+Written by `benchmarks/fault_matrix.py`, which says what the faults are.
+"""
 SLOWEST = 3.0
 """Time in s by which the late winch starts after the other."""
 
@@ -61,11 +67,11 @@ def faulty(scene: Scene, motor: str, damage: str, plane: str, length: float, pea
     return scene.with_values(values)
 
 
-def cells() -> Iterator[tuple[str, str, str]]:
-    """Motor, damage and its plane; the sound ring is left out."""
+def cells(damaged: Sequence[str] = PLANES) -> Iterator[tuple[str, str, str]]:
+    """Motor, damage and its plane, one of those ``damaged``; the sound ring is left out."""
     for motor in MOTORS:
         for damage in DAMAGES:
-            planes = ("upper", "lower") if damage != "none" else ("",)
+            planes = damaged if damage != "none" else ("",)
             for plane in planes if (motor, damage) != ("sound", "none") else ():
                 yield motor, damage, plane
 
@@ -76,12 +82,12 @@ def _timed(scene: Scene) -> tuple[Any, float]:
     return found, time.process_time() - begun
 
 
-def table(sections: int) -> str:
-    """One row a cell, as Markdown."""
+def table(sections: int, planes: Sequence[str]) -> str:
+    """One row a cell with damage in one of these planes, as Markdown."""
     scene, rows = sound_scene(sections), []
     sound, cost = _timed(scene)
     length, peak = float(sound.deployment_time), float(sound.peak_tension)
-    for motor, damage, plane in cells():
+    for motor, damage, plane in cells(planes):
         found, took = _timed(faulty(scene, motor, damage, plane, length, peak))
         rows.append([
             motor, f"{damage} {plane}".strip(), Status(int(found.status)).word,
@@ -89,14 +95,17 @@ def table(sections: int) -> str:
             f"{int(found.locked_joints)} of {2 * sections}", f"{float(found.asynchrony_max):.1f}",
             f"{float(found.peak_tension):.1f}", f"{float(found.energy_error):.1e}",
             str(int(found.restarts)), f"{int(found.steps) / int(sound.steps):.2f}",
+            f"{int(found.newton_iterations) / int(sound.newton_iterations):.2f}",
             f"{took / cost:.2f}",
         ])  # fmt: skip
         print(" | ".join(rows[-1]), flush=True)
     head = [
         "lower motor", "damage", "status", "outcome", "locked", "asynchrony (deg)", "tension (N)",
-        "energy error", "restarts", "steps ratio", "cost ratio",
+        "energy error", "restarts", "steps ratio",
+        "Newton ratio", "cost ratio",
     ]  # fmt: skip
-    note = f"Sound: deployed after {length:.2f} s with {peak:.1f} N, {int(sound.steps)} steps."
+    note = f"Sound: deployed after {length:.2f} s with {peak:.1f} N, {int(sound.steps)} steps, "
+    note += f"{int(sound.newton_iterations)} Newton iterations, {cost:.1f} s."
     return f"## {sections} sections\n\n{note}\n\n{markdown_table(head, rows)}\n"
 
 
@@ -105,10 +114,15 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--sections", type=int, nargs="+", default=[2, 6, 18])
     parser.add_argument("--out", type=Path, default=Path("docs/faults.md"))
-    chosen = parser.parse_args()
-    words = "Written by `benchmarks/fault_matrix.py`, which says what the faults are."
-    parts = [f"# What becomes of a ring with two faults\n\n{words}\n"]
-    chosen.out.write_text("\n".join([*parts, *map(table, chosen.sections)]), encoding="utf-8")
+    parser.add_argument("--planes", nargs="+", choices=PLANES, default=PLANES)
+    chosen, mark = parser.parse_args(), "## "
+    text = chosen.out.read_text(encoding="utf-8") if chosen.out.exists() else TITLE
+    title, *chapters = text.split(f"\n{mark}")
+    known = {int(one.split()[0]): mark + one.strip() for one in chapters}
+    for sections in chosen.sections:
+        known[sections] = table(sections, chosen.planes).strip()
+        page = "\n\n".join([title.strip(), *(known[n] for n in sorted(known))])
+        chosen.out.write_text(page + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -57,6 +57,11 @@ class ChainState:
     """Of the winches at both ends of each cable, m and m/s, shape (cables, 2)."""
 
     @property
+    def exponent_slopes(self) -> Array:
+        """Derivative of the exponents after the speeds, s/m, shape (pulleys,)."""
+        return np.asarray((1.0 - self.exponents**2) / self.slip_speeds)
+
+    @property
     def is_slack(self) -> Flags:
         """Whether a rope is longer than its path, or cut; shape (ropes,)."""
         return np.asarray((self.paths < self.natural) | ~self.ropes.alive)

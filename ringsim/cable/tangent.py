@@ -73,19 +73,24 @@ def rope_tangent(state: ChainState, velocities: Array, rope: int) -> RopeTangent
     )
 
 
-def decay_tangent(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[Array, Array]:
+def decay_tangent(
+    state: ChainState, tangent: RopeTangent, rope: int, slopes: Array
+) -> tuple[Array, Array]:
     """The decay part of one rope: how the shares of its spans change.
 
     Derivatives of each span's tension after each difference of points (N/m) and of velocities
-    (N s/m), shape (n, n, 3) each.
+    (N s/m), shape (n, n, 3) each; ``slopes`` are those of the pulleys' exponents after the rope's
+    speed, in s/m, shape (pulleys,).
     """
-    tensions, by_place, by_velocity = decay_factors(state, tangent, rope)
+    tensions, by_place, by_velocity = decay_factors(state, tangent, rope, slopes)
     both = np.stack([by_place, by_velocity]).reshape(2, len(by_place), -1)
     decay, drag = (tensions @ both).reshape(2, len(tensions), *by_place.shape[1:])
     return decay, drag
 
 
-def decay_factors(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[Array, Array, Array]:
+def decay_factors(
+    state: ChainState, tangent: RopeTangent, rope: int, slopes: Array
+) -> tuple[Array, Array, Array]:
     """The decay part of one rope in factors: changes of tension (N) with the logarithms of the
     decays at its pulleys and, last, with that of the path, shape (n, k), and derivatives of these
     logarithms after differences of points (1/m) and of velocities (s/m), shape (k, n, 3) each.
@@ -101,7 +106,7 @@ def decay_factors(state: ChainState, tangent: RopeTangent, rope: int) -> tuple[A
 
     # Each pulley's p ln(eta) after the differences, shape (pulleys, spans, 3).
     exponent = state.exponents[inner]
-    sensitivity = state.log_decays[inner] * (1.0 - exponent**2) / state.slip_speeds[inner]
+    sensitivity = state.log_decays[inner] * slopes[inner]
     steadily = float(state.wound_rates[rope]) + ratio * path_rate
     by_length = (sensitivity * (steadily / path))[:, None] * beyond_less_part
     by_length += (sensitivity * (ratio / path) * (part_rate - part * path_rate))[:, None]

@@ -83,12 +83,14 @@ class JacobianPattern:
         placed: Placed,
         by_q: float,
         by_rate: float,
+        slopes: Array,
         left: Array | float = 1.0,
     ) -> Array:
         """All entries as (row, column, value), shape (entries, 3), until the next call.
 
         ``by_q`` and ``by_rate`` multiply the derivatives after coordinates and after rates;
-        ``left`` is the share of each rope's stiffness that its winches do not answer.
+        ``slopes`` are those of the pulleys' friction (see ``ringsim.cable.turning``), and ``left``
+        is the share of each rope's stiffness that its winches do not answer.
         """
         maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
         turned = maps.transpose(0, 2, 1)
@@ -98,7 +100,7 @@ class JacobianPattern:
         for rope in range(len(state.natural)):
             tangent = rope_tangent(state, placed.velocities, rope)
             directions[tangent.spans] = tangent.by_direction
-            parts += self._rope(state, tangent, rope, by_q, by_rate, float(shares[rope]))
+            parts += self._rope(state, tangent, rope, by_q, by_rate, slopes, float(shares[rope]))
         blocks = [
             -maps,
             turned @ state.directions[self._span, :, None],
@@ -123,6 +125,7 @@ class JacobianPattern:
         rope: int,
         by_q: float,
         by_rate: float,
+        slopes: Array,
         left: float,
     ) -> list[Array]:
         """How a rope's span tensions follow its mean tension and the differences of its points."""
@@ -133,9 +136,9 @@ class JacobianPattern:
             _entries(tension, mean, -by_q * state.shares[spans]),
             _entries(mean, difference, -mean_values),
         ]
-        if np.all(np.abs(state.exponents[state.ropes.inner(rope)]) > self.steady):
+        if np.all((slopes * state.slip_speeds)[state.ropes.inner(rope)] < 1.0 - self.steady**2):
             return entries
-        by_place, by_velocity = decay_tangent(state, tangent, rope)
+        by_place, by_velocity = decay_tangent(state, tangent, rope, slopes)
         flat = (by_q * by_place + by_rate * by_velocity).reshape(len(tension), -1)
         stiffest = float(np.max(state.tensions[spans] / state.lengths[spans]))
         row, column = np.nonzero(np.abs(flat) > by_q * self.negligible * max(stiffest, 1.0))

@@ -13,6 +13,7 @@ import numpy as np
 from ringsim.cable.chain import Chain
 from ringsim.cable.records import Cables
 from ringsim.cable.state import ChainState
+from ringsim.cable.turning import Turning
 from ringsim.cable.winches import Winches
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.cable_jacobian import JacobianPattern
@@ -46,6 +47,7 @@ class CableDrive:
         self.ropes = self.chain.start(start.points)
         self.winches = Winches(present)
         self._answered: tuple[tuple[float, bytes, bytes], ChainState, Placed] | None = None
+        self._turning = Turning()
         self.pattern = JacobianPattern(path, self.ropes, len(present) + faults)
         self._size = path.size + self.pattern.unknowns
         self.refusal = ""
@@ -86,6 +88,7 @@ class CableDrive:
         ``slopes`` are the derivatives of the cables' ideal paths after the opening angle, m/rad.
         """
         self._answered = None
+        self._turning.forget()
         self.winches.advance(time, state, slopes)
 
     def current(self, position: Array, velocity: Array, time: float) -> ChainState:
@@ -102,6 +105,7 @@ class CableDrive:
         known = self._answered
         if known is None or known[0] != asked or known[1].ropes is not self.ropes:
             known = self._answered = asked, *self.evaluate(place, rates, time)
+            self._turning.note(known[1])
         return known[1:]
 
     def _force(self, mbs: Any, t: float, number: int, q: Any, q_t: Any) -> Array:
@@ -126,7 +130,8 @@ class CableDrive:
                 left: Array | float = 1.0
                 if self.winches.answering:
                     left = self.winches.stiffness_left(t, self.ropes, state.paths, state.path_rates)
-                triplets = self.pattern.triplets(state, placed, by_q, by_rate, left)
+                slopes = self._turning.slopes(state)
+                triplets = self.pattern.triplets(state, placed, by_q, by_rate, slopes, left)
         except ValueError as error:
             self.refusal = str(error)
             triplets = self.pattern.empty()

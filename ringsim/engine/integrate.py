@@ -90,6 +90,8 @@ class Integration:
         predictor = _Predictor(self._built.model.assembly, solver)
         system.SetPreNewtonResidualUserFunction(predictor.apply)
         if self._scene.solver.step_control == "motion":
+            # A step is judged once: each further look would solve a refused step anew.
+            self._settings.timeIntegration.discontinuous.maxIterations = 1
             self._settings.timeIntegration.discontinuous.ignoreMaxIterations = False
             system.SetPostNewtonUserFunction(self._weigh)
         cause = "it stopped before the end"  # exudyn may give up without raising

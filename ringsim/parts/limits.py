@@ -15,9 +15,9 @@ class Limits(Model):
     beyond.  The other two are allowables: the run goes on and shows by how much they are passed.
     """
 
-    overrun: Annotated[Degree, Field(gt=0.0, le=90.0)] = 10.0
+    overrun: Annotated[Degree, Field(gt=0.0, le=90.0)] = 3.0
     """Angle by which a V-joint may be past its stop: rings that open as they should go 0.1 to
-    0.2 deg deep into the default stop, 35 N m hold it at 10 deg."""
+    0.2 deg deep into the default stop, 10 N m hold it at 3 deg."""
     rope_strain: Annotated[float, Field(gt=0.0, le=1.0)] = 0.25
     """Largest strain of a rope: aramid breaks at 2 to 4 %, but models may have soft ropes.  It ends
     the run: a winch that pulls at a jammed pulley next to it would reach any tension."""

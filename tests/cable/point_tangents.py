@@ -35,7 +35,7 @@ def tangents(state, velocities):
     found = []
     for rope in range(len(state.natural)):
         tangent = rope_tangent(state, velocities, rope)
-        decay, drag = decay_tangent(state, tangent, rope)
+        decay, drag = decay_tangent(state, tangent, rope, state.exponent_slopes)
         share, unit = state.shares[tangent.spans], state.directions[tangent.spans]
         count, apart = len(unit), differences_of(len(unit))
 

@@ -139,7 +139,7 @@ class Bench:
         state, placed = self.drive.evaluate(place, rates, 0.0)
         if whole:
             write_all(self.drive)
-        entries = self.drive.pattern.triplets(state, placed, 1.0, by_rate)
+        entries = self.drive.pattern.triplets(state, placed, 1.0, by_rate, state.exponent_slopes)
         size = self.width + self.drive.pattern.unknowns
         matrix = np.zeros((size, size))
         np.add.at(matrix, (entries[:, 0].astype(int), entries[:, 1].astype(int)), entries[:, 2])

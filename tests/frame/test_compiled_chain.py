@@ -103,7 +103,7 @@ def test_the_border_is_the_tangent_of_the_chain(seed: int, jammed: bool, cut: bo
         tangent = rope_tangent(truth, case.rates, rope)
         mean = left[rope] * tangent.mean_by_place + by_velocity * tangent.mean_by_velocity
         change = truth.shares[tangent.spans, None, None] * mean
-        logs, by_place, by_rate = decay_factors(truth, tangent, rope)
+        logs, by_place, by_rate = decay_factors(truth, tangent, rope, truth.exponent_slopes)
         felt = np.append(np.abs(truth.exponents[ropes.inner(rope)]) < 0.9999, True)
         if felt[:-1].any():
             both = (by_place + by_velocity * by_rate)[felt]
