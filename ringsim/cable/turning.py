@@ -11,7 +11,6 @@ slowly: it halves with every further iterate on the same side, as in the Illinoi
 import numpy as np
 
 from ringsim.cable.ropes import Array, Ropes
-from ringsim.cable.state import ChainState
 
 
 class Turning:
@@ -29,22 +28,24 @@ class Turning:
         """Begin a step."""
         self._ropes = None
 
-    def note(self, state: ChainState) -> None:
-        """Remember an iterate."""
-        speeds, back = state.speeds, np.asarray(state.speeds < 0.0)
-        if self._ropes is not state.ropes:
-            self._ropes, self._seen = state.ropes, np.full((2, len(speeds)), np.nan)
+    def note(self, ropes: Ropes, speeds: Array) -> None:
+        """Remember an iterate: speeds of the ropes over all pulleys, m/s."""
+        back = np.asarray(speeds < 0.0)
+        if self._ropes is not ropes:
+            self._ropes, self._seen = ropes, np.full((2, len(speeds)), np.nan)
             self._back, self._stayed = back, -np.ones(len(speeds))
         self._stayed = np.where(back == self._back, self._stayed + 1.0, 0.0)
         self._back = back
         self._seen[back.astype(int), np.arange(len(speeds))] = speeds
 
-    def slopes(self, state: ChainState) -> Array:
-        """Slope of p of each pulley at the iterate noted last, s/m, shape (pulleys,)."""
-        slip = state.slip_speeds
-        if self._ropes is not state.ropes:
-            return state.exponent_slopes
+    def slopes(self, ropes: Ropes, speeds: Array, exponents: Array, slip: Array) -> Array:
+        """Slope of p of each pulley at the iterate noted last, s/m, shape (pulleys,), from its
+        speed, p and slip speed.
+        """
+        own = (1.0 - exponents**2) / slip
+        if self._ropes is not ropes:
+            return np.asarray(own)
         other = self._seen[1 - self._back.astype(int), np.arange(len(slip))]
-        secants = (state.exponents - np.tanh(other / slip)) / (state.speeds - other)
+        secants = (exponents - np.tanh(other / slip)) / (speeds - other)
         # fmax: NaN where the other side was never seen.
-        return np.asarray(np.fmax(state.exponent_slopes, secants * 0.5**self._stayed))
+        return np.asarray(np.fmax(own, secants * 0.5**self._stayed))

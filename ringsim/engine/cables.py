@@ -105,7 +105,7 @@ class CableDrive:
         known = self._answered
         if known is None or known[0] != asked or known[1].ropes is not self.ropes:
             known = self._answered = asked, *self.evaluate(place, rates, time)
-            self._turning.note(known[1])
+            self._turning.note(self.ropes, known[1].speeds)
         return known[1:]
 
     def _force(self, mbs: Any, t: float, number: int, q: Any, q_t: Any) -> Array:
@@ -130,7 +130,9 @@ class CableDrive:
                 left: Array | float = 1.0
                 if self.winches.answering:
                     left = self.winches.stiffness_left(t, self.ropes, state.paths, state.path_rates)
-                slopes = self._turning.slopes(state)
+                slopes = self._turning.slopes(
+                    self.ropes, state.speeds, state.exponents, state.slip_speeds
+                )
                 triplets = self.pattern.triplets(state, placed, by_q, by_rate, slopes, left)
         except ValueError as error:
             self.refusal = str(error)

@@ -15,6 +15,7 @@ from ringsim.cable.faults.family import CableFault
 from ringsim.cable.records import Cables
 from ringsim.cable.ropes import SHORTEST
 from ringsim.cable.state import ChainState
+from ringsim.cable.turning import Turning
 from ringsim.cable.winches import Winches
 from ringsim.frame.chain import (
     Drums,
@@ -59,6 +60,7 @@ class FrameCables:
         self.ropes = self._chain.start(start)
         self.lines = lines_of(skeleton, parts, paths, self.ropes)
         self._drums_at, self._drums = math.nan, Drums(*np.zeros((3, 0)))
+        self._turning = Turning()
         self._retable()
 
     def state(self, time: float, places: Array, rates: Array) -> ChainState:
@@ -74,6 +76,13 @@ class FrameCables:
         """Let a fault change the ropes."""
         self.ropes = fault.strike(self.ropes, state)
         self._retable()
+
+    def begin(self, time: float, state: ChainState, slopes: Array) -> None:
+        """Begin a step at a time (s) in a state of the chain; ``slopes`` are the derivatives of the
+        cables' ideal paths after the opening angle, m/rad.
+        """
+        self._turning.forget()
+        self.winches.advance(time, state, slopes)
 
     def pull(
         self, time: float, pose: Pose, places: Array, rates: Array, g: Array
@@ -91,6 +100,7 @@ class FrameCables:
             self.state(time, places, rates)  # says what is wrong
         log_decays = self._chain.log_decays(spans.angle)
         tighten(table, drums, log_decays, spans)
+        self._turning.note(ropes, spans.speed)
         pull_spans(self.lines, self._mesh, pose, spans, g)
         return drums, log_decays
 
@@ -119,9 +129,10 @@ class FrameCables:
         if self.winches.answering:
             path, path_rate = self.ropes.along(spans.length), self.ropes.along(spans.rate)
             left = self.winches.stiffness_left(time, self.ropes, path, path_rate)
-        factors = np.zeros((2, turning_pulleys(table, spans), self.points, 3))
+        slopes = self._turning.slopes(self.ropes, spans.speed, spans.exponent, table.slip_speed)
+        factors = np.zeros((2, turning_pulleys(table, slopes), self.points, 3))
         log_slopes = self._chain.log_slopes(spans.angle)
-        border(table, drums, log_decays, log_slopes, spans, rates, left, by_place, factors)
+        border(table, drums, log_decays, log_slopes, slopes, spans, rates, left, by_place, factors)
         add_line_tangent(self.lines, pose, spans, fronts)
         out = np.zeros((2 * factors.shape[1], self._mesh.unknowns))
         pull_lines(self.lines, self._mesh, pose, factors.reshape(-1, self.points, 3), out)

@@ -14,9 +14,9 @@ from ringsim.frame.parts import Indices
 from ringsim.frame.vectors import Vector, compiled, dot, minus, plus, times, vector
 from ringsim.layout.pose import Array
 
-STEADY = 0.9999
-"""Share of the full friction from which a pulley is left out of Newton's tangent: it no longer
-changes with the rope's speed."""
+PASSING = 2e-4
+"""Slope of a pulley's friction over that at rest below which Newton's tangent does without it: more
+than 0.9999 of the friction acts, and the rope's speed no longer changes it."""
 
 
 class RopeTable(NamedTuple):
@@ -57,7 +57,7 @@ class Drums(NamedTuple):
 
 class Spans(NamedTuple):
     """Lengths, their rates and directions of spans; angles at pulleys; tensions of spans, their
-    share of the rope's mean, and exponents of the pulleys' friction.
+    share of the rope's mean; exponents of the pulleys' friction and speeds of the ropes over them.
     """
 
     length: Array
@@ -67,6 +67,7 @@ class Spans(NamedTuple):
     tension: Array
     share: Array
     exponent: Array
+    speed: Array
 
     @classmethod
     def empty(cls, ropes: Ropes) -> "Spans":
@@ -74,7 +75,7 @@ class Spans(NamedTuple):
         n, pulleys = ropes.spans, len(ropes.behind)
         one = np.zeros(n)
         return cls(one, one.copy(), np.zeros((n, 3)), np.zeros(pulleys), one.copy(), one.copy(),
-                   np.zeros(pulleys))  # fmt: skip
+                   np.zeros(pulleys), np.zeros(pulleys))  # fmt: skip
 
 
 @compiled
@@ -118,7 +119,7 @@ def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> 
                 moved = (rate_beyond - part * path_rate) * natural / path
                 speed = drums.inflow[rope] + winding * part - moved
                 p = math.tanh(speed / table.slip_speed[j])
-                spans.exponent[j] = p
+                spans.speed[j], spans.exponent[j] = speed, p
                 log += p * log_decays[j]
                 most = max(most, log)
             spans.share[i] = log
@@ -154,14 +155,15 @@ def _tension(
 
 
 @compiled
-def turning_pulleys(table: RopeTable, spans: Spans) -> int:
+def turning_pulleys(table: RopeTable, slopes: Array) -> int:
     """Number of pulleys of whole ropes whose friction changes with speed, and ropes with one."""
     count = 0
     for rope in range(len(table.starts)):
         if table.alive[rope] > 0.0:
             own = 0
             for i in range(table.starts[rope] + 1, table.ends[rope]):
-                own += abs(spans.exponent[table.pulley[i]]) < STEADY
+                j = table.pulley[i]
+                own += slopes[j] * table.slip_speed[j] > PASSING
             count += own + 1 + (own > 0)
     return count
 
@@ -172,6 +174,7 @@ def border(
     drums: Drums,
     log_decays: Array,
     log_slopes: Array,
+    slopes: Array,
     spans: Spans,
     velocities: Array,
     left: Array,
@@ -216,10 +219,10 @@ def border(
             part_rate -= spans.rate[b - 1]
             tail -= spans.share[b - 1] * spans.length[b - 1]
             p = spans.exponent[j]
-            if not abs(p) < STEADY:
+            if not slopes[j] * table.slip_speed[j] > PASSING:
                 continue
             turned = True
-            felt = log_decays[j] * (1.0 - p * p) / table.slip_speed[j]
+            felt = log_decays[j] * slopes[j]
             share = part / path
             for i in range(first, last):
                 unit = vector(spans.unit[i])

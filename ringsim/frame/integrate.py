@@ -108,7 +108,7 @@ class Integration:
         if cables is not None and self._now.chain is not None:
             slope = self._scene.structure.path_slope
             slopes = [slope(cable, now.angles[plane]) for plane, cable in cables.present]
-            cables.winches.advance(now.time, self._now.chain, np.array(slopes))
+            cables.begin(now.time, self._now.chain, np.array(slopes))
 
     def _try(self, step: float) -> tuple[State, Instant]:
         """The state a step later."""

@@ -11,8 +11,16 @@ from ringsim.cable.turning import Turning
 SLIP = 2e-4
 
 
+def noted(memory: Turning, state: Any) -> None:
+    memory.note(state.ropes, state.speeds)
+
+
+def slopes(memory: Turning, state: Any) -> np.ndarray:
+    return memory.slopes(state.ropes, state.speeds, state.exponents, state.slip_speeds)
+
+
 def iterate(speed: np.ndarray, ropes: object) -> Any:
-    """What ``Turning`` reads of a state."""
+    """A state of pulleys, as far as Newton needs it."""
     exponents = np.tanh(speed / SLIP)
     return SimpleNamespace(
         speeds=speed,
@@ -31,8 +39,8 @@ def solved(pull: float, stiffness: float, start: float, *, turning: bool) -> int
         residual = stiffness * (speed - 0.1) + pull * state.exponents
         if abs(residual[0]) < 1e-4 * pull:
             return count
-        memory.note(state)
-        slope = memory.slopes(state) if turning else state.exponent_slopes
+        noted(memory, state)
+        slope = slopes(memory, state) if turning else state.exponent_slopes
         speed = speed - residual / (stiffness + pull * slope)
     return None
 
@@ -49,19 +57,19 @@ def test_where_a_rope_runs_on_slopes_are_tangents() -> None:
     memory, ropes = Turning(), object()
     for speed in (0.1, 0.09, 3e-4):
         state = iterate(np.array([speed]), ropes)
-        memory.note(state)
-        assert memory.slopes(state) == pytest.approx(state.exponent_slopes, rel=1e-15)
+        noted(memory, state)
+        assert slopes(memory, state) == pytest.approx(state.exponent_slopes, rel=1e-15)
 
 
 def test_a_new_step_and_new_ropes_begin_without_memory() -> None:
     memory, ropes = Turning(), object()
     there, back = iterate(np.array([0.1]), ropes), iterate(np.array([-0.1]), ropes)
-    memory.note(there)
-    memory.note(back)
-    assert memory.slopes(back) == pytest.approx(10.0, rel=1e-12)
+    noted(memory, there)
+    noted(memory, back)
+    assert slopes(memory, back) == pytest.approx(10.0, rel=1e-12)
     memory.forget()
-    assert memory.slopes(back)[0] < 1e-9
-    memory.note(there)
+    assert slopes(memory, back)[0] < 1e-9
+    noted(memory, there)
     other = iterate(np.array([-0.1]), object())
-    memory.note(other)
-    assert memory.slopes(other)[0] < 1e-9
+    noted(memory, other)
+    assert slopes(memory, other)[0] < 1e-9

@@ -12,6 +12,7 @@ from ringsim.cable.state import ChainState
 from ringsim.cable.tangent import decay_factors, rope_tangent
 from ringsim.cable.winding.constant import ConstantWinding
 from ringsim.frame.chain import (
+    PASSING,
     Drums,
     RopeTable,
     Spans,
@@ -87,11 +88,12 @@ def test_the_border_is_the_tangent_of_the_chain(seed: int, jammed: bool, cut: bo
     case = Case(seed, jammed=jammed, cut=cut)
     truth, ropes, by_velocity = case.evaluated(), case.ropes, 40.0
     left = LEFT[: len(ropes.starts)]
-    count, points = turning_pulleys(case.table, case.spans), sum(POINTS)
+    slopes = truth.exponent_slopes
+    count, points = turning_pulleys(case.table, slopes), sum(POINTS)
     out = np.zeros((2, count, points, 3))
     log_slopes = case.chain.log_slopes(case.spans.angle)
     border(
-        case.table, case.drums, case.log_decays, log_slopes, case.spans, case.rates, left,
+        case.table, case.drums, case.log_decays, log_slopes, slopes, case.spans, case.rates, left,
         by_velocity, out,
     )  # fmt: skip
     found = np.einsum("kpi,kqj->piqj", *out)
@@ -103,8 +105,8 @@ def test_the_border_is_the_tangent_of_the_chain(seed: int, jammed: bool, cut: bo
         tangent = rope_tangent(truth, case.rates, rope)
         mean = left[rope] * tangent.mean_by_place + by_velocity * tangent.mean_by_velocity
         change = truth.shares[tangent.spans, None, None] * mean
-        logs, by_place, by_rate = decay_factors(truth, tangent, rope, truth.exponent_slopes)
-        felt = np.append(np.abs(truth.exponents[ropes.inner(rope)]) < 0.9999, True)
+        logs, by_place, by_rate = decay_factors(truth, tangent, rope, slopes)
+        felt = np.append((slopes * truth.slip_speeds)[ropes.inner(rope)] > PASSING, True)
         if felt[:-1].any():
             both = (by_place + by_velocity * by_rate)[felt]
             change = change + np.tensordot(logs[:, felt], both, 1)
