@@ -41,10 +41,6 @@ _LEAST = math.radians(1e-4)
 _FADING = 20.0
 """Steps over which the largest d''' fades, so that its passage through zero opens no step."""
 
-_BEHIND = 2.0
-"""Behind a lock d3(angle)/dt3 fades faster by this: it was measured across the kink, not within
-the motion that follows.  Until the first lock, where asynchrony is largest, nothing changes."""
-
 
 class MotionSteps:
     """Steps that keep the relative error in time of the mean opening angle a near a tolerance,
@@ -67,9 +63,8 @@ class MotionSteps:
     def advance(self, now: Instant, stops: StopContact) -> None:
         """Choose the step after an accepted one."""
         self._past.append((now.time, float(np.mean(now.rates))))
-        resting = stops.resting_rate > 0.0
-        wanted = max(self._from_motion(_BEHIND if resting else 1.0), self._solver.step / _FINEST)
-        if resting:
+        wanted = max(self._from_motion(), self._solver.step / _FINEST)
+        if stops.resting_rate > 0.0:
             wanted = max(min(wanted, self._depth / stops.resting_rate), self._contact)
         if math.isfinite(stops.time_to_next):
             meeting = max(self._depth / stops.rate_of_next, self._contact)
@@ -92,7 +87,7 @@ class MotionSteps:
             return None
         return FALL * step if step > _APPROACH * (step + stops.time_to_next) else None
 
-    def _from_motion(self, haste: float) -> float:
+    def _from_motion(self) -> float:
         t2, r2 = self._past[-1]
         apart = (self._stride - 0.5) * self.step
         middle = self._before(t2 - apart)
@@ -105,7 +100,7 @@ class MotionSteps:
         early, late = (r1 - r0) / (t1 - t0), (r2 - r1) / (t2 - t1)
         third = abs(2.0 * (late - early) / (t2 - t0))
         bend = third / max(abs(r2), self._reference)
-        fading = max(0.0, 1.0 - haste * (t2 - t1) * math.sqrt(self._bend))
+        fading = max(0.0, 1.0 - (t2 - t1) * math.sqrt(self._bend))
         self._bend = max(bend, fading * self._bend)
         if self._bend == 0.0:
             return self._solver.step

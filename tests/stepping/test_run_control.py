@@ -323,7 +323,7 @@ def test_what_rests_before_its_goal_ends_at_once(left: int, fate: Fate, words: s
 
 def test_the_end_time_cuts_a_motion_off_and_tells_which_joints_are_missing() -> None:
     motion = spread(Motion(parted), left=1)
-    control = control_of(motion, Solver(end_time=4.2))
+    control = control_of(motion, Solver(end_time=4.2), limits=Limits(overrun=10.0))
     follow(motion, control)
     assert (control.status, control.fate) == (Status.OK, Fate.CUT_OFF)
     assert control.reason.startswith(
