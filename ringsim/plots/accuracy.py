@@ -20,6 +20,9 @@ _LOOKS = {
     "setting": (style.GREY, "X"),
 }
 
+_WIDE = 300.0
+"""Ratio of costs from which on there is no room for numbers between powers of ten."""
+
 
 @style.styled
 def accuracy(found: xr.Dataset) -> Figure:
@@ -50,7 +53,8 @@ def _panel(axes: Axes, found: xr.Dataset) -> None:
     cost, error, ladder = found.cost.values, found.error.values, found.ladder.values
     drawn, frame = np.isfinite(error) & (error > 0.0), found.fidelity.values == "frame"
     axes.loglog()
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    wide = np.nanmax(cost) > _WIDE * np.nanmin(cost)
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
     style.plain_numbers(axes.xaxis)
     for name, (colour, marker) in _LOOKS.items():
         for hollow in (False, True):
