@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from ringsim.cable.state import ChainState
+from ringsim.choice import kind_of
 from ringsim.frame.balance import ANGLES, ENDS, HUB, LINES, POINTS, Held, balance, put_in_place
 from ringsim.frame.cables import FrameCables
 from ringsim.frame.elimination import factor, solve, solve_one
@@ -14,10 +15,12 @@ from ringsim.frame.laws import JointLaws, Openings
 from ringsim.frame.lines import no_lines
 from ringsim.frame.mesh import mesh_of
 from ringsim.frame.net import Strings
-from ringsim.frame.skeleton import Skeleton
+from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
 from ringsim.layout.layout import layout_of
 from ringsim.layout.pose import Array, cross
+from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
+from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.one_coordinate import OneCoordinate
 from ringsim.theory.scales import residual_tolerance
@@ -61,6 +64,8 @@ class FrameModel:
     """
 
     def __init__(self, scene: Scene) -> None:
+        if not isinstance(scene.rods, GeometricallyExactRods):
+            raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
         self.scene, self.layout = scene, layout_of(scene)
         self.skeleton = skeleton = Skeleton(self.layout)
         beam = self.layout.boom
