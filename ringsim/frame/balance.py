@@ -71,3 +71,20 @@ def balance(
             for i in range(6):
                 g[mesh.home[top] + i] += force * rows[k, i]
                 g[mesh.home[low] + i] += force * rows[k, 6 + i]
+
+
+@compiled
+def add_slides(mesh: Mesh, held: Held, pose: Pose, fronts: Array) -> None:
+    """Add what holds the bodies on their boom to the fronts; gaps are so small that how their
+    directions turn does not matter.
+    """
+    for n in range(len(held.top)):
+        top, low = mesh.frame_local[held.top[n]], mesh.frame_local[held.low[n]]
+        _, rows = aside(pose, held.top[n], held.low[n])
+        front = fronts[top[0]]
+        for i in range(12):
+            row = top[1] + i if i < 6 else low[1] + i - 6
+            for j in range(12):
+                column = top[1] + j if j < 6 else low[1] + j - 6
+                shared = rows[0, i] * rows[0, j] + rows[1, i] * rows[1, j]
+                front[row, column] += held.stiffness * shared

@@ -82,12 +82,12 @@ class FrameCables:
         chain has no answer.  Returns what the tangent needs, with the logarithms of the decays.
         """
         ropes, spans, table = self.ropes, self._spans, self._table
-        measure(table, ropes.behind, places, rates, spans)
+        least = measure(table, ropes.behind, places, rates, spans)
         # Winches that do not answer to their ropes turn alike in all iterations of a step.
         if self.winches.answering or time != self._drums_at:
             self._drums, self._drums_at = self._turned(time), time
         drums = self._drums
-        if not (drums.natural.min() > 0.0 and spans.length.min() > SHORTEST):
+        if not (drums.natural.min() > 0.0 and least > SHORTEST):
             self.state(time, places, rates)  # says what is wrong
         log_decays = self._chain.log_decays(spans.angle)
         tighten(table, drums, log_decays, spans)
@@ -108,9 +108,9 @@ class FrameCables:
     def add_tangent(
         self, time: float, pose: Pose, drums: Drums, log_decays: Array, rates: Array,
         by_place: float, fronts: Array,
-    ) -> tuple[Array, Array]:  # fmt: skip
+    ) -> Array:  # fmt: skip
         """Add to the fronts, for the state of the last ``pull``; columns and rows of the border,
-        shape (k, unknowns) each.
+        shape (2, k, unknowns).
 
         ``by_place`` is the derivative of the points' rates after their places, 1/s.  The residual
         changes by the sum of the columns times what the rows say.
@@ -125,7 +125,7 @@ class FrameCables:
         add_line_tangent(self.lines, pose, spans, fronts)
         out = np.zeros((2 * factors.shape[1], self._mesh.unknowns))
         pull_lines(self.lines, self._mesh, pose, factors.reshape(-1, self.points, 3), out)
-        return out[: len(out) // 2], out[len(out) // 2 :]
+        return out.reshape(2, -1, self._mesh.unknowns)
 
     def _retable(self) -> None:
         chain = self._chain

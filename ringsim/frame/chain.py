@@ -78,20 +78,24 @@ class Spans(NamedTuple):
 
 
 @compiled
-def measure(table: RopeTable, behind: Indices, places: Array, rates: Array, spans: Spans) -> None:
-    """Lengths, rates, directions and angles of places and rates of the points, (points, 3)."""
+def measure(table: RopeTable, behind: Indices, places: Array, rates: Array, spans: Spans) -> float:
+    """Lengths, rates, directions and angles of places and rates of the points, (points, 3);
+    returns the least length, m.
+    """
+    least = math.inf
     for i in range(len(spans.length)):
         k = table.near[i]
         d = minus(vector(places[k + 1]), vector(places[k]))
         length = math.sqrt(dot(d, d))
         unit = times(1.0 / length, d)
-        spans.length[i] = length
+        spans.length[i], least = length, min(least, length)
         spans.unit[i, 0], spans.unit[i, 1], spans.unit[i, 2] = unit
         spans.rate[i] = dot(unit, minus(vector(rates[k + 1]), vector(rates[k])))
     for j in range(len(behind)):
         before, after = vector(spans.unit[behind[j] - 1]), vector(spans.unit[behind[j]])
         both, apart = plus(before, after), minus(after, before)
         spans.angle[j] = 2.0 * math.atan2(math.sqrt(dot(both, both)), math.sqrt(dot(apart, apart)))
+    return least
 
 
 @compiled

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ringsim.cable.faults.family import CableFault
-from ringsim.frame.balance import ANGLES, LINES
 from ringsim.frame.kernels import Strains, move, moved_between, straighten
 from ringsim.frame.meter import EnergyMeter
-from ringsim.frame.model import FrameModel, State
+from ringsim.frame.model import FrameModel
+from ringsim.frame.state import State
 from ringsim.frame.stresses import StressMeter
 from ringsim.layout.pose import Array
 from ringsim.outputs.recorder import Recorder
@@ -137,7 +137,7 @@ class Integration:
         """
         model, factored, last, share = self._model, None, math.inf, 1.0
         begun, change, fresh = after.stand(), np.zeros(0), False
-        tolerance = max(model.tolerance, model.reached(step, self._strains))
+        tolerance = model.tolerance(step, self._strains)
         for _ in range(_MOST):
             try:
                 g = model.residual(time, step, self._now, after, self._strains)
@@ -242,15 +242,14 @@ class Integration:
 
     def _measure(self, time: float, state: State) -> Instant:
         """A state, with its cables, and what has passed since the one that was kept last."""
-        model, rate = self._model, state.followed.rate
+        model = self._model
         tensions, stretch, driven = None, 0.0, bool(self._faults)
         if model.cables is not None:
-            place = state.followed.place
-            chain = model.cables.state(time, model.part(place, LINES), model.part(rate, LINES))
+            chain = model.cables.state(time, state.place.lines, state.rate.lines)
             state.chain, tensions = chain, chain.tensions
             stretch = float(np.max(chain.strains, where=chain.ropes.alive, initial=0.0))
             driven = driven or model.cables.winches.driving(time, chain)
-        angles, rates = model.openings.read(state.pose.angle, model.part(rate, ANGLES))
+        angles, rates = model.openings.read(state.pose.angle, state.rate.angles)
         energies = self._energy.read(state, self._strains)
         gap = model.gap(state.pose)
         return Instant(time, angles, rates, energies, gap, tensions, stretch, driven)

@@ -18,8 +18,20 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene
 
 _NUDGE = 1e-7
-"""Change of angle (rad) and rate (rad/s) by which the slopes of laws are measured."""
+"""Change of place (m, rad) and rate by which the slopes of laws are measured."""
+_SIDES = np.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
 Law = Callable[[Array, Array], Reaction]
+
+
+def slope_of(
+    law: Callable[[Array, Array], Array], x: Array, rate: Array, rate_by_place: float
+) -> Array:
+    """Derivative of a force after its coordinate, whose rate follows it, by central differences."""
+    moved = _NUDGE * _SIDES[0].reshape(-1, *[1] * x.ndim)
+    hurried = _NUDGE * _SIDES[1].reshape(-1, *[1] * x.ndim)
+    # All at once: numpy's calls cost more than its numbers.
+    ahead, behind, faster, slower = law(x + moved, rate + hurried)
+    return np.asarray((ahead - behind + rate_by_place * (faster - slower)) / (2.0 * _NUDGE))
 
 
 class Torques(NamedTuple):
@@ -153,7 +165,5 @@ class JointLaws:
         """Derivatives of the torques after the angles, whose rates follow them, N m/rad: (a,)."""
         found = self.damping * rate_by_angle
         for own, _, x, rate, law in self._acting(angles, rates):
-            by_angle = law(x + _NUDGE, rate).total - law(x - _NUDGE, rate).total
-            by_rate = law(x, rate + _NUDGE).total - law(x, rate - _NUDGE).total
-            found[own] += (by_angle + rate_by_angle * by_rate) / (2.0 * _NUDGE)
+            found[own] += slope_of(lambda *at, law=law: law(*at).total, x, rate, rate_by_angle)
         return found

@@ -3,9 +3,9 @@
 import numpy as np
 
 from ringsim.cable.state import ChainState, work_between
-from ringsim.frame.balance import ANGLES, HUB, POINTS
 from ringsim.frame.kernels import Strains, kinetic_energy
-from ringsim.frame.model import FrameModel, State
+from ringsim.frame.model import FrameModel
+from ringsim.frame.state import State
 from ringsim.layout.pose import Array
 from ringsim.stepping.instant import Energies
 
@@ -24,15 +24,15 @@ class EnergyMeter:
     def read(self, state: State, strains: Strains) -> Energies:
         """Energies of a state with its strains and, if there are cables, its chain."""
         model, mesh = self._model, self._model.mesh
-        rate, pose = state.followed.rate, state.pose
-        torques = model.laws.passing(pose.angle, model.part(rate, ANGLES))
-        kinetic = kinetic_energy(mesh, model.part(rate, POINTS))
+        pose = state.pose
+        torques = model.laws.passing(pose.angle, state.rate.angles)
+        kinetic = kinetic_energy(mesh, state.rate.points)
         elastic = 0.5 * float(np.sum(mesh.stiffness * state.strains**2)) + torques.stored
         elastic += sum(slide.stored(pose) for slide in model.slides)
         forces, places = [torques.lost], [pose.angle]
         if model.strings is not None:
-            stored, resisting, lengths = model.strings.passing(*model.net_at(state))
-            moving = model.part(rate, HUB)[0]
+            stored, resisting, lengths = model.strings.passing(*state.net)
+            moving = state.rate.hub[0]
             kinetic += 0.5 * model.strings.hub_mass * float(moving @ moving)
             elastic += stored
             forces.append(resisting)

@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 
-from ringsim.cable.state import ChainState
 from ringsim.choice import kind_of
-from ringsim.frame.balance import ANGLES, ENDS, HUB, LINES, POINTS, Held, balance, put_in_place
+from ringsim.frame.balance import Held, add_slides, balance, put_in_place
 from ringsim.frame.cables import FrameCables
 from ringsim.frame.elimination import factor, solve, solve_one
 from ringsim.frame.following import Coefficients, Followed
@@ -17,6 +16,7 @@ from ringsim.frame.mesh import mesh_of
 from ringsim.frame.net import Strings
 from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
+from ringsim.frame.state import State
 from ringsim.layout.layout import layout_of
 from ringsim.layout.pose import Array, cross
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
@@ -26,32 +26,6 @@ from ringsim.theory.one_coordinate import OneCoordinate
 from ringsim.theory.scales import residual_tolerance
 
 
-class State:
-    """Where everything stands and how it moves.
-
-    ``followed`` are all coordinates that ``FrameModel.part`` tells apart; ``chain`` the cables of a
-    state that a step has led to.
-    """
-
-    def __init__(self, pose: Pose, hub: Array, strains: Array, followed: Followed) -> None:
-        self.pose, self.hub, self.strains, self.followed = pose, hub, strains, followed
-        self.chain: ChainState | None = None
-
-    def stand(self) -> tuple[Array, ...]:
-        """Copies of all places."""
-        return tuple(each.copy() for each in (*self.pose, self.hub))
-
-    def take(self, places: tuple[Array, ...]) -> None:
-        """Go back to places of ``stand``."""
-        for each, place in zip((*self.pose, self.hub), places, strict=True):
-            each[:] = place
-
-    def copy(self) -> "State":
-        """Arrays of its own."""
-        pose = Pose(*(each.copy() for each in self.pose))
-        return State(pose, self.hub.copy(), self.strains.copy(), self.followed.copy())
-
-
 class FrameModel:
     """All parts of a scene on their unknowns.
 
@@ -59,8 +33,6 @@ class FrameModel:
     ----------
     size
         Number of unknowns: those of the mesh and the hub's three, if there is a net.
-    tolerance
-        Residual norm at which Newton stops, N.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -83,7 +55,7 @@ class FrameModel:
         self.cables = None
         if scene.cables is not None:
             self.cables = FrameCables(scene.cables, skeleton, mesh, parts)
-        stiffest = float(mesh.stiffness[:, 0].max())
+        self._stiffest = stiffest = float(mesh.stiffness[:, 0].max())
         slides = [RigidSlide(mesh, *pair, STIFFNESS * stiffest) for pair in skeleton.slides]
         self._beam_slides: list[Slide] = []
         if beam is not None:
@@ -99,9 +71,8 @@ class FrameModel:
             end = skeleton.end_of(self.layout.joints[number].first)
             self.loads[mesh.home[end.frame] : mesh.home[end.frame] + 3] += force
             self._loaded.append((end.frame, pose.place[end.frame].copy(), force))
-        self.tolerance = residual_tolerance(
-            scene, self.layout, 4.0 * float(np.finfo(float).eps) * math.sqrt(self.size)
-        )
+        self._tolerance = residual_tolerance(scene, self.layout, 0.0)
+        self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
         lines = 0 if self.cables is None else self.cables.points
         ends = [] if self.layout.net is None else list(self.layout.net.bodies)
         sizes = 3 * len(mesh.point_mass), 3 * lines, len(angle), 3 * len(ends), 3 * bool(ends)
@@ -118,26 +89,6 @@ class FrameModel:
         self.start = self._started(pose)
         self._fronts = np.zeros((len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]))
 
-    def reached(self, step: float, strains: Strains) -> float:
-        """Residual norm (N) that round-off leaves at this step (s), of coordinates of order 1 m: of
-        inertia, of the rods' damping and of the springs of slides.
-        """
-        mesh = self.mesh
-        inertia = self.coefficients.acceleration_by_place(step) * (
-            mesh.mass[:, 0].max() + mesh.point_mass.max()
-        )
-        rods = mesh.stiffness[:, 0].max() * (1.0 + mesh.tau * strains.lead)
-        slides = STIFFNESS * mesh.stiffness[:, 0].max() if self.slides else 0.0
-        small = 4.0 * float(np.finfo(float).eps)
-        return float(small * (math.sqrt(self.size) * (inertia + rods) + slides))
-
-    def part(self, values: Array, which: int) -> Array:
-        """Of followed coordinates those of POINTS, LINES, ANGLES, ENDS or HUB: a view, shape
-        (n, 3) or (angles,).
-        """
-        own = values[self._held.cuts[which] : self._held.cuts[which + 1]]
-        return own if which == ANGLES else own.reshape(-1, 3)
-
     def work(self, pose: Pose) -> float:
         """Of the loads since the start, J."""
         done = (force @ (pose.place[f] - start) for f, start, force in self._loaded)
@@ -149,85 +100,90 @@ class FrameModel:
         """
         return max((slide.size(pose) for slide in self.slides), default=0.0)
 
+    def tolerance(self, step: float, strains: Strains) -> float:
+        """Residual norm at which Newton stops in a step (s), N; not below what round-off leaves of
+        coordinates of order 1 m: of inertia, of the rods with their damping, of slides.
+        """
+        inertia = self._heaviest * self.coefficients.acceleration_by_place(step)
+        rods = self._stiffest * (1.0 + self.mesh.tau * strains.lead)
+        slides = STIFFNESS * self._stiffest if self.slides else 0.0
+        small = 4.0 * float(np.finfo(float).eps)
+        reached = small * (math.sqrt(self.size) * (inertia + rods) + slides)
+        return max(self._tolerance, reached)
+
     def residual(
         self, time: float, step: float, start: State, now: State, strains: Strains
     ) -> Array:
         """Forces out of balance on all unknowns, shape (size,); ValueError if the cables have no
         answer.
         """
-        place, rate, acceleration, _ = now.followed
         g = -self.loads
         inner = g[: self.mesh.unknowns]
         balance(
             self.mesh, self._lines, self._held, self.coefficients, step, start.followed, now.pose,
             now.hub, now.followed, strains, inner,
         )  # fmt: skip
-        self.laws.push(now.pose.angle, self.part(rate, ANGLES), inner, self.mesh.angle_home)
+        self.laws.push(now.pose.angle, now.rate.angles, inner, self.mesh.angle_home)
         for slide in self._beam_slides:
             slide.hold(now.pose, inner)
         if self.strings is not None:
-            g[-3:] += self.strings.hub_mass * self.part(acceleration, HUB)[0]
-            pulls = self.strings.pulls(*self.net_at(now))
+            g[-3:] += self.strings.hub_mass * now.acceleration.hub[0]
+            pulls = self.strings.pulls(*now.net)
             if pulls is not None:
                 inner[self._string_spots] += pulls
                 g[-3:] -= pulls.sum(axis=0)
         if self.cables is not None:
-            self._pulled = self.cables.pull(
-                time, now.pose, self.part(place, LINES), self.part(rate, LINES), inner
-            )
+            self._pulled = self.cables.pull(time, now.pose, now.place.lines, now.rate.lines, inner)
         inner[self.mesh.fixed] = 0.0
         return g
 
-    def net_at(self, now: State) -> tuple[Array, Array, Array, Array]:
-        """Places and rates of the strings' ends, (n, 3), and of the hub, (3,)."""
-        place, rate = (
-            (self.part(each, ENDS), self.part(each, HUB)[0])
-            for each in (now.followed.place, now.followed.rate)
-        )
-        return place[0], rate[0], place[1], rate[1]
-
     def tangent(self, time: float, step: float, now: State, strains: Strains) -> "Factored":
         """The residual's derivative after the unknowns, factored."""
-        mesh, (place, rate, acceleration, _) = self.mesh, now.followed
+        mesh = self.mesh
         by_rate = self.coefficients.rate_by_place(step)
         by_place = self.coefficients.acceleration_by_place(step)
         fronts = self._fronts
         fronts[:] = 0.0
-        points, pushed = self.part(place, POINTS), self.part(acceleration, POINTS)
-        add_tangent(mesh, now.pose, points, pushed, strains, by_place, fronts)
-        slopes = self.laws.slopes(now.pose.angle, self.part(rate, ANGLES), by_rate)
+        add_tangent(
+            mesh, now.pose, now.place.points, now.acceleration.points, strains, by_place, fronts
+        )
+        add_slides(mesh, self._held, now.pose, fronts)
+        slopes = self.laws.slopes(now.pose.angle, now.rate.angles, by_rate)
         front, spot = mesh.angle_local.T
         fronts[front, spot, spot] += slopes
-        for slide in self.slides:
+        for slide in self._beam_slides:
             slide.add_tangent(now.pose, fronts)
-        columns = rows = np.zeros((0, mesh.unknowns))
+        border = np.zeros((2, 0, mesh.unknowns))
         if self.cables is not None:
-            columns, rows = self.cables.add_tangent(
-                time, now.pose, *self._pulled, self.part(rate, LINES), by_rate, fronts
+            border = self.cables.add_tangent(
+                time, now.pose, *self._pulled, now.rate.lines, by_rate, fronts
             )
-        corner, hub_inertia = -np.eye(len(columns)), np.inf
+        corner, hub_inertia = -np.eye(border.shape[1]), np.inf
         if self.strings is not None:
             hub_inertia = self.strings.hub_mass * by_place
-            blocks = self.strings.tangents(*self.net_at(now), by_rate)
+            blocks = self.strings.tangents(*now.net, by_rate)
             if blocks is not None:
-                columns, rows, corner = self._strung(blocks, hub_inertia, columns, rows, corner)
+                border, corner = self._strung(blocks, hub_inertia, border, corner)
                 hub_inertia = np.inf
-        return Factored(self, fronts, columns, rows, corner, hub_inertia)
+        return Factored(self, fronts, border, corner, hub_inertia)
 
     def _strung(
-        self, blocks: Array, inertia: float, columns: Array, rows: Array, corner: Array
-    ) -> tuple[Array, Array, Array]:
+        self, blocks: Array, inertia: float, border: Array, corner: Array
+    ) -> tuple[Array, Array]:
         """Add strings that pull to the fronts, and the hub to the border."""
         mesh, reach = self.mesh, np.arange(3)
         front, first = mesh.frame_local[self._held.ends].T
         spots = first[:, None] + reach
         self._fronts[front[:, None, None], spots[:, :, None], spots[:, None, :]] += blocks
-        hub = np.zeros((3, mesh.unknowns))
-        hub[:, self._string_spots] = -blocks.transpose(1, 0, 2)
-        whole = np.zeros((len(columns) + 3,) * 2)
-        whole[:-3, :-3] = corner
-        whole[-3:, -3:] = blocks.sum(axis=0) + inertia * np.eye(3)
-        return np.vstack([columns, hub]), np.vstack([rows, hub]), whole
+        count = border.shape[1]
+        longer = np.zeros((2, count + 3, mesh.unknowns))
+        longer[:, :count] = border
+        # Both a row for each of the hub's unknowns and a column.
+        longer[:, count:, self._string_spots] = -blocks.transpose(1, 0, 2)
+        whole = np.zeros((count + 3,) * 2)
+        whole[:count, :count] = corner
+        whole[count:, count:] = blocks.sum(axis=0) + inertia * np.eye(3)
+        return longer, whole
 
     def _place(self, state: State) -> None:
         """Places of all followed coordinates at the state's pose."""
@@ -257,6 +213,7 @@ class FrameModel:
         state = State(
             pose, hub, np.zeros((len(self.mesh.length), 6)),
             Followed.at_rest(np.zeros(self._held.cuts[-1]), np.zeros(self._held.cuts[-1])),
+            self._held,
         )  # fmt: skip
         self._place(state)
         # Accelerations of the points: differences of places along the motion.
@@ -271,12 +228,12 @@ class FrameModel:
         self._place(ahead)
         self._place(behind)
         acceleration = (ahead.followed.place - behind.followed.place) / (2.0 * small)
-        state.followed = Followed.at_rest(state.followed.place, acceleration)
-        return state
+        followed = Followed.at_rest(state.followed.place, acceleration)
+        return State(pose, hub, state.strains, followed, self._held)
 
 
 class Factored:
-    """The tangent K of the unknowns with its border:
+    """The tangent K of the unknowns with its border of columns and rows, shape (2, k, unknowns):
 
         K x + columns^T z = r,   rows x + corner z = r_z.
 
@@ -284,16 +241,15 @@ class Factored:
     """
 
     def __init__(
-        self, model: FrameModel, fronts: Array, columns: Array, rows: Array, corner: Array,
-        hub_inertia: float,
-    ) -> None:  # fmt: skip
-        self._mesh, self._fronts, self._rows = model.mesh, fronts, rows
+        self, model: FrameModel, fronts: Array, border: Array, corner: Array, hub_inertia: float
+    ) -> None:
+        self._mesh, self._fronts, self._rows = model.mesh, fronts, border[1]
         self._hub, self._hub_inertia = model.strings is not None, hub_inertia
         self.sound = bool(factor(model.mesh, fronts))
-        self._reached = columns.T.copy()
-        if len(columns):
+        self._reached = border[0].T.copy()
+        if len(corner):
             solve(model.mesh, fronts, self._reached)
-            self._corner = np.linalg.inv(corner - rows @ self._reached)
+            self._corner = np.linalg.inv(corner - self._rows @ self._reached)
 
     def solve(self, g: Array) -> Array:
         """The change of all unknowns that takes a residual g to zero."""

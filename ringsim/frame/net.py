@@ -4,13 +4,11 @@ import math
 
 import numpy as np
 
+from ringsim.frame.laws import slope_of
 from ringsim.frame.vectors import compiled, dot, minus, times, vector
 from ringsim.layout.layout import HubNet
 from ringsim.layout.pose import Array
 from ringsim.parts.persection import at_section
-
-_NUDGE = 1e-7
-"""Change of stretch (m) and rate (m/s) by which the strings' slopes are measured."""
 
 
 @compiled
@@ -65,9 +63,7 @@ class Strings:
         def force(x: Array, rate: Array) -> Array:
             return np.asarray(self._law.tension(x, rate).total)
 
-        slope = force(stretch + _NUDGE, along) - force(stretch - _NUDGE, along)
-        drag = force(stretch, along + _NUDGE) - force(stretch, along - _NUDGE)
-        slope = (slope + rate_by_place * drag) / (2.0 * _NUDGE)
+        slope = slope_of(force, stretch, along, rate_by_place)
         both = units[:, :, None] * units[:, None, :]
         across = (force(stretch, along) / lengths)[:, None, None]
         return np.asarray(slope[:, None, None] * both + across * (np.eye(3) - both))

@@ -108,7 +108,8 @@ class Parts:
             for k in held[1:]:
                 root[find(k)] = find(held[0])
         members: dict[int, list[int]] = {}
-        for k in range(len(root)):
+        # Angles first: each occurs in one or two elements only, so that little is left of it.
+        for k in (*range(self._inner_frames, len(root)), *range(self._inner_frames)):
             members.setdefault(find(k), []).append(k)
         numbers = {top: number for number, top in enumerate(members)}
         held_first = [

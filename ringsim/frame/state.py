@@ -1,0 +1,66 @@
+"""The state of a model: where everything stands and how it moves."""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+from ringsim.cable.state import ChainState
+from ringsim.frame.balance import Held
+from ringsim.frame.following import Followed
+from ringsim.frame.kernels import Pose
+from ringsim.layout.pose import Array
+
+
+class Groups(NamedTuple):
+    """Followed coordinates by what they belong to: points with mass and points of the cables,
+    shape (n, 3); joint angles, (a,); ends of the net's strings, (n, 3), and its hub, (1, 3).
+    """
+
+    points: Array
+    lines: Array
+    angles: Array
+    ends: Array
+    hub: Array
+
+    @classmethod
+    def of(cls, values: Array, held: Held) -> "Groups":
+        """Views of followed coordinates."""
+        cuts = held.cuts.tolist()
+        own = [values[first:last] for first, last in pairwise(cuts)]
+        return cls(*(each if n == 2 else each.reshape(-1, 3) for n, each in enumerate(own)))
+
+
+class State:
+    """A pose, the hub (m), strains of the elements and all followed coordinates; ``place``,
+    ``rate`` and ``acceleration`` are views of these, ``chain`` the cables where a step has led.
+    """
+
+    def __init__(
+        self, pose: Pose, hub: Array, strains: Array, followed: Followed, held: Held
+    ) -> None:
+        self.pose, self.hub, self.strains, self.followed = pose, hub, strains, followed
+        self._held = held
+        self.place = Groups.of(followed.place, held)
+        self.rate = Groups.of(followed.rate, held)
+        self.acceleration = Groups.of(followed.acceleration, held)
+        self.chain: ChainState | None = None
+
+    @property
+    def net(self) -> tuple[Array, Array, Array, Array]:
+        """Places and rates of the strings' ends, (n, 3), and of the hub, (3,)."""
+        return self.place.ends, self.rate.ends, self.place.hub[0], self.rate.hub[0]
+
+    def stand(self) -> tuple[Array, ...]:
+        """Copies of all places."""
+        place, axes, angle = self.pose
+        return place.copy(), axes.copy(), angle.copy(), self.hub.copy()
+
+    def take(self, places: tuple[Array, ...]) -> None:
+        """Go back to places of ``stand``."""
+        for each, place in zip((*self.pose, self.hub), places, strict=True):
+            each[:] = place
+
+    def copy(self) -> "State":
+        """Arrays of its own."""
+        place, axes, angle, hub = self.stand()
+        strains, followed = self.strains.copy(), self.followed.copy()
+        return State(Pose(place, axes, angle), hub, strains, followed, self._held)

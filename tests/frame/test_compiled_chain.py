@@ -1,0 +1,120 @@
+"""The compiled tension chain against the one that accepted states are evaluated with."""
+
+import numpy as np
+import pytest
+
+from ringsim.cable.chain import Chain
+from ringsim.cable.friction.bearing import BearingFriction
+from ringsim.cable.friction.capstan import CapstanFriction
+from ringsim.cable.records import Cable, Winch
+from ringsim.cable.ropes import Ropes
+from ringsim.cable.state import ChainState
+from ringsim.cable.tangent import decay_factors, rope_tangent
+from ringsim.cable.winding.constant import ConstantWinding
+from ringsim.frame.chain import (
+    Drums,
+    RopeTable,
+    Spans,
+    border,
+    measure,
+    tighten,
+    turning_pulleys,
+)
+
+ROUND_OFF = 1e-11
+"""Sums of a dozen terms in another order, through exponentials of their logarithms."""
+WINCH = Winch(winding=ConstantWinding(speed=0.02))
+CABLES = (
+    Cable(winch=WINCH, friction=BearingFriction(coefficient=8e-4), damping_time=0.01),
+    Cable(winch=WINCH, end="both", friction=CapstanFriction(coefficient=0.2), slip_speed=5e-3),
+)
+POINTS = (8, 7)
+LEFT = np.array([1.0, 0.6, 0.8])
+
+
+class Case:
+    """Ropes at random places and rates, the second cable perhaps jammed, the first one cut."""
+
+    def __init__(self, seed: int, *, jammed: bool, cut: bool) -> None:
+        random = np.random.default_rng(seed)
+        self.chain, count = Chain(CABLES, POINTS), sum(POINTS)
+        self.points = 0.1 * random.normal(size=(count, 3))
+        self.points[:, 0] += 0.3 * np.arange(count)
+        self.rates = 2e-3 * random.normal(size=(count, 3))
+        self.wound = np.array([[0.004, 0.0], [0.002, 0.003]])
+        self.wound_rate = np.array([[0.02, 0.0], [0.01, -0.004]])
+        self.ropes: Ropes = self.chain.start(self.points)
+        if jammed:
+            before = self.evaluated()
+            self.ropes = self.ropes.jam(1, 2, before.stored, before.wound)
+        if cut:
+            self.ropes = self.ropes.cut(0, 3)
+        self.points += 1e-3 * random.normal(size=(count, 3))
+        self.table = RopeTable.of(self.ropes, self.chain.material, self.chain.slip_speed)
+        inflow = np.zeros(len(self.ropes.starts))
+        inflow[self.ropes.of_end[:, 1]] = -self.wound_rate[:, 1]
+        natural = self.ropes.content - self.ropes.per_rope(self.wound)
+        self.drums = Drums(natural, self.ropes.per_rope(self.wound_rate), inflow)
+        self.spans = Spans.empty(self.ropes)
+        least = measure(self.table, self.ropes.behind, self.points, self.rates, self.spans)
+        assert least == pytest.approx(self.spans.length.min())
+        self.log_decays = self.chain.log_decays(self.spans.angle)
+        tighten(self.table, self.drums, self.log_decays, self.spans)
+
+    def evaluated(self) -> ChainState:
+        return self.chain.state(self.ropes, self.points, self.rates, self.wound, self.wound_rate)
+
+
+BOTH = (False, True)
+CASES = [(seed, jammed, cut) for seed in range(3) for jammed in BOTH for cut in BOTH]
+
+
+@pytest.mark.parametrize(("seed", "jammed", "cut"), CASES)
+def test_tensions_are_those_of_the_chain(seed: int, jammed: bool, cut: bool) -> None:
+    case = Case(seed, jammed=jammed, cut=cut)
+    truth, spans = case.evaluated(), case.spans
+    largest = truth.tensions.max()
+    assert largest > 1.0
+    assert np.allclose(spans.tension, truth.tensions, rtol=ROUND_OFF, atol=ROUND_OFF * largest)
+    assert np.allclose(spans.share, truth.shares, rtol=ROUND_OFF)
+    slips = case.ropes.slips > 0.0
+    assert np.allclose(spans.exponent[slips], truth.exponents[slips], rtol=1e-9, atol=1e-12)
+    assert np.ptp(np.abs(truth.exponents[slips])) > 0.1  # some turn round, some slip
+
+
+@pytest.mark.parametrize(("seed", "jammed", "cut"), CASES)
+def test_the_border_is_the_tangent_of_the_chain(seed: int, jammed: bool, cut: bool) -> None:
+    case = Case(seed, jammed=jammed, cut=cut)
+    truth, ropes, by_velocity = case.evaluated(), case.ropes, 40.0
+    left = LEFT[: len(ropes.starts)]
+    count, points = turning_pulleys(case.table, case.spans), sum(POINTS)
+    out = np.zeros((2, count, points, 3))
+    log_slopes = case.chain.log_slopes(case.spans.angle)
+    border(
+        case.table, case.drums, case.log_decays, log_slopes, case.spans, case.rates, left,
+        by_velocity, out,
+    )  # fmt: skip
+    found = np.einsum("kpi,kqj->piqj", *out)
+
+    expected = np.zeros_like(found)
+    for rope in range(len(ropes.starts)):
+        if not ropes.alive[rope]:
+            continue
+        tangent = rope_tangent(truth, case.rates, rope)
+        mean = left[rope] * tangent.mean_by_place + by_velocity * tangent.mean_by_velocity
+        change = truth.shares[tangent.spans, None, None] * mean
+        logs, by_place, by_rate = decay_factors(truth, tangent, rope)
+        felt = np.append(np.abs(truth.exponents[ropes.inner(rope)]) < 0.9999, True)
+        if felt[:-1].any():
+            both = (by_place + by_velocity * by_rate)[felt]
+            change = change + np.tensordot(logs[:, felt], both, 1)
+        near = ropes.near[tangent.spans]
+        pull = change[:, None] * truth.directions[tangent.spans][:, :, None, None]
+        for i, point in enumerate(near):
+            for k, other in enumerate(near):
+                block = pull[i, :, k]
+                expected[point, :, other] += block
+                expected[point + 1, :, other] -= block
+                expected[point, :, other + 1] -= block
+                expected[point + 1, :, other + 1] += block
+    assert np.allclose(found, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
