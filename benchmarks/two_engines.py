@@ -80,7 +80,7 @@ def apart(one: Outcome, two: Outcome) -> dict[str, tuple[float, float, float]]:
             continue
         bars = np.atleast_1d(one.values[bar] + two.values[bar])
         there = np.isfinite(bars) & (difference > LEAST.get(name, 0.0))
-        if np.isfinite(bars).any():
+        if there.any():
             own, value = np.atleast_1d(difference), np.atleast_1d(largest(name, one.values[name]))
             worst = int(np.argmax(np.where(there, own / np.maximum(bars, 1e-300), -1.0)))
             found[name] = (float(value[worst]), float(own[worst]), float(bars[worst]))
@@ -129,7 +129,7 @@ def table(asked: argparse.Namespace) -> None:
     print("|---|---|---|---|---|---|")
     for row in both:
         one, two = row["exudyn"], row["frames"]
-        found = {name: difference / bar for name, (_, difference, bar) in row["apart"].items()}
+        found = {n: far / max(bar, 1e-300) for n, (_, far, bar) in row["apart"].items()}
         for name, (value, difference, _) in row["apart"].items():
             own = (found[name], difference / max(abs(value), 1e-300))
             shares.setdefault(name, []).append(own)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from ringsim.choice import kind_of
 from ringsim.frame.balance import Held, add_slides, balance, put_in_place
 from ringsim.frame.cables import FrameCables
 from ringsim.frame.elimination import factor, solve, solve_one
@@ -13,11 +14,13 @@ from ringsim.frame.laws import JointLaws, Openings
 from ringsim.frame.lines import no_lines
 from ringsim.frame.mesh import mesh_of
 from ringsim.frame.net import Strings
-from ringsim.frame.skeleton import Skeleton
+from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
 from ringsim.frame.state import State
 from ringsim.layout.layout import layout_of
 from ringsim.layout.pose import Array, cross
+from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
+from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.one_coordinate import OneCoordinate
 from ringsim.theory.scales import residual_tolerance
@@ -33,6 +36,8 @@ class FrameModel:
     """
 
     def __init__(self, scene: Scene) -> None:
+        if not isinstance(scene.rods, GeometricallyExactRods):
+            raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
         self.scene, self.layout = scene, layout_of(scene)
         self.skeleton = skeleton = Skeleton(self.layout)
         beam = self.layout.boom

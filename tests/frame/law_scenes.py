@@ -33,6 +33,7 @@ ARC: Values = {"structure.closed": False, "structure.polygon_sections": 18,
 NET: Values = {"net.stiffness": 0.05, "net.neutral_length": 0.1}
 SUDDEN: Values = {"solver.step": 1e-3, "solver.end_time": 0.25, "record.interval": 5e-3}
 """Resolves ropes that winches jerk."""
+STALLING = SUDDEN | {"solver.step": 2.5e-4, "solver.end_time": 0.1}
 BOTH = ("upper", "lower")
 
 
@@ -69,7 +70,8 @@ FORCES: dict[str, Values] = {
     "latched-stop": STOPS | {"stop.latch": True, "stop.damping": 0.5},
     "free-stop": STOPS | {"stop.latch": False, "stop.damping": 0.1},
     "net": NET,
-    "two-sided-net": NET | {"net.two_sided": True, "net.stiffness": 0.01, "net.neutral_length": 0.3},
+    "two-sided-net": NET
+    | {"net.two_sided": True, "net.stiffness": 0.01, "net.neutral_length": 0.3},
     "damped-net": NET | {"net.damping": 0.05},
     "net-sections": NET | {"net.stiffness": [0.05, 0.04, 0.06]} | RIGID,
     "rigid-free": RIGID | {"boom.base": "free"},
@@ -107,12 +109,13 @@ CABLES: dict[str, Values] = {
     "bar-half": cables(bracket={"kind": "bar-half", "angle": 98.0}),
     "constant": winding(kind="constant", speed=0.1) | SUDDEN,
     "table": winding(kind="table", times=[0.0, 0.2, 0.35, 1.0], lengths=[0.0, 0.01, 0.04, 0.1]),
-    "stall": winding(kind="stall", speed=0.05, max_tension=3.0, band=0.6) | SUDDEN,
+    "stall": winding(kind="stall", speed=0.05, max_tension=3.0, band=0.6) | STALLING,
     "backdrivable": winding(
         kind="stall", speed=0.05, max_tension=3.0, band=0.6, backdrivable=True
     )
+    | STALLING,
+    "feedback": winding(kind="tension-feedback", target=2.0, max_speed=0.2, max_payout=0.1)
     | SUDDEN,
-    "feedback": winding(kind="tension-feedback", target=2.0, max_speed=0.2, max_payout=0.1) | SUDDEN,
     "damped-rope": cables(damping_time=2e-3),
     "slack": cables(initial_slack=2e-4) | SUDDEN,
     "taut": cables(initial_slack=-2e-5),

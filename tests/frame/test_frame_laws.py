@@ -15,9 +15,10 @@ from ringsim.scene import Scene
 
 FLOOR = 1e-4
 SLOW = {
-    "forces": {"viscous-sections", "force-sections", "net", "rigid-free", "arc-2-free", "damped-net"},
-    "cables": {"last", "capstan-pulleys", "frictionless", "stall", "feedback", "locked", "constant",
-               "arc-2-flexible", "boom-and-net", "late-lower", "taut"},
+    "forces": {"viscous-sections", "force-sections", "net", "rigid-free", "arc-2-free",
+               "damped-net", "free-stop"},
+    "cables": {"last", "capstan-pulleys", "frictionless", "stall", "two-winches", "feedback",
+               "locked", "constant", "arc-2-flexible", "boom-and-net", "late-lower", "taut"},
 }  # fmt: skip
 """Near kin of what runs by default."""
 
