@@ -167,8 +167,35 @@ def quantile_of_replicates(
     return low, high
 
 
-def standard_error(values: Array, replicate: NDArray[np.int64] | None) -> float:
-    """Standard error of the mean of independent samples, or of independent replicates."""
-    if replicate is None:
-        return float(spread(values) / len(values) ** 0.5) if len(values) > 1 else np.nan
-    return float(_jackknife(values, replicate, np.mean)[1])
+def standard_error(values: Array, replicate: NDArray[np.int64] | None) -> tuple[Array, int]:
+    """Standard error of the mean of independent samples, or of independent replicates (given which
+    one each sample belongs to), and its degrees of freedom; NaN if there is one alone.
+    """
+    if replicate is not None:
+        _, error, count = _jackknife(values, replicate, np.mean)
+        return error, count - 1
+    count = values.shape[-1]
+    if count < 2:
+        return np.full(values.shape[:-1], np.nan), 0
+    return spread(values) / count**0.5, count - 1
+
+
+def of_difference(
+    first: Array, second: Array, replicates: tuple[NDArray[np.int64] | None, ...] = (None, None)
+) -> tuple[Array, Array]:
+    """Interval of the mean of the second minus that of the first, which are not paired.
+
+    Student's t with the degrees of freedom of Welch, Biometrika 34 (1947).
+    """
+    apart = second.mean(axis=-1) - first.mean(axis=-1)
+    (one, free), (other, more) = (
+        standard_error(values, which)
+        for values, which in zip((first, second), replicates, strict=True)
+    )
+    if min(free, more) < 1:
+        return apart + np.nan, apart + np.nan
+    both = one**2 + other**2
+    each = one**4 / free + other**4 / more
+    half = np.sqrt(both) * t.ppf(0.5 + LEVEL / 2, both**2 / np.where(each > 0, each, 1.0))
+    half = np.where(each > 0, half, 0.0)  # no scatter at all leaves no doubt
+    return apart - half, apart + half

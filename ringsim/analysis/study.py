@@ -171,7 +171,7 @@ def _errors(
     values = numbers(campaign, name)
     sampling = np.nan
     if placed.has_intervals:
-        sampling = intervals.standard_error(values[known], placed.replicate_of(index))
+        sampling = float(intervals.standard_error(values[known], placed.replicate_of(index))[0])
     bars = numbers(campaign, f"{name}_error")[known]
     apart = np.full(0, np.nan)
     if f"status{CHECKED}" in campaign and f"{name}{CHECKED}" in campaign:

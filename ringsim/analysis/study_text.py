@@ -32,8 +32,8 @@ def _requirements(analysis: xr.Dataset) -> Iterator[str]:
         further = one["further_samples"]
         rows.append((
             one["requirement_text"], f"{one['probability_required']:g}",
-            f"{one['confidence_required']:g}", _words(verdict), _number(one["probability"]),
-            _interval(one["probability_lower"], one["probability_upper"]),
+            f"{one['confidence_required']:g}", _words(verdict), number_text(one["probability"]),
+            interval_text(one["probability_lower"], one["probability_upper"]),
             str(one["samples_used"]), str(one["samples_violating"]), str(one["samples_lost"]),
             _words(worst) if one["samples_lost"] else "-", str(further) if further > 0 else "-",
         ))  # fmt: skip
@@ -60,8 +60,9 @@ def _outcomes(analysis: xr.Dataset) -> Iterator[str]:
     rows = [
         (
             str(kind), f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}",
-            _number(one["outcome_share"].item()), _interval(*one["outcome_share_interval"].values),
-            *map(_number, one["outcome_share_convergence"].values[:-1]),
+            number_text(one["outcome_share"].item()),
+            interval_text(*one["outcome_share_interval"].values),
+            *map(number_text, one["outcome_share_convergence"].values[:-1]),
         )
         for kind in analysis["kind"].values
         for one in [analysis.sel(kind=kind)]
@@ -94,8 +95,8 @@ def _outputs(analysis: xr.Dataset) -> Iterator[str]:
             first = analysis[f"{name}_convergence"].values[:-1, k]
             rows.append((
                 name, "" if units == "1" else units,
-                "all" if least == most else statistic.replace("_", " "), _number(value, digits),
-                _interval(low, high, digits), *(_number(v, digits) for v in first),
+                "all" if least == most else statistic.replace("_", " "), number_text(value, digits),
+                interval_text(low, high, digits), *(number_text(v, digits) for v in first),
                 used, lost, absent,
             ))  # fmt: skip
     head = (
@@ -120,7 +121,7 @@ def _errors(analysis: xr.Dataset) -> Iterator[str]:
                 (
                     name,
                     analysis[name].attrs["units"],
-                    *(_number(e, 2) for e in errors),
+                    *(number_text(e, 2) for e in errors),
                     dominating(errors),
                 )
             )
@@ -142,10 +143,12 @@ def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:
     return f"{found} ({', '.join(unknown)} unknown)" if unknown else found
 
 
-def _number(value: float, digits: int = 4) -> str:
+def number_text(value: float, digits: int = 4) -> str:
+    """A number with so many digits, or a dash."""
     return f"{value:.{digits}g}" if np.isfinite(value) else "-"
 
 
-def _interval(low: float, high: float, digits: int = 4) -> str:
+def interval_text(low: float, high: float, digits: int = 4) -> str:
+    """Both ends of an interval, or a dash."""
     known = np.isfinite([low, high]).any()
-    return f"{_number(low, digits)} .. {_number(high, digits)}" if known else "-"
+    return f"{number_text(low, digits)} .. {number_text(high, digits)}" if known else "-"

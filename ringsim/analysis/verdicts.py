@@ -55,9 +55,9 @@ def bounds(
     low, high = share_bounds(int(kept.sum()), len(kept), confidence)
     replicate = placed.replicate_of(samples)
     if replicate is not None and placed.replicates > 1:
-        share, count = float(kept.mean()), len(np.unique(replicate))
-        error = standard_error(kept.astype(float), replicate)
-        half = float(t.ppf(confidence, count - 1)) * error if count > 1 else 0.0
+        share = float(kept.mean())
+        error, free = standard_error(kept.astype(float), replicate)
+        half = float(t.ppf(confidence, free) * error) if free > 0 else 0.0
         low, high = max(0.0, min(low, share - half)), min(1.0, max(high, share + half))
     return low, high
 

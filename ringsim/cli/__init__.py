@@ -22,6 +22,7 @@ VERBS = {
     "merge": "Put the results of a campaign into one file.",
     "analyse": "Say what a campaign tells: verdicts, statistics with intervals, errors.",
     "report": "Write one page about a campaign: outcomes, figures, failures, model.",
+    "compare": "Say how one campaign or run differs from another.",
     "replay": "Run one sample of a campaign again, in the foreground.",
     "stability": "Map where the solver is sound, and how runs end where it is not.",
     "accuracy": "Compare numerical settings of a scene: error against run time.",
