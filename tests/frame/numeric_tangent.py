@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.frame.kernels import Strains, move
-from ringsim.frame.model import FrameModel, State
+from ringsim.frame.model import FrameModel
+from ringsim.frame.state import State
 from ringsim.scene import Scene
 
 Array = NDArray[np.float64]

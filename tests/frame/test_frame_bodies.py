@@ -108,7 +108,7 @@ def _momenta(values: dict[str, Any]) -> tuple[float, float]:
 
     def momenta(run: Integration) -> tuple[np.ndarray, np.ndarray, float, float]:
         state, mesh = run._now, model.mesh
-        place, rate = (model.part(each, 0) for each in state.followed[:2])
+        place, rate = state.place.points, state.rate.points
         carried = mesh.point_mass[:, None] * rate
         one, other = mesh.mass.T
         first, second = mesh.point.T
