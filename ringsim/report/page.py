@@ -41,6 +41,7 @@ def page(campaign: xr.Dataset, folder: str) -> str:
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     design = dict(wanted.get("design", {}))
+    design.pop("samples", None)  # a call with --samples changes it
     context: dict[str, Any] = {
         "title": campaign.attrs.get("title", "Campaign"),
         "name": campaign.attrs.get("campaign_name", ""),
