@@ -197,14 +197,38 @@ def test_the_verb(tmp_path: Path) -> None:
         assert (code, told[: 6 + len(out)]) == (EXIT_DONE, f"wrote {out}")
         assert f"ringsim replay {tmp_path}" not in Path(out).read_text()
     (tmp_path / "none").mkdir()
+    (tmp_path / "text.nc").write_text("no netCDF")
     save(made_campaign(3).isel(sample=0), tmp_path / "run.nc")
     for where, words in (
         (tmp_path / "none", "holds no campaign.nc: merge its results with ringsim merge"),
         (tmp_path / "gone", "there is no such folder"),
         (tmp_path / "run.nc", "holds no campaign: give the folder"),
+        (tmp_path / "text.nc", "cannot be read as a netCDF file"),
     ):
         code, told = run(str(where), "--out", out)
         assert code == EXIT_BAD_INPUT
         assert told.startswith(f"{where}: {words}")
+    code, told = run(str(tmp_path), "--out", out, "--analysis", str(tmp_path / "run.nc"))
+    assert (code, "holds no verdicts: leave it out" in told) == (EXIT_BAD_INPUT, True)
     code, told = run(str(tmp_path), "--out", str(tmp_path / "page.pdf"))
     assert (code, told.endswith("the page is HTML: write page.html\n")) == (EXIT_BAD_INPUT, True)
+
+
+def test_verdicts_are_those_of_the_analysis() -> None:
+    flags = {"flag_values": np.array([0, 1], "i1"), "flag_meanings": "not_met met"}
+    columns = {
+        "requirement_text": ["asynchrony_max <= 3 degree"], "probability_required": [0.9],
+        "confidence_required": [0.8], "probability": [0.95], "probability_lower": [0.91],
+        "probability_upper": [0.99], "samples_used": [6], "samples_violating": [1],
+        "samples_lost": [2], "further_samples": [-1],
+    }  # fmt: skip
+    analysis = xr.Dataset({name: ("requirement", values) for name, values in columns.items()})
+    analysis["verdict"] = ("requirement", np.array([1], "i1"), flags)
+    analysis["verdict_worst_case"] = ("requirement", np.array([0], "i1"), flags)
+    text = page(made_campaign(8, failed=(2, 5)), "runs/made", analysis)
+    cells = Page(text).cells
+    at = cells.index("asynchrony_max <= 3 degree")
+    assert cells[at + 1 : at + 10] == [
+        "0.9 with confidence 0.8", "met", "0.95", "0.91 to 0.99", "6", "1", "2", "not met", "-",
+    ]  # fmt: skip
+    assert "without a verdict" not in text
