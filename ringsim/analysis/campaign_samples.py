@@ -106,6 +106,13 @@ def campaign_file(campaign: xr.Dataset) -> dict[str, Any]:
     return tomllib.loads(str(campaign.attrs.get("campaign", "")))
 
 
+def requirements_of(campaign: xr.Dataset) -> dict[str, dict[str, Any]]:
+    """What the campaign requires of its numbers: tables with min, max or is, by name."""
+    stored = campaign.attrs.get("requirements")
+    wanted = json.loads(stored) if stored else campaign_file(campaign).get("requirements", {})
+    return {name: each for name, each in wanted.items() if {"min", "max", "is"} & each.keys()}
+
+
 def distribution_of(variable: xr.DataArray) -> dict[str, Any]:
     """A drawn input's distribution; {"text": ...} where it came out of a list."""
     text = str(variable.attrs.get("distribution", ""))

@@ -1,6 +1,7 @@
 """``ringsim report``: a campaign as one page."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -12,13 +13,15 @@ from ringsim.refusal import InputError
 @click.command()
 @click.argument("folder", metavar="DIR", type=PATH)
 @click.option("--out", metavar="FILE", type=PATH, default=Path("report.html"), show_default=True)
-def command(folder: Path, out: Path) -> None:
+@click.option(
+    "--analysis", metavar="FILE", type=PATH,
+    help="netCDF file with verdicts on the requirements, to show them, too.",
+)  # fmt: skip
+def command(folder: Path, out: Path, analysis: Path | None) -> None:
     """Write one page about the campaign in DIR, which holds campaign.nc, or about such a file.
 
     The page holds all that it shows, and loads nothing: it can be mailed, printed and kept.
     """
-    import xarray as xr
-
     from ringsim.report.page import LARGEST, write_report
     from ringsim.storage.merge import NAME
 
@@ -30,13 +33,25 @@ def command(folder: Path, out: Path) -> None:
         what = f"holds no {NAME}: merge its results with ringsim merge {folder}"
         what = what if folder.is_dir() else "there is no such folder: give that of a campaign"
         raise InputError(f"{folder}: {what}")
-    try:
-        campaign = xr.load_dataset(file, engine="netcdf4")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file}: cannot be read as a netCDF file: {error}; merge again") from None
+    campaign = _load(file)
     if "sample" not in campaign.dims or not {"scene", "campaign"} <= campaign.attrs.keys():
         raise InputError(f"{file}: holds no campaign: give the folder that ringsim campaign named")
-    size = write_report(campaign, out, str(file.parent))
+    judged = None if analysis is None else _load(analysis)
+    if judged is not None and not {"verdict", "requirement"} <= set(judged.variables):
+        raise InputError(f"--analysis {analysis}: holds no verdicts: leave it out")
+    size = write_report(campaign, out, str(file.parent), judged)
     click.echo(f"wrote {out} ({size / 1e6:.2f} MB)")
     if size > LARGEST:
         click.echo(f"{out}: larger than {LARGEST / 1e6:g} MB, the size it is meant to have")
+
+
+def _load(file: Path) -> Any:
+    import xarray as xr
+
+    try:
+        return xr.load_dataset(file, engine="netcdf4")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"{file}: cannot be read as a netCDF file: {reason}; merge again, or give another one"
+        ) from None

@@ -18,19 +18,25 @@ LARGEST = 2_000_000
 """Bytes of a page: it is to go by mail."""
 
 
-def write_report(campaign: xr.Dataset, out: Path, folder: str) -> int:
+def write_report(
+    campaign: xr.Dataset, out: Path, folder: str, analysis: xr.Dataset | None = None
+) -> int:
     """Write the page of a merged campaign, which is in memory; returns its size in bytes.
 
     ``folder`` is what readers of the page give to ``ringsim replay``.  InputError if the file
     cannot be written.
     """
-    text = page(campaign, folder)
+    text = page(campaign, folder, analysis)
     write_text(out, text)
     return len(text.encode("utf-8"))
 
 
-def page(campaign: xr.Dataset, folder: str) -> str:
-    """The page as text: nothing in it refers to another file or address."""
+def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) -> str:
+    """The page as text: nothing in it refers to another file or address.
+
+    Verdicts on requirements are those of ``analysis``, along ``requirement``; the page itself only
+    counts.
+    """
     wanted = campaign_file(campaign)
     failures, more = tables.failures(campaign, folder)
     values, head = model.values(campaign)
@@ -41,6 +47,7 @@ def page(campaign: xr.Dataset, folder: str) -> str:
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     design = dict(wanted.get("design", {}))
+    design.pop("samples", None)  # a call with --samples changes it
     context: dict[str, Any] = {
         "title": campaign.attrs.get("title", "Campaign"),
         "name": campaign.attrs.get("campaign_name", ""),
@@ -49,7 +56,8 @@ def page(campaign: xr.Dataset, folder: str) -> str:
         "design": design.pop("kind", "unknown"), "design_more": design,
         "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),
         "outcomes": tables.outcomes(campaign), "statistics": tables.statistics(campaign),
-        "requirements": tables.requirements(campaign), "peaks": peak_lines(campaign),
+        "requirements": tables.requirements(campaign), "verdicts": tables.verdicts(analysis),
+        "peaks": peak_lines(campaign),
         "figures": figures, "player": player(campaign), "failures": failures, "more": more,
         "truth": tables.truth(campaign), "notes": notes, "inputs": tables.drawn(campaign),
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),

@@ -10,10 +10,10 @@ import xarray as xr
 
 from ringsim.analysis.campaign_samples import (
     NUMERICAL,
-    campaign_file,
     distribution_of,
     endings,
     inputs,
+    requirements_of,
     scalars,
     values_of,
 )
@@ -56,9 +56,7 @@ def statistics(campaign: xr.Dataset) -> Rows:
 def requirements(campaign: xr.Dataset) -> Rows:
     """Number, what is asked, met by how many of those that tell, and how many do not."""
     rows = []
-    for name, wanted in campaign_file(campaign).get("requirements", {}).items():
-        if not isinstance(wanted, dict) or not {"min", "max", "is"} & wanted.keys():
-            continue
+    for name, wanted in requirements_of(campaign).items():
         if "is" in wanted:
             words, asked = endings(campaign), wanted["is"]
             asked = [asked] if isinstance(asked, str) else asked
@@ -74,6 +72,32 @@ def requirements(campaign: xr.Dataset) -> Rows:
         left = campaign.sizes["sample"] - known
         rows.append([name, asked, f"{met} of {known}", str(left)])
     return rows
+
+
+def verdicts(analysis: xr.Dataset | None) -> Rows:
+    """Requirement, verdict, estimate, bounds, counts, of what ``ringsim analyse --out`` wrote."""
+    if analysis is None or "requirement" not in analysis.dims:
+        return []
+    rows = []
+    for place in range(analysis.sizes["requirement"]):
+        one = {str(n): v.item() for n, v in analysis.isel(requirement=place).items() if not v.dims}
+        rows.append([
+            str(one["requirement_text"]),
+            f"{one['probability_required']:g} with confidence {one['confidence_required']:g}",
+            _flag(analysis["verdict"], one["verdict"]), number(one["probability"]),
+            f"{number(one['probability_lower'])} to {number(one['probability_upper'])}",
+            str(one["samples_used"]), str(one["samples_violating"]), str(one["samples_lost"]),
+            _flag(analysis["verdict_worst_case"], one["verdict_worst_case"]),
+            str(one["further_samples"]) if one["further_samples"] > 0 else "-",
+        ])  # fmt: skip
+    return rows
+
+
+def _flag(variable: xr.DataArray, code: int) -> str:
+    """The word of a code, by the CF attributes of its variable."""
+    codes = np.atleast_1d(variable.attrs["flag_values"]).tolist()
+    word: str = str(variable.attrs["flag_meanings"]).split()[codes.index(code)]
+    return word.replace("_", " ")
 
 
 def used_places(campaign: xr.Dataset) -> Any:

@@ -72,9 +72,9 @@ def test_files_that_hold_no_run_are_refused(file: Path, failed: xr.Dataset) -> N
     text.write_text("no netCDF")
     xr.Dataset({"x": 1.0}).to_netcdf(other)
     for path, words in (
-        (campaign, "holds 3 samples of a campaign: write one of them with ringsim replay"),
+        (campaign, "holds neither a run nor a campaign: give a file that ringsim run or ringsim"),
         (text, "cannot be read as a netCDF file: "),
-        (other, "holds no run: give a file that ringsim run has written"),
+        (other, "holds neither a run nor a campaign: give a file that"),
         (file.with_name("c.nc"), "cannot be read as a netCDF file: No such file or directory"),
     ):
         done = ringsim("plot", str(path))

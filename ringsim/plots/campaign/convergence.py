@@ -40,9 +40,10 @@ def convergence(campaign: xr.Dataset) -> Figure:
             axes.fill_between(counts, mean - _NORMAL * error, mean + _NORMAL * error,
                               color=style.SKY, alpha=0.3, linewidth=0.0,
                               label="95 % interval of the mean")  # fmt: skip
-        axes.plot(counts, mean, color=style.BLUE, label="mean", marker="o", markersize=2.5)
+        size = 2.5 if len(counts) < 50 else 0.0
+        axes.plot(counts, mean, color=style.BLUE, label="mean", marker="o", markersize=size)
         axes.plot(counts, quantile, color=style.VERMILLION, linestyle="dashed", marker="s",
-                  markersize=2.5, label="95 % quantile")  # fmt: skip
+                  markersize=size, label="95 % quantile")  # fmt: skip
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.set_title(style.label(campaign[name], width=42), fontsize=9.5, color=style.INK)
         if number + columns >= len(names):

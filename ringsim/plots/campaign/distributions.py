@@ -1,24 +1,19 @@
 """Cumulative distribution of the main numbers, with the limits that the campaign sets them."""
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from ringsim.analysis.campaign_samples import campaign_file, scalars, told, values_of
+from ringsim.analysis.campaign_samples import requirements_of, scalars, told, values_of
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import head
 
 
 def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
     """The least and the largest value of a number that ``[requirements]`` of the campaign allow."""
-    wanted: Any = campaign_file(campaign).get("requirements", {}).get(name, {})
-    found = (
-        [(word, wanted.get(word)) for word in ("min", "max")] if isinstance(wanted, dict) else []
-    )
-    return [(word, float(value)) for word, value in found if isinstance(value, int | float)]
+    wanted = requirements_of(campaign).get(name, {})
+    return [(word, float(wanted[word])) for word in ("min", "max") if word in wanted]
 
 
 @style.styled

@@ -43,7 +43,7 @@ def fan(campaign: xr.Dataset) -> Figure:
             look: dict[str, Any] = {"color": colours[plane], "linewidth": 0.0}
             axes.fill_between(own["share"], low, high, alpha=0.18, **look)
             axes.fill_between(own["share"], lower, upper, alpha=0.35, **look)
-            axes.plot(own["share"], middle, color=colours[plane], linewidth=1.3, gid="median")
+            axes.plot(own["share"], middle, color=colours[plane], linewidth=1.3, label="median")
             if worst in own["sample"]:
                 one = own.sel(sample=worst)
                 dashes = "solid" if plane == planes[0] else (0, (3, 1.5))

@@ -36,7 +36,9 @@ def shares(campaign: xr.Dataset) -> tuple[Array, Array, Array]:
 def lock_order(campaign: xr.Dataset) -> Figure:
     """Bars by plane and section from ``lock_time`` (sample, plane, section)."""
     sections, planes = campaign["section"].values, campaign["plane"].values.tolist()
-    figure = Figure(figsize=(max(6.4, 0.42 * len(sections) + 2.0), 1.9 * len(planes) + 1.4))
+    figure = Figure(
+        figsize=(float(np.clip(0.42 * len(sections) + 2.0, 6.4, 11.0)), 1.9 * len(planes) + 1.4)
+    )
     grid = figure.subplots(len(planes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     looks = (("locks first", style.BLUE, ""), ("locks last", style.ORANGE, "//"),
              ("does not lock", style.GREY, ".."))  # fmt: skip
@@ -51,6 +53,7 @@ def lock_order(campaign: xr.Dataset) -> Figure:
                      linewidth=0.3, label=label)  # fmt: skip
         axes.set_title(f"{plane} plane", fontsize=9.5)
         axes.grid(visible=False, axis="x")
+    grid[0].set_xlim(sections[0] - 0.6, sections[-1] + 0.6)
     grid[0].yaxis.set_major_formatter(PercentFormatter(1.0))
     grid[-1].set_xlabel(style.label(campaign["section"]))
     grid[-1].xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))

@@ -1,0 +1,105 @@
+"""A merged campaign made by hand: deployments of which every number is known."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from ringsim.dataset import to_dataset
+from ringsim.outputs.family import span_names
+from ringsim.scene import Scene, load_scene
+from ringsim.variables import PLANES, Cause, Fate, Outcome, Status
+
+SECTIONS = 4
+TIMES = np.linspace(0.0, 10.0, 21)
+TEXT = """
+name = "made"
+title = "Made by hand <&> quoted"
+seed = 3
+scene = "ring18-cable"
+design = {{ kind = "{kind}", samples = {samples} }}
+[set]
+"structure.sections" = 4
+boom = "none"
+[requirements]
+asynchrony_max = {{ max = 3.0, probability = 0.9 }}
+outcome = {{ is = "deployed", probability = 0.9 }}
+"""
+
+
+def made_scene() -> Scene:
+    """Four sections of the built-in scene with cables, without boom."""
+    values = {"structure.sections": SECTIONS, "boom": "none", "solver.end_time": 10.0}
+    return load_scene("ring18-cable").with_values(values)
+
+
+def lags(sample: int) -> np.ndarray:
+    """Deviation of each V-joint at mid-time in degree, (plane, section), of mean 0."""
+    row = np.linspace(-1.0, 1.0, SECTIONS) * (1.0 + 0.25 * sample)
+    return np.stack([row, 0.5 * row])
+
+
+def made_campaign(
+    samples: int = 8, *, failed: Sequence[int] = (), stalled: Sequence[int] = (),
+    not_run: Sequence[int] = (), kind: str = "random",
+) -> xr.Dataset:  # fmt: skip
+    """Sample k deploys at 10 s and lags by ``lags(k)``; its tension peaks at 20 + k N in span 1."""
+    scene, runs = made_scene(), []
+    share = TIMES / TIMES[-1]
+    spans = np.arange(1, span_names(scene).shape[1] + 1)
+    for k in range(samples):
+        angle = 20.0 + 160.0 * share + 4.0 * lags(k)[..., None] * (share * (1.0 - share))
+        tension = (20.0 + k) / spans[None, :, None] * np.sin(np.pi * share) * np.ones((2, 1, 1))
+        lock = 10.0 - 0.1 * np.arange(2 * SECTIONS).reshape(2, SECTIONS)
+        fate = Fate.STALLED if k in stalled else Fate.DEPLOYED
+        spread = np.ptp(angle, axis=(0, 1))
+        values = {
+            "opening_angle": angle, "cable_tension": tension, "asynchrony": spread,
+            "asynchrony_max": spread.max(), "peak_tension": np.array(20.0 + k), "lock_time": lock,
+            "deployment_time": np.array(10.0),
+            "final_time": np.array(10.0), "energy_error": np.array(1e-5 * (k + 1)),
+            "restarts": np.array(0),
+        }  # fmt: skip
+        if k in failed or k in not_run:
+            late = (4.0 if k in failed else -1.0) < TIMES
+            timed = ("opening_angle", "cable_tension", "asynchrony")
+            values = {
+                name: np.where(late if name in timed else True, np.nan, array)
+                for name, array in values.items()
+            }
+            fate = Fate.NONE
+        if k in stalled:
+            values["deployment_time"], values["lock_time"] = np.array(np.nan), lock * np.nan
+        values["outcome"] = np.array(int(fate))
+        bad = k in failed
+        coordinates = {"plane": np.array(PLANES), "section": np.arange(1, SECTIONS + 1),
+                       "time": TIMES, "span": spans}  # fmt: skip
+        why = f"broke </script> at 4 s in sample {k}" if bad else "all V-joints have locked"
+        outcome = Outcome(
+            Status.TIMEOUT if bad else Status.OK, why, coordinates, values,
+            Cause.TIME_LIMIT if bad else Cause.NONE,
+        )  # fmt: skip
+        run = to_dataset(outcome, scene)
+        runs.append(run.assign(reason=run.attrs["reason"]))
+    found = xr.concat(runs, dim="sample", combine_attrs="override", data_vars="all")
+    found = found.assign_coords(sample=np.arange(samples))
+    found["status"] = found["status"].astype("i1")
+    found["status"][list(not_run)] = -1
+    found["outcome"] = found["outcome"].astype("i1")
+    for name, values, units in (
+        ("rods_young_modulus", 1e11 + 1e9 * np.arange(samples), "Pa"),
+        ("cables_upper_friction_coefficient", np.arange(samples)[:, None] + np.ones((1, 3)), "m"),
+        ("cables_lower_winch_stop_time", np.where(np.arange(samples) % 2, "none", "3.0"), "1"),
+    ):
+        dims = ("sample", "pulley")[: values.ndim]
+        law = json.dumps({"kind": "uniform", "low": 0.0, "high": 9.0})
+        path = name.replace("_", ".", 1)
+        says = {"role": "input", "path": path, "units": units, "distribution": law}
+        found[name] = (dims, values, says)
+    text = TEXT.format(kind=kind, samples=samples)
+    found.attrs |= {"campaign": text, "campaign_name": "made", "title": "Made by hand <&> quoted",
+                    "seed": 3}  # fmt: skip
+    return found

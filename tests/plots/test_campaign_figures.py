@@ -1,0 +1,184 @@
+"""Figures of a campaign show the numbers of the file, and what they leave out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from made_campaign import SECTIONS, TIMES, lags, made_campaign
+from matplotlib.figure import Figure
+
+from ringsim.analysis.campaign_samples import median_and_worst
+from ringsim.cli import cli
+from ringsim.dataset import save
+from ringsim.plots.campaign.by_input import by_input, drawn
+from ringsim.plots.campaign.convergence import convergence
+from ringsim.plots.campaign.courses import courses
+from ringsim.plots.campaign.distributions import distributions
+from ringsim.plots.campaign.fan import fan
+from ringsim.plots.campaign.figures import PICTURES, draw_campaign, figures_of
+from ringsim.plots.campaign.lag_map import lag_map
+from ringsim.plots.campaign.lock_order import lock_order, shares
+from ringsim.plots.campaign.tension import tension
+
+GOOD = [0, 1, 3, 4, 6]
+
+
+@pytest.fixture(scope="module")
+def mixed() -> xr.Dataset:
+    return made_campaign(8, failed=(2, 5), not_run=(7,))
+
+
+def words(figure: Figure) -> str:
+    texts = [figure.get_supxlabel(), *(each.get_title().get_text() for each in figure.legends)]
+    labels = [t.get_text() for legend in figure.legends for t in legend.get_texts()]
+    return " ".join(" ".join([*texts, *labels]).split())
+
+
+def deviation(campaign: xr.Dataset) -> np.ndarray:
+    """By numpy alone, of the samples that count; every run ends at the last record."""
+    angle = campaign["opening_angle"].transpose("sample", "plane", "section", "time").values[GOOD]
+    return angle - angle.mean(axis=(1, 2), keepdims=True)
+
+
+def test_the_fan_shows_quantiles_of_the_deviation(mixed: xr.Dataset) -> None:
+    figure, wanted = fan(mixed), deviation(mixed)
+    for section, axes in enumerate(figure.axes):
+        middles = [line for line in axes.lines if line.get_label() == "median"]
+        assert len(middles) == 2
+        for plane, line in enumerate(middles):
+            np.testing.assert_allclose(line.get_xdata(), TIMES / 10.0, atol=1e-12)
+            expected = np.median(wanted[:, plane, section], axis=0)
+            np.testing.assert_allclose(line.get_ydata(), expected, atol=1e-5)
+            every, most = axes.collections[2 * plane : 2 * plane + 2]
+            for band, levels in ((every, (0.0, 1.0)), (most, (0.05, 0.95))):
+                low, high = np.quantile(wanted[:, plane, section], levels, axis=0)
+                drawn_at = band.get_paths()[0].vertices[:, 1]
+                assert drawn_at.min() == pytest.approx(low.min(), abs=1e-5)
+                assert drawn_at.max() == pytest.approx(high.max(), abs=1e-5)
+        worst = [line for line in axes.lines if line.get_label() != "median"]
+        assert [np.abs(w.get_ydata()).max() for w in worst] == pytest.approx(
+            np.abs(lags(6)[:, section]), abs=1e-5
+        )
+    assert "worst: sample 6" in words(figure)
+
+
+def test_runs_of_different_length_are_laid_over_each_other() -> None:
+    campaign = made_campaign(3)
+    campaign["opening_angle"][:] = 0.0
+    slope = xr.DataArray([[1.0, 2.0, 3.0, 4.0]] * 2, dims=("plane", "section"))
+    campaign["opening_angle"][:] = (campaign.time * slope).transpose("plane", "section", "time")
+    campaign["deployment_time"][:] = [3.3, 5.0, 10.0]
+    found = courses(campaign)
+    for sample, end in enumerate((3.3, 5.0, 10.0)):
+        np.testing.assert_allclose(
+            found.sel(sample=sample).isel(share=-1), end * (slope - 2.5), rtol=1e-6
+        )
+
+
+def test_the_map_shows_the_median_and_the_worst(mixed: xr.Dataset) -> None:
+    figure, wanted = lag_map(mixed), deviation(mixed)
+    upper, lower = figure.axes[:2], figure.axes[2:4]
+    for plane, pair in enumerate((upper, lower)):
+        for axes, values in zip(pair, (np.median(wanted, axis=0), wanted[-1]), strict=True):
+            image = axes.collections[0].get_array().reshape(SECTIONS, -1)
+            np.testing.assert_allclose(image, values[plane], atol=1e-5)
+
+
+def test_lock_order_counts_ties_by_halves_and_what_stays_open() -> None:
+    campaign = made_campaign(4, failed=(3,))
+    campaign["lock_time"][:] = 5.0
+    campaign["lock_time"][0, 0, 0] = 4.0
+    campaign["lock_time"][1, 1, 2:] = 6.0
+    campaign["lock_time"][2, 0, 1] = np.nan
+    first, last, never = shares(campaign)
+    assert first.sum() == pytest.approx(1.0)
+    assert first[0, 0] == pytest.approx((1 + 1 / 6 + 1 / 7) / 3)
+    assert last[1, 2] == pytest.approx((1 / 7 + 1 / 2) / 3)
+    assert last.sum() == pytest.approx(2 / 3)
+    assert never[0, 1] == pytest.approx(1 / 3)
+    assert never.sum() == pytest.approx(1 / 3)
+    assert "all V-joints lock in 2" in words(lock_order(campaign))
+
+
+def test_distributions_are_steps_with_limits(mixed: xr.Dataset) -> None:
+    figure = distributions(mixed)
+    values = np.sort(mixed["asynchrony_max"].values[GOOD])
+    (panel,) = [a for a in figure.axes if a.get_xlabel().startswith("Largest asynchrony")]
+    step, limit = panel.lines[0], panel.lines[-1]
+    np.testing.assert_allclose(step.get_xdata()[1:], values)
+    np.testing.assert_allclose(step.get_ydata()[1:], np.arange(1, 6) / 5)
+    assert limit.get_xdata()[0] == 3.0
+    assert panel.get_title(loc="left") == "n = 5 of 8"
+
+
+def test_convergence_ends_at_mean_and_quantile(mixed: xr.Dataset) -> None:
+    figure = convergence(mixed)
+    values = mixed["peak_tension"].values[GOOD]
+    panel = figure.axes[-1]
+    mean, quantile = panel.lines
+    assert mean.get_ydata()[-1] == pytest.approx(values.mean())
+    assert mean.get_ydata()[1] == pytest.approx(values[:2].mean())
+    assert quantile.get_ydata()[-1] == pytest.approx(np.quantile(values, 0.95))
+    assert len(panel.collections) == 1
+    assert not convergence(made_campaign(4, kind="sobol")).axes[-1].collections
+
+
+def test_tension_by_span(mixed: xr.Dataset) -> None:
+    figure = tension(mixed)
+    spans = mixed["span"].values
+    for axes in figure.axes:
+        middle = axes.lines[0]
+        np.testing.assert_allclose(middle.get_ydata(), 23.0 / spans)
+        np.testing.assert_allclose(axes.lines[1].get_ydata(), 26.0 / spans)
+    assert "largest tension: sample 6" in words(figure)
+
+
+def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
+    figure = by_input(mixed)
+    points = {c.get_label(): c.get_offsets() for c in figure.axes[1].collections}
+    assert {name: len(at) for name, at in points.items()} == {
+        "deployed (5)": 5, "failed: timeout (2)": 2, "not run (1)": 1,
+    }  # fmt: skip
+    np.testing.assert_allclose(points["deployed (5)"][:, 0], np.array(GOOD) + 1.0)
+    np.testing.assert_allclose(points["deployed (5)"][:, 1], mixed["asynchrony_max"].values[GOOD])
+    places, labels = drawn(mixed["cables_lower_winch_stop_time"])
+    assert labels == ["3.0", "none"]
+    assert places.tolist() == [0, 1] * 4
+
+
+def test_no_figure_drops_a_sample_in_silence(mixed: xr.Dataset) -> None:
+    for picture, figure in figures_of(mixed):
+        told = words(figure)
+        if picture.name == "by_input":
+            assert "All 8 samples; 3 without" in told
+        else:
+            assert "5 of 8 samples; left out: 2 failed: timeout, 1 not run" in told, picture.name
+
+
+def test_the_median_is_a_sample_and_the_worst_has_the_largest_asynchrony(
+    mixed: xr.Dataset,
+) -> None:
+    assert median_and_worst(mixed) == (3, 6)
+    assert median_and_worst(made_campaign(2, failed=(0, 1))) is None
+
+
+def test_all_figures_of_a_file(tmp_path: Path, mixed: xr.Dataset) -> None:
+    save(mixed, tmp_path / "campaign.nc")
+    done = CliRunner().invoke(cli, ["plot", str(tmp_path / "campaign.nc"), "--plot-format", "svg"])
+    assert done.exit_code == 0, done.output
+    names = {path.name for path in tmp_path.glob("*.svg")}
+    assert names == {f"campaign-fig-{picture.name}.svg" for picture in PICTURES}
+
+
+@pytest.mark.parametrize("choice", [{"failed": (0, 1)}, {"not_run": (0, 1)}, {"stalled": (0, 1)}])
+def test_campaigns_in_which_nothing_deployed(
+    choice: dict[str, tuple[int, ...]], tmp_path: Path
+) -> None:
+    names = {path.stem for path in draw_campaign(made_campaign(2, **choice), tmp_path)}
+    stalled = {"distributions", "convergence", "fan", "lag_map", "tension", "by_input"}
+    expected = stalled if "stalled" in choice else {"by_input"}
+    assert names == {f"campaign-fig-{name}" for name in expected}

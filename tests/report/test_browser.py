@@ -1,0 +1,88 @@
+"""A browser opens the report, offline: it plays, and nothing complains."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from made_campaign import made_campaign
+
+from ringsim.report.page import page
+
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+HEAD = """<head><script>
+window.faults = [];
+window.addEventListener("error", (event) => window.faults.push(String(event.message)));
+document.addEventListener("securitypolicyviolation", (e) => window.faults.push(e.blockedURI));
+</script>"""
+TAIL = """<script>
+const seen = {}, canvas = document.getElementById("scene"), told = document.getElementById("told");
+const shot = () => canvas.toDataURL();
+const choose = (id, value) => {
+  const box = document.getElementById(id);
+  box.value = value;
+  box.dispatchEvent(new Event("change"));
+};
+const drag = (word, x) => canvas.dispatchEvent(
+  new PointerEvent(word, {clientX: x, clientY: 50, pointerId: 1, bubbles: true}));
+seen.first = told.textContent;
+let before = shot();
+canvas.setPointerCapture = () => {};
+drag("pointerdown", 50); drag("pointermove", 90); drag("pointerup", 90);
+seen.turned = before !== shot();
+before = shot();
+choose("view", "lag"); seen.viewed = before !== shot(); choose("view", "ring");
+choose("sample", "2"); seen.failed = told.textContent; choose("sample", "0");
+const slider = document.getElementById("moment"), play = document.getElementById("play");
+slider.value = 0;
+slider.dispatchEvent(new Event("input"));
+seen.start = told.textContent;
+play.click();
+seen.button = play.textContent;
+const waiting = setInterval(() => {
+  if (told.textContent === seen.start) return;
+  clearInterval(waiting);
+  seen.later = told.textContent;
+  play.click();
+  seen.stopped = play.textContent;
+  seen.wide = document.documentElement.scrollWidth - window.innerWidth;
+  seen.resources = performance.getEntriesByType("resource").length;
+  seen.faults = window.faults;
+  document.body.dataset.seen = JSON.stringify(seen);
+}, 20);
+</script></body>"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="there is no chromium or chrome")
+@pytest.mark.parametrize("width", [1000, 500])
+def test_the_page_plays_offline(tmp_path: Path, width: int) -> None:
+    text = page(made_campaign(8, failed=(2, 5)), "runs/made")
+    text = text.replace("<head>", HEAD, 1).replace("</body>", TAIL, 1)
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr",
+         f"--user-data-dir={tmp_path / 'profile'}", "--host-resolver-rules=MAP * ~NOTFOUND",
+         f"--window-size={width},900", "--virtual-time-budget=6000", "--dump-dom",
+         (tmp_path / "page.html").as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    assert "CONSOLE" not in done.stderr
+    held = re.search(r'data-seen="([^"]*)"', done.stdout)
+    assert held is not None
+    seen = json.loads(held[1].replace("&quot;", '"'))
+    assert seen["faults"] == []
+    assert seen["resources"] == 0
+    assert seen["turned"]
+    assert seen["viewed"]
+    assert " s of 10.00 s" in seen["first"]
+    assert " s of 4.00 s" in seen["failed"]
+    assert (seen["button"], seen["stopped"]) == ("Pause", "Play")
+    assert seen["start"].startswith("0.00 s of 10.00 s")
+    assert not seen["later"].startswith("0.00 s")
+    assert seen["wide"] <= 0  # only tables and figures scroll sideways, within themselves

@@ -1,0 +1,234 @@
+"""The report is whole: one well-formed page that loads nothing and hides no sample."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from made_campaign import SECTIONS, TIMES, made_campaign, made_scene
+
+from ringsim.cli import cli
+from ringsim.dataset import save
+from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
+from ringsim.plots.campaign.figures import PICTURES
+from ringsim.plots.ring import lines_at
+from ringsim.report.page import LARGEST, page
+from ringsim.report.player import player
+
+VOID = {"meta", "br", "img", "input", "link", "hr"}
+KINDS = {
+    "mixed": {"failed": (2, 5), "stalled": (4,), "not_run": (7,)},
+    "good": {},
+    "lost": {"failed": tuple(range(8))},
+}
+
+
+class Page(HTMLParser):
+    """Checks nesting, and collects ids, references and the text of cells."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.loads: list[str] = []
+        self.cells: list[str] = []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in VOID:
+            self.open.append(tag)
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(str(value))
+            elif name in ("src", "href", "xlink:href", "action", "data", "srcset"):
+                self.loads.append(str(value))
+        if tag in ("td", "th"):
+            self.cells.append("")
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if {"td", "th"} & set(self.open):
+            self.cells[-1] += data
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def made(request: pytest.FixtureRequest) -> tuple[str, xr.Dataset, str]:
+    campaign = made_campaign(8, **KINDS[request.param])
+    return request.param, campaign, page(campaign, "runs/made here")
+
+
+def test_the_page_is_well_formed_small_and_loads_nothing(
+    made: tuple[str, xr.Dataset, str],
+) -> None:
+    text = made[2]
+    found = Page(text)
+    assert len(text.encode()) < LARGEST
+    assert len(found.ids) == len(set(found.ids))
+    assert all(load.startswith(("#", "data:image/png;base64,")) for load in found.loads)
+    assert not re.search(r"https?:|@import|url\((?!#)", text)
+    own = {load[1:] for load in found.loads if load.startswith("#")}
+    own |= set(re.findall(r"url\(#([^)]+)\)", text))
+    assert own <= set(found.ids)
+
+
+def test_every_figure_and_section_is_there(made: tuple[str, xr.Dataset, str]) -> None:
+    kind, _, text = made
+    ids = set(Page(text).ids)
+    figures = {f"figure-{picture.name}" for picture in PICTURES}
+    assert ids & figures == ({"figure-by_input"} if kind == "lost" else figures)
+    sections = {"outcomes", "figures", "failures", "truth", "inputs", "model", "provenance"}
+    assert sections | {"requirements", "player"} <= ids
+
+
+def test_failures_have_their_replay_commands(made: tuple[str, xr.Dataset, str]) -> None:
+    kind, _, text = made
+    cells = Page(text).cells
+    short = sorted({*KINDS[kind].get("failed", ()), *KINDS[kind].get("stalled", ())})
+    commands = [cell for cell in cells if cell.startswith("ringsim replay")]
+    assert sorted(commands) == [f"ringsim replay 'runs/made here' {k}" for k in short]
+    assert ("None: every sample that has run reached its goal" in text) == (kind == "good")
+    for k in KINDS[kind].get("failed", ()):
+        assert f"broke </script> at 4 s in sample {k}" in cells
+
+
+def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
+    kind, campaign, text = made
+    if kind != "mixed":
+        return
+    cells = Page(text).cells
+    good = campaign["peak_tension"].values[[0, 1, 3, 4, 6]]
+    at = next(k for k, cell in enumerate(cells) if cell.startswith("largest tension"))
+    assert cells[at + 1 : at + 5] == ["N", "5", "3", f"{good.mean():.5g}"]
+    assert cells[at + 9 : at + 11] == ["20 (0)", "26 (6)"]
+    at = cells.index("outcome")
+    assert cells[at + 2 : at + 4] == ["4 of 5", "3"]
+    spread = campaign["asynchrony_max"].values[[0, 1, 3, 4, 6]]
+    at = cells.index("asynchrony_max")
+    assert cells[at + 2] == f"{(spread <= 3.0).sum()} of 5"
+
+
+def test_every_value_of_the_scene_has_its_origin(made: tuple[str, xr.Dataset, str]) -> None:
+    cells = Page(made[2]).cells
+    for path, value, origin in (
+        ("structure.opening_angle", "20.0", "inferred"),
+        ("structure.sections", "4", "campaign"),
+        ("structure.half_bar", "0.2889", "scene"),
+        ("rods.elements", "1", "default"),
+        ("rods.young_modulus", "120000000000.0", "drawn"),
+    ):
+        at = cells.index(path, cells.index("Origin"))
+        assert cells[at + 1 : at + 3] == [value, origin]
+
+
+def test_the_player_holds_what_was_computed(made: tuple[str, xr.Dataset, str]) -> None:
+    _, campaign, text = made
+    held = re.search(r'id="player-data">(.*?)</script>', text, re.DOTALL)
+    assert held is not None
+    data = json.loads(held[1])
+    for each in data["samples"]:
+        k = int(re.match(r"sample (\d+)", each["name"])[1])
+        angles = np.frombuffer(base64.b64decode(each["angles"]), "<i2").reshape(-1, 2 * SECTIONS)
+        own = campaign["opening_angle"].sel(sample=k, time=each["times"])
+        own = own.transpose("time", "plane", "section").values.reshape(len(angles), -1)
+        np.testing.assert_allclose(angles / 100.0, own, atol=0.0051)
+
+
+def test_the_player_offers_median_worst_and_failures() -> None:
+    data = player(made_campaign(8, **KINDS["mixed"]))
+    assert data is not None
+    assert [each["name"] for each in data["samples"]] == [
+        "sample 3: median by asynchrony_max, deployed",
+        "sample 6: worst by asynchrony_max, deployed",
+        "sample 2: failed: timeout", "sample 5: failed: timeout", "sample 4: stalled",
+    ]  # fmt: skip
+    assert len(data["samples"][0]["times"]) == len(TIMES)
+    assert data["samples"][2]["times"][-1] == 4.0
+
+
+def test_the_players_ring_is_that_of_the_figure() -> None:
+    data = player(made_campaign(2))
+    assert data is not None
+    ring = data["ring"]
+    fixed, joints = ring["fixed"], ring["joints"]
+    points = np.frombuffer(base64.b64decode(ring["points"]), "<i2")
+    points = ring["unit"] * points.reshape(len(ring["means"]), fixed + 2 * joints, 3)
+    pose = len(ring["means"]) // 2
+    openings = np.radians(ring["means"][pose] + np.linspace(-3.0, 3.0, joints).reshape(2, -1))
+    middle, aside = points[pose, fixed : fixed + joints], points[pose, fixed + joints :]
+    folded = np.cos(0.5 * openings.ravel())[:, None]
+    places = np.concatenate([points[pose, :fixed], middle + folded * aside])
+    wanted = lines_at(made_scene(), openings)
+    wanted.pop("V-joints")
+    wanted["net, taut"] = np.concatenate(
+        [wanted.pop(n) for n in ("net, taut", "net, slack") if n in wanted]
+    )
+    assert set(ring["groups"]) == set(wanted)
+    for number, name in enumerate(ring["groups"]):
+        own = places[[line[:2] for line in ring["lines"] if line[2] == number]]
+        np.testing.assert_allclose(own, wanted[name], atol=1e-4)
+
+
+def run(*words: str) -> tuple[int, str]:
+    done = CliRunner().invoke(cli, ["report", *words])
+    return done.exit_code, done.output
+
+
+def test_the_verb(tmp_path: Path) -> None:
+    out = str(tmp_path / "page.html")
+    save(made_campaign(3), tmp_path / "campaign.nc")
+    for where in (tmp_path, tmp_path / "campaign.nc"):
+        code, told = run(str(where), "--out", out)
+        assert (code, told[: 6 + len(out)]) == (EXIT_DONE, f"wrote {out}")
+        assert f"ringsim replay {tmp_path}" not in Path(out).read_text()
+    (tmp_path / "none").mkdir()
+    (tmp_path / "text.nc").write_text("no netCDF")
+    save(made_campaign(3).isel(sample=0), tmp_path / "run.nc")
+    for where, words in (
+        (tmp_path / "none", "holds no campaign.nc: merge its results with ringsim merge"),
+        (tmp_path / "gone", "there is no such folder"),
+        (tmp_path / "run.nc", "holds no campaign: give the folder"),
+        (tmp_path / "text.nc", "cannot be read as a netCDF file"),
+    ):
+        code, told = run(str(where), "--out", out)
+        assert code == EXIT_BAD_INPUT
+        assert told.startswith(f"{where}: {words}")
+    code, told = run(str(tmp_path), "--out", out, "--analysis", str(tmp_path / "run.nc"))
+    assert (code, "holds no verdicts: leave it out" in told) == (EXIT_BAD_INPUT, True)
+    code, told = run(str(tmp_path), "--out", str(tmp_path / "page.pdf"))
+    assert (code, told.endswith("the page is HTML: write page.html\n")) == (EXIT_BAD_INPUT, True)
+
+
+def test_verdicts_are_those_of_the_analysis() -> None:
+    flags = {"flag_values": np.array([0, 1], "i1"), "flag_meanings": "not_met met"}
+    columns = {
+        "requirement_text": ["asynchrony_max <= 3 degree"], "probability_required": [0.9],
+        "confidence_required": [0.8], "probability": [0.95], "probability_lower": [0.91],
+        "probability_upper": [0.99], "samples_used": [6], "samples_violating": [1],
+        "samples_lost": [2], "further_samples": [-1],
+    }  # fmt: skip
+    analysis = xr.Dataset({name: ("requirement", values) for name, values in columns.items()})
+    analysis["verdict"] = ("requirement", np.array([1], "i1"), flags)
+    analysis["verdict_worst_case"] = ("requirement", np.array([0], "i1"), flags)
+    text = page(made_campaign(8, failed=(2, 5)), "runs/made", analysis)
+    cells = Page(text).cells
+    at = cells.index("asynchrony_max <= 3 degree")
+    assert cells[at + 1 : at + 10] == [
+        "0.9 with confidence 0.8", "met", "0.95", "0.91 to 0.99", "6", "1", "2", "not met", "-",
+    ]  # fmt: skip
+    assert "without a verdict" not in text
