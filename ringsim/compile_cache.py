@@ -26,11 +26,11 @@ def choose_folder() -> Path:
     """The folder of compiled code, in the environment from now on, for child processes, too.
 
     That of ``NUMBA_CACHE_DIR`` if it is set; else one of the user's cache folder (XDG_CACHE_HOME,
-    or ~/.cache) for these versions and this processor; else, told in a line, a temporary one.
+    or ~/.cache) for these sources and this processor; else, told in a line, a temporary one.
     """
     if given := os.environ.get(VARIABLE):
         return Path(given)
-    made = f"ringsim-{version('ringsim')}-numba-{version('numba')}-{_processor()}"
+    made = f"ringsim-{_sources()}-numba-{version('numba')}-{_processor()}"
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     folder = Path(cache) / "ringsim" / made
     if not _usable(folder):
@@ -52,10 +52,8 @@ def compile_once(kind: Hashable, compiling: Callable[[], object]) -> None:
     that of its content.
     """
     folder = choose_folder()
-    digest = hashlib.blake2b(repr((version("numba"), sys.version, kind)).encode(), digest_size=12)
-    for source in sorted(SOURCES.glob("*.py")):
-        digest.update(source.read_bytes())
-    mark = folder / f"compiled-{digest.hexdigest()}"
+    made = repr((version("numba"), sys.version, _sources(), kind)).encode()
+    mark = folder / f"compiled-{hashlib.blake2b(made, digest_size=12).hexdigest()}"
     if mark.exists():
         return
     with _alone(folder / "lock"):
@@ -89,6 +87,14 @@ def _private(folder: Path) -> bool:
     found = folder.lstat()
     others = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
     return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not others
+
+
+def _sources() -> str:
+    """Of what is compiled: numba looks at a function's own file, not at those that it calls."""
+    digest = hashlib.blake2b(version("ringsim").encode(), digest_size=6)
+    for source in sorted(SOURCES.glob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()
 
 
 def _processor() -> str:
