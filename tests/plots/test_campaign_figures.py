@@ -182,3 +182,10 @@ def test_campaigns_in_which_nothing_deployed(
     stalled = {"distributions", "convergence", "fan", "lag_map", "tension", "by_input"}
     expected = stalled if "stalled" in choice else {"by_input"}
     assert names == {f"campaign-fig-{name}" for name in expected}
+
+
+def test_the_ideal_ring_has_no_fan() -> None:
+    campaign = made_campaign(2)
+    campaign["asynchrony"][:] = np.nan
+    names = {picture.name for picture, _ in figures_of(campaign)}
+    assert names == {picture.name for picture in PICTURES} - {"fan", "lag_map"}

@@ -19,6 +19,7 @@ from ringsim.dataset import save
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.plots.campaign.figures import PICTURES
 from ringsim.plots.ring import lines_at
+from ringsim.report import tables
 from ringsim.report.page import LARGEST, page
 from ringsim.report.player import player
 
@@ -232,3 +233,16 @@ def test_verdicts_are_those_of_the_analysis() -> None:
         "0.9 with confidence 0.8", "met", "0.95", "0.91 to 0.99", "6", "1", "2", "not met", "-",
     ]  # fmt: skip
     assert "without a verdict" not in text
+
+
+def test_numerical_truth_tells_error_bars_and_differences_of_engines() -> None:
+    campaign = made_campaign(4, failed=(3,))
+    campaign["peak_tension_error"] = campaign["peak_tension"] * 0.0 + 0.5
+    campaign["peak_tension_error"].attrs = {"long_name": "error bar", "units": "N"}
+    campaign["peak_tension_checked"] = campaign["peak_tension"] + [0.3, np.nan, -0.4, 9.0]
+    rows = {row[0]: row[1:] for row in tables.truth(campaign)}
+    assert rows["error bar"] == ["N", "3", "0.5 (rms)", "0.5 (sample 0)"]
+    (checked,) = [row for what, row in rows.items() if what.startswith("difference of the engines")]
+    assert checked == ["N", "2", f"{np.sqrt(0.125):.2g} (rms)", "0.4 (sample 2)"]
+    (energy,) = [row for what, row in rows.items() if "energy imbalance" in what]
+    assert energy == ["1", "3", "2e-05 (median)", "3e-05 (sample 2)"]

@@ -28,11 +28,13 @@ class Picture(NamedTuple):
     words: str
     """What it shows, for those who cannot see it."""
     needs: tuple[str, ...] = ()
-    """Variables of which some used sample must have a value."""
+    """Variables that must be there; some used sample must have a value of the first."""
     of: Callable[[xr.Dataset], object] = bool
     """What must hold beyond that."""
 
 
+_COURSES = ("asynchrony", "opening_angle", "final_time", "deployment_time")
+"""Asynchrony first: the ideal ring has none, and its angles are equal by assumption."""
 PICTURES = (
     Picture(
         "distributions", distributions,
@@ -40,11 +42,11 @@ PICTURES = (
     ),
     Picture(
         "fan", fan, "Deviation of each section from the mean opening angle, over all samples",
-        ("opening_angle", "final_time", "deployment_time"), judged_by,
+        _COURSES, judged_by,
     ),
     Picture(
         "lag_map", lag_map, "Section by time: lag of the median and of the worst sample",
-        ("opening_angle", "final_time", "deployment_time"), judged_by,
+        _COURSES, judged_by,
     ),
     Picture(
         "lock_order", lock_order, "How often each V-joint locks first, last and not at all",
