@@ -14,10 +14,17 @@ _SPARE = 5
 _HALVINGS = 60
 
 
+def _ranks(columns: Array) -> Array:
+    """Ranks in every column less their mean; one by one, because all at once take much memory."""
+    found = np.empty(columns.shape)
+    for k, column in enumerate(columns.T):
+        found[:, k] = rankdata(column) - (len(column) + 1) / 2
+    return found
+
+
 def correlations(columns: Array, output: Array) -> Array:
     """Rank correlation (Spearman) of every column, shape (samples, columns), with the output."""
-    x, y = rankdata(columns, axis=0), rankdata(output)
-    x, y = x - x.mean(axis=0), y - y.mean()
+    x, y = _ranks(columns), _ranks(output[:, None])[:, 0]
     scale = np.sqrt((x**2).sum(axis=0) * (y**2).sum())
     known = scale > 0
     return np.where(known, (y @ x) / np.where(known, scale, 1.0), np.nan)
@@ -33,12 +40,12 @@ def partial_correlations(columns: Array, output: Array) -> Array:
     none = np.full(wide, np.nan)
     if count < wide + 2 + _SPARE or not wide:
         return none
-    ranks = rankdata(np.column_stack([columns, output]), axis=0)
-    scale = ranks.std(axis=0)
+    x, y = _ranks(columns), _ranks(output[:, None])
+    matrix = np.block([[x.T @ x, x.T @ y], [y.T @ x, y.T @ y]])
+    scale = np.sqrt(np.diag(matrix))
     if (scale == 0).any():
         return none
-    ranks = (ranks - ranks.mean(axis=0)) / scale
-    matrix = ranks.T @ ranks / count
+    matrix = matrix / scale / scale[:, None]
     if np.linalg.cond(matrix) > 1e10:
         return none
     inverse = np.linalg.inv(matrix)
@@ -54,8 +61,7 @@ def areas(columns: Array, group: NDArray[np.bool_]) -> Array:
     """
     inside = int(group.sum())
     outside = len(group) - inside
-    sums = rankdata(columns, axis=0)[group].sum(axis=0)
-    found: Array = (sums - inside * (inside + 1) / 2) / (inside * outside)
+    found: Array = 0.5 + _ranks(columns)[group].sum(axis=0) / (inside * outside)
     return found
 
 
