@@ -117,14 +117,10 @@ def _correlated(
                 both = ranks.correlation_interval(middle[own], len(output), int(count))
                 ends[own] = np.stack(both, axis=1)
         elif placed.has_intervals and replicate is not None:
-            both = ranks.replicate_interval(measure, replicate, _to_normal, np.tanh)
+            both = ranks.replicate_interval(measure, replicate, ranks.to_normal, np.tanh)
             ends = np.stack(both, axis=1)
         results.append((middle, ends))
     return results[0], results[1]
-
-
-def _to_normal(correlation: Array) -> Array:
-    return np.arctanh(np.clip(correlation, -1 + 1e-12, 1 - 1e-12))
 
 
 def _groups(

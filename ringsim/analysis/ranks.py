@@ -74,8 +74,14 @@ def correlation_interval(found: Array, samples: int, held: int = 0) -> tuple[Arr
     if free < 1:
         return found + np.nan, found + np.nan
     half = _WIDE * np.sqrt((1.0 + found**2 / 2.0) / free)
-    middle = np.arctanh(np.clip(found, -1 + 1e-12, 1 - 1e-12))
+    middle = to_normal(found)
     return np.tanh(middle - half), np.tanh(middle + half)
+
+
+def to_normal(correlation: Array) -> Array:
+    """Fisher's transform; NaN for a perfect correlation, whose error is not known."""
+    known = np.abs(correlation) < 1 - 1e-9
+    return np.where(known, np.arctanh(np.where(known, correlation, 0.0)), np.nan)
 
 
 def area_interval(found: Array, inside: int, outside: int) -> tuple[Array, Array]:

@@ -117,7 +117,8 @@ def _errors(analysis: xr.Dataset) -> Iterator[str]:
     rows = []
     for name in outputs_in(analysis):
         errors = analysis[f"{name}_error_of_mean"].values
-        if np.isfinite(errors).any() and np.isfinite(analysis[name].values[0]):
+        mean, *_, least, most = analysis[name].values
+        if np.isfinite(errors).any() and np.isfinite(mean) and least < most:
             rows.append(
                 (
                     name,

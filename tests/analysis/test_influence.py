@@ -98,6 +98,13 @@ def test_intervals_from_replicates_cover(kind):
         assert 0.91 <= covered(np.transpose(each), value) <= 0.99
 
 
+def test_a_perfect_correlation_of_a_few_samples_has_no_interval():
+    x = np.arange(10.0)
+    found = analyse(with_inputs(campaign(x**3), force=x))
+    assert found.asynchrony_max_rank_correlation.item() == pytest.approx(1.0)
+    assert np.isnan(found.asynchrony_max_rank_correlation_interval).all()
+
+
 def test_a_perfect_separation_has_an_interval_below_one():
     found = ranks.areas(np.arange(20.0)[:, None], np.arange(20) >= 15)
     assert found.tolist() == [1.0]
