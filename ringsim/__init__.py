@@ -15,12 +15,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ringsim.analysis.comparison import compare
+    from ringsim.analysis.study import analyse
     from ringsim.scene import Scene, load_scene
     from ringsim.simulation import simulate
 
-__all__ = ["Scene", "load_scene", "simulate"]
+__all__ = ["Scene", "analyse", "compare", "load_scene", "simulate"]
 
-_HOMES = {"Scene": "scene", "load_scene": "scene", "simulate": "simulation"}
+_HOMES = {
+    "analyse": "analysis.study", "compare": "analysis.comparison",
+    "Scene": "scene", "load_scene": "scene", "simulate": "simulation",
+}  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

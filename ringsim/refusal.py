@@ -43,6 +43,7 @@ _SAYS = {
     "string_too_long": "{shown} must have at most {max_length} characters",
     "literal_error": "{shown} must be {expected}",
     "model": "{shown} must be a table: write [{where}], and its keys on the lines below",
+    "dict": "{shown} must be a table: write [{where}], and its keys on the lines below",
     "tuple": "{shown} must be one value, or a list with a value for each section",
 }
 """What is wrong with a value, by pydantic's word for the fault, or the type that it begins with."""

@@ -1,5 +1,6 @@
 """Tables, in Markdown and for terminals."""
 
+import math
 from collections.abc import Iterable, Sequence
 
 from tabulate import DataRow, TableFormat, tabulate
@@ -24,3 +25,14 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     sides = ["left", *["right"] * (len(head) - 1)]
     text = tabulate(list(rows), head, "simple", disable_numparse=True, colalign=sides)
     return str(text).splitlines()
+
+
+def number_text(value: float, digits: int = 4) -> str:
+    """A number with so many digits, or a dash."""
+    return f"{value:.{digits}g}" if math.isfinite(value) else "-"
+
+
+def interval_text(low: float, high: float, digits: int = 4) -> str:
+    """Both ends of an interval, or a dash."""
+    known = math.isfinite(low) or math.isfinite(high)
+    return f"{number_text(low, digits)} .. {number_text(high, digits)}" if known else "-"

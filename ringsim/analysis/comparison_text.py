@@ -6,8 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.quantities import quantities
-from ringsim.analysis.study_text import interval_text, number_text
-from ringsim.tables import text_table
+from ringsim.tables import interval_text, number_text, text_table
 
 _NAMED = 20
 """Changed outcomes that are listed at most."""

@@ -113,7 +113,7 @@ def of_replicates(
     Source: Shao and Tu, The Jackknife and Bootstrap (1995), section 2.
     """
     centre, scatter, count = _jackknife(values, replicate, statistic)
-    half = _wide(count) * scatter
+    half = student(count) * scatter
     if statistic is np.mean:
         return centre - half, centre + half
     return centre * np.exp(-half), centre * np.exp(half)
@@ -131,11 +131,17 @@ def _jackknife(
     if statistic is not np.mean:
         # Where one replicate has all the spread there is no telling; none at all is no doubt.
         left_out = np.log(np.where(left_out > 0, left_out, np.where(centre > 0, np.nan, 1.0)))
+    return centre, jackknife_error(left_out), len(which)
+
+
+def jackknife_error(left_out: Array) -> Array:
+    """Standard error from the estimates without each of the replicates, shape (replicates, ...)."""
     squares = ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
-    return centre, np.sqrt(squares * (len(which) - 1) / len(which)), len(which)
+    return np.asarray(np.sqrt(squares * (len(left_out) - 1) / len(left_out)))
 
 
-def _wide(replicates: int) -> float:
+def student(replicates: int) -> float:
+    """Half length of an interval over the standard error from so many replicates."""
     return float(t.ppf(0.5 + LEVEL / 2, replicates - 1)) if replicates > 1 else np.nan
 
 
@@ -150,7 +156,7 @@ def quantile_of_replicates(
     """
     middle = np.quantile(values, probability, axis=-1, keepdims=True)
     _, scatter, count = _jackknife((values <= middle).astype(float), replicate, np.mean)
-    half, size = _wide(count) * scatter, values.shape[-1]
+    half, size = student(count) * scatter, values.shape[-1]
     ordered = np.sort(values, axis=-1)
     ends = []
     for level in (probability - half, probability + half):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ringsim.analysis import intervals
 from ringsim.analysis.binomial import share_interval
 from ringsim.analysis.design import Placement, placement
+from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import NONE, Array, Interval
 from ringsim.analysis.quantities import good, lost, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
@@ -50,8 +51,9 @@ def analyse(
         For every output NAME ``NAME`` (statistic), ``NAME_interval`` (statistic, bound),
         ``NAME_convergence`` (part, statistic), ``NAME_error_of_mean`` (source), all in its unit,
         and ``NAME_samples`` (counted); ``outcome_...`` along ``kind``; verdicts along
-        ``requirement``.  NaN stands for what the samples do not tell; ``intervals`` among the
-        attributes says what intervals are from, or why there are none.
+        ``requirement``; what matters along ``input``, see ``influence``.  NaN stands for what the
+        samples do not tell; ``intervals`` among the attributes says what intervals are from, or
+        why there are none.
 
     InputError if it is no campaign, or a requirement cannot be judged by it.
     """
@@ -86,7 +88,7 @@ def analyse(
     found = found.merge(_outcomes(campaign, placed), combine_attrs="override")
     if wanted:
         found = found.merge(judge(campaign, wanted, placed), combine_attrs="override")
-    return found
+    return found.merge(influence(campaign, wanted, placed), combine_attrs="override")
 
 
 def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any]:

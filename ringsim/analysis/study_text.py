@@ -5,10 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.influence_text import influence_lines
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
 from ringsim.analysis.verdicts import Verdict
-from ringsim.tables import text_table
+from ringsim.tables import interval_text, number_text, text_table
 
 
 def told(analysis: xr.Dataset) -> list[str]:
@@ -16,7 +17,7 @@ def told(analysis: xr.Dataset) -> list[str]:
     counts = f"{analysis.attrs['samples']} samples, design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
-    for part in (_requirements, _outcomes, _outputs, _errors):
+    for part in (_requirements, _outcomes, _outputs, _errors, influence_lines):
         if more := list(part(analysis)):
             lines += ["", *more]
     return lines
@@ -116,7 +117,8 @@ def _errors(analysis: xr.Dataset) -> Iterator[str]:
     rows = []
     for name in outputs_in(analysis):
         errors = analysis[f"{name}_error_of_mean"].values
-        if np.isfinite(errors).any() and np.isfinite(analysis[name].values[0]):
+        mean, *_, least, most = analysis[name].values
+        if np.isfinite(errors).any() and np.isfinite(mean) and least < most:
             rows.append(
                 (
                     name,
@@ -141,14 +143,3 @@ def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:
     unknown = [name for name, k in zip(SOURCES, known, strict=True) if not k]
     found = SOURCES[int(np.nanargmax(errors))]
     return f"{found} ({', '.join(unknown)} unknown)" if unknown else found
-
-
-def number_text(value: float, digits: int = 4) -> str:
-    """A number with so many digits, or a dash."""
-    return f"{value:.{digits}g}" if np.isfinite(value) else "-"
-
-
-def interval_text(low: float, high: float, digits: int = 4) -> str:
-    """Both ends of an interval, or a dash."""
-    known = np.isfinite([low, high]).any()
-    return f"{number_text(low, digits)} .. {number_text(high, digits)}" if known else "-"

@@ -12,7 +12,7 @@ from ringsim.refusal import InputError
 @click.command()
 @click.argument("source", metavar="DIR|FILE", type=PATH)
 @click.option(
-    "--require", "required", metavar="TEXT", multiple=True,
+    "--require", "required", metavar="REQUIREMENT", multiple=True,
     help="Judge a requirement, too, or in place of the file's on that output: 'asynchrony_max: max "
     "10, probability 0.99, confidence 0.9', 'outcome: is deployed, probability ...'.",
 )  # fmt: skip

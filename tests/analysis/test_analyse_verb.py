@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
@@ -52,7 +54,11 @@ def analyse(*arguments):
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     (folder / "stand_in.py").write_text(STAND_IN)
-    (folder / "study.toml").write_text(CAMPAIGN)
+    return run_campaign(folder, CAMPAIGN)
+
+
+def run_campaign(folder, text):
+    (folder / "study.toml").write_text(text)
     line = [sys.executable, "-m", "ringsim", "campaign", "study.toml", "--workers", "0"]
     done = subprocess.run(
         [*line, "--solver", "stand_in:run"], cwd=folder, capture_output=True, text=True,
@@ -106,3 +112,17 @@ def test_the_output_needs_a_name_of_netcdf(tmp_path):
     campaign([1.0, 2.0]).to_netcdf(tmp_path / "campaign.nc")
     with pytest.raises(InputError, match="must end with"):
         analyse(tmp_path, "--out", tmp_path / "analysis.txt")
+
+
+def test_a_requirement_that_changes_later_is_taken_over_and_nothing_runs_again(study, tmp_path):
+    folder = tmp_path / "later"
+    shutil.copytree(study.parents[1], folder)
+    (folder / "stand_in.py").write_text("def run(scene):\n    raise SystemExit('ran again')\n")
+    found = run_campaign(folder, CAMPAIGN.replace("max = 30.0", "max = 10.0"))
+    done = analyse(found)
+    assert "deployment_time <= 10 s" in done.output
+    with (
+        xr.open_dataset(found / "campaign.nc") as now,
+        xr.open_dataset(study / "campaign.nc") as old,
+    ):
+        np.testing.assert_array_equal(now.deployment_time, old.deployment_time)

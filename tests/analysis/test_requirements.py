@@ -36,6 +36,7 @@ def test_both_ways_of_writing_read_alike():
         ({"outcome": {"max": 1.0, **SHOWN}}, 'as is = "deployed"'),
         ({"outcome": {"is": "deplyed", **SHOWN}}, r"did you mean deployed\?"),
         ({"peak_tension": 5.0}, "must be a table"),
+        ({"outcome": {"is": 3, **SHOWN}}, "must be text in quotes"),
     ],
 )
 def test_wrong_requirements_are_told_with_the_cure(table, words):

@@ -11,6 +11,9 @@ from ringsim.sampling.distributions.family import Array, inside
 class RandomDesign(Design):
     """Plain Monte Carlo: sample i depends on the campaign's seed and on i alone."""
 
+    gone: ClassVar[dict[str, str]] = {
+        "replicates": "samples of a random design are independent as they are; leave it out",
+    }
     independent: ClassVar[bool] = True
 
     kind: Literal["random"] = "random"

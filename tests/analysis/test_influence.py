@@ -1,0 +1,174 @@
+"""What matters: known correlations and separations are found, with intervals that cover them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.special import expit, logit
+from scipy.stats import norm, spearmanr
+
+from made import campaign, points
+from ringsim.analysis import ranks
+from ringsim.analysis.drawn import drawn
+from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import told
+from ringsim.variables import Fate, Status
+
+CAMPAIGNS = 1000
+
+
+def with_inputs(made, **columns):
+    for path, values in columns.items():
+        says = {"role": "input", "path": path.replace("__", ".")}
+        made[path] = (("sample", "pulley")[: np.ndim(values)], values, says)
+    return made
+
+
+def covered(ends, true):
+    low, high = np.array(ends)
+    return np.mean((low <= true) & (true <= high))
+
+
+def test_rank_correlations_are_those_of_scipy():
+    random = np.random.default_rng(0)
+    columns = random.integers(0, 5, (50, 3)).astype(float)
+    output = columns @ [1.0, -0.5, 0.0] + random.normal(size=50)
+    expected = [spearmanr(column, output).statistic for column in columns.T]
+    np.testing.assert_allclose(ranks.correlations(columns, output), expected, rtol=1e-12)
+
+
+def test_partial_correlations_are_those_of_residuals():
+    random = np.random.default_rng(1)
+    columns = random.normal(size=(60, 3))
+    columns[:, 1] += columns[:, 0]
+    output = columns[:, 0] + random.normal(size=60)
+    from scipy.stats import rankdata
+
+    x, y = rankdata(columns, axis=0), rankdata(output)
+    for k, found in enumerate(ranks.partial_correlations(columns, output)):
+        others = np.column_stack([np.ones(60), np.delete(x, k, axis=1)])
+        fits = [np.linalg.lstsq(others, each, rcond=None)[0] for each in (x[:, k], y)]
+        left = [each - others @ fit for each, fit in zip((x[:, k], y), fits, strict=True)]
+        assert found == pytest.approx(np.corrcoef(*left)[0, 1], abs=1e-12)
+
+
+def test_intervals_of_correlations_cover_normal_pairs():
+    """Of a normal pair with correlation r the rank correlation is 6 / pi arcsin(r / 2)."""
+    random = np.random.default_rng(2)
+    true = 6 / np.pi * np.arcsin(0.6 / 2)
+    ends = []
+    for _ in range(CAMPAIGNS):
+        x, y = random.normal(size=(2, 60))
+        found = ranks.correlations(x[:, None], 0.6 * x + 0.8 * y)
+        ends.append(np.ravel(ranks.correlation_interval(found, 60)))
+    assert 0.92 <= covered(np.transpose(ends), true) <= 0.98
+
+
+def test_intervals_of_areas_cover_normal_groups():
+    random, true = np.random.default_rng(3), norm.cdf(1 / np.sqrt(2))
+    inside = np.arange(80) < 15
+    columns = random.normal(size=(80, CAMPAIGNS)) + inside[:, None]
+    ends = ranks.area_interval(ranks.areas(columns, inside), 15, 65)
+    assert 0.92 <= covered(ends, true) <= 0.98
+
+
+@pytest.mark.parametrize("kind", ["sobol", "latin-hypercube"])
+def test_intervals_from_replicates_cover(kind):
+    """Truth from 400,000 independent samples, whose own error is a hundredth of the intervals."""
+
+    def output(drawn):
+        return drawn[..., 0] + 0.5 * drawn[..., 1] ** 2 + 0.3 * drawn[..., 2] * drawn[..., 0]
+
+    many = np.random.default_rng(5).random((400_000, 3))
+    first = many[:, :1]
+    high = output(many) > 1.2
+    true = ranks.correlations(first, output(many)), ranks.areas(first, high)
+    which = np.arange(128) % 8
+    ends = [[], []]
+    for seed in range(300):
+        x = points(kind, 128, 8, seed)
+        y = output(x)
+        correlate = lambda rows: ranks.correlations(x[rows, :1], y[rows])  # noqa: B023, E731
+        area = lambda rows: ranks.areas(x[rows, :1], y[rows] > 1.2)  # noqa: B023, E731
+        ends[0].append(np.ravel(ranks.replicate_interval(correlate, which, np.arctanh, np.tanh)))
+        ends[1].append(np.ravel(ranks.replicate_interval(area, which, logit, expit)))
+    for each, value in zip(ends, true, strict=True):
+        # 300 campaigns leave a standard error of 1.3 % of the share.
+        assert 0.91 <= covered(np.transpose(each), value) <= 0.99
+
+
+def test_a_perfect_correlation_of_a_few_samples_has_no_interval():
+    x = np.arange(10.0)
+    found = analyse(with_inputs(campaign(x**3), force=x))
+    assert found.asynchrony_max_rank_correlation.item() == pytest.approx(1.0)
+    assert np.isnan(found.asynchrony_max_rank_correlation_interval).all()
+
+
+def test_a_perfect_separation_has_an_interval_below_one():
+    found = ranks.areas(np.arange(20.0)[:, None], np.arange(20) >= 15)
+    assert found.tolist() == [1.0]
+    low, high = ranks.area_interval(found, 5, 15)
+    assert 0.7 < low.item() < 0.95
+    assert high.item() == pytest.approx(1.0)
+
+
+def test_pulleys_matter_by_mean_and_by_place():
+    random = np.random.default_rng(6)
+    friction, force = random.random((400, 5)), random.random(400)
+    made = campaign(friction @ [1, 1, 4, 1, 1] - force + 0.1 * random.normal(size=400))
+    made = with_inputs(made, cables__friction=friction, loads__force=force, same=force)
+    made = made.assign_coords(pulley_name=("pulley", [f"section {k} V" for k in range(1, 6)]))
+    found = analyse(made)
+    assert "same" not in found.input.values  # shared values are one column
+    plain, partial = (
+        found[f"asynchrony_max_{each}rank_correlation"].to_series() for each in ("", "partial_")
+    )
+    assert plain.idxmax() == 'cables.friction["section 3 V"]'
+    assert plain["mean of cables.friction"] > 0.6
+    assert plain["loads.force"] < -0.1
+    assert (partial.drop(["loads.force", "mean of cables.friction"]) > 0.7).all()
+    ends = found.asynchrony_max_rank_correlation_interval.sel(input="loads.force").values
+    assert ends[0] < plain["loads.force"] < ends[1] < 0
+    assert any('cables.friction["section 3 V"]' in line for line in told(found))
+
+
+def test_what_separates_failures_stalls_and_violations_is_found():
+    random = np.random.default_rng(7)
+    force, other = random.random((2, 200))
+    status = np.where(force > 0.9, Status.DIVERGED, Status.OK)
+    outcome = np.where(status, Fate.NONE, np.where(force < 0.2, Fate.STALLED, Fate.DEPLOYED))
+    values = np.where(status == Status.OK, other, np.nan)
+    stop = np.where(force < 0.2, "3.0", "none").astype(object)
+    made = with_inputs(
+        campaign(values, status=status, outcome=outcome), force=force, other=other, stop=stop
+    )
+    wanted = {"asynchrony_max": {"max": 0.8, "probability": 0.9, "confidence": 0.9}}
+    found = analyse(made, wanted)
+    areas = found.separation.to_series()
+    assert areas["lost", "force"] == 1.0
+    assert areas["stalled", "force"] == 0.0
+    assert areas["stalled", "stop = 3.0"] == 1.0
+    assert areas["violates asynchrony_max <= 0.8 degree", "other"] == 1.0
+    low, high = found.separation_interval.sel(group="stalled", input="other").values
+    assert low < 0.5 < high
+    (line,) = (line for line in told(found) if line.startswith("stalled: force"))
+    assert line.split()[2] == "0"
+    assert line.split()[-1] == str((force < 0.2).sum())
+
+
+def test_designs_without_intervals_tell_correlations_alone():
+    x = points("latin-hypercube", 64, 1, 0)[:, 0]
+    found = analyse(with_inputs(campaign(x**2, design={"kind": "latin-hypercube"}), force=x))
+    assert found.asynchrony_max_rank_correlation.item() == pytest.approx(1.0)
+    assert np.isnan(found.asynchrony_max_rank_correlation_interval).all()
+
+
+def test_inputs_that_were_not_drawn_are_left_out():
+    made = with_inputs(campaign(np.arange(20.0)), fixed=np.ones(20))
+    made["solver_error_bars"] = (
+        "sample", np.arange(20) % 8 == 0, {"role": "input", "path": "solver.error_bars"}
+    )  # fmt: skip
+    assert not drawn(made).names
+    assert "input" not in analyse(made).dims
+    assert isinstance(analyse(made), xr.Dataset)
