@@ -15,7 +15,7 @@ from ringsim.refusal import InputError
 @click.option("--out", metavar="FILE", type=PATH, default=Path("report.html"), show_default=True)
 @click.option(
     "--analysis", metavar="FILE", type=PATH,
-    help="netCDF file with verdicts on the requirements, to show them, too.",
+    help="File of ringsim analyse with verdicts to show instead of those of today.",
 )  # fmt: skip
 def command(folder: Path, out: Path, analysis: Path | None) -> None:
     """Write one page about the campaign in DIR, which holds campaign.nc, or about such a file.
@@ -36,7 +36,14 @@ def command(folder: Path, out: Path, analysis: Path | None) -> None:
     campaign = _load(file)
     if "sample" not in campaign.dims or not {"scene", "campaign"} <= campaign.attrs.keys():
         raise InputError(f"{file}: holds no campaign: give the folder that ringsim campaign named")
-    judged = None if analysis is None else _load(analysis)
+    if analysis is not None:
+        judged = _load(analysis)
+    elif "requirements" in campaign.attrs:
+        from ringsim.analysis.study import analyse
+
+        judged = analyse(campaign)
+    else:
+        judged = None
     if judged is not None and not {"verdict", "requirement"} <= set(judged.variables):
         raise InputError(f"--analysis {analysis}: holds no verdicts: leave it out")
     size = write_report(campaign, out, str(file.parent), judged)
