@@ -78,7 +78,9 @@ def _advice(found: xr.Dataset) -> str:
         of = found.sel(output=column)
         rows.append([name])
         for target, cheapest in zip(targets, of.cheapest.values, strict=True):
-            picked = [cheapest, *ideal[of.bound.values[ideal] <= target]]
+            most = of.cost.values[cheapest] if cheapest >= 0 else np.inf
+            worth = (of.bound.values <= target) & (of.cost.values < most)
+            picked = [cheapest, *ideal[worth[ideal]]]
             words = [f"{in_words(of, k)}, {of.cost.values[k]:.3g} s" for k in picked if k >= 0]
             otherwise = "reference too coarse" if of.uncertainty >= target else "none tried"
             rows[-1].append("; or ".join(words) or otherwise)

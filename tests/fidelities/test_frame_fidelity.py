@@ -108,3 +108,8 @@ def test_both_engines_stand_in_one_file_and_one_table(tmp_path: Path) -> None:
 def test_measured_settings_are_for_one_engine() -> None:
     printed = called("run", "truss2", "--accuracy", "0.05", "--fidelity", "both", code=2)
     assert "leave out one" in printed
+
+
+def test_settings_of_an_engine_that_was_not_measured_are_refused() -> None:
+    printed = called("run", "ring18", "--accuracy", "0.05", "--fidelity", "frame", code=2)
+    assert "no settings of it were measured with ring18" in printed
