@@ -14,7 +14,7 @@ from ringsim.dataset import save, to_dataset
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_table, scene_from_toml
-from ringsim.variables import Cause, Outcome, Status
+from ringsim.variables import Cause, Fidelity, Outcome, Status
 
 TIMES = np.array([0.0, 0.1, 0.25])
 
@@ -47,6 +47,7 @@ def full_outcome(sections: int = 4) -> Outcome:
             if variable.dims:
                 values[name][..., -1] = np.nan
     del values["status"], values["cause"]
+    values["fidelity"] = np.array(int(Fidelity.FRAME))
     coordinates = {
         "plane": np.array(["upper", "lower"]),
         "section": np.arange(1, sections + 1),

@@ -38,12 +38,11 @@ def command(folder: Path, out: Path, analysis: Path | None) -> None:
         raise InputError(f"{file}: holds no campaign: give the folder that ringsim campaign named")
     if analysis is not None:
         judged = _load(analysis)
-    elif "requirements" in campaign.attrs:
+    else:
         from ringsim.analysis.study import analyse
 
         judged = analyse(campaign)
-    else:
-        judged = None
+        judged = judged if "verdict" in judged else None
     if judged is not None and not {"verdict", "requirement"} <= set(judged.variables):
         raise InputError(f"--analysis {analysis}: holds no verdicts: leave it out")
     size = write_report(campaign, out, str(file.parent), judged)
