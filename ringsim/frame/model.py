@@ -69,6 +69,8 @@ class FrameModel:
         self._loaded: list[tuple[int, Array, Array]] = []
         for number, force in self.layout.forces:
             end = skeleton.end_of(self.layout.joints[number].first)
+            if end.arm.any():
+                raise InputError(f"{NOT_HERE} forces beside a frame's origin: {CURE}")
             self.loads[mesh.home[end.frame] : mesh.home[end.frame] + 3] += force
             self._loaded.append((end.frame, pose.place[end.frame].copy(), force))
         self._tolerance = residual_tolerance(scene, self.layout, 0.0)
@@ -200,11 +202,9 @@ class FrameModel:
             pull = ideal.work_rate(q) / motion.inertia
             velocity, rotation = motion.velocity, motion.rotation
         self.first = np.zeros(self.size)
-        rates = []
         for f, (rate, turn) in enumerate(skeleton.rates):
             moving = pull * (rate - velocity - cross(rotation, skeleton.places[f]))
             turning = pull * (turn - rotation)
-            rates.append((moving, turning))
             k = self.mesh.home[f]
             self.first[k : k + 3], self.first[k + 3 : k + 6] = moving, turning
         angular = pull * np.array(skeleton.angle_rates)
