@@ -21,6 +21,7 @@ from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.rotations import Array
 from ringsim.layout.layout import Contact, HubNet
 from ringsim.layout.pose import turned_about_z
+from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.net import Net
@@ -132,7 +133,7 @@ class Faults:
         """Strike all faults that are due, at opening angles (rad) of shape (planes, sections) and
         a state of the cables; returns whether there was one.
         """
-        due = [one for one in self._waiting if one[0].time <= time + 1e-12]
+        due = [one for one in self._waiting if one[0].time <= time + AT_ONCE]
         del self._waiting[: len(due)]
         for fault, joint in due:
             if joint is not None:

@@ -15,6 +15,7 @@ from ringsim.frame.stresses import StressMeter
 from ringsim.layout.pose import Array
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
+from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Instant
@@ -33,7 +34,7 @@ _DESCENT = 0.9
 _SMALLEST_SHARE = 0.1
 """... down to a sixteenth: by then the tangent of the other side is better."""
 _SHORTEST = 1e-9
-"""Step (s) below which a run is given up, as of the full model."""
+"""Step (s) below which Newton's failure ends a run, as of the full model."""
 
 Watch = Callable[[Instant], None]
 """What is shown every accepted state of a run."""
@@ -85,18 +86,19 @@ class Integration:
         while control.goes_on:
             step = control.next_step(self._faults[0].time if self._faults else math.inf)
             self._begin()
-            while step >= _SHORTEST:
+            while True:
                 try:
                     after, found = self._try(step)
                 except NoBalanceError as error:
-                    cause, step = str(error), control.retry(0.5 * step)
+                    step = control.retry(0.5 * step)
+                    if step < _SHORTEST:
+                        control.fail(str(error))
+                        break
                     continue
                 if control.shorter(found) is None:
                     self._accept(step, after, found)
                     break
                 step = control.retry(step)
-            else:
-                control.fail(cause)
         control.conclude()
         history.status, history.fate = control.status, control.fate
         history.reason, history.repeats = control.reason, control.repeats
@@ -229,7 +231,7 @@ class Integration:
 
     def _strike(self, now: Instant) -> bool:
         """Strike all faults that are due; returns whether there was one."""
-        due = [fault for fault in self._faults if fault.time <= now.time + 1e-12]
+        due = [fault for fault in self._faults if fault.time <= now.time + AT_ONCE]
         del self._faults[: len(due)]
         for fault in due:
             if isinstance(fault, StuckVJoint):

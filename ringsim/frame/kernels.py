@@ -118,8 +118,8 @@ def _loaded(
         strains.now[e, k], strains.now[e, 3 + k] = u[k], psi[k]
     du = plus(times(strains.lead, u), vector(strains.before[e, :3]))
     dpsi = plus(times(strains.lead, psi), vector(strains.before[e, 3:]))
-    force = scaled(vector(mesh.stiffness[e, :3]), u, du, mesh.tau)
-    moment = scaled(vector(mesh.stiffness[e, 3:]), psi, dpsi, mesh.tau)
+    force = scaled(vector(mesh.stiffness[e, :3]), u, du, mesh.tau[e])
+    moment = scaled(vector(mesh.stiffness[e, 3:]), psi, dpsi, mesh.tau[e])
     n, w, m = carried(axes, d, force, moment, psi)
     return r1, r2, axes, d, psi, n, w, m
 
@@ -180,11 +180,11 @@ def add_tangent(
     after places, 1/s^2.
     """
     k12, rows, h = np.zeros((12, 12)), np.zeros((12, 14)), np.zeros((14, 14))
-    more = 1.0 + mesh.tau * strains.lead
     for e in range(len(mesh.length)):
         r1, r2, axes, d, psi, n, w, m = _loaded(mesh, pose, points, strains, e)
         f1, m1, f2, m2 = _pulls(mesh, accelerations, e, n, w, m)
         k12[:] = 0.0
+        more = 1.0 + mesh.tau[e] * strains.lead
         ku = times(more, vector(mesh.stiffness[e, :3]))
         kp = times(more, vector(mesh.stiffness[e, 3:]))
         element_tangent(axes, d, n, w, m, psi, ku, kp, k12)

@@ -31,7 +31,7 @@ class Mesh(NamedTuple):
     length: Array
     stiffness: Array
     mass: Array
-    tau: float
+    tau: Array
     point_frame: Indices
     point_arm: Array
     point_mass: Array
@@ -92,7 +92,8 @@ def mesh_of(
         length=np.array([element.length for element in elements]),
         stiffness=np.array([element.stiffness for element in elements]),
         mass=np.array([element.mass for element in elements]),
-        tau=float(rods.damping),
+        # The boom's elements come last, and are not damped.
+        tau=np.repeat([rods.damping, 0.0], [len(elements) - len(boom), len(boom)]),
         point_frame=np.array(points.frames),
         point_arm=np.array(points.arms),
         point_mass=np.array(points.masses),

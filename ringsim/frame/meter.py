@@ -37,9 +37,9 @@ class EnergyMeter:
             elastic += stored
             forces.append(resisting)
             places.append(lengths)
-        if mesh.tau > 0.0:
+        if mesh.tau.any():
             straining = strains.lead * state.strains + strains.before
-            forces.append((mesh.tau * mesh.stiffness * straining).ravel())
+            forces.append((mesh.tau[:, None] * mesh.stiffness * straining).ravel())
             places.append(state.strains.ravel())
         force, place = np.concatenate(forces), np.concatenate(places)
         lost = driven = 0.0

@@ -107,7 +107,7 @@ class FrameModel:
         coordinates of order 1 m: of inertia, of the rods with their damping, of slides.
         """
         inertia = self._heaviest * self.coefficients.acceleration_by_place(step)
-        rods = self._stiffest * (1.0 + self.mesh.tau * strains.lead)
+        rods = self._stiffest * (1.0 + float(self.mesh.tau.max()) * strains.lead)
         slides = STIFFNESS * self._stiffest if self.slides else 0.0
         small = 4.0 * float(np.finfo(float).eps)
         reached = small * (math.sqrt(self.size) * (inertia + rods) + slides)

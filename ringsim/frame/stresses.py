@@ -34,7 +34,7 @@ class StressMeter:
         """Stresses, shape (rod halves, sections), Pa."""
         own, mesh = self._elements, self._mesh
         now, before = strains.now[own], strains.before[own]
-        carried = mesh.stiffness[own] * (now + mesh.tau * (strains.lead * now + before))
+        carried = mesh.stiffness[own] * (now + mesh.tau[own, None] * (strains.lead * now + before))
         force, torque = carried[:, :3].T, carried[:, 3:].T
         x = self._outside
         moment = np.hypot(torque[1] + force[2] * x, torque[2] - force[1] * x)

@@ -79,6 +79,14 @@ def _turning_energy(model: FrameModel, turn: np.ndarray) -> float:
     return float(kinetic_energy(model.mesh, (sides[0] - sides[1]) / (2.0 * small)))
 
 
+def test_damping_of_rods_leaves_the_boom_undamped() -> None:
+    """The boom is a body of its own, as in the full model: ``rods.damping`` is of rods."""
+    boom = {"boom.kind": "flexible", "boom.elements": 3, "rods.damping": 0.01}
+    model = FrameModel(load_scene("ring18").with_values({"structure.sections": 3, **boom}))
+    assert list(model.mesh.tau[-3:]) == [0.0] * 3
+    assert set(model.mesh.tau[:-3]) == {0.01}
+
+
 def test_a_free_ring_keeps_its_momenta() -> None:
     """It opens under forces that sum to zero, unlike from section to section, and meets its stops.
 

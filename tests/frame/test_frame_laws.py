@@ -12,6 +12,7 @@ import pytest
 from engine_pairs import apart
 from law_scenes import CABLES, FORCES, of_cables, of_forces
 from ringsim.scene import Scene
+from ringsim.simulation import simulate
 
 FLOOR = 1e-4
 SLOW = {
@@ -41,3 +42,18 @@ def test_rings_under_forces(values: dict[str, object]) -> None:
 @pytest.mark.parametrize("values", named("cables", CABLES))
 def test_rings_on_cables(values: dict[str, object]) -> None:
     check(of_cables(values))
+
+
+@pytest.mark.parametrize("fidelity", ["full", "frame"])
+def test_faults_closer_than_any_step(fidelity: str) -> None:
+    """A cable is cut twice, 1e-10 s apart, which is as if it were cut so at once."""
+    first = {"kind": "cut-cable", "cable": 1, "span": 2, "time": 0.2}
+    second = {"kind": "cut-cable", "cable": 1, "span": 6}
+    once, twice = (
+        simulate(of_cables({"faults": [first, second | {"time": time}]}), fidelity=fidelity)
+        for time in (0.2, 0.2 + 1e-10)
+    )
+    assert once.status.item() == twice.status.item() == 0
+    last = once.cable_tension.isel(time=-1)
+    assert last.max() > 10.0
+    assert abs(twice.cable_tension.isel(time=-1) - last).max() < 1e-3 * last.max()

@@ -31,15 +31,16 @@ def test_energy_error_falls_with_the_tolerance(usual: Run, fine: Run) -> None:
     assert 5.0 < errors[0] / errors[1] < 20.0
 
 
-def test_energy_is_closed_over_the_impact(fine: Run) -> None:
-    """Steps that lack energy are repeated, over the stop as well (9.6e-5 and 1.02e-4).
+def test_energy_converges_over_the_impact(fine: Run) -> None:
+    """Steps that lack energy are repeated, over the stop as well (9.6e-5 and 2.6e-5).
 
-    Unrepeated, the same tolerances leave 3.6e-3 and 1.3e-3.  What is left is the smallest step,
-    whatever the tolerance.
+    What is left is the smallest step, which goes with the largest: all are halved, by the tolerance
+    and ``solver.step``.  Halved by the tolerance alone they leave 1.02e-4.
     """
-    finer = run(ring(3, solver__tolerance=2e-6))
+    finer = run(ring(3, solver__tolerance=2e-6, solver__step=0.1))
     errors = [np.abs(r.balance()).max() for r in (fine, finer)]
-    assert max(errors) < 1.2e-4
+    assert errors[0] < 2e-4
+    assert errors[1] < 0.4 * errors[0]
 
 
 def test_stops_and_rods_take_energy_and_never_give_any(fine: Run) -> None:
