@@ -2,7 +2,6 @@
 
 from ringsim.units import Model, SecondOrZero
 
-
 AT_ONCE = 1e-8
 """Faults strike together that are nearer than this, s: the accelerations of a shorter step are
 round-off of places (in steps of 1e-10 s they blew rings up that sound steps open)."""
