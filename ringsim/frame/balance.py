@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from ringsim.frame.following import Coefficients, Followed, follow
 from ringsim.frame.kernels import Pose, Strains, add_forces, place_points
-from ringsim.frame.lines import Lines, place_lines
+from ringsim.frame.lines import Arms, Lines, place_lines
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.parts import Indices
 from ringsim.frame.slide import aside
@@ -32,12 +32,12 @@ class Held(NamedTuple):
 
 @compiled
 def put_in_place(
-    mesh: Mesh, lines: Lines, held: Held, pose: Pose, hub: Array, place: Array
+    mesh: Mesh, lines: Lines, held: Held, pose: Pose, hub: Array, arms: Arms, place: Array
 ) -> None:
-    """Places of all followed coordinates at a pose."""
+    """Places of all followed coordinates at a pose, and arms of the cables' points."""
     cuts = held.cuts
     place_points(mesh, pose, place[cuts[POINTS] : cuts[LINES]].reshape((-1, 3)))
-    place_lines(lines, pose, place[cuts[LINES] : cuts[ANGLES]].reshape((-1, 3)))
+    place_lines(lines, pose, arms, place[cuts[LINES] : cuts[ANGLES]].reshape((-1, 3)))
     place[cuts[ANGLES] : cuts[ENDS]] = pose.angle
     for n in range(len(held.ends)):
         k = cuts[ENDS] + 3 * n
@@ -49,12 +49,12 @@ def put_in_place(
 @compiled
 def balance(
     mesh: Mesh, lines: Lines, held: Held, coefficients: Coefficients, step: float,
-    start: Followed, pose: Pose, hub: Array, now: Followed, strains: Strains, g: Array,
+    start: Followed, pose: Pose, hub: Array, arms: Arms, now: Followed, strains: Strains, g: Array,
 ) -> None:  # fmt: skip
     """Follow a pose over a step, and add forces of rods, masses, slides and linear friction to the
     residual, shape (unknowns,).
     """
-    put_in_place(mesh, lines, held, pose, hub, now.place)
+    put_in_place(mesh, lines, held, pose, hub, arms, now.place)
     follow(coefficients, step, start, now)
     first, last = held.cuts[POINTS], held.cuts[LINES]
     points = now.place[first:last].reshape((-1, 3))

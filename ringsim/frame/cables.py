@@ -26,8 +26,8 @@ from ringsim.frame.chain import (
     tighten,
     turning_pulleys,
 )
-from ringsim.frame.kernels import Pose
 from ringsim.frame.lines import (
+    Arms,
     add_line_tangent,
     lines_of,
     pull_lines,
@@ -85,7 +85,7 @@ class FrameCables:
         self.winches.advance(time, state, slopes)
 
     def pull(
-        self, time: float, pose: Pose, places: Array, rates: Array, g: Array
+        self, time: float, arms: Arms, places: Array, rates: Array, g: Array
     ) -> tuple[Drums, Array]:
         """Add what resists the cables' pull to the residual, shape (unknowns,); ValueError if the
         chain has no answer.  Returns what the tangent needs, with the logarithms of the decays.
@@ -101,7 +101,7 @@ class FrameCables:
         log_decays = self._chain.log_decays(spans.angle)
         tighten(table, drums, log_decays, spans)
         self._turning.note(ropes, spans.speed)
-        pull_spans(self.lines, self._mesh, pose, spans, g)
+        pull_spans(self.lines, self._mesh, arms, spans, g)
         return drums, log_decays
 
     def _turned(self, time: float) -> Drums:
@@ -115,28 +115,28 @@ class FrameCables:
         natural = ropes.content - ropes.per_rope(wound)
         return Drums(natural, ropes.per_rope(wound_rate), inflow)
 
-    def add_tangent(
-        self, time: float, pose: Pose, drums: Drums, log_decays: Array, rates: Array,
-        by_place: float, fronts: Array,
-    ) -> Array:  # fmt: skip
-        """Add to the fronts, for the state of the last ``pull``; columns and rows of the border,
-        shape (2, k, unknowns).
-
-        ``by_place`` is the derivative of the points' rates after their places, 1/s.  The residual
-        changes by the sum of the columns times what the rows say.
+    def factor(
+        self, time: float, drums: Drums, log_decays: Array, rates: Array, by_place: float
+    ) -> int:
+        """Factor how tensions change in the state of the last ``pull``; returns the number of
+        factors.  ``by_place`` is the derivative of the points' rates after their places, 1/s.
         """
         spans, table, left = self._spans, self._table, np.ones(len(drums.natural))
         if self.winches.answering:
             path, path_rate = self.ropes.along(spans.length), self.ropes.along(spans.rate)
             left = self.winches.stiffness_left(time, self.ropes, path, path_rate)
         slopes = self._turning.slopes(self.ropes, spans.speed, spans.exponent, table.slip_speed)
-        factors = np.zeros((2, turning_pulleys(table, slopes), self.points, 3))
+        count = turning_pulleys(table, slopes)
+        self._factors = factors = np.zeros((2, count, self.points, 3))
         log_slopes = self._chain.log_slopes(spans.angle)
         border(table, drums, log_decays, log_slopes, slopes, spans, rates, left, by_place, factors)
-        add_line_tangent(self.lines, pose, spans, fronts)
-        out = np.zeros((2 * factors.shape[1], self._mesh.unknowns))
-        pull_lines(self.lines, self._mesh, pose, factors.reshape(-1, self.points, 3), out)
-        return out.reshape(2, -1, self._mesh.unknowns)
+        return count
+
+    def add_tangent(self, arms: Arms, fronts: Array, columns: Array, rows: Array) -> None:
+        """Add to the fronts and, for each factor, to a column and a row, (unknowns, factors)."""
+        add_line_tangent(self.lines, arms, self._spans, fronts)
+        pull_lines(self.lines, self._mesh, arms, self._factors[0], columns)
+        pull_lines(self.lines, self._mesh, arms, self._factors[1], rows)
 
     def _retable(self) -> None:
         chain = self._chain

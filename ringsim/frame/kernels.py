@@ -109,19 +109,21 @@ def end_axes(mesh: Mesh, pose: Pose, e: int, side: int) -> Matrix:
 @compiled
 def _loaded(
     mesh: Mesh, pose: Pose, points: Array, strains: Strains, e: int
-) -> tuple[Matrix, Matrix, Matrix, Vector, Vector, Vector, Vector, Vector]:
-    """What an element holds: axes of its ends and middle, d, psi, n, w, m; keeps its strains."""
+) -> tuple[Matrix, Matrix, Matrix, Vector, Vector, Vector, Vector, Vector, Vector]:
+    """What an element holds: axes of its ends and middle, d, psi, n, w, m, coefficients; keeps its
+    strains.
+    """
     r1, r2 = end_axes(mesh, pose, e, 0), end_axes(mesh, pose, e, 1)
     d = minus(vector(points[mesh.point[e, 1]]), vector(points[mesh.point[e, 0]]))
-    axes, u, psi = middle(r1, r2, d, mesh.length[e])
+    axes, u, psi, own = middle(r1, r2, d, mesh.length[e])
     for k in range(3):
         strains.now[e, k], strains.now[e, 3 + k] = u[k], psi[k]
     du = plus(times(strains.lead, u), vector(strains.before[e, :3]))
     dpsi = plus(times(strains.lead, psi), vector(strains.before[e, 3:]))
     force = scaled(vector(mesh.stiffness[e, :3]), u, du, mesh.tau[e])
     moment = scaled(vector(mesh.stiffness[e, 3:]), psi, dpsi, mesh.tau[e])
-    n, w, m = carried(axes, d, force, moment, psi)
-    return r1, r2, axes, d, psi, n, w, m
+    n, w, m = carried(axes, d, force, moment, psi, own)
+    return r1, r2, axes, d, psi, n, w, m, own
 
 
 @compiled
@@ -144,7 +146,7 @@ def add_forces(
 ) -> None:
     """Add forces of elastic rods and of inertia on all unknowns, shape (unknowns,)."""
     for e in range(len(mesh.length)):
-        r1, r2, _, _, _, n, w, m = _loaded(mesh, pose, points, strains, e)
+        r1, r2, _, _, _, n, w, m, _ = _loaded(mesh, pose, points, strains, e)
         f1, m1, f2, m2 = _pulls(mesh, accelerations, e, n, w, m)
         for side in range(2):
             force, moment, axes = (f1, m1, r1) if side == 0 else (f2, m2, r2)
@@ -181,13 +183,13 @@ def add_tangent(
     """
     k12, rows, h = np.zeros((12, 12)), np.zeros((12, 14)), np.zeros((14, 14))
     for e in range(len(mesh.length)):
-        r1, r2, axes, d, psi, n, w, m = _loaded(mesh, pose, points, strains, e)
+        r1, r2, axes, d, psi, n, w, m, bending = _loaded(mesh, pose, points, strains, e)
         f1, m1, f2, m2 = _pulls(mesh, accelerations, e, n, w, m)
         k12[:] = 0.0
         more = 1.0 + mesh.tau[e] * strains.lead
         ku = times(more, vector(mesh.stiffness[e, :3]))
         kp = times(more, vector(mesh.stiffness[e, 3:]))
-        element_tangent(axes, d, n, w, m, psi, ku, kp, k12)
+        element_tangent(axes, d, n, w, m, psi, bending, ku, kp, k12)
         for k in range(3):
             k12[k, k] += by_place * mesh.mass[e, 0]
             k12[k, 6 + k] += by_place * mesh.mass[e, 1]

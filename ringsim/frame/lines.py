@@ -19,7 +19,6 @@ from ringsim.frame.mesh import Mesh
 from ringsim.frame.parts import Indices, Parts
 from ringsim.frame.skeleton import Skeleton
 from ringsim.frame.vectors import (
-    Vector,
     compiled,
     cross,
     dot,
@@ -53,6 +52,21 @@ class Lines(NamedTuple):
     near: Indices
     front: Indices
     local: Indices
+
+
+class Arms(NamedTuple):
+    """Of all points at a pose, (points, 3) each: arms that turn with the frames, what turns with
+    the angles, and about which axes.
+    """
+
+    whole: Array
+    swung: Array
+    axis: Array
+
+    @classmethod
+    def empty(cls, points: int) -> "Arms":
+        """Of so many points."""
+        return cls(*(np.zeros((points, 3)) for _ in range(3)))
 
 
 def lines_of(
@@ -101,43 +115,41 @@ def _point(skeleton: Skeleton, sheave: Sheave) -> tuple[int, Array, Array, Array
 
 
 @compiled
-def _arms(lines: Lines, pose: Pose, n: int) -> tuple[Vector, Vector, Vector]:
-    """Arm of a point that turns with its frame, what turns with its angle, and about which axis."""
-    axes = matrix(pose.axes[lines.frame[n]])
-    arm, swung, axis = turn(axes, vector(lines.arm[n])), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    if lines.angle[n] >= 0:
-        own = mul(axes, matrix(lines.axes[n]))
-        turned = turned_about_z(lines.share[n] * pose.angle[lines.angle[n]])
-        swung = turn(mul(own, turned), vector(lines.swung[n]))
-        axis = times(lines.share[n], (own[2], own[5], own[8]))
-    return plus(arm, swung), swung, axis
-
-
-@compiled
-def place_lines(lines: Lines, pose: Pose, out: Array) -> None:
-    """Places of all points, shape (points, 3), m."""
+def place_lines(lines: Lines, pose: Pose, arms: Arms, out: Array) -> None:
+    """Arms and places of all points, shape (points, 3), m."""
     for n in range(len(lines.frame)):
-        arm, _, _ = _arms(lines, pose, n)
+        frame, angle = lines.frame[n], lines.angle[n]
+        axes = matrix(pose.axes[frame])
+        arm, swung, axis = turn(axes, vector(lines.arm[n])), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        if angle >= 0:
+            own = mul(axes, matrix(lines.axes[n]))
+            turned = turned_about_z(lines.share[n] * pose.angle[angle])
+            swung = turn(own, turn(turned, vector(lines.swung[n])))
+            axis = times(lines.share[n], (own[2], own[5], own[8]))
+        arm = plus(arm, swung)
         for k in range(3):
-            out[n, k] = pose.place[lines.frame[n], k] + arm[k]
+            arms.whole[n, k], arms.swung[n, k], arms.axis[n, k] = arm[k], swung[k], axis[k]
+            out[n, k] = pose.place[frame, k] + arm[k]
 
 
 @compiled
-def pull_lines(lines: Lines, mesh: Mesh, pose: Pose, forces: Array, out: Array) -> None:
-    """Add what forces on all points, shape (n, points, 3), do to the unknowns: (n, unknowns)."""
+def pull_lines(lines: Lines, mesh: Mesh, arms: Arms, forces: Array, out: Array) -> None:
+    """Add what forces on all points, shape (n, points, 3), do to the unknowns: (unknowns, n)."""
     for n in range(len(lines.frame)):
-        arm, swung, axis = _arms(lines, pose, n)
-        k = mesh.home[lines.frame[n]]
-        for row in range(len(forces)):
-            force = vector(forces[row, n])
-            put(out[row, k : k + 3], force)
-            put(out[row, k + 3 : k + 6], cross(arm, force))
-            if lines.angle[n] >= 0:
-                out[row, mesh.angle_home[lines.angle[n]]] += dot(axis, cross(swung, force))
+        k, angle = mesh.home[lines.frame[n]], lines.angle[n]
+        arm, turned = vector(arms.whole[n]), cross(vector(arms.axis[n]), vector(arms.swung[n]))
+        for c in range(len(forces)):
+            force = vector(forces[c, n])
+            moment = cross(arm, force)
+            for i in range(3):
+                out[k + i, c] += force[i]
+                out[k + 3 + i, c] += moment[i]
+            if angle >= 0:
+                out[mesh.angle_home[angle], c] += dot(turned, force)
 
 
 @compiled
-def pull_spans(lines: Lines, mesh: Mesh, pose: Pose, spans: Spans, g: Array) -> None:
+def pull_spans(lines: Lines, mesh: Mesh, arms: Arms, spans: Spans, g: Array) -> None:
     """Add what resists the pull of spans between frames to the unknowns, shape (unknowns,)."""
     for s in range(len(lines.span)):
         span = lines.span[s]
@@ -145,23 +157,23 @@ def pull_spans(lines: Lines, mesh: Mesh, pose: Pose, spans: Spans, g: Array) -> 
         for side in range(2):
             n = lines.near[s] + side
             pull = force if side == 1 else times(-1.0, force)
-            arm, swung, axis = _arms(lines, pose, n)
-            k = mesh.home[lines.frame[n]]
+            k, angle = mesh.home[lines.frame[n]], lines.angle[n]
             put(g[k : k + 3], pull)
-            put(g[k + 3 : k + 6], cross(arm, pull))
-            if lines.angle[n] >= 0:
-                g[mesh.angle_home[lines.angle[n]]] += dot(axis, cross(swung, pull))
+            put(g[k + 3 : k + 6], cross(vector(arms.whole[n]), pull))
+            if angle >= 0:
+                turned = cross(vector(arms.swung[n]), pull)
+                g[mesh.angle_home[angle]] += dot(vector(arms.axis[n]), turned)
 
 
 @compiled
-def add_line_tangent(lines: Lines, pose: Pose, spans: Spans, fronts: Array) -> None:
+def add_line_tangent(lines: Lines, arms: Arms, spans: Spans, fronts: Array) -> None:
     """Add how the pulls of spans between frames turn with the spans and the arms to the fronts."""
     legs, pulled = np.zeros((3, 14)), np.zeros((3, 14))
     for s in range(len(lines.span)):
         span, front = lines.span[s], fronts[lines.front[s]]
         for side in range(2):
             n, own, sign = lines.near[s] + side, 7 * side, 2.0 * side - 1.0
-            a, b, z = _arms(lines, pose, n)
+            a, b, z = vector(arms.whole[n]), vector(arms.swung[n]), vector(arms.axis[n])
             swing = cross(z, b)
             for i in range(3):
                 for j in range(6):

@@ -7,13 +7,13 @@ import numpy as np
 from ringsim.choice import kind_of
 from ringsim.frame.balance import Held, add_slides, balance, put_in_place
 from ringsim.frame.cables import FrameCables
-from ringsim.frame.elimination import factor, solve, solve_one
+from ringsim.frame.factored import Border, Factored
 from ringsim.frame.following import Coefficients, Followed
 from ringsim.frame.kernels import Pose, Strains, add_tangent, move
 from ringsim.frame.laws import JointLaws, Openings
-from ringsim.frame.lines import no_lines
+from ringsim.frame.lines import Arms, no_lines
 from ringsim.frame.mesh import mesh_of
-from ringsim.frame.net import Strings
+from ringsim.frame.net import Strings, add_strings
 from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
 from ringsim.frame.state import State
@@ -88,6 +88,7 @@ class FrameModel:
         )
         self._string_spots = mesh.home[self._held.ends][:, None] + np.arange(3)
         self._lines = no_lines() if self.cables is None else self.cables.lines
+        self._arms = Arms.empty(lines)
         self.start = self._started(pose)
         self._fronts = np.zeros((len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]))
 
@@ -123,7 +124,7 @@ class FrameModel:
         inner = g[: self.mesh.unknowns]
         balance(
             self.mesh, self._lines, self._held, self.coefficients, step, start.followed, now.pose,
-            now.hub, now.followed, strains, inner,
+            now.hub, self._arms, now.followed, strains, inner,
         )  # fmt: skip
         self.laws.push(now.pose.angle, now.rate.angles, inner, self.mesh.angle_home)
         for slide in self._beam_slides:
@@ -135,11 +136,12 @@ class FrameModel:
                 inner[self._string_spots] += pulls
                 g[-3:] -= pulls.sum(axis=0)
         if self.cables is not None:
-            self._pulled = self.cables.pull(time, now.pose, now.place.lines, now.rate.lines, inner)
+            lines = now.place.lines, now.rate.lines
+            self._pulled = self.cables.pull(time, self._arms, *lines, inner)
         inner[self.mesh.fixed] = 0.0
         return g
 
-    def tangent(self, time: float, step: float, now: State, strains: Strains) -> "Factored":
+    def tangent(self, time: float, step: float, now: State, strains: Strains) -> Factored:
         """The residual's derivative after the unknowns, factored."""
         mesh = self.mesh
         by_rate = self.coefficients.rate_by_place(step)
@@ -155,42 +157,31 @@ class FrameModel:
         fronts[front, spot, spot] += slopes
         for slide in self._beam_slides:
             slide.add_tangent(now.pose, fronts)
-        border = np.zeros((2, 0, mesh.unknowns))
-        if self.cables is not None:
-            border = self.cables.add_tangent(
-                time, now.pose, *self._pulled, now.rate.lines, by_rate, fronts
-            )
-        corner, hub_inertia = -np.eye(border.shape[1]), np.inf
+        blocks, inertia = None, math.nan
         if self.strings is not None:
-            hub_inertia = self.strings.hub_mass * by_place
+            inertia = self.strings.hub_mass * by_place
             blocks = self.strings.tangents(*now.net, by_rate)
-            if blocks is not None:
-                border, corner = self._strung(blocks, hub_inertia, border, corner)
-                hub_inertia = np.inf
-        return Factored(self, fronts, border, corner, hub_inertia)
-
-    def _strung(
-        self, blocks: Array, inertia: float, border: Array, corner: Array
-    ) -> tuple[Array, Array]:
-        """Add strings that pull to the fronts, and the hub to the border."""
-        mesh, reach = self.mesh, np.arange(3)
-        front, first = mesh.frame_local[self._held.ends].T
-        spots = first[:, None] + reach
-        self._fronts[front[:, None, None], spots[:, :, None], spots[:, None, :]] += blocks
-        count = border.shape[1]
-        longer = np.zeros((2, count + 3, mesh.unknowns))
-        longer[:, :count] = border
-        # Both a row for each of the hub's unknowns and a column.
-        longer[:, count:, self._string_spots] = -blocks.transpose(1, 0, 2)
-        whole = np.zeros((count + 3,) * 2)
-        whole[:count, :count] = corner
-        whole[count:, count:] = blocks.sum(axis=0) + inertia * np.eye(3)
-        return longer, whole
+        hub = 0 if blocks is None else 3
+        pulled = 0
+        if self.cables is not None:
+            pulled = self.cables.factor(time, *self._pulled, now.rate.lines, by_rate)
+        columns, rows = np.zeros((2, mesh.unknowns, pulled + hub))
+        corner = -np.eye(pulled + hub)
+        if self.cables is not None:
+            self.cables.add_tangent(self._arms, fronts, columns, rows)
+        if blocks is not None:
+            add_strings(mesh, self._held.ends, blocks, fronts, columns)
+            rows[:, -3:] = columns[:, -3:]
+            corner[-3:, -3:] = blocks.sum(axis=0) + inertia * np.eye(3)
+            inertia = math.nan
+        return Factored(mesh, fronts, Border(columns, rows, corner, blocks is not None, inertia))
 
     def _place(self, state: State) -> None:
         """Places of all followed coordinates at the state's pose."""
-        followed = state.followed.place
-        put_in_place(self.mesh, self._lines, self._held, state.pose, state.hub, followed)
+        put_in_place(
+            self.mesh, self._lines, self._held, state.pose, state.hub, self._arms,
+            state.followed.place,
+        )  # fmt: skip
 
     def _started(self, pose: Pose) -> State:
         """At rest with the accelerations of the structure with rigid rods, as of the full model."""
@@ -230,41 +221,3 @@ class FrameModel:
         acceleration = (ahead.followed.place - behind.followed.place) / (2.0 * small)
         followed = Followed.at_rest(state.followed.place, acceleration)
         return State(pose, hub, state.strains, followed, self._held)
-
-
-class Factored:
-    """The tangent K of the unknowns with its border of columns and rows, shape (2, k, unknowns):
-
-        K x + columns^T z = r,   rows x + corner z = r_z.
-
-    A net's hub that no string pulls moves by its inertia alone (N/m); else it ends the border.
-    """
-
-    def __init__(
-        self, model: FrameModel, fronts: Array, border: Array, corner: Array, hub_inertia: float
-    ) -> None:
-        self._mesh, self._fronts, self._rows = model.mesh, fronts, border[1]
-        self._hub, self._hub_inertia = model.strings is not None, hub_inertia
-        self.sound = bool(factor(model.mesh, fronts))
-        self._reached = border[0].T.copy()
-        if len(corner):
-            solve(model.mesh, fronts, self._reached)
-            self._corner = np.linalg.inv(corner - self._rows @ self._reached)
-
-    def solve(self, g: Array) -> Array:
-        """The change of all unknowns that takes a residual g to zero."""
-        unknowns, strung = self._mesh.unknowns, math.isinf(self._hub_inertia)
-        found = -g
-        x, hub = found[:unknowns], found[unknowns:]
-        solve_one(self._mesh, self._fronts, x)
-        if len(self._rows):
-            right = -(self._rows @ x)
-            if self._hub and strung:
-                right[-3:] += hub
-            z = self._corner @ right
-            x -= self._reached @ z
-            if self._hub and strung:
-                hub[:] = z[-3:]
-        if self._hub and not strung:
-            hub /= self._hub_inertia
-        return np.asarray(found)

@@ -5,6 +5,8 @@ import math
 import numpy as np
 
 from ringsim.frame.laws import slope_of
+from ringsim.frame.mesh import Mesh
+from ringsim.frame.parts import Indices
 from ringsim.frame.vectors import compiled, dot, minus, times, vector
 from ringsim.layout.layout import HubNet
 from ringsim.layout.pose import Array
@@ -23,6 +25,21 @@ def stretched(ends: Array, rates: Array, hub: Array, hub_rate: Array) -> tuple[A
         lengths[k], along[k] = length, dot(unit, minus(vector(rates[k]), vector(hub_rate)))
         units[k, 0], units[k, 1], units[k, 2] = unit
     return lengths, along, units
+
+
+@compiled
+def add_strings(mesh: Mesh, ends: Indices, blocks: Array, fronts: Array, columns: Array) -> None:
+    """Add derivatives of the strings' pulls, (n, 3, 3), to the fronts, and those after the hub's
+    place to the last three columns.
+    """
+    hub = columns.shape[1] - 3
+    for n in range(len(ends)):
+        number, first = mesh.frame_local[ends[n], 0], mesh.frame_local[ends[n], 1]
+        home = mesh.home[ends[n]]
+        for i in range(3):
+            for j in range(3):
+                fronts[number, first + i, first + j] += blocks[n, i, j]
+                columns[home + i, hub + j] -= blocks[n, i, j]
 
 
 class Strings:

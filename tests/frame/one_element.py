@@ -9,7 +9,7 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.frame.element import carried, element_tangent, middle, scaled
+from ringsim.frame.element import carried, coefficients, element_tangent, middle, scaled
 from ringsim.frame.vectors import turned
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def bent(rng: np.random.Generator, angle: float) -> Ends:
 def strains(ends: Ends) -> tuple[Array, Array, Array]:
     """Axes of the middle, u and psi."""
     across = tuple(ends.x2 - ends.x1)
-    axes, u, psi = middle(tuple(ends.r1.ravel()), tuple(ends.r2.ravel()), across, LENGTH)
+    axes, u, psi, _ = middle(tuple(ends.r1.ravel()), tuple(ends.r2.ravel()), across, LENGTH)
     return np.array(axes), np.array(u), np.array(psi)
 
 
@@ -82,8 +82,9 @@ def tangent(ends: Ends) -> Array:
     n, w, m = _loads(ends)
     axes, _, psi = strains(ends)
     found = np.zeros((12, 12))
+    own, bending = coefficients(tuple(psi)), tuple(psi)
     element_tangent(
-        tuple(axes), tuple(ends.x2 - ends.x1), n, w, m, tuple(psi), *map(tuple, STIFFNESS), found
+        tuple(axes), tuple(ends.x2 - ends.x1), n, w, m, bending, own, *map(tuple, STIFFNESS), found
     )
     return found
 
@@ -92,7 +93,9 @@ def _loads(ends: Ends) -> tuple[tuple[float, ...], ...]:
     axes, u, psi = strains(ends)
     force = scaled(tuple(STIFFNESS[0]), tuple(u), REST, 0.0)
     moment = scaled(tuple(STIFFNESS[1]), tuple(psi), REST, 0.0)
-    return carried(tuple(axes), tuple(ends.x2 - ends.x1), force, moment, tuple(psi))
+    bending = tuple(psi)
+    own = coefficients(bending)
+    return carried(tuple(axes), tuple(ends.x2 - ends.x1), force, moment, bending, own)
 
 
 def differences(function, ends: Ends, step: float = 1e-6) -> Array:
