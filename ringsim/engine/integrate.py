@@ -75,7 +75,7 @@ class Integration:
         ropes = None if built.cables is None else built.cables.ropes.content
         self._control = RunControl(
             scene.solver,
-            scales_of(scene, model.layout, ropes),
+            scales_of(scene, model.layout, model.ideal, ropes),
             self._read(self._measure(0.0)),
             self._locks,
             limits=scene.limits,

@@ -44,7 +44,8 @@ class Multibody:
         self.scene, self.layout = scene, layout_of(scene)
         self.formulation = formulation = FORMULATIONS[type(scene.rods)]
         self.assembly = assembly = Assembly()
-        started = _started(scene, self.layout)
+        self.ideal = OneCoordinate(scene)
+        started = _started(scene, self.layout, self.ideal)
         self.bodies: list[tuple[Any, Any]] = []
         for body in self.layout.bodies:
             node = assembly.add_rigid_node(started(body.pose))
@@ -99,7 +100,7 @@ class Multibody:
         return self.assembly.node_marker(node)
 
 
-def _started(scene: Scene, layout: Layout) -> Callable[[Pose], Pose]:
+def _started(scene: Scene, layout: Layout, ideal: OneCoordinate) -> Callable[[Pose], Pose]:
     """Gives poses accelerations, those of the structure with rigid rods released at rest, in place
     of their derivatives.
 
@@ -107,7 +108,7 @@ def _started(scene: Scene, layout: Layout) -> Callable[[Pose], Pose]:
     """
     pull, velocity, rotation = 0.0, np.zeros(3), np.zeros(3)
     if not layout.springs:
-        ideal, q = OneCoordinate(scene), scene.structure.coordinate
+        q = scene.structure.coordinate
         motion = ideal.motion(q)
         pull = ideal.work_rate(q) / motion.inertia
         velocity, rotation = motion.velocity, motion.rotation

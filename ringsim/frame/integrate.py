@@ -73,7 +73,7 @@ class Integration:
         ropes = None if model.cables is None else model.cables.ropes.content
         self._control = RunControl(
             scene.solver,
-            scales_of(scene, model.layout, ropes),
+            scales_of(scene, model.layout, model.ideal, ropes),
             self._read(first),
             self._locks,
             limits=scene.limits,

@@ -9,6 +9,7 @@ from ringsim.frame.mesh import Mesh
 from ringsim.frame.vectors import (
     Matrix,
     Vector,
+    add,
     compiled,
     cross,
     dot,
@@ -18,6 +19,7 @@ from ringsim.frame.vectors import (
     plus,
     put,
     rotation_vector,
+    scale,
     store,
     times,
     transposed,
@@ -74,17 +76,12 @@ def moved_between(mesh: Mesh, before: Pose, after: Pose, out: Array) -> None:
 
 
 @compiled
-def straighten(pose: Pose) -> float:
-    """Take what round-off has done to the axes out: R (3 - R^T R) / 2; returns the largest."""
-    worst = 0.0
+def straighten(pose: Pose) -> None:
+    """Take what round-off has done to the axes out: R (3 - R^T R) / 2."""
+    most = (1.5, 0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.5)
     for f in range(len(pose.axes)):
-        r = pose.axes[f]
-        square = r.T @ r
-        for i in range(3):
-            for j in range(3):
-                worst = max(worst, abs(square[i, j] - (i == j)))
-        r[:] = 1.5 * r - 0.5 * (r @ square)
-    return worst
+        r = matrix(pose.axes[f])
+        store(pose.axes[f], mul(r, add(most, scale(-0.5, mul(transposed(r), r)))))
 
 
 @compiled

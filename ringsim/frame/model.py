@@ -31,6 +31,8 @@ class FrameModel:
 
     Attributes
     ----------
+    ideal
+        The structure with rigid rods.
     size
         Number of unknowns: those of the mesh and the hub's three, if there is a net.
     """
@@ -38,7 +40,7 @@ class FrameModel:
     def __init__(self, scene: Scene) -> None:
         if not isinstance(scene.rods, GeometricallyExactRods):
             raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
-        self.scene, self.layout = scene, layout_of(scene)
+        self.scene, self.layout, self.ideal = scene, layout_of(scene), OneCoordinate(scene)
         self.skeleton = skeleton = Skeleton(self.layout)
         beam = self.layout.boom
         boom = [] if beam is None else skeleton.add_beam(beam)
@@ -188,9 +190,9 @@ class FrameModel:
         skeleton, scene = self.skeleton, self.scene
         pull, velocity, rotation = 0.0, np.zeros(3), np.zeros(3)
         if not self.layout.springs:
-            ideal, q = OneCoordinate(scene), scene.structure.coordinate
-            motion = ideal.motion(q)
-            pull = ideal.work_rate(q) / motion.inertia
+            q = scene.structure.coordinate
+            motion = self.ideal.motion(q)
+            pull = self.ideal.work_rate(q) / motion.inertia
             velocity, rotation = motion.velocity, motion.rotation
         self.first = np.zeros(self.size)
         for f, (rate, turn) in enumerate(skeleton.rates):

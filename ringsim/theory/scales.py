@@ -14,7 +14,7 @@ from ringsim.stepping.instant import Scales
 from ringsim.theory.one_coordinate import OneCoordinate
 
 
-def scales_of(scene: Scene, layout: Layout, ropes: Array | None) -> Scales:
+def scales_of(scene: Scene, layout: Layout, ideal: OneCoordinate, ropes: Array | None) -> Scales:
     """What the ideal structure, as stowed, the stops and the cables say before a run.
 
     ``ropes`` are the natural lengths of the cables' ropes, shape (cables,), m; None without cables.
@@ -22,7 +22,7 @@ def scales_of(scene: Scene, layout: Layout, ropes: Array | None) -> Scales:
     structure = scene.structure
     angles, rates = layout.opening_angles()
     travel, per_angle = math.pi - float(angles.mean()), float(rates.mean())
-    ideal, start = OneCoordinate(scene), structure.coordinate
+    start = structure.coordinate
     folding = ideal.motion(start).inertia
     acceleration = per_angle * (ideal.work_rate(start) / folding)
     inertia = folding / per_angle**2
