@@ -119,6 +119,7 @@ def growth(counts: list[int]) -> None:
 def profile(name: str) -> None:
     """Compiled kernels one by one, and the rest; counts and processor time."""
     import ringsim.frame.cables as cables
+    import ringsim.frame.factored as factored
     import ringsim.frame.integrate as integrate
     import ringsim.frame.meter as meter
     import ringsim.frame.model as model
@@ -128,7 +129,8 @@ def profile(name: str) -> None:
     spent: Counter[str] = Counter()
     calls: Counter[str] = Counter()
     rooms = {
-        model: ("balance", "add_tangent", "add_slides", "factor", "solve", "solve_one"),
+        model: ("balance", "begin_tangent", "add_slides", "add_strings"),
+        factored: ("factor", "solve", "solve_one"),
         cables: ("measure", "tighten", "pull_spans", "border", "pull_lines", "add_line_tangent"),
         integrate: ("move", "moved_between", "straighten"),
         meter: ("kinetic_energy",),

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -66,7 +67,7 @@ class ChainState:
         """Whether a rope is longer than its path, or cut; shape (ropes,)."""
         return np.asarray((self.paths < self.natural) | ~self.ropes.alive)
 
-    @property
+    @cached_property
     def winch_tensions(self) -> Array:
         """Tension at both ends of each cable, in N, shape (cables, 2)."""
         edge = self.ropes.cable_starts
@@ -89,7 +90,7 @@ class ChainState:
         taut, loose = np.maximum(stretch, 0.0), np.minimum(stretch, 0.0)
         return np.asarray(self.lengths * (1.0 - taut[rope] * self.shares - loose[rope]))
 
-    @property
+    @cached_property
     def held_beyond(self) -> Array:
         """Natural length from each pulley to its rope's far end, m, shape (pulleys,)."""
         rope = self.ropes.of_pulley
@@ -97,7 +98,7 @@ class ChainState:
         beyond = total[self.ropes.ends[rope]] - total[self.ropes.behind]
         return np.asarray(beyond * (self.natural / self.paths)[rope])
 
-    @property
+    @cached_property
     def friction_forces(self) -> Array:
         """Loss of tension over each pulley times the stretch there, in N, shape (pulleys,)."""
         before = self.tensions[self.ropes.behind - 1] * self.ropes.slips
@@ -109,7 +110,7 @@ class ChainState:
         """Power lost on each pulley, in W, never negative, shape (pulleys,)."""
         return self.friction_forces * self.speeds
 
-    @property
+    @cached_property
     def viscous_forces(self) -> Array:
         """Viscous part of each rope's mean tension, in N, shape (ropes,)."""
         stiffness, _, width = self.material
@@ -121,7 +122,7 @@ class ChainState:
         """Power lost inside each rope, in W, never negative, shape (ropes,)."""
         return np.asarray(self.viscous_forces * self.strain_rates * self.natural)
 
-    @property
+    @cached_property
     def energy_density(self) -> Array:
         """Elastic energy of each rope per natural length, in J/m, shape (ropes,)."""
         stiffness, _, width = self.material
@@ -133,7 +134,7 @@ class ChainState:
         """Elastic energy of each rope, in J, shape (ropes,)."""
         return self.energy_density * self.natural
 
-    @property
+    @cached_property
     def winch_forces(self) -> Array:
         """Force of the winches at both ends of each cable per natural length, in N, (cables, 2)."""
         return self.winch_tensions * (1.0 + self.strains[self.ropes.of_end])

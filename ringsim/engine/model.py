@@ -44,7 +44,7 @@ class Multibody:
         self.scene, self.layout = scene, layout_of(scene)
         self.formulation = formulation = FORMULATIONS[type(scene.rods)]
         self.assembly = assembly = Assembly()
-        self.ideal = OneCoordinate(scene)
+        self.ideal = OneCoordinate(scene, self.layout)
         started = _started(scene, self.layout, self.ideal)
         self.bodies: list[tuple[Any, Any]] = []
         for body in self.layout.bodies:

@@ -166,7 +166,7 @@ def add_forces(
 
 
 @compiled
-def add_tangent(
+def begin_tangent(
     mesh: Mesh,
     pose: Pose,
     points: Array,
@@ -175,9 +175,11 @@ def add_tangent(
     by_place: float,
     fronts: Array,
 ) -> None:
-    """Add the derivative of ``add_forces`` to the fronts; ``by_place`` is that of accelerations
+    """Set the fronts to the derivative of ``add_forces``; ``by_place`` is that of accelerations
     after places, 1/s^2.
     """
+    for number in range(len(mesh.size)):
+        fronts[number, : mesh.size[number], : mesh.size[number]] = 0.0
     k12, rows, h = np.zeros((12, 12)), np.zeros((12, 14)), np.zeros((14, 14))
     for e in range(len(mesh.length)):
         r1, r2, axes, d, psi, n, w, m, bending = _loaded(mesh, pose, points, strains, e)

@@ -9,7 +9,7 @@ from ringsim.frame.balance import Held, add_slides, balance, put_in_place
 from ringsim.frame.cables import FrameCables
 from ringsim.frame.factored import Border, Factored
 from ringsim.frame.following import Coefficients, Followed
-from ringsim.frame.kernels import Pose, Strains, add_tangent, move
+from ringsim.frame.kernels import Pose, Strains, begin_tangent, move
 from ringsim.frame.laws import JointLaws, Openings
 from ringsim.frame.lines import Arms, no_lines
 from ringsim.frame.mesh import mesh_of
@@ -32,7 +32,7 @@ class FrameModel:
     Attributes
     ----------
     ideal
-        The structure with rigid rods.
+        The structure with rigid rods, at the start.
     size
         Number of unknowns: those of the mesh and the hub's three, if there is a net.
     """
@@ -40,7 +40,8 @@ class FrameModel:
     def __init__(self, scene: Scene) -> None:
         if not isinstance(scene.rods, GeometricallyExactRods):
             raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
-        self.scene, self.layout, self.ideal = scene, layout_of(scene), OneCoordinate(scene)
+        self.scene, self.layout = scene, layout_of(scene)
+        self.ideal = OneCoordinate(scene, self.layout)
         self.skeleton = skeleton = Skeleton(self.layout)
         beam = self.layout.boom
         boom = [] if beam is None else skeleton.add_beam(beam)
@@ -68,13 +69,16 @@ class FrameModel:
         self.slides: list[Slide] = [*slides, *self._beam_slides]
         self.size = mesh.unknowns + (0 if self.strings is None else 3)
         self.loads = np.zeros(self.size)
-        self._loaded: list[tuple[int, Array, Array]] = []
+        at, forces = [], []
         for number, force in self.layout.forces:
             end = skeleton.end_of(self.layout.joints[number].first)
             if end.arm.any():
                 raise InputError(f"{NOT_HERE} forces beside a frame's origin: {CURE}")
             self.loads[mesh.home[end.frame] : mesh.home[end.frame] + 3] += force
-            self._loaded.append((end.frame, pose.place[end.frame].copy(), force))
+            at.append(end.frame)
+            forces.append(force)
+        loaded = np.array(at, dtype=np.int64)
+        self._loaded = loaded, pose.place[loaded], np.array(forces).reshape(-1, 3)
         self._tolerance = residual_tolerance(scene, self.layout, 0.0)
         self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
         lines = 0 if self.cables is None else self.cables.points
@@ -96,8 +100,8 @@ class FrameModel:
 
     def work(self, pose: Pose) -> float:
         """Of the loads since the start, J."""
-        done = (force @ (pose.place[f] - start) for f, start, force in self._loaded)
-        return float(sum(done))
+        at, start, forces = self._loaded
+        return float(np.sum(forces * (pose.place[at] - start)))
 
     def gap(self, pose: Pose) -> float:
         """Largest distance of a body from the boom that it slides along, m; revolutes cannot come
@@ -149,8 +153,7 @@ class FrameModel:
         by_rate = self.coefficients.rate_by_place(step)
         by_place = self.coefficients.acceleration_by_place(step)
         fronts = self._fronts
-        fronts[:] = 0.0
-        add_tangent(
+        begin_tangent(
             mesh, now.pose, now.place.points, now.acceleration.points, strains, by_place, fronts
         )
         add_slides(mesh, self._held, now.pose, fronts)

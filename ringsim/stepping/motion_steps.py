@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
@@ -81,11 +82,11 @@ class MotionSteps:
             return min(self.step, left)
         return 0.5 * left
 
-    def shorter_first(self, step: float, stops: StopContact) -> float | None:
+    def shorter_first(self, step: float, stops: Callable[[], StopContact]) -> float | None:
         """A smaller first step in s, where this one leads too close to a stop; else None."""
         if self._past or step <= SHORTEST * self._solver.step:
             return None
-        return FALL * step if step > _APPROACH * (step + stops.time_to_next) else None
+        return FALL * step if step > _APPROACH * (step + stops().time_to_next) else None
 
     def _from_motion(self) -> float:
         t2, r2 = self._past[-1]

@@ -99,7 +99,7 @@ class RunControl:
         self._shorter = min((one for one in wanted if one is not None), default=None)
         if self._shorter is None and isinstance(self._steps, MotionSteps):
             step = found.time - self.now.time
-            self._shorter = self._steps.shorter_first(step, self._contact(found))
+            self._shorter = self._steps.shorter_first(step, lambda: self._contact(found))
         return self._shorter
 
     def accept(self, found: Instant, struck: Instant | None = None) -> bool:

@@ -22,6 +22,7 @@ import numpy as np
 
 from ringsim.layout.bodies import OnBody
 from ringsim.layout.free_hub import FreeHub, NetForces
+from ringsim.layout.layout import Layout
 from ringsim.layout.pose import Array, skew
 from ringsim.scene import Scene
 from ringsim.theory.ideal_points import UP, Points, body_of
@@ -75,14 +76,14 @@ class Configuration(NamedTuple):
 
 
 class Mechanism:
-    """Coordinates, masses and equations of a scene's structure; ``at`` is as of ``Points``.
+    """Coordinates, masses and equations of a scene's structure; arguments are those of ``Points``.
 
     ``freedom`` is the number of free coordinates, q the first: 1, or 4 or 5 for an open arc;
     ``fixed`` is whether a body is held: the first upper assembly by the base of a boom.
     """
 
-    def __init__(self, scene: Scene, at: float | None = None) -> None:
-        self.points = points = Points(scene, at)
+    def __init__(self, scene: Scene, at: float | None = None, layout: Layout | None = None) -> None:
+        self.points = points = Points(scene, at, layout)
         masses, bodies = points.layout.point_masses()[:2]
         places = points.swung(lambda layout: layout.point_masses()[2:], bodies)
         count, flat = places.shape[-1], places.reshape(len(masses), -1)

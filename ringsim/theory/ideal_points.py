@@ -42,10 +42,11 @@ class Points:
     ``normals`` these pins' axes, shape (swinging, 3).
     """
 
-    def __init__(self, scene: Scene, at: float | None = None) -> None:
+    def __init__(self, scene: Scene, at: float | None = None, layout: Layout | None = None) -> None:
+        """Everywhere, or at one coordinate (rad) alone, of which a ``layout`` may be given."""
         self.basis = scene.structure.basis if at is None else lambda _: np.eye(3, 2)
         nodes = NODES if at is None else (at,)
-        self._layouts = [layout_of(scene, q) for q in nodes]
+        self._layouts = [layout_of(scene, q) for q in nodes] if layout is None else [layout]
         self._known = np.concatenate([self.basis(q)[:2] for q in nodes])
         self.layout = self._layouts[0]
         hinges = [] if at is not None else _end_hinges(self.layout)

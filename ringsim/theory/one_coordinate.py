@@ -14,11 +14,13 @@ end assemblies of an open arc are held upright.  From rest at q_0 the time until
 The substitution q = q_0 - (q_0 - q_1) u^2 removes the singularity at the start.
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from ringsim.layout.layout import Layout
 from ringsim.layout.pose import Array
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
@@ -39,7 +41,12 @@ class Motion(NamedTuple):
 class OneCoordinate:
     """Masses, loads and net of a scene; joint friction, stops, springs and cables are left out."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, start: Layout | None = None) -> None:
+        """Everywhere; or, with the layout at the start, there alone and sooner."""
+        if start is not None:
+            begin = Mechanism(scene, scene.structure.coordinate, start)
+            self._mechanism: Callable[[float], Mechanism] = lambda _: begin
+            return
         known = scene.structure.basis(scene.structure.coordinate).size
         everywhere = Mechanism(scene) if known else None
         self._mechanism = lru_cache(maxsize=4)(lambda q: everywhere or Mechanism(scene, q))
