@@ -6,6 +6,7 @@ Engines are imported by whoever runs them: each costs a second, and its own libr
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -92,16 +93,17 @@ def prepare_run_frame(scene: Scene) -> None:
         next(left)  # raises StopIteration
 
     def compiling() -> None:
-        try:
+        with suppress(StopIteration):
             solve(scene, watch)
-        except InputError:
-            raise
-        except Exception:  # its end; what breaks here breaks in the run, too, which tells of it
-            return
 
     parts = (getattr(scene, name) for name in ("rods", *sorted(type(scene).parts())))
     kinds = [kind_of(each) for each in parts if hasattr(each, "kind")]
-    compile_once((sorted(holds(scene)), kinds), compiling)
+    try:
+        compile_once((sorted(holds(scene)), kinds), compiling)
+    except InputError:
+        raise
+    except Exception:  # it breaks in the run, too, which tells of it; nothing counts as compiled
+        return
 
 
 def why_not_frame(scene: Scene) -> str:
