@@ -34,9 +34,10 @@ class Turning:
         if self._ropes is not ropes:
             self._ropes, self._seen = ropes, np.full((2, len(speeds)), np.nan)
             self._back, self._stayed = back, -np.ones(len(speeds))
-        self._stayed = np.where(back == self._back, self._stayed + 1.0, 0.0)
+        self._stayed = (self._stayed + 1.0) * (back == self._back)
         self._back = back
-        self._seen[back.astype(int), np.arange(len(speeds))] = speeds
+        np.copyto(self._seen[0], speeds, where=~back)
+        np.copyto(self._seen[1], speeds, where=back)
 
     def slopes(self, ropes: Ropes, speeds: Array, exponents: Array, slip: Array) -> Array:
         """Slope of p of each pulley at the iterate noted last, s/m, shape (pulleys,), from its

@@ -10,6 +10,7 @@ from ringsim.cable.faults.family import CableFault
 from ringsim.frame.kernels import Strains, move, moved_between, straighten
 from ringsim.frame.meter import EnergyMeter
 from ringsim.frame.model import FrameModel
+from ringsim.frame.secants import Secants
 from ringsim.frame.state import State
 from ringsim.frame.stresses import StressMeter
 from ringsim.layout.pose import Array
@@ -26,9 +27,9 @@ from ringsim.variables import Outcome
 
 _MOST = 25
 """Newton iterations a step at most, as of the full model."""
-_FALL = 0.3
+_FALL = 0.5
 """Ratio of successive residuals above which the tangent is renewed: one more iteration costs a
-third of a tangent."""
+third of a tangent, and teaches."""
 _DESCENT = 0.9
 """Ratio of successive residuals above which half the change is tried, and half of that ..."""
 _SMALLEST_SHARE = 0.1
@@ -134,11 +135,12 @@ class Integration:
         return Strains(after.strains, (r**2 / (1.0 + r) * before - (1.0 + r) * now) / step, lead)
 
     def _newton(self, time: float, step: float, after: State) -> None:
-        """Newton's method with a line search, in place: where forces bend sharply, as of stops and
-        of pulleys whose friction turns round, a whole step may lead as far to the other side.
+        """Newton's method with secants and a line search, in place: where forces bend sharply, as
+        of stops and of pulleys whose friction turns round, a whole step may lead as far to the
+        other side.
         """
         model, factored, last, share = self._model, None, math.inf, 1.0
-        begun, change, fresh = after.stand(), np.zeros(0), False
+        begun, change, fresh, secants = after.stand(), np.zeros(0), False, Secants()
         tolerance = model.tolerance(step, self._strains)
         for _ in range(_MOST):
             try:
@@ -153,17 +155,19 @@ class Integration:
             self.history.newton_iterations += 1
             if fresh and norm > _DESCENT * last and share > _SMALLEST_SHARE:
                 share *= 0.5
+                secants.forget()
                 after.take(begun)
                 self._move(after, share * change)
                 continue
             fresh = factored is None or norm > _FALL * last
             if factored is None or fresh:
                 factored = model.tangent(time, step, after, self._strains)
+                secants.forget()
                 self.history.jacobians += 1
                 if not factored.sound:
                     raise NoBalanceError("a pivot of the tangent is too small")
             last, share, begun = norm, 1.0, after.stand()
-            change = factored.solve(g)
+            change = secants.corrected(factored.solve(g))
             self._move(after, change)
         raise NoBalanceError(
             f"Newton's residual is {norm:.3g} N after {_MOST} iterations, step {step:.3g} s"

@@ -1,5 +1,6 @@
 """Torques on joint angles: friction, stops and joints that stick, by the laws of ringsim.parts."""
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from ringsim.frame.parts import Indices
 from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
+from ringsim.frame.vectors import compiled
 from ringsim.layout.joints import JointOpening
 from ringsim.layout.pose import Array
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
@@ -32,6 +34,17 @@ def slope_of(
     # All at once: numpy's calls cost more than its numbers.
     ahead, behind, faster, slower = law(x + moved, rate + hurried)
     return np.asarray((ahead - behind + rate_by_place * (faster - slower)) / (2.0 * _NUDGE))
+
+
+@compiled
+def folded_between(angles: Array, own: Indices, sense: Array) -> tuple[float, float]:
+    """The least and the most folded V-joint, rad."""
+    least, most = math.inf, -math.inf
+    for plane in range(own.shape[0]):
+        for section in range(own.shape[1]):
+            folded = sense[plane, section] * angles[own[plane, section]]
+            least, most = min(least, folded), max(most, folded)
+    return least, most
 
 
 class Torques(NamedTuple):
@@ -82,6 +95,7 @@ class JointLaws:
         for family, law in scene.joints.present().items():
             self._rub(family, law, skeleton)
         self.latched = np.zeros(openings.angle.shape, dtype=bool)
+        self._latches = False
         self._stuck: list[tuple[StuckVJoint, tuple[int, int], float]] = []
 
     def _rub(self, family: str, law: JointFriction, skeleton: Skeleton) -> None:
@@ -109,6 +123,7 @@ class JointLaws:
         """Hold these V-joints from both sides from now on, if the stop latches."""
         if self._stop is not None and self._stop.latch:
             self.latched |= deployed
+            self._latches = bool(self.latched.any())
 
     def stick(self, fault: StuckVJoint, place: tuple[int, int], opening: float) -> None:
         """Hold a V-joint, (plane, section), at an opening angle (rad)."""
@@ -127,10 +142,10 @@ class JointLaws:
             found.append((own, sense, angles[own], sense * rates[own], rub))
         own, sense = self._openings
         if self._stop is not None:
-            folded = sense * angles[own]
-            free = folded.min() > _NUDGE and folded.max() < self._stop.most_folded - _NUDGE
-            if self.latched.any() or not free:
-                stop, latched = self._stop, self.latched
+            least, most = folded_between(angles, own, sense)
+            free = least > _NUDGE and most < self._stop.most_folded - _NUDGE
+            if self._latches or not free:
+                stop, latched, folded = self._stop, self.latched, sense * angles[own]
 
                 def hold(x: Array, rate: Array) -> Reaction:
                     return stop.torque(x, rate, latched)

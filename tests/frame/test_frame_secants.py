@@ -1,0 +1,48 @@
+"""Broyden's corrections against the secant method and against a linear system's solution."""
+
+import numpy as np
+import pytest
+
+from ringsim.frame.secants import Secants
+
+
+def test_one_unknown_is_the_secant_method() -> None:
+    """x^2 = 2 with the tangent of x = 2: the iterates are those of the secant formula."""
+
+    def g(x: float) -> float:
+        return x * x - 2.0
+
+    secants, found = Secants(), [2.0]
+    for _ in range(6):
+        change = secants.corrected(np.array([-g(found[-1]) / 4.0]))
+        found.append(found[-1] + float(change[0]))
+    expected = found[:2]
+    for _ in range(5):
+        before, now = expected[-2:]
+        slope = (g(now) - g(before)) / (now - before)
+        expected.append(now - g(now) / slope)
+    assert found == pytest.approx(expected, abs=1e-12)
+    assert found[-1] == pytest.approx(np.sqrt(2.0), abs=1e-12)
+
+
+def test_a_linear_system_is_solved_though_its_matrix_is_wrong() -> None:
+    """In 2 n changes (Gay, SIAM Journal on Numerical Analysis 16, 1979); without corrections 2e-4
+    of the error are left then.
+    """
+    random = np.random.default_rng(2)
+    matrix = np.eye(4) + 0.25 * random.normal(size=(4, 4))
+    wanted, secants = random.normal(size=4), Secants()
+    x, plain = np.zeros(4), np.zeros(4)
+    for _ in range(9):
+        x = x + secants.corrected(matrix @ (wanted - x))
+        plain = plain + matrix @ (wanted - plain)
+    assert np.abs(x - wanted).max() < 1e-9
+    assert np.abs(plain - wanted).max() > 1e-4
+
+
+def test_a_change_like_the_last_one_is_left_alone() -> None:
+    secants, change = Secants(), np.array([1.0, 2.0])
+    assert secants.corrected(change) is change
+    assert np.array_equal(secants.corrected(0.9 * change), 0.9 * change)
+    secants.forget()
+    assert secants.corrected(change) is change
