@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.sampling.correlation import Correlation, correlate
 from ringsim.sampling.distributions.family import Array, Distribution
@@ -26,6 +27,8 @@ class Design(Model):
     """Whether its samples stand for the distributions of the inputs, so that they have a mean."""
     independent: ClassVar[bool] = False
     """Whether every sample is drawn apart from the others; else only replicates are."""
+    in_blocks: ClassVar[bool] = False
+    """Whether its samples are made of blocks of runs that belong together."""
     cure: ClassVar[str] = "change or truncate the inputs"
     """What helps against samples that the scene refuses."""
 
@@ -47,7 +50,8 @@ class Design(Model):
         """
         if correlations and not self.correlated:
             raise InputError(
-                "correlations: a grid has none, its inputs are crossed; use another design"
+                f"correlations: a design of kind {kind_of(self)} has none, because it moves each "
+                "input by itself; use another design"
             )
         if not factors:
             return {}
