@@ -67,8 +67,8 @@ def test_each_half_and_each_replicate_is_balanced():
 
 def test_a_trajectory_moves_each_group_once_by_half_of_the_levels():
     factors = FACTORS | TypeAdapter(dict[str, AnyDistribution]).validate_python(
-        {"fault": {"kind": "discrete", "values": ["a", "b", "c"], "probabilities": [0.9, 0.05, 0.05]}}
-    )  # fmt: skip
+        {"fault": {"kind": "discrete", "values": list("abc"), "probabilities": [0.9, 0.05, 0.05]}}
+    )
     design = Morris(samples=40, levels=6, groups={"some": ("friction", "force")})
     rows = np.array(design.rows(factors, 1)).reshape(40, -1)
     points = design.points(factors, 1).reshape(40, -1, len(factors))

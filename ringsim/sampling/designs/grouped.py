@@ -2,7 +2,7 @@
 
 import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -17,6 +17,15 @@ from ringsim.units import ListIn
 
 MOST_RUNS = 10_000_000
 _STRETCH = re.compile(r"(.*)\[(\d{1,6})(?:\.\.(\d{1,6}))?\]", re.DOTALL)
+
+
+def stretches(places: int, parts: int) -> Iterator[tuple[int, int]]:
+    """Where stretches of places of about equal length begin, and where they end.
+
+    >>> list(stretches(17, 4))
+    [(0, 4), (4, 8), (8, 13), (13, 17)]
+    """
+    return itertools.pairwise(round(k * places / parts) for k in range(parts + 1))
 
 
 class Grouped(Design):
@@ -116,9 +125,8 @@ class Grouped(Design):
             raise InputError(
                 f'design.stretches."{name}" = {parts} must be at most its {len(own)} places'
             )
-        ends = [round(k * len(own) / parts) for k in range(parts + 1)]
         return {
-            f"{name}[{low + 1}..{high}]": own[low:high] for low, high in itertools.pairwise(ends)
+            f"{name}[{low + 1}..{high}]": own[low:high] for low, high in stretches(len(own), parts)
         }
 
     def runs_told(self, runs: int) -> str:
