@@ -14,6 +14,7 @@ from ringsim.analysis.intervals import NONE, Array
 from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME, Requirement
 from ringsim.analysis.verdicts import violations
+from ringsim.choice import kind_of
 from ringsim.files import parse_toml
 from ringsim.overrides import parse_value
 from ringsim.refusal import InputError, explain, known_or_nearest, show
@@ -195,7 +196,10 @@ def reweight(
         (), count, {"long_name": "effective samples of all that ran", "units": "1"}
     )  # fmt: skip
     found["reweighted_samples"] = (), int(ran.sum()), {"long_name": "samples that ran"}
-    laws = {path: law.model_dump(exclude_none=True) for path, law in wanted.items()}
+    laws = {
+        path: {"kind": kind_of(law), **law.model_dump(exclude_defaults=True)}
+        for path, law in wanted.items()
+    }
     found["reweighted_to"] = (), json.dumps(laws), {"long_name": "distributions by path (JSON)"}
     coords = {
         "reweighted_statistic": [*STATISTICS], "event": np.array(words, dtype=object),

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import effects, given_data, sobol_indices
-from ringsim.analysis.blocks import Blocks, blocks_of
+from ringsim.analysis.blocks import Blocks, blocks_of, population_of
 from ringsim.analysis.dependence import LEVEL, dependence
 from ringsim.analysis.design import Placement
 from ringsim.analysis.drawn import drawn
@@ -43,13 +43,16 @@ def responses(
 ) -> dict[str, tuple[Array, str]]:
     """Outputs that vary, NaN where missing, with units; then failures and violations, 0 or 1."""
     ok, found = good(campaign), dict[str, tuple[Array, str]]()
+    # Of blocks the samples whose variance the indices share out.
+    stand = np.isin(campaign["sample"].to_numpy(), population_of(campaign)["sample"].to_numpy())
     for name, variable in quantities().items():
         values = np.where(ok, numbers(campaign, name), np.nan)
         known = values[np.isfinite(values)]
         if len(known) and np.ptp(known) > 0:
             found[name] = np.where(np.isfinite(values), values, np.nan), variable.units
     for name, (own, of) in groups_of(campaign, requirements).items():
-        if min(own.sum(), of.sum() - own.sum()) >= _LEAST_OF_A_KIND:
+        own_drawn, of_drawn = own[stand], of[stand]
+        if min(own_drawn.sum(), (of_drawn & ~own_drawn).sum()) >= _LEAST_OF_A_KIND:
             found[name] = np.where(of, own.astype(float), np.nan), "1"
     return found
 

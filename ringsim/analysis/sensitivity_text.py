@@ -72,6 +72,7 @@ def gate_lines(analysis: xr.Dataset) -> Iterator[str]:
     if "missing_by_inputs" not in analysis:
         return
     outputs: dict[tuple[int, float], list[str]] = {}
+    blocks = ", and the rest of their blocks," if "factor" in analysis.dims else ""
     for output in analysis["output"].values:
         one = analysis.sel(output=output)
         if count := one["missing"].item():
@@ -79,15 +80,16 @@ def gate_lines(analysis: xr.Dataset) -> Iterator[str]:
             outputs.setdefault((count, chance), []).append(output)
     for (count, chance), names in outputs.items():
         who = ", ".join(names[:_MOST]) + (f" and {len(names) - _MOST} more" * (len(names) > _MOST))
+        p = f"p = {chance:.2g}" if chance else "p < 0.0001"
         if chance < LEVEL:
             yield (
                 f"no index of {who}: {count} samples have no value, and which ones depends on "
-                f"inputs (p = {chance:.2g}); what explains and separates failures tells on which"
+                f"inputs ({p}); what explains and separates failures tells on which"
             )
         else:
             yield (
                 f"{who}: {count} samples have no value, as far as one can tell whatever their "
-                f"inputs are (p = {chance:.2g}); they, and the rest of their blocks, are left out"
+                f"inputs are ({p}); they{blocks} are left out"
             )
 
 

@@ -59,8 +59,8 @@ def analyse(
         ``NAME_convergence`` (part, statistic), ``NAME_error_of_mean`` (source), all in its unit,
         and ``NAME_samples`` (counted); ``outcome_...`` along ``kind``; verdicts along
         ``requirement``; what matters along ``input`` and ``output``, see ``influence`` and
-        ``sensitivity``.  NaN stands for what the samples do not tell; ``intervals`` among the attributes says what intervals are from, or
-        why there are none.
+        ``sensitivity``.  NaN stands for what the samples do not tell; ``intervals`` among the
+        attributes says what intervals are from, or why there are none.
 
     InputError if it is no campaign, or a requirement cannot be judged by it.
     """

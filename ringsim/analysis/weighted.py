@@ -58,6 +58,7 @@ def share_interval(own: Mask, weights: Array, replicate: Replicate) -> Interval:
     the kind, for the effective ones.  Source: Korn and Graubard, Survey Methodology 24 (1998).
     """
     share, few = mean(own.astype(float), weights), min(own.sum(), (~own).sum()) < _FEW
+    share = 1.0 if own.all() else share  # not a bit less by round-off
     if replicate is not None and not few:
         low, high = mean_interval(own.astype(float), weights, replicate)
         return max(0.0, low), min(1.0, high)
