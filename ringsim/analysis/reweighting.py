@@ -26,6 +26,9 @@ from ringsim.variables import Fate
 
 LEAST_EFFECTIVE = 10.0
 """Effective samples below which nothing is told."""
+LEAST_REPLICATES = 16
+"""Replicates of a Sobol' design from which on weighted shares and quantiles have intervals."""
+SOBOL = ("sobol", "saltelli")
 _BEYOND = 1e-3
 """Probability of the new distribution that may lie where the old one has none."""
 _BEYOND_SAMPLES = 0.01
@@ -184,7 +187,7 @@ def reweight(
     for word, (own, of) in _events(campaign, requirements, ok, gone).items():
         of = of & (weights > 0)
         share, ends = weighted.mean(own[of].astype(float), weights[of]), NONE
-        if placed.has_intervals:
+        if has_share_intervals(placed):
             ends = weighted.share_interval(own[of], weights[of], placed.replicate_of(index[of]))
         words.append(word)
         shares.append((share, *ends))
@@ -208,6 +211,16 @@ def reweight(
     return xr.Dataset(found, coords=coords)
 
 
+def has_share_intervals(placed: Placement) -> bool:
+    """Whether weighted shares and quantiles have intervals.
+
+    Shares of a few Sobol' points take few values: 8 replicates held the truth in 91 of 100
+    campaigns, 16 in 94 to 97.
+    """
+    few = placed.kind in SOBOL and placed.replicates < LEAST_REPLICATES
+    return placed.has_intervals and not few
+
+
 def _told(
     values: Array, weights: Array, level: float | None, placed: Placement, replicate: Any
 ) -> tuple[float, float, float]:
@@ -218,7 +231,7 @@ def _told(
             ends = weighted.mean_interval(values, weights, replicate)
     else:
         middle, ends = weighted.quantile(values, weights, level), NONE
-        if placed.has_intervals:
+        if has_share_intervals(placed):
             ends = weighted.quantile_interval(values, weights, level, replicate)
     return (middle, *ends)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import xarray as xr
 
 from ringsim.analysis.quantities import quantities
-from ringsim.analysis.reweighting import STATISTICS
+from ringsim.analysis.reweighting import LEAST_REPLICATES, SOBOL, STATISTICS
 from ringsim.sampling.values import label_of
 from ringsim.tables import interval_text, number_text, text_table
 
@@ -44,6 +44,9 @@ def reweighting_lines(analysis: xr.Dataset) -> Iterator[str]:
         )
         for event in analysis["event"].values
     ]  # fmt: skip
+    known = bool(analysis["reweighted_share_interval"].notnull().any())
     if shares:
         yield ""
+        if analysis.attrs["design"] in SOBOL and not known:
+            yield f"intervals of shares and quantiles need design.replicates = {LEAST_REPLICATES}"
         yield from text_table(("probability of", "reweighted", "95 % interval"), shares)

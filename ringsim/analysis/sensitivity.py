@@ -4,7 +4,7 @@ Failures are outputs of their own, 0 or 1.  No index of an output is given where
 depend on inputs: what is left would be another population.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -58,8 +58,9 @@ def responses(
 
 
 def sensitivity(
-    campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement
-) -> xr.Dataset:
+    campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement,
+    names: Collection[str] | None = None,
+) -> xr.Dataset:  # fmt: skip
     """Indices of all ``responses``, along ``output``; empty where the design allows none.
 
     Designs of kind saltelli have ``first_order_index`` and ``total_index`` (and
@@ -68,10 +69,14 @@ def sensitivity(
     along ``input``; each with its ``..._interval``.  ``index_used`` and ``index_lost`` count blocks
     or samples, ``missing`` the samples without the output, and ``missing_by_inputs`` is the
     probability that samples missing at random would go with inputs as much: below 0.05 there is no
-    index.
+    index.  ``names`` are the outputs to tell of beside failures, by default all.
     """
     blocks, inputs = blocks_of(campaign), drawn(campaign)
-    outputs = responses(campaign, requirements)
+    outputs = {
+        name: each
+        for name, each in responses(campaign, requirements).items()
+        if names is None or name in names or name not in quantities()
+    }
     if not outputs or not inputs.names or (blocks is None and not _plain(placed)):
         return xr.Dataset()
     index = campaign["sample"].to_numpy()

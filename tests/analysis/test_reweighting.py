@@ -13,6 +13,7 @@ from made import UNIT, drawn_campaign, points
 from ringsim.analysis import weighted
 from ringsim.analysis.reweighting import parse_reweighted, read_distributions, weights_of
 from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import told
 from ringsim.cli.analyse import command
 from ringsim.refusal import InputError
 from ringsim.sampling.designs.morris import Morris
@@ -58,26 +59,28 @@ def test_an_input_that_is_not_reweighted_keeps_its_distribution():
 @pytest.mark.parametrize("kind", ["random", "latin-hypercube", "sobol"])
 def test_intervals_of_weighted_estimates_cover(kind, case):
     campaigns, least, most = case
-    exact = {"mean": 1.0, "share": None, 0.05: None, 0.5: None, 0.95: None}
+    samples, replicates = (256, 16) if kind == "sobol" else (512, 8)
     grid = (np.arange(4000) + 0.5) / 4000
-    fine = np.stack(np.meshgrid(truncnorm(-4, 4, 0.5, 0.12).ppf(grid), grid[::20]), axis=-1)
+    ends = 0.5 / 0.12
+    normal = truncnorm(-ends, ends, 0.5, 0.12).ppf(grid)
+    fine = np.stack(np.meshgrid(normal, (np.arange(200) + 0.5) / 200), axis=-1)
     value = lambda x: np.exp(x[..., 0]) + 0.2 * x[..., 1]  # noqa: E731
     truth = value(fine).ravel()
     exact = {"mean": truth.mean(), "share": np.mean(truth > 1.9)}
     exact |= {level: np.quantile(truth, level) for level in (0.05, 0.5, 0.95)}
     hits = dict.fromkeys(exact, 0)
     for seed in range(campaigns):
-        x = points(kind, 256, 8, seed)
+        x = points(kind, samples, replicates, seed)
         y, weights = value(x), TRUE.pdf(x[:, 0])
-        replicate = None if kind == "random" else np.arange(256) % 8
-        ends = {
+        replicate = None if kind == "random" else np.arange(samples) % replicates
+        found = {
             "mean": weighted.mean_interval(y, weights, replicate),
             "share": weighted.share_interval(y > 1.9, weights, replicate),
         } | {
             level: weighted.quantile_interval(y, weights, level, replicate)
             for level in (0.05, 0.5, 0.95)
         }  # fmt: skip
-        for name, (low, high) in ends.items():
+        for name, (low, high) in found.items():
             hits[name] += bool(low <= exact[name] <= high)
     for name, count in hits.items():
         assert least <= count / campaigns <= most, (name, count / campaigns)
@@ -97,6 +100,10 @@ def test_blocks_are_reweighted_by_the_samples_that_stand_for_the_population():
     assert found.reweighted_samples.item() == 512
     low, high = found.asynchrony_max_reweighted_interval.sel(reweighted_statistic="mean").values
     assert low < 5.0 < high
+    assert np.isnan(found.reweighted_share_interval).all()
+    assert any("need design.replicates = 16" in line for line in told(found))
+    many = drawn_campaign(Saltelli(samples=256, replicates=16), linear, 3, 1)
+    assert (analyse(many, None, {"x1": NARROW}).reweighted_share_interval[0] > 0.9).all()
 
 
 def test_words_and_lists_of_places_have_weights():
@@ -136,13 +143,13 @@ def test_words_and_lists_of_places_have_weights():
 def test_what_samples_do_not_cover_is_refused(reweighted, words):
     made = drawn_campaign(RandomDesign(samples=100), linear, 2, 1)
     law = {"kind": "normal", "mean": 0.0, "standard_deviation": 1.0}
-    for path, values, told in (
+    for path, values, words_of in (
         ("tail", norm.ppf(made.x1), json.dumps(law)),
         ("word", np.full(100, "a", dtype=object), '{"kind": "discrete", "values": ["a", "b"]}'),
         ("listed", made.x1.values, "listed in a file"),
         ("pair", made.x1.values, UNIT),
     ):
-        made[path] = "sample", values, {"role": "input", "path": path, "distribution": told}
+        made[path] = "sample", values, {"role": "input", "path": path, "distribution": words_of}
     made.attrs["campaign"] = '[[correlations]]\nbetween = ["x1", "pair"]\ncoefficient = 0.5\n'
     if next(iter(reweighted)) == "x1":
         made.attrs["campaign"] = ""
