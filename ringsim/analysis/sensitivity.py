@@ -24,6 +24,10 @@ from ringsim.analysis.requirements import Requirement
 _LEAST_OF_A_KIND = 10
 """Samples that failed, and that did not, below which failure is no output to analyse."""
 _LEAST_BLOCKS = 8
+_LEAST_FOR_FIRST = 100
+"""Samples A and B of either kind below which first-order indices of failures have no intervals: of
+20 their intervals held the truth in 60 to 78 of 100 campaigns, of 45 in 90 to 95, of 180 in 94 to 97.
+"""
 Found = dict[str, tuple[tuple[str, ...], Array]]
 """Values of variables, and their intervals ("..._interval"), with their dimensions."""
 ABOUT = {
@@ -103,7 +107,7 @@ def sensitivity(
             kept = Blocks(blocks.rows[whole])
             rows = values.reshape(blocks.rows.shape)[whole]
             found[name] = (
-                _sobol(rows, blocks, number % placed.replicates)
+                _sobol(rows, blocks, number % placed.replicates, binary=name not in quantities())
                 if blocks.of_indices
                 else _effects(rows, kept, blocks)
             )
@@ -125,10 +129,14 @@ def _plain(placed: Placement) -> bool:
     return placed.population and placed.block == 1
 
 
-def _sobol(values: Array, blocks: Blocks, replicate: NDArray[np.int64]) -> Found:
+def _sobol(values: Array, blocks: Blocks, replicate: NDArray[np.int64], *, binary: bool) -> Found:
+    """Indices of the groups of blocks; ``binary`` outputs are 0 or 1."""
     groups = len(blocks.groups)
     middle, ends = sobol_indices.indices_with_intervals(values, groups, replicate)
     told = np.column_stack([middle, ends])
+    hits = values[:, [0, -1]]
+    if binary and min((hits == 0).sum(), (hits == 1).sum()) < _LEAST_FOR_FIRST:
+        told[:groups, 1:] = told[2 * groups :, 1:] = np.nan
     found: Found = {
         "first_order_index": (("factor",), told[:groups]),
         "total_index": (("factor",), told[groups : 2 * groups]),

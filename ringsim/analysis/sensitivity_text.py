@@ -84,7 +84,8 @@ def gate_lines(analysis: xr.Dataset) -> Iterator[str]:
         if chance < LEVEL:
             yield (
                 f"no index of {who}: {count} samples have no value, and which ones depends on "
-                f"inputs ({p}); what explains and separates failures tells on which"
+                f"inputs ({p}), so that the others are another population: see what separates "
+                "failures, mend them (ringsim campaign --retry-failed), or narrow the inputs"
             )
         else:
             yield (

@@ -84,7 +84,7 @@ def bars_of(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, Bars]]:
             told = f"{'blocks' if dim == 'factor' else 'samples'}: {used} used, {lost} lost"
             if not np.isfinite(one[measure]).any():
                 told = f"no index: {one['missing'].item()} samples have no value,\nby their inputs"
-                told += f" (p = {one['missing_by_inputs'].item():.2g})"
+                told += f" (p = {max(one['missing_by_inputs'].item(), 1e-4):.1g} at most)"
             yield output, _bars(one, measure, str(dim), told)
         return
     for name in analysis.data_vars:
@@ -132,7 +132,7 @@ def tornado(campaign: xr.Dataset, measure: str = "") -> Figure:
     for axes, (output, bars) in zip(panels, found, strict=True):
         _draw(axes, bars, measure)
         certain = certain or bool(np.isfinite(bars.ends).any())
-        words = style.label(campaign[output], width=52) if output in campaign else output
+        words = style.label(campaign[output], width=42) if output in campaign else output
         axes.set_title(words, fontsize=9.5, color=style.INK)
         units = campaign[output].attrs.get("units", "1") if output in campaign else "1"
         unit = f" ({units})" if measure == "mean_absolute_effect" and units != "1" else ""
@@ -166,8 +166,15 @@ def _draw(axes: Axes, bars: Bars, measure: str) -> None:
         axes.axvline(bars.chance, color=style.VERMILLION, linestyle="dashed", linewidth=1.2,
                      label="by chance in one case of 20")  # fmt: skip
     axes.axvline(0.0, color=style.INK, linewidth=0.8)
-    axes.set_yticks(height, [textwrap.fill(name, _WIDE) for name in bars.names], fontsize=8)
+    axes.set_yticks(height, [_short(name) for name in bars.names], fontsize=8)
     axes.grid(axis="y", visible=False)
+
+
+def _short(name: str) -> str:
+    """A name on lines of bearable length, its place on one of its own."""
+    path, bracket, place = name.partition("[")
+    broken = bracket and len(name) > _WIDE
+    return textwrap.fill(path, _WIDE) + ("\n" if broken else "") + bracket + place
 
 
 def _row(
