@@ -27,14 +27,14 @@ def dependence(missing: Mask, columns: Array, block: NDArray[np.int64] | None = 
         return np.nan
     chances = []
     if columns.shape[1]:
-        ranks = centred_ranks(columns)
-        least = 1.0
-        for each in (ranks, centred_ranks(np.abs(ranks))):
-            spread = each.std(axis=0, ddof=1) * np.sqrt((1 - gone / count) / gone)
-            moved = np.abs(each[missing].mean(axis=0))
-            z = np.divide(moved, spread, out=np.zeros_like(moved), where=spread > 0)
-            least = min(least, float(2 * norm.sf(z.max())))
-        chances.append(2 * columns.shape[1] * least)
+        largest = 0.0
+        for column in columns.T:  # one by one, because all at once take much memory
+            ranks = centred_ranks(column[:, None])
+            for each in (ranks, centred_ranks(np.abs(ranks))):
+                spread = float(each.std(ddof=1)) * np.sqrt((1 - gone / count) / gone)
+                moved = abs(float(each[missing].mean()))
+                largest = max(largest, moved / spread if spread > 0 else 0.0)
+        chances.append(2 * columns.shape[1] * float(2 * norm.sf(largest)))
     if block is not None:
         chances.append(_clustered(np.bincount(block[missing], minlength=block[-1] + 1), block))
     return min(1.0, len(chances) * min(chances, default=1.0))

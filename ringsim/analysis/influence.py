@@ -21,7 +21,7 @@ from ringsim.analysis.requirements import OUTCOME, Requirement
 from ringsim.analysis.verdicts import violations
 from ringsim.variables import GOALS, Fate
 
-_LEAST = 8
+LEAST = 8
 """Samples below which there is no correlation to speak of."""
 _LEAST_GROUP = 3
 """Samples of a group, and of the rest, below which nothing separates them."""
@@ -50,7 +50,7 @@ def influence(
             continue
         values = numbers(campaign, name)
         known = ok & np.isfinite(values)
-        if known.sum() < _LEAST or np.ptp(values[known]) == 0:
+        if known.sum() < LEAST or np.ptp(values[known]) == 0:
             continue
         columns, replicate = inputs.values[known], placed.replicate_of(index[known])
         plain, partial = _correlated(columns, values[known], inputs, placed, replicate)

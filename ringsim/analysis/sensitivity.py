@@ -26,7 +26,8 @@ _LEAST_OF_A_KIND = 10
 _LEAST_BLOCKS = 8
 _LEAST_FOR_FIRST = 100
 """Samples A and B of either kind below which first-order indices of failures have no intervals: of
-20 their intervals held the truth in 60 to 78 of 100 campaigns, of 45 in 90 to 95, of 180 in 94 to 97.
+20 their intervals held the truth in 60 to 78 of 100 campaigns, of 45 in 90 to 95, of 180 in 94 to
+97.
 """
 Found = dict[str, tuple[tuple[str, ...], Array]]
 """Values of variables, and their intervals ("..._interval"), with their dimensions."""
@@ -86,7 +87,7 @@ def sensitivity(
     index = campaign["sample"].to_numpy()
     count = len(index)
     block = None if blocks is None else np.repeat(np.arange(len(blocks.rows)), blocks.size)
-    bins = [given_data.Bins(column) for column in inputs.values.T] if blocks is None else []
+    tested: dict[bytes, tuple[float, list[given_data.Bins]]] = {}
     found: dict[str, Found] = {}
     counts = np.zeros((len(outputs), 3), dtype=np.int64)
     chance = np.full(len(outputs), np.nan)
@@ -94,14 +95,17 @@ def sensitivity(
         missing = np.isnan(values)
         by_block = missing[:, None] if blocks is None else missing.reshape(blocks.rows.shape)
         whole = np.asarray(~by_block.any(axis=1))
-        chance[k] = dependence(missing, inputs.values, block)
+        # Outputs that lack the same samples share the test, and the bins.
+        if (key := missing.tobytes()) not in tested:
+            tested[key] = dependence(missing, inputs.values, block), []
+        chance[k], bins = tested[key]
         counts[k] = whole.sum(), len(whole) - whole.sum(), missing.sum()
         if chance[k] < LEVEL:
             continue
         if blocks is None:
             if whole.sum() >= given_data.LEAST:
-                own = bins if whole.all() else [given_data.Bins(c) for c in inputs.values[whole].T]
-                found[name] = _given(own, values[whole], index[whole], placed)
+                bins += [given_data.Bins(c[whole]) for c in inputs.values.T] if not bins else []
+                found[name] = _given(bins, values[whole], index[whole], placed)
         elif whole.sum() >= _LEAST_BLOCKS:
             number = np.flatnonzero(whole)
             kept = Blocks(blocks.rows[whole])

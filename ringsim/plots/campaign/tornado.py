@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ringsim.analysis.blocks import population_of
 from ringsim.analysis.campaign_samples import scalars, told, values_of
 from ringsim.analysis.design import placement
-from ringsim.analysis.influence import influence
+from ringsim.analysis.drawn import drawn
+from ringsim.analysis.influence import LEAST, influence
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import head
@@ -31,6 +32,7 @@ _INSIDE = {"total_index": ("first_order_index", "first-order index")}
 _MOST = 8
 _MOST_PANELS = 9
 _WIDE = 34
+_NONE = np.empty(0), np.empty((0, 2)), np.empty(0), np.empty((0, 2))
 
 
 class Bars(NamedTuple):
@@ -113,8 +115,13 @@ def _bars(one: xr.Dataset, measure: str, dim: str, told: str) -> Bars:
 
 
 def explained(campaign: xr.Dataset) -> bool:
-    """Whether there is something to draw."""
-    return bool(measure_of(analysed(campaign)))
+    """Whether there is something to draw: drawn inputs, and enough samples for a correlation.
+
+    Told without the analysis itself, which takes a while for many samples.
+    """
+    known = [values_of(campaign, name)[1] for name in scalars(campaign)]
+    varied = any(len(values) >= LEAST and np.ptp(values) > 0 for values in known)
+    return varied and bool(drawn(campaign).names)
 
 
 @style.styled
@@ -125,7 +132,8 @@ def tornado(campaign: xr.Dataset, measure: str = "") -> Figure:
     """
     analysis = analysed(campaign)
     measure = measure or measure_of(analysis)
-    found = list(bars_of(analysis, measure))[:_MOST_PANELS]
+    found = list(bars_of(analysis, measure))[:_MOST_PANELS] if measure else []
+    found = found or [("", Bars([], *_NONE, np.nan, "no measure is known"))]
     rows = max(len(bars.names) for _, bars in found)
     figure, panels, _ = style.new_panels(len(found), 5.2, 0.9 + 0.34 * rows, 1.1, most=2)
     certain = False
@@ -137,7 +145,7 @@ def tornado(campaign: xr.Dataset, measure: str = "") -> Figure:
         units = campaign[output].attrs.get("units", "1") if output in campaign else "1"
         unit = f" ({units})" if measure == "mean_absolute_effect" and units != "1" else ""
         below = f"\n{bars.told}" if bars.told and bars.names else ""
-        axes.set_xlabel(f"{MEASURES[measure]}{unit}{below}", fontsize=9)
+        axes.set_xlabel(f"{MEASURES.get(measure, '')}{unit}{below}", fontsize=9)
     legends = [axes.get_legend_handles_labels() for axes in panels]
     handles, labels = max(legends, key=lambda each: len(each[1]))
     if len(labels) > 1:
@@ -155,6 +163,7 @@ def _draw(axes: Axes, bars: Bars, measure: str) -> None:
         axes.text(0.5, 0.5, bars.told, ha="center", va="center", transform=axes.transAxes,
                   fontsize=9, color=style.VERMILLION)  # fmt: skip
         axes.set_xticks([])
+        return
     word = MEASURES[measure][0].lower() + MEASURES[measure][1:]
     second = bool(np.isfinite(bars.inside).any())
     shift = 0.17 if second else 0.0
