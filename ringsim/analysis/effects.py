@@ -11,6 +11,10 @@ from ringsim.analysis.intervals import Array
 
 MEASURES = ("mean_absolute_effect", "mean_effect", "effect_deviation")
 """Morris' mu*, mu and sigma."""
+LEAST = {"mean_absolute_effect": 20, "mean_effect": 20, "effect_deviation": 60}
+"""Trajectories below which there is no interval: of 10 those of mu* held the truth in 88 of 100
+campaigns, of 20 in 93; those of sigma of 30 in 90.
+"""
 
 
 def effects(values: Array, blocks: Blocks, groups: tuple[str, ...]) -> Array:
@@ -46,5 +50,7 @@ def measured(found: Array, joint: np.ndarray[tuple[int], np.dtype[np.bool_]]) ->
             continue
         middle = np.asarray(statistic(values, axis=-1))
         told = np.stack([middle, *intervals.of_independent(values, statistic)], axis=-1)
+        if len(found) < LEAST[name]:
+            told[:, 1:] = np.nan
         results.append(np.where(joint[:, None] & with_sign, np.nan, told))
     return np.array(results)

@@ -233,6 +233,16 @@ def test_intervals_of_effects_cover(case):
     ):  # fmt: skip
         ends = np.stack(of_independent(values, statistic), axis=-1)
         assert least <= covered(ends, value) <= most
+    # The mean effect has intervals from 20 trajectories on.
+    ends = np.stack(of_independent(np.abs(found[:, :20]), np.mean), axis=-1)
+    assert least <= covered(ends, true[0]) <= most
+
+
+def test_few_trajectories_have_no_intervals():
+    for count, known in ((19, [False] * 3), (20, [True, True, False]), (60, [True] * 3)):
+        found = moved(Morris(samples=count), ishigami_like, 1)[2]
+        ends = effects.measured(found, np.zeros(3, dtype=bool))[..., 1:]
+        assert np.isfinite(ends).all(axis=(1, 2)).tolist() == known
 
 
 def ishigami_like(x):

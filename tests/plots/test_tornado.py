@@ -53,7 +53,7 @@ def widths(figure: Figure) -> list[list[float]]:
     ("design", "measure"),
     [
         (Saltelli(samples=64), "total_index"),
-        (Morris(samples=12), "mean_absolute_effect"),
+        (Morris(samples=20), "mean_absolute_effect"),
         (RandomDesign(samples=200), "given_data_index"),
     ],
 )

@@ -27,8 +27,6 @@ class Design(Model):
     """Whether its samples stand for the distributions of the inputs, so that they have a mean."""
     independent: ClassVar[bool] = False
     """Whether every sample is drawn apart from the others; else only replicates are."""
-    in_blocks: ClassVar[bool] = False
-    """Whether its samples are made of blocks of runs that belong together."""
     cure: ClassVar[str] = "change or truncate the inputs"
     """What helps against samples that the scene refuses."""
 

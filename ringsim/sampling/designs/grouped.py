@@ -4,7 +4,7 @@ import itertools
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from pydantic import Field
 
@@ -33,8 +33,6 @@ class Grouped(Design):
 
     An input that no group names is a group of its own, with all its places if it has many.
     """
-
-    in_blocks: ClassVar[bool] = True
 
     groups: dict[str, Annotated[tuple[str, ...], ListIn]] = Field(default_factory=dict)
     """Inputs by the name of their group: paths as under [inputs], and for inputs of many places
