@@ -7,10 +7,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.analysis.blocks import blocks_of
 from ringsim.choice import kinds_of
 from ringsim.files import parse_toml
 from ringsim.refusal import InputError
 from ringsim.sampling.designs.family import Design
+from ringsim.sampling.designs.grouped import Grouped
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,9 @@ class Placement:
     independent: bool
     """Whether each sample is drawn apart from the others."""
     replicates: int = 1
-    """Independent replicates; sample i belongs to replicate i modulo this."""
+    """Independent replicates; sample, or block, i belongs to replicate i modulo this."""
+    block: int = 1
+    """Successive samples that belong together."""
 
     @property
     def has_intervals(self) -> bool:
@@ -32,7 +36,7 @@ class Placement:
 
     def replicate_of(self, samples: NDArray[np.int64]) -> NDArray[np.int64] | None:
         """The replicate of each sample; None if all samples are independent."""
-        return None if self.independent else samples % self.replicates
+        return None if self.independent else samples // self.block % self.replicates
 
     @property
     def told(self) -> str:
@@ -53,13 +57,14 @@ class Placement:
                 "intervals of 95 %: bootstrap (BCa) of means and standard deviations, order "
                 "statistics of quantiles, Clopper-Pearson of shares"
             )
+        of = "the samples A and B of its blocks alone stand for the population: " * (self.block > 1)
         if self.replicates > 1:
-            return (
+            return of + (
                 f"intervals of 95 % from {self.replicates} independent replicates of the design "
                 f"{self.kind}, with Student's t; shares of fewer than 10 samples have that of "
                 "independent samples"
             )
-        return (
+        return of + (
             f"no intervals: the samples of one {self.kind} design depend on each other, so that "
             "their scatter does not tell the error; give design.replicates = 8 (independent "
             'replicates), or kind = "random"; bounds of requirements are those of independent '
@@ -80,6 +85,8 @@ def placement(campaign: xr.Dataset) -> Placement:
     kind = kinds_of(Design).get(str(table.get("kind")))
     if kind is None or not issubclass(kind, Design):
         return Placement("", population=False, independent=False)
-    return Placement(
-        str(table["kind"]), kind.population, kind.independent, int(table.get("replicates", 1))
-    )
+    given = table.get("replicates", getattr(kind.model_fields.get("replicates"), "default", 1))
+    block = 1
+    if issubclass(kind, Grouped) and (blocks := blocks_of(campaign)) is not None:
+        block = blocks.size
+    return Placement(str(table["kind"]), kind.population, kind.independent, int(given), block)

@@ -1,4 +1,4 @@
-"""The drawn inputs of a campaign as columns of numbers: by mean, by place, and word by word."""
+"""The drawn inputs of a campaign as columns of numbers: by mean, quarter, place, and by word."""
 
 import hashlib
 from dataclasses import dataclass
@@ -7,9 +7,12 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.intervals import Array
+from ringsim.sampling.designs.grouped import stretches
 
 _MOST_WORDS = 12
 """Different words of an input up to which each is a column of its own."""
+_LEAST_QUARTERED = 8
+"""Places of an input from which on each quarter of them has a mean of its own."""
 
 
 @dataclass(frozen=True)
@@ -18,15 +21,13 @@ class Drawn:
 
     names: tuple[str, ...]
     values: Array
-    of_place: tuple[bool, ...]
-    """Which columns are one place of an input that has many."""
-    mean: tuple[bool, ...]
-    """Which columns are the mean over the places of an input."""
+    level: tuple[str, ...]
+    """Of each column: "input"; of one that has many places "mean", "quarter" and "place"."""
 
 
 def drawn(campaign: xr.Dataset) -> Drawn:
     """All drawn inputs; one that several paths share is one column, named after the first."""
-    found: dict[str, tuple[Array, bool, bool]] = {}
+    found: dict[str, tuple[Array, str]] = {}
     for name, variable in campaign.data_vars.items():
         says = variable.attrs
         if says.get("role") != "input" or says.get("path") == "solver.error_bars":
@@ -37,14 +38,18 @@ def drawn(campaign: xr.Dataset) -> Drawn:
             if values.ndim == 1 and len(words) <= _MOST_WORDS:
                 for word in words[: 1 if len(words) == 2 else None]:
                     is_so = (values.astype(str) == word).astype(float)
-                    found[f"{path} = {word}"] = is_so, False, False
+                    found[f"{path} = {word}"] = is_so, "input"
         elif values.ndim == 1:
-            found[path] = values.astype(float), False, False
+            found[path] = values.astype(float), "input"
         else:
             numbers = values.astype(float)
-            found[f"mean of {path}"] = numbers.mean(axis=1), False, True
+            found[f"mean of {path}"] = numbers.mean(axis=1), "mean"
+            if (count := numbers.shape[1]) >= _LEAST_QUARTERED:
+                for low, high in stretches(count, 4):
+                    mean = numbers[:, low:high].mean(axis=1)
+                    found[f"mean of {path}[{low + 1}..{high}]"] = mean, "quarter"
             for k, place in enumerate(_places(campaign, variable)):
-                found[f"{path}[{place}]"] = numbers[:, k], True, False
+                found[f"{path}[{place}]"] = numbers[:, k], "place"
     seen: set[bytes] = set()
     kept = {}
     for name, column in found.items():
@@ -54,8 +59,7 @@ def drawn(campaign: xr.Dataset) -> Drawn:
             kept[name] = column
     count = campaign.sizes["sample"]
     values = np.array([each[0] for each in kept.values()]).reshape(-1, count).T
-    of_place = tuple(each[1] for each in kept.values())
-    return Drawn(tuple(kept), values, of_place, tuple(each[2] for each in kept.values()))
+    return Drawn(tuple(kept), values, tuple(each[1] for each in kept.values()))
 
 
 def _places(campaign: xr.Dataset, variable: xr.DataArray) -> list[str]:

@@ -21,11 +21,12 @@ from ringsim.analysis.requirements import OUTCOME, Requirement
 from ringsim.analysis.verdicts import violations
 from ringsim.variables import GOALS, Fate
 
-_LEAST = 8
+LEAST = 8
 """Samples below which there is no correlation to speak of."""
 _LEAST_GROUP = 3
 """Samples of a group, and of the rest, below which nothing separates them."""
-_BOUNDS = ("input", "bound")
+_LEVELS = ("place", "quarter", "mean")
+"""How an input of many places is represented; the last one decides about the other inputs."""
 
 
 def influence(
@@ -36,8 +37,8 @@ def influence(
     For every output NAME ``NAME_rank_correlation`` and ``NAME_partial_rank_correlation``; along
     ``group`` the ``separation`` of samples that were lost, ended in another way than planned, or
     violate a requirement: the probability that the input is larger there.  Intervals as for other
-    statistics.  In partial correlations an input of many places is represented by its mean, and
-    for its places by these.
+    statistics.  In partial correlations an input of many places is represented by its mean, for its
+    quarters by the means of these, and for its places by these.
     """
     inputs = drawn(campaign)
     if not inputs.names:
@@ -49,14 +50,14 @@ def influence(
             continue
         values = numbers(campaign, name)
         known = ok & np.isfinite(values)
-        if known.sum() < _LEAST or np.ptp(values[known]) == 0:
+        if known.sum() < LEAST or np.ptp(values[known]) == 0:
             continue
         columns, replicate = inputs.values[known], placed.replicate_of(index[known])
         plain, partial = _correlated(columns, values[known], inputs, placed, replicate)
         for word, (middle, ends) in {"": plain, "partial_": partial}.items():
             about = f"{word.replace('_', ' ')}rank correlation with {name}"
             found |= _told(f"{name}_{word}rank_correlation", middle, ends, about, ("input",))
-    groups = _groups(campaign, requirements)
+    groups = groups_of(campaign, requirements)
     if groups:
         pairs = [_separated(inputs, own, of, index, placed) for own, of in groups.values()]
         middle, ends = (np.array([pair[k] for pair in pairs]) for k in (0, 1))
@@ -69,8 +70,8 @@ def influence(
     if not found:
         return xr.Dataset()
     found["input_is_place"] = (
-        "input", np.array(inputs.of_place),
-        {"long_name": "whether it is one place of an input that has many", "units": "1"},
+        "input", np.isin(inputs.level, ["place", "quarter"]),
+        {"long_name": "whether it is of one place, or a quarter, of many", "units": "1"},
     )  # fmt: skip
     coords: dict[str, Any] = {"input": np.array(inputs.names, dtype=object)}
     if groups:
@@ -94,28 +95,31 @@ def _correlated(
     replicate: NDArray[np.int64] | None,
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:  # fmt: skip
     """Plain and partial rank correlations, shape (input,), with intervals, shape (input, 2)."""
-    place, mean = np.array(inputs.of_place), np.array(inputs.mean)
+    level = np.array(inputs.level)
+    own = level == "input"
 
     def plain(rows: Any) -> Array:
         return ranks.correlations(columns[rows], output[rows])
 
     def partial(rows: Any) -> Array:
-        found = np.full(len(place), np.nan)
-        if place.any():
-            found[~mean] = ranks.partial_correlations(columns[rows][:, ~mean], output[rows])
-        found[~place] = ranks.partial_correlations(columns[rows][:, ~place], output[rows])
+        found = np.full(len(level), np.nan)
+        for each in (each for each in _LEVELS if (level == each).any() or each == "mean"):
+            held = own | (level == each)
+            found[held] = ranks.partial_correlations(columns[rows][:, held], output[rows])
         return found
 
     every = np.ones(len(output), dtype=bool)
-    held = np.where(place, (~mean).sum(), (~place).sum()) - 1
+    held = np.zeros(len(level), dtype=int)
+    for each in _LEVELS:
+        held[own | (level == each)] = (own | (level == each)).sum() - 1
     results = []
     for measure, others in ((plain, 0), (partial, held)):
-        middle, ends = measure(every), np.full((len(place), 2), np.nan)
+        middle, ends = measure(every), np.full((len(level), 2), np.nan)
         if placed.has_intervals and replicate is None:
             for count in np.unique(others):
-                own = np.broadcast_to(others == count, place.shape)
-                both = ranks.correlation_interval(middle[own], len(output), int(count))
-                ends[own] = np.stack(both, axis=1)
+                some = np.broadcast_to(others == count, level.shape)
+                both = ranks.correlation_interval(middle[some], len(output), int(count))
+                ends[some] = np.stack(both, axis=1)
         elif placed.has_intervals and replicate is not None:
             both = ranks.replicate_interval(measure, replicate, ranks.to_normal, np.tanh)
             ends = np.stack(both, axis=1)
@@ -123,7 +127,7 @@ def _correlated(
     return results[0], results[1]
 
 
-def _groups(
+def groups_of(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement]
 ) -> dict[str, tuple[Mask, Mask]]:
     """Samples to be told from the rest, and of which samples they are; only those of some size."""

@@ -14,7 +14,7 @@ _SPARE = 5
 _HALVINGS = 60
 
 
-def _ranks(columns: Array) -> Array:
+def centred_ranks(columns: Array) -> Array:
     """Ranks in every column less their mean; one by one, because all at once take much memory."""
     found = np.empty(columns.shape)
     for k, column in enumerate(columns.T):
@@ -24,7 +24,7 @@ def _ranks(columns: Array) -> Array:
 
 def correlations(columns: Array, output: Array) -> Array:
     """Rank correlation (Spearman) of every column, shape (samples, columns), with the output."""
-    x, y = _ranks(columns), _ranks(output[:, None])[:, 0]
+    x, y = centred_ranks(columns), centred_ranks(output[:, None])[:, 0]
     scale = np.sqrt((x**2).sum(axis=0) * (y**2).sum())
     known = scale > 0
     return np.where(known, (y @ x) / np.where(known, scale, 1.0), np.nan)
@@ -40,7 +40,7 @@ def partial_correlations(columns: Array, output: Array) -> Array:
     none = np.full(wide, np.nan)
     if count < wide + 2 + _SPARE or not wide:
         return none
-    x, y = _ranks(columns), _ranks(output[:, None])
+    x, y = centred_ranks(columns), centred_ranks(output[:, None])
     matrix = np.block([[x.T @ x, x.T @ y], [y.T @ x, y.T @ y]])
     scale = np.sqrt(np.diag(matrix))
     if (scale == 0).any():
@@ -61,7 +61,7 @@ def areas(columns: Array, group: NDArray[np.bool_]) -> Array:
     """
     inside = int(group.sum())
     outside = len(group) - inside
-    found: Array = 0.5 + _ranks(columns)[group].sum(axis=0) / (inside * outside)
+    found: Array = 0.5 + centred_ranks(columns)[group].sum(axis=0) / (inside * outside)
     return found
 
 

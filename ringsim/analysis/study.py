@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
 from ringsim.analysis.binomial import share_interval
+from ringsim.analysis.blocks import population_of
 from ringsim.analysis.design import Placement, placement
 from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import NONE, Array, Interval
 from ringsim.analysis.quantities import good, lost, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
+from ringsim.analysis.reweighting import read_distributions, reweight
+from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.verdicts import judge
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status
@@ -33,7 +36,9 @@ _FEW = 10
 
 
 def analyse(
-    campaign: xr.Dataset, requirements: Mapping[str, Requirement | Mapping[str, Any]] | None = None
+    campaign: xr.Dataset,
+    requirements: Mapping[str, Requirement | Mapping[str, Any]] | None = None,
+    reweighted: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> xr.Dataset:
     """Statistics of all outputs of a merged campaign, its outcomes, and verdicts on requirements.
 
@@ -44,6 +49,8 @@ def analyse(
     requirements
         By output, for example ``{"asynchrony_max": {"max": 10.0, "probability": 0.99,
         "confidence": 0.9}}``; those of the campaign file if None.
+    reweighted
+        Other distributions of inputs, by path, as campaign files give them; see ``reweight``.
 
     Returns
     -------
@@ -51,9 +58,9 @@ def analyse(
         For every output NAME ``NAME`` (statistic), ``NAME_interval`` (statistic, bound),
         ``NAME_convergence`` (part, statistic), ``NAME_error_of_mean`` (source), all in its unit,
         and ``NAME_samples`` (counted); ``outcome_...`` along ``kind``; verdicts along
-        ``requirement``; what matters along ``input``, see ``influence``.  NaN stands for what the
-        samples do not tell; ``intervals`` among the attributes says what intervals are from, or
-        why there are none.
+        ``requirement``; what matters along ``input`` and ``output``, see ``influence`` and
+        ``sensitivity``.  NaN stands for what the samples do not tell; ``intervals`` among the
+        attributes says what intervals are from, or why there are none.
 
     InputError if it is no campaign, or a requirement cannot be judged by it.
     """
@@ -82,13 +89,18 @@ def analyse(
         },
     )  # fmt: skip
     found["part"].attrs = {"long_name": "share of the samples, the first ones", "units": "1"}
+    stand = population_of(campaign)
     for name in quantities():
-        if name in campaign and np.isfinite(numbers(campaign, name)[good(campaign)]).any():
-            found = found.assign(_output(campaign, name, placed))
-    found = found.merge(_outcomes(campaign, placed), combine_attrs="override")
-    if wanted:
-        found = found.merge(judge(campaign, wanted, placed), combine_attrs="override")
-    return found.merge(influence(campaign, wanted, placed), combine_attrs="override")
+        if name in stand and np.isfinite(numbers(stand, name)[good(stand)]).any():
+            found = found.assign(_output(stand, name, placed))
+    more = [_outcomes(stand, placed), influence(stand, wanted, placed)]
+    more += [judge(stand, wanted, placed)] if wanted else []
+    more += [sensitivity(campaign, wanted, placed)]
+    if reweighted:
+        more += [reweight(stand, wanted, placed, read_distributions(reweighted))]
+    for part in more:
+        found = found.merge(part, combine_attrs="override")
+    return found
 
 
 def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any]:

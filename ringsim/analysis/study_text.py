@@ -7,6 +7,8 @@ import xarray as xr
 
 from ringsim.analysis.influence_text import influence_lines
 from ringsim.analysis.quantities import quantities
+from ringsim.analysis.reweighting_text import reweighting_lines
+from ringsim.analysis.sensitivity_text import sensitivity_lines
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
 from ringsim.analysis.verdicts import Verdict
 from ringsim.tables import interval_text, number_text, text_table
@@ -17,7 +19,11 @@ def told(analysis: xr.Dataset) -> list[str]:
     counts = f"{analysis.attrs['samples']} samples, design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
-    for part in (_requirements, _outcomes, _outputs, _errors, influence_lines):
+    parts = (
+        _requirements, _outcomes, _outputs, _errors, sensitivity_lines, influence_lines,
+        reweighting_lines,
+    )  # fmt: skip
+    for part in parts:
         if more := list(part(analysis)):
             lines += ["", *more]
     return lines

@@ -16,6 +16,7 @@ from ringsim.choice import kind_of
 from ringsim.execution.local import Local
 from ringsim.execution.work import Work, relative_cost
 from ringsim.sampling.columns import Column
+from ringsim.sampling.designs.grouped import Grouped
 from ringsim.sampling.values import labels_of
 from ringsim.storage.journal import survey
 from ringsim.storage.locks import in_use
@@ -103,10 +104,16 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver
     found = survey(folder, old.attributes["identity"] if old is not None else "", table.samples)
     todo = found.missing[share.holds(found.missing)]
     cost = relative_cost(table, campaign.scene)
-    kind = kind_of(campaign.specification.design)
+    design = campaign.specification.design
+    kind = kind_of(design)
     lines = [
         f"{campaign.specification.name}: {table.samples} samples "
         f"({kind} design), {len(todo)} to run here",
+        *(
+            [f"  runs           {design.runs_told(table.samples)}"]
+            if isinstance(design, Grouped)
+            else []
+        ),
         f"  folder         {folder}",
         f"  workers        {workers}",
         *map(_extent, table.columns),

@@ -16,26 +16,37 @@ from ringsim.refusal import InputError
     help="Judge a requirement, too, or in place of the file's on that output: 'asynchrony_max: max "
     "10, probability 0.99, confidence 0.9', 'outcome: is deployed, probability ...'.",
 )  # fmt: skip
+@click.option(
+    "--reweight", "reweighted", metavar="INPUT", multiple=True,
+    help="Tell also what another distribution of a drawn input would give, without new runs: "
+    "'loads.force = { kind = \"normal\", mean = 0.012, standard_deviation = 1e-4 }'.",
+)  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, help="Write all of it to a netCDF file.")
-def command(source: Path, required: tuple[str, ...], out: Path | None) -> None:
+def command(
+    source: Path, required: tuple[str, ...], reweighted: tuple[str, ...], out: Path | None
+) -> None:
     """Say what the campaign in DIR (or its campaign.nc) tells: verdicts on requirements, shares of
-    outcomes, statistics of outputs with intervals that fit the design, and which error dominates.
+    outcomes, statistics of outputs with intervals that fit the design, which error dominates, and
+    which inputs matter.
 
     Exit codes: 0 done, whatever the verdicts; 2 bad input.
     """
     from ringsim.analysis.requirements import parse_requirements, read_requirements
+    from ringsim.analysis.reweighting import parse_reweighted
     from ringsim.analysis.stored import open_stored
     from ringsim.analysis.study import analyse
     from ringsim.analysis.study_text import told
     from ringsim.dataset import require_file, save
 
+    others = parse_reweighted(reweighted)
     wanted = parse_requirements(required)
     if out is not None:
         require_file(out)
     with open_stored(source) as campaign:
         own = json.loads(campaign.attrs.get("requirements", "{}"))
         try:
-            found = analyse(campaign, {**read_requirements(own, "requirements"), **wanted})
+            judged = {**read_requirements(own, "requirements"), **wanted}
+            found = analyse(campaign, judged, others)
         except InputError as error:
             raise InputError(f"{source}: {error}") from None
     for line in told(found):

@@ -15,7 +15,7 @@ from ringsim.refusal import InputError
 @click.option("--out", metavar="FILE", type=PATH, default=Path("report.html"), show_default=True)
 @click.option(
     "--analysis", metavar="FILE", type=PATH,
-    help="File of ringsim analyse with verdicts to show instead of those of today.",
+    help="File of ringsim analyse --out with what to show instead of today's verdicts and indices.",
 )  # fmt: skip
 def command(folder: Path, out: Path, analysis: Path | None) -> None:
     """Write one page about the campaign in DIR, which holds campaign.nc, or about such a file.
@@ -42,9 +42,10 @@ def command(folder: Path, out: Path, analysis: Path | None) -> None:
         from ringsim.analysis.study import analyse
 
         judged = analyse(campaign)
-        judged = judged if "verdict" in judged else None
-    if judged is not None and not {"verdict", "requirement"} <= set(judged.variables):
-        raise InputError(f"--analysis {analysis}: holds no verdicts: leave it out")
+    if analysis is not None and not {"requirement", "output"} & set(judged.dims):
+        raise InputError(
+            f"--analysis {analysis}: holds neither verdicts nor what matters: leave it out"
+        )
     size = write_report(campaign, out, str(file.parent), judged)
     click.echo(f"wrote {out} ({size / 1e6:.2f} MB)")
     if size > LARGEST:

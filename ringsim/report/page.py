@@ -13,6 +13,7 @@ from ringsim.plots.campaign.figures import figures_of
 from ringsim.plots.inline import inline
 from ringsim.report import model, tables
 from ringsim.report.player import player
+from ringsim.report.sensitivity import what_matters
 
 LARGEST = 2_000_000
 """Bytes of a page: it is to go by mail."""
@@ -34,8 +35,8 @@ def write_report(
 def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) -> str:
     """The page as text: nothing in it refers to another file or address.
 
-    Verdicts on requirements are those of ``analysis``, along ``requirement``; the page itself only
-    counts.
+    Verdicts on requirements are those of ``analysis``, along ``requirement``, and so is what
+    matters, along ``output``; the page itself only counts.
     """
     wanted = campaign_file(campaign)
     failures, more = tables.failures(campaign, folder)
@@ -57,7 +58,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),
         "outcomes": tables.outcomes(campaign), "statistics": tables.statistics(campaign),
         "requirements": tables.requirements(campaign), "verdicts": tables.verdicts(analysis),
-        "peaks": peak_lines(campaign),
+        "matters": what_matters(analysis), "peaks": peak_lines(campaign),
         "figures": figures, "player": player(campaign), "failures": failures, "more": more,
         "truth": tables.truth(campaign), "notes": notes, "inputs": tables.drawn(campaign),
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from ringsim.cable.places import CABLES
 from ringsim.sampling.values import Values, array_of, label_of, labels_of, plain
 
+BLOCK_ROW = "block_row"
+"""The label of a sample that says what it is within its block, see ``designs.grouped``."""
+
 
 @dataclass(frozen=True)
 class Column:

@@ -1,6 +1,6 @@
 """Correlated inputs: a Gaussian copula over the axes of a design."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated
 
 import numpy as np
@@ -30,16 +30,7 @@ def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correl
     section.  InputError if a pair names what is not drawn, or if the pairs contradict each other.
     """
     matrix = np.eye(len(paths))
-    for pair in correlations:
-        first, second = (_axes(paths, name) for name in pair.between)
-        where = f"correlations.between = {list(pair.between)}"
-        if set(first) & set(second):
-            raise InputError(f"{where} must name two different inputs")
-        if len(first) != len(second):
-            raise InputError(
-                f"{where}: one has {len(first)} values and the other {len(second)}: give both or "
-                "neither each_section = true"
-            )
+    for pair, first, second in pairs_of(paths, correlations):
         matrix[first, second] = matrix[second, first] = pair.coefficient
     moved = np.flatnonzero((matrix != np.eye(len(paths))).any(axis=0))
     if not moved.size:
@@ -54,6 +45,24 @@ def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correl
     dependent = points.copy()
     dependent[:, moved] = inside(ndtr(ndtri(points[:, moved]) @ lower.T))
     return dependent
+
+
+def pairs_of(
+    paths: Sequence[str], correlations: Sequence[Correlation]
+) -> Iterator[tuple[Correlation, int, int]]:
+    """Every two axes that depend on each other; InputError as ``correlate`` raises it."""
+    for pair in correlations:
+        first, second = (_axes(paths, name) for name in pair.between)
+        where = f"correlations.between = {list(pair.between)}"
+        if set(first) & set(second):
+            raise InputError(f"{where} must name two different inputs")
+        if len(first) != len(second):
+            raise InputError(
+                f"{where}: one has {len(first)} values and the other {len(second)}: give both or "
+                "neither each_section = true"
+            )
+        for one, other in zip(first, second, strict=True):
+            yield pair, one, other
 
 
 def _axes(paths: Sequence[str], name: str) -> list[int]:

@@ -8,13 +8,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ringsim.choice import OneOf
+from ringsim.choice import OneOf, kind_of
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.overrides import field_at, place_of, pulleys_at, section_of, with_number
 from ringsim.refusal import InputError, known_or_nearest, show
-from ringsim.sampling.columns import Column, Table
+from ringsim.sampling.columns import BLOCK_ROW, Column, Table
 from ringsim.sampling.correlation import Correlation
 from ringsim.sampling.designs.family import Design
+from ringsim.sampling.designs.grouped import Grouped
 from ringsim.sampling.distributions.family import Distribution
 from ringsim.sampling.values import Values, extremes_of, is_label, plain
 from ringsim.scene import Scene
@@ -74,6 +75,9 @@ def draw(
         if not is_label(name):
             refuse_fixed(base, name)
         columns.append(_column(base, name, drawn[name], "listed in a file", design))
+    if isinstance(design, Grouped):
+        rows, words = np.array(design.rows(factors, seed)), f"row of a {kind_of(design)} block"
+        columns.append(Column(BLOCK_ROW, "", "", "1", words, rows))
     if every := error_bars_every:
         path = "solver.error_bars"
         if any(column.path == path for column in columns):

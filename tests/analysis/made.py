@@ -9,6 +9,7 @@ import xarray as xr
 
 from ringsim.sampling.designs.latin_hypercube import LatinHypercube
 from ringsim.sampling.designs.sobol import Sobol
+from ringsim.sampling.distributions.uniform import Uniform
 from ringsim.variables import Fate, Status
 
 AXES = dict.fromkeys("abc")
@@ -41,3 +42,46 @@ def campaign(values, *, design=None, status=None, outcome=None, **more):
         coords={"sample": np.arange(count)},
         attrs={"design": json.dumps(design), "title": "made", "identity": "made"},
     )
+
+
+UNIT = json.dumps({"kind": "uniform", "low": 0.0, "high": 1.0})
+
+
+def drawn_campaign(design, output, count, seed, lost=None, **more):
+    """A merged campaign of inputs x1, x2, ... in the unit interval; ``lost`` takes them."""
+    factors = dict.fromkeys(f"x{k + 1}" for k in range(count))
+    law = Uniform(low=0.0, high=1.0)
+    factors = dict.fromkeys(factors, law)
+    x = design.points(factors, seed)
+    gone = np.zeros(len(x), dtype=bool) if lost is None else lost(x)
+    made = campaign(
+        np.where(gone, np.nan, output(x)), design=json.loads(design.model_dump_json()),
+        status=np.where(gone, Status.DIVERGED, Status.OK),
+        outcome=np.where(gone, Fate.NONE, Fate.DEPLOYED), **more,
+    )  # fmt: skip
+    for path, column in zip(factors, x.T, strict=True):
+        made[path] = "sample", column, {"role": "input", "path": path, "distribution": UNIT}
+    if hasattr(design, "rows"):
+        made["block_row"] = "sample", np.array(design.rows(factors, seed)), {"role": "label"}
+    return made
+
+
+def ishigami(points):
+    """Ishigami's function of three numbers in the unit interval, with a = 7 and b = 0.1."""
+    x = np.pi * (2 * points - 1)
+    return np.sin(x[..., 0]) * (1 + 0.1 * x[..., 2] ** 4) + 7 * np.sin(x[..., 1]) ** 2
+
+
+def ishigami_indices():
+    """First-order and total indices in closed form; Ishigami and Homma (1990)."""
+    b4, b8 = 0.1 * np.pi**4, 0.01 * np.pi**8
+    first = np.array([0.5 * (1 + b4 / 5) ** 2, 49 / 8, 0.0])
+    both = b8 * (1 / 18 - 1 / 50)
+    total = first + np.array([both, 0.0, both])
+    return first / (first.sum() + both), total / (first.sum() + both)
+
+
+def grouped(points):
+    """A function of two groups, x1 with x2 and x3, of variance 1: shares 1/6, 1/3 and 1/2."""
+    one, other = points[..., 0] + points[..., 1] - 1, points[..., 2] - 0.5
+    return one + 2 * other + 6 * one * other

@@ -171,7 +171,9 @@ def test_all_figures_of_a_file(tmp_path: Path, mixed: xr.Dataset) -> None:
     done = CliRunner().invoke(cli, ["plot", str(tmp_path / "campaign.nc"), "--plot-format", "svg"])
     assert done.exit_code == 0, done.output
     names = {path.name for path in tmp_path.glob("*.svg")}
-    assert names == {f"campaign-fig-{picture.name}.svg" for picture in PICTURES}
+    # Five samples are too few for a correlation.
+    expected = {picture.name for picture in PICTURES} - {"tornado"}
+    assert names == {f"campaign-fig-{name}.svg" for name in expected}
 
 
 @pytest.mark.parametrize("choice", [{"failed": (0, 1)}, {"not_run": (0, 1)}, {"stalled": (0, 1)}])
@@ -188,4 +190,4 @@ def test_the_ideal_ring_has_no_fan() -> None:
     campaign = made_campaign(2)
     campaign["asynchrony"][:] = np.nan
     names = {picture.name for picture, _ in figures_of(campaign)}
-    assert names == {picture.name for picture in PICTURES} - {"fan", "lag_map"}
+    assert names == {picture.name for picture in PICTURES} - {"fan", "lag_map", "tornado"}

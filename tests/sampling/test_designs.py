@@ -47,7 +47,7 @@ def values(table, path):
 
 
 def test_every_kind_is_tested():
-    assert set(kinds_of(Design)) == {*PROBABILISTIC, "grid", "list"}
+    assert set(kinds_of(Design)) == {*PROBABILISTIC, "grid", "list", "saltelli", "morris"}
 
 
 @pytest.mark.parametrize("kind", PROBABILISTIC)

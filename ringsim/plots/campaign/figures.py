@@ -18,6 +18,7 @@ from ringsim.plots.campaign.fan import fan
 from ringsim.plots.campaign.lag_map import lag_map
 from ringsim.plots.campaign.lock_order import lock_order
 from ringsim.plots.campaign.tension import tension
+from ringsim.plots.campaign.tornado import explained, tornado
 
 
 class Picture(NamedTuple):
@@ -53,6 +54,10 @@ PICTURES = (
         ("lock_time",),
     ),
     Picture("by_input", by_input, "What became of each sample, by each drawn input", of=inputs),
+    Picture(
+        "tornado", tornado, "Which inputs matter for each main number, with intervals",
+        of=explained,
+    ),
     Picture(
         "convergence", convergence, "Mean and 95 % quantile as samples come in", of=scalars,
     ),

@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.sampling.correlation import Correlation, correlate
 from ringsim.sampling.distributions.family import Array, Distribution
@@ -47,7 +48,8 @@ class Design(Model):
         """
         if correlations and not self.correlated:
             raise InputError(
-                "correlations: a grid has none, its inputs are crossed; use another design"
+                f"correlations: a design of kind {kind_of(self)} has none, because it moves each "
+                "input by itself; use another design"
             )
         if not factors:
             return {}

@@ -33,12 +33,16 @@ class Replicated(Design):
 
     def points(self, factors: Factors, seed: int) -> Array:
         """The points of all replicates, those of the first with the campaign's own seed."""
-        found = np.empty((self.samples, len(factors)))
+        return self.spread(len(factors), seed)
+
+    def spread(self, axes: int, seed: int) -> Array:
+        """The points of all replicates in a unit cube of so many axes."""
+        found = np.empty((self.samples, axes))
         for number in range(self.replicates):
             # Keys of two numbers, since those of one are the seeds of samples.
             key = () if number == 0 else (0, number)
             stream = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
-            points = self.replicate(self.samples // self.replicates, len(factors), stream)
+            points = self.replicate(self.samples // self.replicates, axes, stream)
             found[number :: self.replicates] = points
         return inside(found)
 

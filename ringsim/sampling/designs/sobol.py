@@ -20,13 +20,21 @@ class Sobol(Replicated):
 
     def replicate(self, samples: int, axes: int, stream: np.random.Generator) -> Array:
         """The first points of the sequence that belongs to the stream."""
-        from scipy.stats import qmc
+        return sobol_points(samples, axes, stream, kind=self.kind)
 
-        if axes > qmc.Sobol.MAXDIM:
-            raise InputError(
-                f"design.kind = sobol has at most {qmc.Sobol.MAXDIM} inputs, not {axes}: "
-                'use kind = "random"'
-            )
-        engine = qmc.Sobol(d=axes, scramble=True, rng=stream, bits=30)
-        points: Array = engine.random_base2((samples - 1).bit_length())[:samples]
-        return points
+
+def sobol_points(samples: int, axes: int, stream: np.random.Generator, *, kind: str) -> Array:
+    """The first points of a scrambled sequence, shape (samples, axes).
+
+    InputError, which names the kind of the design, above the dimensions of the directions.
+    """
+    from scipy.stats import qmc
+
+    if axes > qmc.Sobol.MAXDIM:
+        raise InputError(
+            f"design.kind = {kind} needs {axes} dimensions and has at most {qmc.Sobol.MAXDIM}: "
+            "draw fewer inputs"
+        )
+    engine = qmc.Sobol(d=axes, scramble=True, rng=stream, bits=30)
+    points: Array = engine.random_base2((samples - 1).bit_length())[:samples]
+    return points

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from ringsim.refusal import show
 from ringsim.sampling.distributions.family import Array, Distribution
-from ringsim.sampling.values import Values, array_of, labels_of
+from ringsim.sampling.values import Values, array_of, label_of, labels_of, plain
 from ringsim.units import ListIn
 
 
@@ -61,6 +61,21 @@ class Discrete(Distribution):
         chosen = np.searchsorted(self._upper_ends()[:-1], probability, side="right")
         values: Values = array_of(self.values)[chosen]
         return values
+
+    def log_density(self, values: Values) -> Array:
+        """Logarithm of the probability of each value; of words and tables also by their labels."""
+        shares = self.probabilities or (1.0 / len(self.values),) * len(self.values)
+        known: dict[Any, float] = {}
+        for value, share in zip(self.values, shares, strict=True):
+            number = type(value) in (int, float)
+            known |= {label_of(value): share, str(value): share}
+            known |= {float(value): share} if number else {}
+        plainly = (plain(each) for each in np.ravel(values))
+        keys = (float(v) if type(v) in (int, float) else v for v in plainly)
+        found = [known.get(k if isinstance(k, (str, float)) else label_of(k), 0.0) for k in keys]
+        with np.errstate(divide="ignore"):
+            logarithms: Array = np.log(np.array(found)).reshape(np.shape(values))
+        return logarithms
 
     def levels(self, count: int) -> Array:
         """One probability for each value, whatever ``count`` is: the middle of its interval."""

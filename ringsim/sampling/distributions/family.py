@@ -27,6 +27,13 @@ class Distribution(Model):
         """Probabilities of ``count`` grid points: middles of intervals of equal probability."""
         return (np.arange(count) + 0.5) / count
 
+    def log_density(self, values: Values) -> Array:
+        """Logarithm of the density, or of the probability of each value; -inf where there is none.
+
+        Raises TypeError for what is no value of this kind of distribution.
+        """
+        raise NotImplementedError
+
 
 class Continuous(Distribution):
     """A distribution over an interval of real numbers."""

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from ringsim.sampling.distributions.family import Array, Continuous
 from ringsim.sampling.distributions.normal import Normal
+from ringsim.sampling.values import Values
 
 
 class Lognormal(Continuous):
@@ -32,6 +33,13 @@ class Lognormal(Continuous):
     def quantile(self, probability: Array) -> Array:
         """Inverse of the cumulative distribution."""
         return np.exp(self._logarithm.quantile(probability))
+
+    def log_density(self, values: Values) -> Array:
+        """That of ln x, less ln x."""
+        known = np.asarray(values, dtype=float)
+        logarithm = np.log(np.where(known > 0.0, known, 1.0))
+        found = self._logarithm.log_density(logarithm) - logarithm
+        return np.where(known > 0.0, found, -np.inf)
 
     def probability(self, value: float) -> float:
         """Cumulative distribution."""

@@ -1,11 +1,14 @@
 """Normal distribution."""
 
+import math
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 from scipy.special import ndtr, ndtri
 
 from ringsim.sampling.distributions.family import Array, Continuous
+from ringsim.sampling.values import Values
 
 
 class Normal(Continuous):
@@ -23,6 +26,12 @@ class Normal(Continuous):
         """Inverse of the cumulative distribution."""
         values: Array = self.mean + self.standard_deviation * ndtri(probability)
         return values
+
+    def log_density(self, values: Values) -> Array:
+        """Logarithm of the density above."""
+        scaled = (np.asarray(values, dtype=float) - self.mean) / self.standard_deviation
+        found: Array = -0.5 * scaled**2 - math.log(self.standard_deviation * math.sqrt(2 * math.pi))
+        return found
 
     def probability(self, value: float) -> float:
         """Cumulative distribution."""

@@ -47,6 +47,19 @@ class Truncated(Distribution):
         above = 1.0 if self.high is None else self.of.probability(self.high)
         return below, above
 
+    def log_density(self, values: Values) -> Array:
+        """That of the whole distribution over what the bounds keep of it."""
+        below, above = self._ends()
+        low = -np.inf if self.low is None else self.low
+        high = np.inf if self.high is None else self.high
+        found = self.of.log_density(values) - np.log(above - below)
+        return np.where((values >= low) & (values <= high), found, -np.inf)
+
+    def probability(self, value: float) -> float:
+        """Cumulative probability of ``value``."""
+        below, above = self._ends()
+        return float(np.clip((self.of.probability(value) - below) / (above - below), 0.0, 1.0))
+
     def quantile(self, probability: Array) -> Values:
         """Inverse of the cumulative distribution, inside the bounds to the bit."""
         below, above = self._ends()

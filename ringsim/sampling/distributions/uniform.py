@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import model_validator
 
 from ringsim.sampling.distributions.family import Array, Continuous
+from ringsim.sampling.values import Values
 
 
 class Uniform(Continuous):
@@ -32,6 +33,11 @@ class Uniform(Continuous):
     def levels(self, count: int) -> Array:
         """From end to end: both are values that can occur."""
         return np.linspace(0.0, 1.0, count) if count > 1 else super().levels(count)
+
+    def log_density(self, values: Values) -> Array:
+        """Of a constant density."""
+        within = (values >= self.low) & (values <= self.high)
+        return np.where(within, -np.log(self.high - self.low), -np.inf)
 
     def probability(self, value: float) -> float:
         """Cumulative distribution."""

@@ -1,0 +1,251 @@
+"""What samples say about other distributions of their inputs, without new runs."""
+
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from pydantic import ValidationError
+
+from ringsim.analysis import weighted
+from ringsim.analysis.design import Placement
+from ringsim.analysis.intervals import NONE, Array
+from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
+from ringsim.analysis.requirements import OUTCOME, Requirement
+from ringsim.analysis.verdicts import violations
+from ringsim.choice import kind_of
+from ringsim.files import parse_toml
+from ringsim.overrides import parse_value
+from ringsim.refusal import InputError, explain, known_or_nearest, show
+from ringsim.sampling.distributions.discrete import Discrete
+from ringsim.sampling.distributions.family import Distribution, inside
+from ringsim.sampling.table import AnyDistribution
+from ringsim.units import Model
+from ringsim.variables import Fate
+
+LEAST_EFFECTIVE = 10.0
+"""Effective samples below which nothing is told."""
+LEAST_REPLICATES = 16
+"""Replicates of a Sobol' design from which on weighted shares and quantiles have intervals."""
+SOBOL = ("sobol", "saltelli")
+_BEYOND = 1e-3
+"""Probability of the new distribution that may lie where the old one has none."""
+_BEYOND_SAMPLES = 0.01
+"""The same where the old one has hardly a sample, if that is more than two samples' share."""
+STATISTICS = {"mean": None, "quantile_05": 0.05, "median": 0.5, "quantile_95": 0.95}
+
+
+class _Holder(Model):
+    reweight: dict[str, AnyDistribution]
+
+
+def read_distributions(table: Mapping[str, Any]) -> dict[str, Distribution]:
+    """Distributions by path from plain tables; InputError if one is refused."""
+    try:
+        return _Holder.model_validate({"reweight": dict(table)}).reweight
+    except ValidationError as error:
+        raise InputError(explain(error, _Holder, "--reweight")) from None
+
+
+def parse_reweighted(texts: Iterable[str]) -> dict[str, Any]:
+    """Plain tables by path from texts of the command line.
+
+    >>> parse_reweighted(['loads.force = { kind = "uniform", low = 1, high = 2 }'])
+    {'loads.force': {'kind': 'uniform', 'low': 1, 'high': 2}}
+    """
+    found: dict[str, Any] = {}
+    for text in texts:
+        path, equals, raw = (part.strip() for part in text.partition("="))
+        path = path[1:-1] if path[:1] == path[-1:] and path[:1] in ('"', "'") else path
+        table = parse_value(raw, f"--reweight {path}") if path and equals and raw else None
+        if not isinstance(table, dict):
+            raise InputError(
+                f"--reweight {show(text)}: must read PATH = DISTRIBUTION, for example "
+                "'loads.force = { kind = \"normal\", mean = 0.01, standard_deviation = 0.001 }'"
+            )
+        if path in found:
+            raise InputError(f"--reweight {path} is given twice: leave out one of the two")
+        found[path] = table
+    return found
+
+
+def weights_of(campaign: xr.Dataset, wanted: Mapping[str, Distribution]) -> Array:
+    """Weight of each sample, shape (samples,), the largest 1: the ratio of the densities.
+
+    An input of many places has the new distribution in each of them, independently.  InputError
+    where an input was not drawn by itself, or its samples do not cover the new distribution.
+    """
+    paths = {
+        str(v.attrs.get("path")): v
+        for v in campaign.data_vars.values() if v.attrs.get("role") == "input"
+    }  # fmt: skip
+    logarithm = np.zeros(campaign.sizes["sample"])
+    for path, new in wanted.items():
+        if path not in paths:
+            hint = known_or_nearest(path, paths) if paths else "none is drawn"
+            raise InputError(f"--reweight {path}: is no drawn input of this campaign ({hint})")
+        values, old = paths[path].to_numpy(), _drawn_from(campaign, path, paths[path])
+        _check_cover(path, old, new, len(values))
+        ratio = new.log_density(values) - old.log_density(values)
+        logarithm += ratio if ratio.ndim == 1 else ratio.sum(axis=1)
+    largest = logarithm.max()
+    return np.exp(logarithm - largest) if np.isfinite(largest) else np.zeros(len(logarithm))
+
+
+def _drawn_from(campaign: xr.Dataset, path: str, variable: xr.DataArray) -> Distribution:
+    try:
+        table = json.loads(str(variable.attrs.get("distribution", "")))
+        old = _Holder.model_validate({"reweight": {path: table}}).reweight[path]
+    except (ValueError, ValidationError):
+        raise InputError(
+            f"--reweight {path}: the file tells no distribution of it, as of values that were "
+            "listed: draw it from one"
+        ) from None
+    text = parse_toml(str(campaign.attrs.get("campaign", "")), "campaign")
+    for pair in text.get("correlations", []):
+        if path in (names := pair.get("between", [])):
+            raise InputError(
+                f"--reweight {path}: it was drawn with a correlation to "
+                f"{next((name for name in names if name != path), path)}, which another "
+                "distribution of one alone does not keep: run a campaign with it"
+            )
+    return old
+
+
+def _check_cover(path: str, old: Distribution, new: Distribution, samples: int) -> None:
+    if isinstance(old, Discrete) != isinstance(new, Discrete):
+        kinds = ["values" if isinstance(each, Discrete) else "an interval" for each in (old, new)]
+        raise InputError(
+            f"--reweight {path}: it was drawn from {kinds[0]}, and the new distribution is over "
+            f"{kinds[1]}: samples of the one do not cover the other"
+        )
+    if isinstance(new, Discrete):
+        for value in new.values:
+            if not np.isfinite(old.log_density(np.array([value], dtype=object))).all():
+                raise InputError(
+                    f"--reweight {path}: {show(value)} was never drawn, so no sample tells about "
+                    "it: leave it out, or run a campaign with it"
+                )
+        return
+    # All but what is discrete has cumulative probabilities.
+    cumulative: Any = new
+    tail = 0.5 / samples
+    for part, most, words in (
+        (0.0, _BEYOND, "where it was not drawn at all"),
+        (tail, max(_BEYOND_SAMPLES, 2 / samples), f"where {samples} samples hardly reach"),
+    ):
+        low, high = old.quantile(inside(np.array([part, 1 - part]))).tolist()
+        beyond = cumulative.probability(low) + 1 - cumulative.probability(high)
+        if beyond > most:
+            raise InputError(
+                f"--reweight {path}: {beyond:.2g} of the new distribution lies below {low:.4g} or "
+                f"above {high:.4g}, {words}, must be at most {most:.2g}: choose a narrower one, or "
+                "run a campaign with it"
+            )
+
+
+def reweight(
+    campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement,
+    wanted: Mapping[str, Distribution],
+) -> xr.Dataset:  # fmt: skip
+    """Statistics and probabilities if inputs had other distributions.
+
+    For every output NAME ``NAME_reweighted`` along ``reweighted_statistic``, its ``_interval`` and
+    ``NAME_effective_samples``; ``reweighted_share`` along ``event``: outcomes, lost runs, and
+    requirements that are kept to; ``effective_samples`` of all that ran.  InputError where the
+    design stands for no population, or below 10 effective samples.
+    """
+    if not placed.population:
+        raise InputError(f"--reweight: {placed.told}")
+    weights = weights_of(campaign, wanted)
+    ok, gone, index = good(campaign), lost(campaign), campaign["sample"].to_numpy()
+    ran = ok | gone
+    if (count := weighted.effective(weights[ran])) < LEAST_EFFECTIVE:
+        raise InputError(
+            f"--reweight {', '.join(wanted)}: {ran.sum()} samples count as {count:.2g} effective "
+            f"ones, must be at least {LEAST_EFFECTIVE:g}: choose a distribution nearer to the old "
+            "one, reweight fewer inputs, or run a campaign with it"
+        )
+    found: dict[str, Any] = {}
+    for name, variable in quantities().items():
+        values = numbers(campaign, name)
+        known = ok & np.isfinite(values) & (weights > 0)
+        if name not in campaign or weighted.effective(weights[known]) < LEAST_EFFECTIVE:
+            continue
+        rows = np.array([
+            _told(values[known], weights[known], level, placed, placed.replicate_of(index[known]))
+            for level in STATISTICS.values()
+        ])  # fmt: skip
+        about = {"long_name": f"reweighted estimates of: {name}", "units": variable.units}
+        found[f"{name}_reweighted"] = "reweighted_statistic", rows[:, 0], about
+        found[f"{name}_reweighted_interval"] = ("reweighted_statistic", "bound"), rows[:, 1:], about
+        found[f"{name}_effective_samples"] = (
+            (), weighted.effective(weights[known]), {"long_name": "effective samples", "units": "1"}
+        )  # fmt: skip
+    shares, words = list[tuple[float, ...]](), list[str]()
+    for word, (own, of) in _events(campaign, requirements, ok, gone).items():
+        of = of & (weights > 0)
+        share, ends = weighted.mean(own[of].astype(float), weights[of]), NONE
+        if has_share_intervals(placed):
+            ends = weighted.share_interval(own[of], weights[of], placed.replicate_of(index[of]))
+        words.append(word)
+        shares.append((share, *ends))
+    told = np.array(shares).reshape(-1, 3)
+    about = {"long_name": "share if inputs had the other distributions", "units": "1"}
+    found["reweighted_share"] = "event", told[:, 0], about
+    found["reweighted_share_interval"] = ("event", "bound"), told[:, 1:], about
+    found["effective_samples"] = (
+        (), count, {"long_name": "effective samples of all that ran", "units": "1"}
+    )  # fmt: skip
+    found["reweighted_samples"] = (), int(ran.sum()), {"long_name": "samples that ran"}
+    laws = {
+        path: {"kind": kind_of(law), **law.model_dump(exclude_defaults=True)}
+        for path, law in wanted.items()
+    }
+    found["reweighted_to"] = (), json.dumps(laws), {"long_name": "distributions by path (JSON)"}
+    coords = {
+        "reweighted_statistic": [*STATISTICS], "event": np.array(words, dtype=object),
+        "bound": ["lower", "upper"],
+    }  # fmt: skip
+    return xr.Dataset(found, coords=coords)
+
+
+def has_share_intervals(placed: Placement) -> bool:
+    """Whether weighted shares and quantiles have intervals.
+
+    Shares of a few Sobol' points take few values: 8 replicates held the truth in 91 of 100
+    campaigns, 16 in 94 to 97.
+    """
+    few = placed.kind in SOBOL and placed.replicates < LEAST_REPLICATES
+    return placed.has_intervals and not few
+
+
+def _told(
+    values: Array, weights: Array, level: float | None, placed: Placement, replicate: Any
+) -> tuple[float, float, float]:
+    """Estimate of the mean, or of a quantile, and its interval if the design has some."""
+    if level is None:
+        middle, ends = weighted.mean(values, weights), NONE
+        if placed.has_intervals:
+            ends = weighted.mean_interval(values, weights, replicate)
+    else:
+        middle, ends = weighted.quantile(values, weights, level), NONE
+        if has_share_intervals(placed):
+            ends = weighted.quantile_interval(values, weights, level, replicate)
+    return (middle, *ends)
+
+
+def _events(
+    campaign: xr.Dataset, requirements: Mapping[str, Requirement], ok: Mask, gone: Mask
+) -> dict[str, tuple[Mask, Mask]]:
+    """What may happen to a sample: which samples it happened to, of which."""
+    found: dict[str, tuple[Mask, Mask]] = {}
+    if OUTCOME in campaign and ok.any():
+        fates = campaign[OUTCOME].to_numpy()
+        found = {f.word: (ok & (fates == f), ok) for f in Fate if (ok & (fates == f)).any()}
+    if gone.any():
+        found["lost"] = gone, ok | gone
+    for name, each in requirements.items() if ok.any() else ():
+        found[each.told(name)] = ok & ~violations(campaign, name, each), ok
+    return found

@@ -1,0 +1,52 @@
+"""Estimates for other distributions of inputs, as lines for people."""
+
+import json
+from collections.abc import Iterator
+
+import xarray as xr
+
+from ringsim.analysis.quantities import quantities
+from ringsim.analysis.reweighting import LEAST_REPLICATES, SOBOL, STATISTICS
+from ringsim.sampling.values import label_of
+from ringsim.tables import interval_text, number_text, text_table
+
+
+def reweighting_lines(analysis: xr.Dataset) -> Iterator[str]:
+    """Which distributions, how many effective samples, then the estimates beside the old ones."""
+    if "reweighted_to" not in analysis:
+        return
+    laws = json.loads(analysis["reweighted_to"].item())
+    told = ", ".join(f"{path} = {label_of(law)}" for path, law in laws.items())
+    yield (
+        f"reweighted to {told}: {analysis['reweighted_samples'].item()} samples count as "
+        f"{number_text(analysis['effective_samples'].item(), 3)} effective ones"
+    )
+    rows = []
+    for name, variable in quantities().items():
+        if f"{name}_reweighted" not in analysis:
+            continue
+        for statistic in STATISTICS:
+            one = analysis.sel(reweighted_statistic=statistic, statistic=statistic)
+            low, high = one[f"{name}_reweighted_interval"].values.tolist()
+            rows.append((
+                name, "" if variable.units == "1" else variable.units, statistic.replace("_", " "),
+                number_text(one[name].item()), number_text(one[f"{name}_reweighted"].item()),
+                interval_text(low, high), number_text(one[f"{name}_effective_samples"].item(), 3),
+            ))  # fmt: skip
+    if rows:
+        head = ("output", "unit", "statistic", "as drawn", "reweighted", "95 % interval",
+                "effective samples")  # fmt: skip
+        yield from text_table(head, rows)
+    shares = [
+        (
+            str(event), number_text(analysis["reweighted_share"].sel(event=event).item()),
+            interval_text(*analysis["reweighted_share_interval"].sel(event=event).values.tolist()),
+        )
+        for event in analysis["event"].values
+    ]  # fmt: skip
+    known = bool(analysis["reweighted_share_interval"].notnull().any())
+    if shares:
+        yield ""
+        if analysis.attrs["design"] in SOBOL and not known:
+            yield f"intervals of shares and quantiles need design.replicates = {LEAST_REPLICATES}"
+        yield from text_table(("probability of", "reweighted", "95 % interval"), shares)

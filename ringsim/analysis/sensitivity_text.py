@@ -1,0 +1,131 @@
+"""Indices of sensitivity as lines for people."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from ringsim.analysis.dependence import LEVEL
+from ringsim.analysis.intervals import Array
+from ringsim.tables import interval_text, number_text, text_table
+
+_MOST = 5
+"""Groups or inputs that are told for each output."""
+_MOST_PLACES = 3
+SETS = (
+    ("total_index", "first_order_index"),
+    ("mean_absolute_effect", "effect_deviation"),
+    ("given_data_index", "chance_level"),
+)
+"""Measures of each kind of design, the first of which orders the groups."""
+HEADS = {
+    "total_index": "total index", "first_order_index": "first-order index",
+    "mean_absolute_effect": "mu*", "effect_deviation": "sigma",
+    "given_data_index": "first-order index", "chance_level": "by chance up to",
+    "second_order_index": "second-order index",
+}  # fmt: skip
+
+
+def _ends(interval: Array) -> str:
+    return interval_text(float(interval[0]), float(interval[1]), 2)
+
+
+def measures_of(analysis: xr.Dataset) -> tuple[str, ...]:
+    """The measures that an analysis holds, the one that orders groups first; empty if none."""
+    return next((names for names in SETS if names[0] in analysis), ())
+
+
+def told_rows(analysis: xr.Dataset) -> tuple[list[str], list[list[str]]]:
+    """Head and rows of a table: the groups, or inputs, that matter most for each output."""
+    names = measures_of(analysis)
+    if not names:
+        return [], []
+    (dim,) = analysis[names[0]].dims[1:]
+    place = (
+        analysis["input_is_place"].values
+        if dim == "input" and "input_is_place" in analysis
+        else np.zeros(analysis.sizes[dim], dtype=bool)
+    )
+    of = "samples" if dim == "input" else "blocks"
+    head = ["what explains"]
+    for name in names:
+        head += [HEADS[name]] + ["95 % interval"] * (f"{name}_interval" in analysis)
+    rows = []
+    for output in analysis["output"].values:
+        one = analysis.sel(output=output)
+        size = np.nan_to_num(one[names[0]].values, nan=-np.inf)
+        order = np.argsort(-size, kind="stable")
+        chosen = [k for k in order[~place[order]][:_MOST] if np.isfinite(size[k])]
+        chosen += [k for k in order[place[order]][:_MOST_PLACES] if np.isfinite(size[k])]
+        for k in chosen:
+            row = [f"{output} by {analysis[dim].values[k]}"]
+            for name in names:
+                row.append(number_text(one[name].values[k], 2))
+                if f"{name}_interval" in one:
+                    row.append(_ends(one[f"{name}_interval"].values[k]))
+            rows.append([*row, str(one["index_used"].item()), str(one["index_lost"].item())])
+    return [*head, f"{of} used", "lost"], rows
+
+
+def gate_lines(analysis: xr.Dataset) -> Iterator[str]:
+    """What became of outputs that samples lack: why there is no index, or why there is one."""
+    if "missing_by_inputs" not in analysis:
+        return
+    outputs: dict[tuple[int, float], list[str]] = {}
+    blocks = ", and the rest of their blocks," if "factor" in analysis.dims else ""
+    for output in analysis["output"].values:
+        one = analysis.sel(output=output)
+        if count := one["missing"].item():
+            chance = round(one["missing_by_inputs"].item(), 4)
+            outputs.setdefault((count, chance), []).append(output)
+    for (count, chance), names in outputs.items():
+        who = ", ".join(names[:_MOST]) + (f" and {len(names) - _MOST} more" * (len(names) > _MOST))
+        p = f"p = {chance:.2g}" if chance else "p < 0.0001"
+        if chance < LEVEL:
+            yield (
+                f"no index of {who}: {count} samples have no value, and which ones depends on "
+                f"inputs ({p}), so that the others are another population: see what separates "
+                "failures, mend them (ringsim campaign --retry-failed), or narrow the inputs"
+            )
+        else:
+            yield (
+                f"{who}: {count} samples have no value, as far as one can tell whatever their "
+                f"inputs are ({p}); they{blocks} are left out"
+            )
+
+
+def sensitivity_lines(analysis: xr.Dataset) -> Iterator[str]:
+    """Tables of indices, and what they leave out."""
+    head, rows = told_rows(analysis)
+    if rows:
+        yield from text_table(head, rows)
+        if "mean_absolute_effect" in analysis:
+            yield (
+                "mu*: mean absolute change of the output, in its unit, when the group moves by "
+                "half of its levels; sigma: scatter of that change"
+            )
+        elif "total_index" in analysis and analysis["total_index_interval"].isnull().all():
+            yield "no intervals: give design.replicates = 8, or more, for independent replicates"
+        elif "given_data_index" in analysis:
+            yield (
+                "shares of the variance by one input alone, from bins: corrected for chance, too "
+                "small where the output bends within a bin"
+            )
+    if "second_order_index" in analysis:
+        yield from _second(analysis)
+    yield from gate_lines(analysis)
+
+
+def _second(analysis: xr.Dataset) -> Iterator[str]:
+    rows, factors = [], analysis["factor"].values
+    for output in analysis["output"].values:
+        one = analysis.sel(output=output)
+        values = one["second_order_index"].values
+        found = [(j, k) for j in range(len(factors)) for k in range(j) if np.isfinite(values[j, k])]
+        for j, k in sorted(found, key=lambda pair: -values[pair])[:_MOST_PLACES]:
+            ends = one["second_order_index_interval"].values[j, k]
+            rows.append((f"{output} by {factors[k]} with {factors[j]}",
+                         number_text(values[j, k], 2), _ends(ends)))  # fmt: skip
+    if rows:
+        yield ""
+        yield from text_table(("what explains", "second-order index", "95 % interval"), rows)

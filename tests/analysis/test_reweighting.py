@@ -1,0 +1,180 @@
+"""Other distributions of inputs without new runs, against exact answers."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.stats import norm, truncnorm
+
+from made import UNIT, drawn_campaign, points
+from ringsim.analysis import weighted
+from ringsim.analysis.reweighting import parse_reweighted, read_distributions, weights_of
+from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import told
+from ringsim.cli.analyse import command
+from ringsim.refusal import InputError
+from ringsim.sampling.designs.morris import Morris
+from ringsim.sampling.designs.random import RandomDesign
+from ringsim.sampling.designs.saltelli import Saltelli
+
+FEW, MANY = (100, 0.88, 1.0), (1000, 0.92, 0.98)
+SOME = [pytest.param(FEW, id="few"), pytest.param(MANY, id="many", marks=pytest.mark.slow)]
+NARROW = {"kind": "normal", "mean": 0.5, "standard_deviation": 0.12}
+TRUE = norm(0.5, 0.12)
+
+
+def linear(x):
+    return 10.0 * x[..., 0]
+
+
+def test_a_reweighted_campaign_tells_the_exact_mean_quantiles_and_probabilities():
+    made = drawn_campaign(RandomDesign(samples=4000), linear, 2, 1)
+    wanted = {"asynchrony_max": {"max": 6.0, "probability": 0.5, "confidence": 0.9}}
+    found = analyse(made, wanted, {"x1": NARROW})
+    # Of a density ratio f / 1: the effective share is 1 / integral of f^2 = 2 sqrt(pi) s.
+    assert found.effective_samples.item() == pytest.approx(4000 * 2 * np.pi**0.5 * 0.12, rel=0.05)
+    values, ends = found.asynchrony_max_reweighted, found.asynchrony_max_reweighted_interval
+    exact = [5.0, *(10 * TRUE.ppf([0.05, 0.5, 0.95]))]
+    np.testing.assert_allclose(values, exact, atol=0.15)
+    for (low, high), true in zip(ends.values, exact, strict=True):
+        assert low < true < high
+    share = found.reweighted_share.sel(event="asynchrony_max <= 6 degree").item()
+    assert share == pytest.approx(TRUE.cdf(0.6), abs=0.03)
+    assert found.reweighted_share.sel(event="deployed").item() == pytest.approx(1.0)
+
+
+def test_an_input_that_is_not_reweighted_keeps_its_distribution():
+    made = drawn_campaign(RandomDesign(samples=4000), lambda x: x[:, 0] + x[:, 1], 2, 1)
+    found = analyse(made, None, {"x2": {"kind": "uniform", "low": 0.0, "high": 0.5}})
+    mean = found.asynchrony_max_reweighted.sel(reweighted_statistic="mean").item()
+    assert mean == pytest.approx(0.75, abs=0.03)
+    # Half of the samples have no weight.
+    assert found.effective_samples.item() == pytest.approx(2000, rel=0.05)
+
+
+@pytest.mark.parametrize("case", SOME)
+@pytest.mark.parametrize("kind", ["random", "latin-hypercube", "sobol"])
+def test_intervals_of_weighted_estimates_cover(kind, case):
+    campaigns, least, most = case
+    samples, replicates = (256, 16) if kind == "sobol" else (512, 8)
+    grid = (np.arange(4000) + 0.5) / 4000
+    ends = 0.5 / 0.12
+    normal = truncnorm(-ends, ends, 0.5, 0.12).ppf(grid)
+    fine = np.stack(np.meshgrid(normal, (np.arange(200) + 0.5) / 200), axis=-1)
+    value = lambda x: np.exp(x[..., 0]) + 0.2 * x[..., 1]  # noqa: E731
+    truth = value(fine).ravel()
+    exact = {"mean": truth.mean(), "share": np.mean(truth > 1.9)}
+    exact |= {level: np.quantile(truth, level) for level in (0.05, 0.5, 0.95)}
+    hits = dict.fromkeys(exact, 0)
+    for seed in range(campaigns):
+        x = points(kind, samples, replicates, seed)
+        y, weights = value(x), TRUE.pdf(x[:, 0])
+        replicate = None if kind == "random" else np.arange(samples) % replicates
+        found = {
+            "mean": weighted.mean_interval(y, weights, replicate),
+            "share": weighted.share_interval(y > 1.9, weights, replicate),
+        } | {
+            level: weighted.quantile_interval(y, weights, level, replicate)
+            for level in (0.05, 0.5, 0.95)
+        }  # fmt: skip
+        for name, (low, high) in found.items():
+            hits[name] += bool(low <= exact[name] <= high)
+    for name, count in hits.items():
+        assert least <= count / campaigns <= most, (name, count / campaigns)
+
+
+def test_equal_weights_change_nothing():
+    values = np.random.default_rng(1).random(200)
+    one = np.full(200, 0.3)
+    assert weighted.effective(one) == pytest.approx(200)
+    assert weighted.mean(values, one) == pytest.approx(values.mean())
+    assert weighted.quantile(values, one, 0.3) == pytest.approx(np.quantile(values, 0.3), abs=0.01)
+    assert weighted.share_interval(values < 2, one, None)[1] == 1.0
+
+
+def test_blocks_are_reweighted_by_the_samples_that_stand_for_the_population():
+    found = analyse(drawn_campaign(Saltelli(samples=256), linear, 3, 1), None, {"x1": NARROW})
+    assert found.reweighted_samples.item() == 512
+    low, high = found.asynchrony_max_reweighted_interval.sel(reweighted_statistic="mean").values
+    assert low < 5.0 < high
+    assert np.isnan(found.reweighted_share_interval).all()
+    assert any("need design.replicates = 16" in line for line in told(found))
+    many = drawn_campaign(Saltelli(samples=256, replicates=16), linear, 3, 1)
+    assert (analyse(many, None, {"x1": NARROW}).reweighted_share_interval[0] > 0.9).all()
+
+
+def test_words_and_lists_of_places_have_weights():
+    made = drawn_campaign(RandomDesign(samples=300), linear, 1, 1)
+    old = {"kind": "discrete", "values": ["a", "b"], "probabilities": [0.5, 0.5]}
+    word = np.where(made.x1 < 0.5, "a", "b").astype(object)
+    made["word"] = (
+        "sample",
+        word,
+        {"role": "input", "path": "word", "distribution": json.dumps(old)},
+    )
+    weights = weights_of(made, read_distributions({"word": old | {"probabilities": [0.9, 0.1]}}))
+    np.testing.assert_allclose(weights, np.where(word == "a", 1.0, 1 / 9))
+    friction = np.random.default_rng(2).random((300, 2))
+    says = {"role": "input", "path": "friction", "distribution": UNIT}
+    made["friction"] = ("sample", "pulley"), friction, says
+    weights = weights_of(made, read_distributions({"friction": NARROW}))
+    product = TRUE.pdf(friction).prod(axis=1)
+    np.testing.assert_allclose(weights, product / product.max())
+
+
+@pytest.mark.parametrize(
+    ("reweighted", "words"),
+    [
+        ({"x3": NARROW}, "is no drawn input of this campaign"),
+        ({"x1": NARROW | {"standard_deviation": 0.3}}, "where it was not drawn at all"),
+        ({"x1": {"kind": "uniform", "low": 0.5, "high": 1.5}}, "0.5 of the new distribution"),
+        ({"x1": {"kind": "uniform", "low": 0.5, "high": 0.51}}, "effective ones, must be at least"),
+        ({"x1": {"kind": "discrete", "values": [0.5]}}, "do not cover the other"),
+        ({"x1": {"kind": "normal", "mean": 0.5}}, "standard_deviation is missing"),
+        ({"tail": {"kind": "normal", "mean": 3.2, "standard_deviation": 0.5}}, "hardly reach"),
+        ({"word": {"kind": "discrete", "values": ["a", "c"]}}, '"c" was never drawn'),
+        ({"listed": NARROW}, "tells no distribution"),
+        ({"pair": NARROW}, "drawn with a correlation to x1"),
+    ],
+)
+def test_what_samples_do_not_cover_is_refused(reweighted, words):
+    made = drawn_campaign(RandomDesign(samples=100), linear, 2, 1)
+    law = {"kind": "normal", "mean": 0.0, "standard_deviation": 1.0}
+    for path, values, words_of in (
+        ("tail", norm.ppf(made.x1), json.dumps(law)),
+        ("word", np.full(100, "a", dtype=object), '{"kind": "discrete", "values": ["a", "b"]}'),
+        ("listed", made.x1.values, "listed in a file"),
+        ("pair", made.x1.values, UNIT),
+    ):
+        made[path] = "sample", values, {"role": "input", "path": path, "distribution": words_of}
+    made.attrs["campaign"] = '[[correlations]]\nbetween = ["x1", "pair"]\ncoefficient = 0.5\n'
+    if next(iter(reweighted)) == "x1":
+        made.attrs["campaign"] = ""
+    with pytest.raises(InputError, match=words):
+        analyse(made, None, reweighted)
+
+
+def test_designs_without_a_population_are_refused():
+    with pytest.raises(InputError, match="stands for no population"):
+        analyse(drawn_campaign(Morris(samples=20), linear, 2, 1), None, {"x1": NARROW})
+
+
+def test_the_command_line_takes_inputs_as_campaign_files_write_them(tmp_path):
+    made = drawn_campaign(RandomDesign(samples=500), linear, 2, 1)
+    made.to_netcdf(tmp_path / "campaign.nc")
+    text = 'x1 = { kind = "normal", mean = 0.5, standard_deviation = 0.12 }'
+    call = [str(tmp_path), "--reweight", text, "--out", str(tmp_path / "out.nc")]
+    done = CliRunner().invoke(command, call, catch_exceptions=False)
+    assert done.exit_code == 0
+    assert "500 samples count as 2" in done.output
+    assert any(line.startswith("asynchrony_max  degree         mean") for line in
+               done.output.splitlines())  # fmt: skip
+    assert (tmp_path / "out.nc").exists()
+    for wrong in ("x1", "x1 = normal", "= {}"):
+        with pytest.raises(InputError, match="must read PATH = DISTRIBUTION"):
+            parse_reweighted([wrong])
+    with pytest.raises(InputError, match="given twice"):
+        parse_reweighted([text, text])

@@ -1,0 +1,93 @@
+"""The tornado shows the indices that the design allows, with their intervals, or says why not."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from made_campaign import made_campaign
+from matplotlib.figure import Figure
+
+from ringsim.analysis.design import placement
+from ringsim.analysis.sensitivity import sensitivity
+from ringsim.plots.campaign.tornado import analysed, bars_of, explained, measure_of, tornado
+from ringsim.sampling.designs.morris import Morris
+from ringsim.sampling.designs.random import RandomDesign
+from ringsim.sampling.designs.saltelli import Saltelli
+from ringsim.sampling.distributions.uniform import Uniform
+from ringsim.variables import Status
+
+FACTORS = dict.fromkeys(("force", "modulus"), Uniform(low=0.0, high=1.0))
+
+
+def made(design, lost=None) -> xr.Dataset:
+    """Peak tension of two inputs; samples beyond ``lost`` of the modulus have none."""
+    points = design.points(FACTORS, 1)
+    few = made_campaign(2)
+    gone = np.zeros(len(points), bool) if lost is None else points[:, 1] > lost
+    tension = 20 + 3 * points[:, 0] + points[:, 1] ** 2
+    found = xr.Dataset(
+        {
+            "status": ("sample", np.where(gone, Status.TIMEOUT, Status.OK).astype("i1")),
+            "peak_tension": ("sample", np.where(gone, np.nan, tension), few.peak_tension.attrs),
+        },
+        coords={"sample": np.arange(len(points))},
+        attrs=few.attrs | {"design": json.dumps(json.loads(design.model_dump_json()))},
+    )
+    for path, column in zip(FACTORS, points.T, strict=True):
+        found[path] = "sample", column, {"role": "input", "path": path}
+    if hasattr(design, "rows"):
+        found["block_row"] = "sample", np.array(design.rows(FACTORS, 1)), {"role": "label"}
+    return found
+
+
+def widths(figure: Figure) -> list[list[float]]:
+    """Lengths of the bars of the first panel, by row of bars."""
+    return [[patch.get_width() for patch in bars] for bars in figure.axes[0].containers
+            if hasattr(bars, "patches")]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("design", "measure"),
+    [
+        (Saltelli(samples=64), "total_index"),
+        (Morris(samples=20), "mean_absolute_effect"),
+        (RandomDesign(samples=200), "given_data_index"),
+    ],
+)
+def test_bars_are_the_indices_of_the_analysis(design, measure) -> None:
+    campaign = made(design)
+    known = sensitivity(campaign, {}, placement(campaign)).sel(output="peak_tension")
+    figure = tornado(campaign)
+    longest = np.sort(known[measure].values)[::-1]
+    np.testing.assert_allclose(widths(figure)[0], longest)
+    names = [tick.get_text() for tick in figure.axes[0].get_yticklabels()]
+    assert names == ["force", "modulus"]
+    assert len(widths(figure)) == (2 if measure == "total_index" else 1)
+    (whiskers, *_) = [line for line in figure.axes[0].collections if len(line.get_segments())]
+    ends = known[f"{measure}_interval"].values[np.argsort(-known[measure].values)]
+    drawn = [segment[:, 0] for segment in whiskers.get_segments()]
+    np.testing.assert_allclose(drawn, ends)
+    assert "used, 0 lost" in figure.axes[0].get_xlabel()
+
+
+def test_few_plain_samples_have_correlations() -> None:
+    campaign = made(RandomDesign(samples=20))
+    assert measure_of(analysed(campaign)) == "partial_rank_correlation"
+    figure = tornado(campaign)
+    assert figure.axes[0].get_xlabel() == "Partial rank correlation"
+    assert widths(tornado(campaign, "rank_correlation")) != widths(figure)
+    assert not explained(made(RandomDesign(samples=5)))
+
+
+def test_a_shut_gate_is_told_in_place_of_bars() -> None:
+    campaign = made(Saltelli(samples=64), lost=0.9)
+    figure = tornado(campaign)
+    told = " ".join(text.get_text() for text in figure.axes[0].texts)
+    assert "no index: " in told
+    assert "by their inputs" in told
+    outputs = dict(bars_of(analysed(campaign), "total_index"))
+    assert outputs["lost"].names[0] == "modulus"
+    assert "left out: " in figure.legends[0].get_title().get_text()
