@@ -13,7 +13,7 @@ from ringsim.analysis.binomial import share_interval
 from ringsim.analysis.design import Placement, placement
 from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import NONE, Array, Interval
-from ringsim.analysis.quantities import good, lost, numbers, quantities
+from ringsim.analysis.quantities import CHECKED, good, lost, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
 from ringsim.analysis.verdicts import judge
 from ringsim.refusal import InputError
@@ -26,8 +26,6 @@ PARTS = (0.25, 0.5, 0.75, 1.0)
 COUNTED = ("used", "lost", "without_value", "not_run")
 SOURCES = ("sampling", "numerical", "engines")
 """What makes a mean wrong: few samples, steps and elements, and the choice of the engine."""
-CHECKED = "_checked"
-"""How names of the other engine's answers end in the file of a campaign."""
 _FEW = 10
 """Samples of a kind, and of other kinds, below which Student's t does not fit their share."""
 

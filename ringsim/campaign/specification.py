@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from ringsim.analysis.engines import compared
+from ringsim.analysis.quantities import quantities
 from ringsim.analysis.requirements import Requirements
 from ringsim.choice import kinds_of
 from ringsim.execution.work import Allowance
@@ -111,10 +111,10 @@ class Specification(Model):
                 "give both"
             )
         for name in self.max_difference if isinstance(self.max_difference, dict) else ():
-            if name not in compared():
+            if name not in quantities():
                 raise ValueError(
                     f"max_difference.{name}: there is no such output to compare engines by "
-                    f"({known_or_nearest(name, compared())})"
+                    f"({known_or_nearest(name, quantities())})"
                 )
         return self
 

@@ -8,6 +8,7 @@ import xarray as xr
 
 from ringsim.analysis.campaign_notes import budget_lines, override_lines, peak_lines, restart_lines
 from ringsim.analysis.campaign_samples import campaign_file, endings
+from ringsim.analysis.quantities import good
 from ringsim.files import write_text
 from ringsim.plots.campaign.figures import figures_of
 from ringsim.plots.inline import inline
@@ -51,7 +52,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     context: dict[str, Any] = {
         "title": campaign.attrs.get("title", "Campaign"),
         "name": campaign.attrs.get("campaign_name", ""),
-        "samples": campaign.sizes["sample"], "used": int(tables.used_places(campaign).sum()),
+        "samples": campaign.sizes["sample"], "used": int(good(campaign).sum()),
         "not_run": int((endings(campaign) == "not run").sum()),
         "design": design.pop("kind", "unknown"), "design_more": design,
         "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),

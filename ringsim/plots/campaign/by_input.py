@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from ringsim.analysis.campaign_samples import endings, inputs, judged_by, used
+from ringsim.analysis.campaign_samples import endings, inputs, judged_by
+from ringsim.analysis.quantities import used
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, head
 

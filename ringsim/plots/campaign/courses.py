@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.campaign_samples import used
+from ringsim.analysis.quantities import used
 from ringsim.outputs.family import Array
 
 MOST = 401

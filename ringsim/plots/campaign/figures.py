@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ringsim.analysis.campaign_samples import inputs, judged_by, scalars, used
+from ringsim.analysis.campaign_samples import inputs, judged_by, scalars
+from ringsim.analysis.quantities import used
 from ringsim.files import writing
 from ringsim.plots import style
 from ringsim.plots.campaign.by_input import by_input

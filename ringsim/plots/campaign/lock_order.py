@@ -5,7 +5,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from ringsim.analysis.campaign_samples import told, used
+from ringsim.analysis.campaign_samples import told
+from ringsim.analysis.quantities import used
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import head

@@ -5,7 +5,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ringsim.analysis.campaign_samples import told, used, values_of
+from ringsim.analysis.campaign_samples import told, values_of
+from ringsim.analysis.quantities import used
 from ringsim.plots import style
 from ringsim.plots.campaign.courses import ends
 from ringsim.plots.campaign.frame import bands, head
