@@ -15,6 +15,7 @@ from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import NONE, Array, Interval
 from ringsim.analysis.quantities import CHECKED, good, lost, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
+from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.verdicts import judge
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status
@@ -77,6 +78,7 @@ def analyse(
             "title": campaign.attrs.get("title", ""),
             "campaign_identity": campaign.attrs.get("identity", ""),
             "samples": campaign.sizes["sample"], "design": placed.kind, "intervals": placed.told,
+            "stopping": "".join(stopping_lines(campaign, placed)),
         },
     )  # fmt: skip
     found["part"].attrs = {"long_name": "share of the samples, the first ones", "units": "1"}

@@ -1,14 +1,19 @@
 """An analysis of a campaign as lines for people."""
 
+import json
 from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.design import placement
 from ringsim.analysis.influence_text import influence_lines
 from ringsim.analysis.quantities import quantities
+from ringsim.analysis.requirements import read_requirements
+from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
-from ringsim.analysis.verdicts import Verdict
+from ringsim.analysis.verdicts import Verdict, judge
+from ringsim.refusal import InputError
 from ringsim.tables import interval_text, number_text, text_table
 
 
@@ -17,10 +22,25 @@ def told(analysis: xr.Dataset) -> list[str]:
     counts = f"{analysis.attrs['samples']} samples, design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
+    lines += filter(None, [analysis.attrs["stopping"]])
     for part in (_requirements, _outcomes, _outputs, _errors, influence_lines):
         if more := list(part(analysis)):
             lines += ["", *more]
     return lines
+
+
+def verdict_lines(campaign: xr.Dataset) -> list[str]:
+    """The verdicts on the requirements of a merged campaign's own file; none without any."""
+    own = json.loads(campaign.attrs.get("requirements", "{}"))
+    placed = placement(campaign)
+    lines = stopping_lines(campaign, placed)
+    if not own:
+        return lines
+    try:
+        found = judge(campaign, read_requirements(own, "requirements"), placed)
+    except InputError as error:
+        return [*lines, f"the requirements cannot be judged: {error}"]
+    return [*lines, *_requirements(found)]
 
 
 def _requirements(analysis: xr.Dataset) -> Iterator[str]:

@@ -11,6 +11,7 @@ from ringsim.campaign.retry import FAILED, check_settings
 from ringsim.campaign.run import Choices, Share, run_campaign
 from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.campaign.status import plan
+from ringsim.campaign.stopping import as_decided
 from ringsim.cli.options import PATH, PLOT_FORMAT, SETTINGS, require_plot
 from ringsim.execution.local import Local, Serial
 from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
@@ -90,7 +91,7 @@ def command(
 
     def draw(folder: Path) -> None:
         # As long as samples are left, a file would be an older one.
-        if not plot or len(open_folder(folder).survey().missing):
+        if not plot or len(as_decided(open_folder(folder)).survey().missing):
             return
         import xarray as xr
 
