@@ -16,6 +16,9 @@ from ringsim.analysis.quantities import used
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, head
 
+_MANY = 500
+"""Samples from which on marks are drawn as dots: as shapes they would make a page too large."""
+
 
 def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
     """An input as one number a sample: the mean of its places, or the place of its word in the
@@ -86,7 +89,8 @@ def _scatter(axes: Axes, x: Any, y: Any, words: NDArray[np.str_]) -> None:
         colour, marker = looks[word]
         axes.scatter(x[own], y[own], s=26, color=colour, marker=marker, alpha=0.8,
                      linewidths=1.2 if marker in "x+1234|" else 0.0,
-                     label=f"{word} ({own.sum()})", zorder=3)  # fmt: skip
+                     label=f"{word} ({own.sum()})", zorder=3,
+                     rasterized=len(words) > _MANY)  # fmt: skip
 
 
 def _label(variable: xr.DataArray) -> str:
