@@ -16,6 +16,7 @@ from ringsim.analysis.intervals import NONE, Array, Interval
 from ringsim.analysis.quantities import CHECKED, good, lost, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
 from ringsim.analysis.stopping import stopping_lines
+from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status
@@ -86,6 +87,7 @@ def analyse(
         if name in campaign and np.isfinite(numbers(campaign, name)[good(campaign)]).any():
             found = found.assign(_output(campaign, name, placed))
     found = found.merge(_outcomes(campaign, placed), combine_attrs="override")
+    found = found.assign(tail(campaign))
     if wanted:
         found = found.merge(judge(campaign, wanted, placed), combine_attrs="override")
     return found.merge(influence(campaign, wanted, placed), combine_attrs="override")

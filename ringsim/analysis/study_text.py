@@ -12,6 +12,7 @@ from ringsim.analysis.quantities import quantities
 from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
+from ringsim.analysis.tails import tail, tail_lines
 from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.refusal import InputError
 from ringsim.tables import interval_text, number_text, text_table
@@ -22,7 +23,7 @@ def told(analysis: xr.Dataset) -> list[str]:
     counts = f"{analysis.attrs['samples']} samples, design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
-    lines += filter(None, [analysis.attrs["stopping"]])
+    lines += [*filter(None, [analysis.attrs["stopping"]]), *tail_lines(analysis)]
     for part in (_requirements, _outcomes, _outputs, _errors, influence_lines):
         if more := list(part(analysis)):
             lines += ["", *more]
@@ -33,7 +34,8 @@ def verdict_lines(campaign: xr.Dataset) -> list[str]:
     """The verdicts on the requirements of a merged campaign's own file; none without any."""
     own = json.loads(campaign.attrs.get("requirements", "{}"))
     placed = placement(campaign)
-    lines = stopping_lines(campaign, placed)
+    found = xr.Dataset(tail(campaign), attrs={"samples": campaign.sizes["sample"]})
+    lines = stopping_lines(campaign, placed) + tail_lines(found)
     if not own:
         return lines
     try:

@@ -69,6 +69,8 @@ class Choices:
     """Samples that ended so run again, too."""
     overrides: Mapping[str, Any] = field(default_factory=dict)
     """Settings by scene path with which those run, and nothing else does."""
+    more: bool = False
+    """Whether more samples may follow: then nothing is merged or told as long as all goes well."""
 
 
 def run_campaign(folder: Path, choices: Choices) -> int:
@@ -190,6 +192,8 @@ def _checks(campaign: Folder, choices: Choices) -> list[int]:
 
 def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
     """Merge if nothing is left, say how it ended, and choose the exit code."""
+    if choices.more and not stop.reason and not len(campaign.survey().missing):
+        return EXIT_DONE
     from ringsim.analysis.study_text import verdict_lines  # scipy.stats takes half a second
 
     stop.at_once = True

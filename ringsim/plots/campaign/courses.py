@@ -19,7 +19,7 @@ from ringsim.plots.campaign.frame import QUANTILES
 
 MOST, FEWER = 401, 101
 """Points along the axis at most: more than a figure resolves; fewer where samples are many."""
-HELD_BYTES = 300 << 20
+HELD_BYTES = 200 << 20
 """Angles that are held at once."""
 _ANGLE = "opening_angle"
 _PASSES = 4
