@@ -7,9 +7,11 @@ import numpy as np
 import xarray as xr
 from scipy.stats import norm
 
+from ringsim.analysis.binomial import share_interval
 from ringsim.analysis.intervals import LEVEL, student
-from ringsim.analysis.quantities import good, lost
+from ringsim.analysis.quantities import CHECKED, good, lost
 from ringsim.sampling.designs.subset_simulation import SubsetSimulation
+from ringsim.variables import Status
 
 
 def tail(campaign: xr.Dataset) -> dict[str, Any]:
@@ -23,7 +25,8 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
         return {}
     design = SubsetSimulation.model_validate(table)
     values = campaign[design.of].to_numpy().astype(float)
-    found = design.levels(design.responses(values, ~good(campaign)))
+    known = design.responses(values, ~good(campaign))
+    found = design.levels(known)
     each = np.array([one.probability for one in found.repetitions])
     chains = np.array([one.variation for one in found.repetitions])
     middle, count = float(each.mean()), len(each)
@@ -39,7 +42,17 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
     def told(words: str) -> dict[str, str]:
         return {"long_name": words, "units": "1"}
 
+    inside, both = (known > design.target) & good(campaign), np.zeros(len(known), dtype=bool)
+    again = inside & both
+    if f"{design.of}{CHECKED}" in campaign:
+        both = campaign[f"status{CHECKED}"].to_numpy() == Status.OK
+        values = campaign[f"{design.of}{CHECKED}"].to_numpy().astype(float)
+        again = inside & both & (design.responses(values, ~both) > design.target)
     return {
+        "tail_checked": (
+            (), int((inside & both).sum()), told("runs in the event repeated with the full engine"),
+        ),
+        "tail_confirmed": ((), int(again.sum()), told("of these, runs in the event there, too")),
         "tail_probability": ((), middle, told(f"probability of {event}") | {"event": event}),
         "tail_probability_interval": ("bound", ends, told("interval of 95 % of that probability")),
         "tail_variation": ((), variation, told("coefficient of variation of that probability")),
@@ -74,4 +87,13 @@ def tail_lines(analysis: xr.Dataset) -> list[str]:
         f"{float(one['tail_variation_of_chains']):.2g} from the correlation of chains; "
         f"{analysis.attrs['samples']} runs, {int(one['tail_lost'])} lost and taken as no event"
     )
-    return [line]
+    if not (checked := int(one["tail_checked"])):
+        return [line]
+    confirmed = int(one["tail_confirmed"])
+    low, high = share_interval(confirmed, checked)
+    return [
+        line,
+        f"{confirmed} of {checked} runs in the event that were repeated with the full engine are "
+        f"in it there, too (95 % {low:.2g} .. {high:.2g} of all); events that only the full engine "
+        "sees are not looked for",
+    ]

@@ -47,7 +47,10 @@ class Folder:
     def checked(self) -> NDArray[np.int64]:
         """Samples that run with the judging engine, too."""
         every = int(self.attributes.get("check_every", 0))
-        return np.arange(0, self.table.samples, every) if every else np.empty(0, dtype=np.int64)
+        wanted = np.array(json.loads(self.attributes.get("suspects", "[]")), dtype=np.int64)
+        if every:
+            wanted = np.union1d(wanted, np.arange(0, self.table.samples, every))
+        return wanted[wanted < self.table.samples]
 
     def unchecked(self) -> NDArray[np.int64]:
         """Samples whose check has no result."""
@@ -94,7 +97,9 @@ def prepare_folder(
 def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool:
     """Whether there is nothing to write to the folder: it is neither new nor does it grow."""
     if (old := opened_as(campaign, path, table, solver)) is not None:
-        return old.table.samples == table.samples and old.attributes["campaign"] == campaign.text
+        told = old.attributes["campaign"], old.attributes.get("suspects", "[]")
+        same = told == (campaign.text, json.dumps(campaign.suspects))
+        return same and old.table.samples == table.samples
     try:
         names = sorted(entry.name for entry in path.iterdir()) if path.exists() else []
     except OSError as error:
@@ -126,6 +131,8 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str
     }  # fmt: skip
     if wanted.rule is not None:
         attributes["stop_when"] = wanted.rule.model_dump_json(exclude_none=True)
+    if campaign.suspects:
+        attributes |= {"suspects": json.dumps(campaign.suspects), "judge": judge}
     if wanted.check_every:
         attributes |= {
             "check_every": wanted.check_every, "judge": judge,

@@ -11,7 +11,7 @@ from ringsim.refusal import InputError
 from ringsim.sampling.designs.subset_simulation import SubsetSimulation
 from ringsim.sampling.distributions.family import Array
 from ringsim.storage.netcdf import DESIGN
-from ringsim.variables import GOALS, Status
+from ringsim.variables import GOALS, Fate, Status
 
 
 def grows(campaign: Campaign) -> bool:
@@ -27,9 +27,20 @@ def grown(campaign: Campaign, path: Path) -> Campaign:
     design = campaign.specification.design
     if not isinstance(design, SubsetSimulation) or not (path / DESIGN).exists():
         return campaign
-    known = _responses(open_folder(path), design)
-    wanted = campaign.specification.model_copy(update={"design": design.knowing(known)})
-    return replace(campaign, specification=wanted)
+    folder = open_folder(path)
+    known = _responses(folder, design)
+    design = design.knowing(known)
+    wanted = campaign.specification.model_copy(update={"design": design})
+    suspects = _suspects(folder, known, design) if design.check and design.ended else ()
+    return replace(campaign, specification=wanted, suspects=suspects)
+
+
+def _suspects(folder: Folder, known: Array, design: SubsetSimulation) -> tuple[int, ...]:
+    """Runs on which the probability depends most: in the event, lost, or short of their goal."""
+    short = ~np.isin(folder.survey().fate, (*GOALS, Fate.NONE))
+    found = np.flatnonzero((known > design.target) | np.isneginf(known) | short)
+    chosen = np.linspace(0, len(found) - 1, min(design.check, len(found))).round().astype(int)
+    return tuple(found[chosen].tolist())
 
 
 def is_open(campaign: Campaign) -> bool:

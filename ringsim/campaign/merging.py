@@ -14,7 +14,7 @@ from ringsim.variables import Fidelity
 
 _KEPT = (
     "identity", "seed", "solver", "campaign", "campaign_name", "scene", "output", "design",
-    "requirements", "check_every", "judge", "max_difference", "stop_when",
+    "requirements", "check_every", "judge", "max_difference", "stop_when", "suspects",
 )  # fmt: skip
 """Attributes of the design that a merged file has, too."""
 

@@ -110,6 +110,11 @@ class Specification(Model):
                 f'full model, but fidelity = "{self.fidelity}": leave check_every out, or set '
                 'fidelity = "frame"'
             )
+        if getattr(self.design, "check", 0) and self.fidelity != "frame":
+            raise ValueError(
+                "design.check repeats runs of the frame engine with the full model, but "
+                f'fidelity = "{self.fidelity}": leave design.check out, or set fidelity = "frame"'
+            )
         if self.max_difference is not None and not self.check_every:
             raise ValueError(
                 f"max_difference = {show(self.max_difference)} says nothing without check_every: "
@@ -169,6 +174,8 @@ class Campaign:
     text: str
     specification: Specification
     scene: Scene
+    suspects: tuple[int, ...] = ()
+    """Samples that run with the full model, too, because of their results."""
 
     def draw(self) -> Table:
         """All inputs of all samples; InputError if the scene refuses one."""

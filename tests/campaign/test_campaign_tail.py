@@ -93,8 +93,24 @@ def test_nor_on_a_kill(tail, bench):
     assert "probability of" in bench.run(*START, "--workers", 0)
 
 
+def test_runs_in_the_event_are_repeated_with_the_full_engine(bench, tail):
+    """The stand-in for it deploys a tenth of a percent later, so that all are confirmed."""
+    path = write(bench)
+    text = path.read_text().replace('kind = "subset', 'check = 7\nkind = "subset')
+    path.write_text(text.replace('scene = "ring18"', 'scene = "ring18"\nfidelity = "frame"'))
+    more = ("--workers", 0, "--judge", "fake_solver:judge")
+    printed = bench.run(*START, *more)
+    assert "7 of 7 runs in the event that were repeated" in printed
+    found = bench.result("out")
+    checked = found.status_checked.values == 0
+    assert checked.sum() == 7
+    above = float(re.search(r"above = ([\d.]+)", text)[1])
+    assert (found.deployment_time.values[checked] > above).all()
+    plain = tail.result("out")
+    np.testing.assert_array_equal(found.deployment_time, plain.deployment_time)
+
+
 def test_parts_and_retries_are_refused(bench):
     write(bench)
     assert "leave it out" in bench.run(*START, "--part", "1/2", code=2)
     assert "leave it out" in bench.run(*START, "--retry-failed", code=2)
-    assert "160 to run here" in bench.run(*START, "--dry-run")

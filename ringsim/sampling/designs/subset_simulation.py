@@ -39,6 +39,9 @@ class SubsetSimulation(Design):
     """Independent simulations: their scatter tells how certain the probability is."""
     most_levels: Annotated[int, Field(ge=1, le=30)] = 8
     """Levels after which nothing rarer is looked for."""
+    check: Annotated[int, Field(ge=0)] = 0
+    """Runs in the event, lost ones and those that fall short of their goal that are repeated with
+    the full model in the end: so many of them at most, evenly spread over all."""
     _known: Array = PrivateAttr(default_factory=lambda: np.empty(0))
 
     @model_validator(mode="after")
