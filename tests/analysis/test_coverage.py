@@ -33,7 +33,7 @@ def least_and_most(campaigns):
     return binom.ppf(5e-4, campaigns, 0.92), binom.ppf(1 - 5e-4, campaigns, 0.98)
 
 
-@pytest.mark.parametrize("campaigns", [60, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("campaigns", [40, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("kind", "replicates"), DESIGNS)
 def test_intervals_of_an_analysis_cover(kind, replicates, campaigns, truth):
     """Mean, deviation, quantiles, share as ``ringsim analyse`` gives them; one-sided bounds."""

@@ -60,7 +60,7 @@ def test_it_ends_at_a_look_and_tells_why(ended):
     assert finished(ended.folder / "out") == set(range(count))
 
 
-@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2, 4])
+@pytest.mark.parametrize("workers", [*(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2)), 4])
 def test_it_ends_there_for_any_number_of_workers(workers, ended, bench):
     write(bench)
     bench.run("campaign", "small.toml", "--workers", workers, "--out", "out")
