@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.analysis.quantities import used
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.summary import summary
 from ringsim.variables import GOALS, Fate, Status
@@ -66,17 +67,18 @@ def budget_lines(campaign: xr.Dataset) -> list[str]:
     of one sample.  Those of neighbouring samples are alike, so they do not average out: it is
     compared with the standard error as it is.  Samples that did not end well are left out.
     """
-    good = campaign.isel(sample=np.flatnonzero(campaign.status == 0))
-    lines = []
-    for name in map(str, good.data_vars):
+    sound, lines = used(campaign), []
+    for name in map(str, sound.data_vars):
         of = name.removesuffix("_error")
-        if of == name or of not in good or good[of].dims != ("sample",):
+        if of == name or of not in sound or sound[of].dims != ("sample",):
             continue
-        values, bars = (good[each].dropna("sample").to_numpy().astype(float) for each in (of, name))
+        values, bars = (
+            sound[each].dropna("sample").to_numpy().astype(float) for each in (of, name)
+        )
         if len(values) >= 2 and len(bars):
             spread, numerical = values.std(ddof=1), np.sqrt(np.mean(bars**2))
             standard_error = spread / len(values) ** 0.5
-            units = good[of].attrs.get("units", "1")
+            units = sound[of].attrs.get("units", "1")
             lines.append(
                 f"{of}: mean {values.mean():.6g}{'' if units == '1' else f' {units}'}, spread "
                 f"{spread:.2g}, standard error {standard_error:.2g}, numerical error at most "
@@ -123,13 +125,13 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
     if "span_name" in campaign:
         names = campaign.span_name.transpose("plane", "span").values.tolist()
         spans = dict(zip(campaign.plane.values.tolist(), names, strict=True))
-    good, lines = campaign.isel(sample=np.flatnonzero(campaign.status == 0)), []
+    sound, lines = used(campaign), []
     for output in OUTPUTS:
         for variable in output.variables:
-            if variable.summary is None or variable.name not in good:
+            if variable.summary is None or variable.name not in sound:
                 continue
-            known = good[variable.name].dropna("sample")
-            worst = good.sel(sample=known.idxmax()) if known.size else good
+            known = sound[variable.name].dropna("sample")
+            worst = sound.sel(sample=known.idxmax()) if known.size else sound
             values = {str(n): each.values for n, each in worst.items() if not each.dims}
             if output().told(values, spans):
                 # Series tell which places are alike.

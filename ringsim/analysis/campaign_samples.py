@@ -1,4 +1,4 @@
-"""Which samples of a merged campaign count, what became of each, and which one stands for many."""
+"""What became of each, and which one stands for many."""
 
 import json
 import tomllib
@@ -9,17 +9,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.analysis.quantities import good, numbers, used
 from ringsim.outputs import VARIABLES
 from ringsim.variables import Fate, Status
 
 NUMERICAL = ("energy_error", "constraint_error")
 """Main numbers that tell about the solution, not about the antenna."""
 _EFFORT = ("wall_time",)
-
-
-def used(campaign: xr.Dataset) -> xr.Dataset:
-    """The samples whose numbers hold; the others are told, and never counted."""
-    return campaign.isel(sample=np.flatnonzero(campaign["status"].to_numpy() == Status.OK))
 
 
 def endings(campaign: xr.Dataset) -> NDArray[np.str_]:
@@ -50,9 +46,9 @@ def told(campaign: xr.Dataset, counted: int) -> str:
     ``counted`` are samples that are ``used`` and have the value in question.
     """
     words = endings(campaign)
-    good = campaign["status"].to_numpy() == Status.OK
-    left = [f"{count} {word}" for word, count in Counter(words[~good].tolist()).items()]
-    if without := int(good.sum()) - counted:
+    ok = good(campaign)
+    left = [f"{count} {word}" for word, count in Counter(words[~ok].tolist()).items()]
+    if without := int(ok.sum()) - counted:
         left.append(f"{without} without a value")
     lost = f"; left out: {', '.join(left)}" if left else "; none lost"
     return f"{counted} of {len(words)} samples{lost}"
@@ -60,24 +56,23 @@ def told(campaign: xr.Dataset, counted: int) -> str:
 
 def scalars(campaign: xr.Dataset) -> list[str]:
     """Main numbers of the antenna that some sample has, in the order of summaries."""
-    good = used(campaign)
+    sound = used(campaign)
     return [
         name
         for name, variable in VARIABLES.items()
         if variable.summary is not None
         and variable.dtype == "f8"
         and name not in (*NUMERICAL, *_EFFORT)
-        and name in good
-        and bool(np.isfinite(good[name]).any())
+        and name in sound
+        and bool(np.isfinite(sound[name]).any())
     ]
 
 
 def values_of(campaign: xr.Dataset, name: str) -> tuple[NDArray[Any], NDArray[Any]]:
     """Samples that are used and have a finite value, and these values."""
-    good = used(campaign)
-    values = good[name].to_numpy().astype(float)
-    known = np.isfinite(values)
-    return good["sample"].to_numpy()[known], values[known]
+    values = numbers(campaign, name)
+    known = good(campaign) & np.isfinite(values)
+    return campaign["sample"].to_numpy()[known], values[known]
 
 
 def judged_by(campaign: xr.Dataset) -> str:

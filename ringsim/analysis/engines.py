@@ -8,32 +8,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ringsim.outputs import COORDINATES, OUTPUTS
+from ringsim.analysis.quantities import CHECKED, good, numbers, quantities
 from ringsim.outputs.family import Array
 from ringsim.tables import text_table
-from ringsim.variables import Fate, Outcome, Status, Variable
+from ringsim.variables import Fate, Outcome, Status
 
-CHECKED = "_checked"
-"""How names of the full engine's answers end in the file of a campaign."""
 _NOT_CHECKED = -1
 _NAMED = 6
 
 
-def compared() -> dict[str, Variable]:
-    """The numbers by which engines are compared: all that tell of the antenna, no places."""
-    places = COORDINATES.keys() - {"time"}
-    return {
-        each.name: each
-        for output in OUTPUTS if output.of_antenna
-        for each in output.variables
-        if not each.dims and each.flags is None and each.dtype != "str"
-        and each.name.rpartition("_")[2] not in places
-    }  # fmt: skip
-
-
 def main_outputs() -> list[str]:
     """Those of the numbers that summaries tell."""
-    return [name for name, variable in compared().items() if variable.summary is not None]
+    return [name for name, variable in quantities().items() if variable.summary is not None]
 
 
 @dataclass(frozen=True)
@@ -61,35 +47,26 @@ class Difference:
 
 def differences(campaign: xr.Dataset) -> list[Difference]:
     """All outputs of a merged campaign that was checked; none if no check ended well."""
-    good = campaign["status"].to_numpy() == Status.OK
-    both = np.flatnonzero(good & (campaign[f"status{CHECKED}"].to_numpy() == Status.OK))
+    ok = good(campaign)
+    both = np.flatnonzero(ok & (campaign[f"status{CHECKED}"].to_numpy() == Status.OK))
     found = []
-    for name, variable in compared().items():
+    for name, variable in quantities().items():
         if name not in campaign or f"{name}{CHECKED}" not in campaign or not len(both):
             continue
-        frame, full = (_numbers(campaign, f"{name}{end}", variable) for end in ("", CHECKED))
+        frame, full = (numbers(campaign, f"{name}{end}") for end in ("", CHECKED))
         apart, share = _apart(frame[both], full[both])
         if not np.isfinite([frame[both], full[both]]).any():
             continue
-        own, theirs = (_numbers(campaign, f"{name}_error{end}", variable) for end in ("", CHECKED))
+        own, theirs = (numbers(campaign, f"{name}_error{end}") for end in ("", CHECKED))
         own, theirs = (np.where(np.isnan(x), _largest(x), x) for x in (own, theirs))
         bars = np.where(np.isnan(own), theirs, own) + np.where(np.isnan(theirs), own, theirs)
-        known = frame[good & np.isfinite(frame)]
+        known = frame[ok & np.isfinite(frame)]
         error = known.std(ddof=1) / len(known) ** 0.5 if len(known) > 1 else np.nan
         samples = campaign["sample"].to_numpy()[both]
         found.append(
             Difference(name, variable.units, samples, apart, share, bars[both], float(error))
         )
     return found
-
-
-def _numbers(campaign: xr.Dataset, name: str, like: Variable) -> Array:
-    """A variable as floats, NaN where it is missing."""
-    if name not in campaign:
-        return np.full(campaign.sizes["sample"], np.nan)
-    values = campaign[name].to_numpy().astype(float)
-    counts = like.dtype.startswith("i") and not name.endswith("_error")
-    return np.where(values < 0, np.nan, values) if counts else values
 
 
 def _largest(values: Array) -> float:
@@ -200,7 +177,7 @@ def limits_of(given: float | Mapping[str, float] | None) -> dict[str, float]:
 def run_lines(frame: Outcome, full: Outcome) -> list[str]:
     """The same table for one run of a scene with both engines."""
     rows: list[tuple[str, ...]] = []
-    for name, variable in compared().items():
+    for name, variable in quantities().items():
         if name not in frame.values or name not in full.values:
             continue
         one, other = (float(each.values[name]) for each in (frame, full))

@@ -1,4 +1,4 @@
-"""The numbers of a result that statistics and requirements are about."""
+"""The numbers of a result that statistics are about, and the samples whose numbers hold."""
 
 import numpy as np
 import xarray as xr
@@ -10,6 +10,8 @@ from ringsim.variables import Status, Variable
 
 Mask = NDArray[np.bool_]
 """One truth for each sample."""
+CHECKED = "_checked"
+"""How names of the full engine's answers end in the file of a campaign."""
 
 
 def quantities() -> dict[str, Variable]:
@@ -29,9 +31,10 @@ def numbers(campaign: xr.Dataset, name: str) -> Array:
     if name not in campaign:
         return np.full(campaign.sizes["sample"], np.nan)
     values = campaign[name].to_numpy().astype(float)
-    known = quantities().get(name)
+    known = quantities().get(name.removesuffix(CHECKED))
     # Missing counts are negative.
-    return np.where(values < 0, np.nan, values) if known and known.dtype == "i4" else values
+    counts = known is not None and known.dtype.startswith("i")
+    return np.where(values < 0, np.nan, values) if counts else values
 
 
 def good(campaign: xr.Dataset) -> Mask:
@@ -42,3 +45,8 @@ def good(campaign: xr.Dataset) -> Mask:
 def lost(campaign: xr.Dataset) -> Mask:
     """Which samples have run and given no numbers that hold."""
     return np.asarray(campaign["status"].to_numpy() >= Status.SOLVER_FAILED)
+
+
+def used(campaign: xr.Dataset) -> xr.Dataset:
+    """The samples whose numbers hold; the others are told, and never counted."""
+    return campaign.isel(sample=np.flatnonzero(good(campaign)))

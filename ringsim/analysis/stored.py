@@ -12,6 +12,8 @@ MERGED = "campaign.nc"
 def open_stored(path: Path) -> xr.Dataset:
     """The dataset in a file, or of the campaign in a folder, loaded only as far as it is used.
 
+    What has one value a sample is in memory at once, for it is used again and again; series stay
+    in the file.
     InputError if there is none, or it is not merged yet; close it, or use it in ``with``.
     """
     file = path
@@ -26,7 +28,11 @@ def open_stored(path: Path) -> xr.Dataset:
             )
             raise InputError(f"{path}: this folder holds no {MERGED}: {cure}")
     try:
-        return xr.open_dataset(file, engine="netcdf4")
+        found = xr.open_dataset(file, engine="netcdf4")
+        for variable in found.variables.values():
+            if len(variable.dims) < 2:
+                variable.load()
+        return found
     except FileNotFoundError:
         raise InputError(
             f"{file}: there is no such file or folder: check its name, and the folder that you are "

@@ -14,10 +14,12 @@ from ringsim.analysis.blocks import population_of
 from ringsim.analysis.design import Placement, placement
 from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import NONE, Array, Interval
-from ringsim.analysis.quantities import good, lost, numbers, quantities
+from ringsim.analysis.quantities import CHECKED, good, lost, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
 from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import sensitivity
+from ringsim.analysis.stopping import stopping_lines
+from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status
@@ -29,8 +31,6 @@ PARTS = (0.25, 0.5, 0.75, 1.0)
 COUNTED = ("used", "lost", "without_value", "not_run")
 SOURCES = ("sampling", "numerical", "engines")
 """What makes a mean wrong: few samples, steps and elements, and the choice of the engine."""
-CHECKED = "_checked"
-"""How names of the other engine's answers end in the file of a campaign."""
 _FEW = 10
 """Samples of a kind, and of other kinds, below which Student's t does not fit their share."""
 
@@ -86,6 +86,7 @@ def analyse(
             "title": campaign.attrs.get("title", ""),
             "campaign_identity": campaign.attrs.get("identity", ""),
             "samples": campaign.sizes["sample"], "design": placed.kind, "intervals": placed.told,
+            "stopping": "".join(stopping_lines(campaign, placed)),
         },
     )  # fmt: skip
     found["part"].attrs = {"long_name": "share of the samples, the first ones", "units": "1"}
@@ -93,6 +94,7 @@ def analyse(
     for name in quantities():
         if name in stand and np.isfinite(numbers(stand, name)[good(stand)]).any():
             found = found.assign(_output(stand, name, placed))
+    found = found.assign(tail(campaign))
     more = [_outcomes(stand, placed), influence(stand, wanted, placed)]
     more += [judge(stand, wanted, placed)] if wanted else []
     more += [sensitivity(campaign, wanted, placed)]

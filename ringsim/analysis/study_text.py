@@ -1,16 +1,23 @@
 """An analysis of a campaign as lines for people."""
 
+import json
 from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.blocks import population_of
+from ringsim.analysis.design import placement
 from ringsim.analysis.influence_text import influence_lines
 from ringsim.analysis.quantities import quantities
+from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.reweighting_text import reweighting_lines
 from ringsim.analysis.sensitivity_text import sensitivity_lines
+from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
-from ringsim.analysis.verdicts import Verdict
+from ringsim.analysis.tails import tail, tail_lines
+from ringsim.analysis.verdicts import Verdict, judge
+from ringsim.refusal import InputError
 from ringsim.tables import interval_text, number_text, text_table
 
 
@@ -19,6 +26,7 @@ def told(analysis: xr.Dataset) -> list[str]:
     counts = f"{analysis.attrs['samples']} samples, design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
+    lines += [*filter(None, [analysis.attrs["stopping"]]), *tail_lines(analysis)]
     parts = (
         _requirements, _outcomes, _outputs, _errors, sensitivity_lines, influence_lines,
         reweighting_lines,
@@ -27,6 +35,21 @@ def told(analysis: xr.Dataset) -> list[str]:
         if more := list(part(analysis)):
             lines += ["", *more]
     return lines
+
+
+def verdict_lines(campaign: xr.Dataset) -> list[str]:
+    """The verdicts on the requirements of a merged campaign's own file; none without any."""
+    own = json.loads(campaign.attrs.get("requirements", "{}"))
+    placed = placement(campaign)
+    found = xr.Dataset(tail(campaign), attrs={"samples": campaign.sizes["sample"]})
+    lines = stopping_lines(campaign, placed) + tail_lines(found)
+    if not own:
+        return lines
+    try:
+        found = judge(population_of(campaign), read_requirements(own, "requirements"), placed)
+    except InputError as error:
+        return [*lines, f"the requirements cannot be judged: {error}"]
+    return [*lines, *_requirements(found)]
 
 
 def _requirements(analysis: xr.Dataset) -> Iterator[str]:

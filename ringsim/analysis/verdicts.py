@@ -10,6 +10,7 @@ from scipy.stats import t
 from ringsim.analysis.binomial import samples_needed, share_bounds
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import Interval, standard_error
+from ringsim.analysis.looks import Levels, Rule, rule_of
 from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME, Requirement
 from ringsim.refusal import InputError, known_or_nearest
@@ -45,31 +46,38 @@ def violations(campaign: xr.Dataset, name: str, wanted: Requirement) -> Mask:
 
 
 def bounds(
-    kept: Mask, samples: NDArray[np.int64], confidence: float, placed: Placement
+    kept: Mask, samples: NDArray[np.int64], levels: Levels, placed: Placement
 ) -> Interval:  # fmt: skip
     """One-sided bounds of the probability that samples keep to a requirement.
 
-    Those after Clopper and Pearson; where the replicates of a design scatter by more than
-    independent samples would, those of Student's t from the replicates.
+    ``levels`` are the confidence of the lower and of the upper one.  Those after Clopper and
+    Pearson; where the replicates of a design scatter by more than independent samples would, those
+    of Student's t from the replicates.
     """
-    low, high = share_bounds(int(kept.sum()), len(kept), confidence)
+    low, high = (share_bounds(int(kept.sum()), len(kept), levels[k])[k] for k in (0, 1))
     replicate = placed.replicate_of(samples)
     if replicate is not None and placed.replicates > 1:
         share = float(kept.mean())
         error, free = standard_error(kept.astype(float), replicate)
-        half = float(t.ppf(confidence, free) * error) if free > 0 else 0.0
-        low, high = max(0.0, min(low, share - half)), min(1.0, max(high, share + half))
+        if free > 0:
+            below, above = (float(t.ppf(level, free) * error) for level in levels)
+            low, high = max(0.0, min(low, share - below)), min(1.0, max(high, share + above))
     return low, high
 
 
 def judge(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement
 ) -> xr.Dataset:
-    """The verdict on every requirement, along ``requirement``."""
+    """The verdict on every requirement, along ``requirement``.
+
+    Where the campaign's rule for stopping looks at a requirement again and again, its bounds hold
+    at all looks at once.
+    """
+    rule = rule_of(campaign.attrs)
     columns: dict[str, list[float]] = {name: [] for name in _MEANING}
     for name, wanted in requirements.items():
         _require_values(campaign, name)
-        for key, value in _judged(campaign, name, wanted, placed).items():
+        for key, value in _judged(campaign, name, wanted, placed, rule).items():
             columns[key].append(value)
     known = {
         name: ("requirement", values, {"long_name": words, "units": "1"})
@@ -89,6 +97,8 @@ def judge(
 _MEANING = {
     "probability_required": ("probability required", "f8"),
     "confidence_required": ("confidence required of each bound", "f8"),
+    "confidence_lower": ("confidence of the lower bound, more than required at many looks", "f8"),
+    "confidence_upper": ("confidence of the upper bound, more than required at many looks", "f8"),
     "verdict": ("verdict from the samples with numbers that hold", "i1"),
     "verdict_worst_case": ("verdict if all lost samples violated the requirement", "i1"),
     "probability": ("share of the samples used that keep to the requirement", "f8"),
@@ -120,31 +130,39 @@ def _require_values(campaign: xr.Dataset, name: str) -> None:
 
 
 def _judged(
-    campaign: xr.Dataset, name: str, wanted: Requirement, placed: Placement
+    campaign: xr.Dataset, name: str, wanted: Requirement, placed: Placement, rule: Rule | None
 ) -> dict[str, float]:
     used, gone = good(campaign), lost(campaign)
     broken = violations(campaign, name, wanted)
     absent = used & np.isnan(numbers(campaign, name)) if name != OUTCOME else ~used & used
     count, bad, missing = (int(each.sum()) for each in (used, broken, gone))
     place = campaign["sample"].to_numpy()
+    levels = wanted.confidence, wanted.confidence
+    looked = int((campaign["status"].to_numpy() >= 0).sum())
+    if rule is not None:
+        levels = rule.levels(name, wanted, looked, placed.replicates)
     low, high = 0.0, 1.0
     verdict = worst = Verdict.NOT_YET_SHOWN
     if count:
-        low, high = bounds(~broken[used], place[used], wanted.confidence, placed)
+        low, high = bounds(~broken[used], place[used], levels, placed)
         verdict = _verdict(low, high, wanted.probability)
     if count + missing:
         run = used | gone
-        ends = bounds(~(broken | gone)[run], place[run], wanted.confidence, placed)
+        ends = bounds(~(broken | gone)[run], place[run], levels, placed)
         worst = _verdict(*ends, wanted.probability)
     further = -1
     if verdict == Verdict.NOT_YET_SHOWN:
-        needed = samples_needed(bad, wanted.probability, wanted.confidence)
-        further = needed - count if needed > count else -1
+        if rule is not None and rule.judges(name):
+            further = rule.further_samples(name, wanted, looked, bad, placed.replicates)
+        else:
+            needed = samples_needed(bad, wanted.probability, wanted.confidence)
+            further = needed - count if needed > count else -1
     if not placed.population:
         verdict = worst = Verdict.NO_POPULATION
         low, high, further = np.nan, np.nan, -1
     return {
         "probability_required": wanted.probability, "confidence_required": wanted.confidence,
+        "confidence_lower": levels[0], "confidence_upper": levels[1],
         "verdict": verdict, "verdict_worst_case": worst,
         "probability": 1.0 - bad / count if count else np.nan,
         "probability_lower": low, "probability_upper": high,

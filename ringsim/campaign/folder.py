@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -18,19 +18,11 @@ from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError, show
 from ringsim.sampling.columns import Table
 from ringsim.scene import Scene, scene_from_toml
-from ringsim.storage.journal import FOLDER, DamagedError, Survey, survey
+from ringsim.storage.journal import FOLDER, Survey, survey
 from ringsim.storage.locks import GO_ON, locked, tries
-from ringsim.storage.merge import NAME as MERGED
-from ringsim.storage.merge import write_merged
-from ringsim.storage.netcdf import DESIGN, OutputTable, provenance, read_design, write_design
+from ringsim.storage.netcdf import DESIGN, provenance, read_design, write_design
 from ringsim.units import LEFT_OUT
 from ringsim.variables import Fidelity
-
-_KEPT = (
-    "identity", "seed", "solver", "campaign", "campaign_name", "scene", "output", "design",
-    "requirements", "check_every", "judge", "max_difference",
-)  # fmt: skip
-"""Attributes of the design that a merged file has, too."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +35,10 @@ class Folder:
     attributes: dict[str, Any]
     """Those of the design: "identity", the digest of all that decides about the results, ..."""
 
+    def first(self, samples: int) -> "Folder":
+        """The same with the first samples alone."""
+        return replace(self, table=self.table.first(samples))
+
     def survey(self, *, checks: bool = False) -> Survey:
         """What it holds of every sample, or of every sample's check."""
         return survey(self.path, self.attributes["identity"], self.table.samples, checks=checks)
@@ -51,7 +47,10 @@ class Folder:
     def checked(self) -> NDArray[np.int64]:
         """Samples that run with the judging engine, too."""
         every = int(self.attributes.get("check_every", 0))
-        return np.arange(0, self.table.samples, every) if every else np.empty(0, dtype=np.int64)
+        wanted = np.array(json.loads(self.attributes.get("suspects", "[]")), dtype=np.int64)
+        if every:
+            wanted = np.union1d(wanted, np.arange(0, self.table.samples, every))
+        return wanted[wanted < self.table.samples]
 
     def unchecked(self) -> NDArray[np.int64]:
         """Samples whose check has no result."""
@@ -98,7 +97,9 @@ def prepare_folder(
 def _is_ready(campaign: Campaign, path: Path, table: Table, solver: str) -> bool:
     """Whether there is nothing to write to the folder: it is neither new nor does it grow."""
     if (old := opened_as(campaign, path, table, solver)) is not None:
-        return old.table.samples == table.samples and old.attributes["campaign"] == campaign.text
+        told = old.attributes["campaign"], old.attributes.get("suspects", "[]")
+        same = told == (campaign.text, json.dumps(campaign.suspects))
+        return same and old.table.samples == table.samples
     try:
         names = sorted(entry.name for entry in path.iterdir()) if path.exists() else []
     except OSError as error:
@@ -128,6 +129,10 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str
         "output": wanted.output.model_dump_json(),
         "design": wanted.design.model_dump_json(), "requirements": to_json(wanted.requirements),
     }  # fmt: skip
+    if wanted.rule is not None:
+        attributes["stop_when"] = wanted.rule.model_dump_json(exclude_none=True)
+    if campaign.suspects:
+        attributes |= {"suspects": json.dumps(campaign.suspects), "judge": judge}
     if wanted.check_every:
         attributes |= {
             "check_every": wanted.check_every, "judge": judge,
@@ -198,38 +203,3 @@ def _changed_input(new: Table, old: Table) -> str:
             if change := _first_change(json.loads(mine.origin), json.loads(held.origin)):
                 return f"; inputs.{mine.path}{change}"
     return ""
-
-
-def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, Path | None]:
-    """Write ``campaign.nc``, one process at a time, so that it never loses samples it had.
-
-    ``execution`` says who computed it; if samples or checks are left, it is written only if
-    ``partly``.  Returns the number of samples left, of failed ones, and the file, or None if it is
-    not written.  InputError if the folder cannot be written to.
-    """
-    path, design = campaign.path / MERGED, campaign.attributes
-    model = Fidelity[design.get("fidelity", "full").upper()]
-    title = design["title"]
-    made = provenance(name=design["campaign_name"], title=title, action="merged", model=model)
-    attributes = made | {n: design[n] for n in _KEPT if n in design} | {"execution": execution}
-    attributes["history"] += f"\n{design['history']}"
-    output = OutputTable.model_validate_json(design["output"])
-    with writing(path, GO_ON), locked(campaign.path / "lock-merge", wait=True):
-        for draft in campaign.path.glob(f".{MERGED}.*{DRAFT}"):
-            draft.unlink(missing_ok=True)
-        for whole in (False, True):
-            found = campaign.survey()
-            checks = campaign.survey(checks=True) if len(campaign.checked) else None
-            left, failed = len(found.missing), len(found.failed)
-            if not partly and (left or len(campaign.unchecked())):
-                return left, failed, None
-            try:
-                failed += write_merged(
-                    campaign.path, found, campaign.table, campaign.scene, output, attributes,
-                    checks,
-                )  # fmt: skip
-                break
-            except DamagedError:
-                if whole:
-                    raise
-    return left, failed, path

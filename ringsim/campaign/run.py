@@ -12,8 +12,10 @@ import xarray as xr
 
 from ringsim.analysis.campaign_notes import budget_lines, notes
 from ringsim.analysis.engines import check_lines, too_far
-from ringsim.campaign.folder import Folder, merge, open_folder
+from ringsim.campaign.folder import Folder, open_folder
+from ringsim.campaign.merging import merge
 from ringsim.campaign.specification import SOLVERS
+from ringsim.campaign.stopping import Watch, as_decided
 from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
 from ringsim.compile_cache import choose_folder
 from ringsim.execution.work import Allowance, Scheduler, Work, longest_first, relative_cost
@@ -21,7 +23,7 @@ from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.refusal import InputError
 from ringsim.storage.journal import Journal
 from ringsim.storage.locks import reserved
-from ringsim.storage.result import check_of, sample_of
+from ringsim.storage.result import Result, check_of, sample_of
 from ringsim.variables import Status
 
 
@@ -67,6 +69,8 @@ class Choices:
     """Samples that ended so run again, too."""
     overrides: Mapping[str, Any] = field(default_factory=dict)
     """Settings by scene path with which those run, and nothing else does."""
+    more: bool = False
+    """Whether more samples may follow: then nothing is merged or told as long as all goes well."""
 
 
 def run_campaign(folder: Path, choices: Choices) -> int:
@@ -136,6 +140,7 @@ def _watched(
 ) -> tuple[list[int], Progress, Work]:
     """The checks and samples to run, longest ones first, and the work with who watches it."""
     share, most = choices.share, choices.max_failed
+    campaign = as_decided(campaign)
     before, every = campaign.survey(), np.arange(campaign.table.samples)
     again = every[np.isin(before.status, list(choices.again))]
     failed, open_ = np.setdiff1d(before.failed, again), np.union1d(before.missing, again)
@@ -149,8 +154,17 @@ def _watched(
         total=total, done=done, failed=mine, workers=choices.scheduler.workers,
     )  # fmt: skip
 
+    watch = Watch(campaign, again)
+
+    def finished(result: Result) -> None:
+        progress.finished(result)
+        watch.finished(result.sample)
+
     def asked() -> str:
         progress.refresh()
+        if enough := watch.ended():
+            stop.enough = stop.enough or not stop.reason
+            stop.note(enough, signalled=False)
         count = progress.failed + len(failed) - mine
         if most is not None and count > most:
             stop.note(f"{count} samples failed, more than max_failed = {most}", signalled=False)
@@ -159,7 +173,8 @@ def _watched(
     samples = longest_first(missing, relative_cost(campaign.table, campaign.scene))
     # First, since the full engine takes longest.
     samples = [check_of(sample) for sample in _checks(campaign, choices)] + samples
-    work = replace(work, started=progress.started, finished=progress.finished, stop=asked)
+    samples = watch.in_order(samples)
+    work = replace(work, started=progress.started, finished=finished, stop=asked)
     return samples, progress, work
 
 
@@ -177,6 +192,10 @@ def _checks(campaign: Folder, choices: Choices) -> list[int]:
 
 def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
     """Merge if nothing is left, say how it ended, and choose the exit code."""
+    if choices.more and not stop.reason and not len(campaign.survey().missing):
+        return EXIT_DONE
+    from ringsim.analysis.study_text import verdict_lines  # scipy.stats takes half a second
+
     stop.at_once = True
     try:
         left, failed, path = merge(campaign, execution=choices.scheduler.description, partly=False)
@@ -185,7 +204,7 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
         return EXIT_INTERRUPTED
     finally:
         stop.at_once = False
-    refused = []
+    refused, campaign = [], as_decided(campaign)
     if path is not None:
         _tell(f"{path}: {campaign.table.samples} samples, {failed} failed")
         listed = any(column.path == "solver.error_bars" for column in campaign.table.columns)
@@ -193,11 +212,11 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
             lines = notes(dataset)
             if listed or campaign.scene.solver.error_bars:
                 lines += budget_lines(dataset)
-            lines += check_lines(dataset)
+            lines += check_lines(dataset) + verdict_lines(dataset)
             refused = too_far(dataset)
         for line in lines:
             _tell(f"  {line}")
-    if stop.reason and not stop.signalled:
+    if stop.reason and not stop.signalled and not stop.enough:
         _tell(
             f"{stop.reason}; {left} samples are left: raise max_failed, or mend what fails and "
             "give the same command with --retry-failed (and --set solver.tolerance=...)"

@@ -8,9 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from ringsim.analysis.engines import compared
+from ringsim.analysis.looks import Condition, Looks, Rule, as_list
+from ringsim.analysis.quantities import quantities
 from ringsim.analysis.requirements import Requirements
-from ringsim.choice import kinds_of
+from ringsim.choice import kind_of, kinds_of
 from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
 from ringsim.outputs.family import VARIABLES, holds
@@ -95,6 +96,10 @@ class Specification(Model):
     """The campaign stops when more samples than this have failed."""
     requirements: Requirements = Field(default_factory=dict)
     """What outputs must be, how probably, and how surely; ``ringsim analyse`` judges it."""
+    stop_when: Annotated[list[Condition], BeforeValidator(as_list)] = Field(default_factory=list)
+    """The campaign ends before its last sample once all of these hold; one or a list of them."""
+    looks: Looks = Looks()
+    """After how many samples that is judged."""
     output: OutputTable = OutputTable()
 
     @model_validator(mode="after")
@@ -105,18 +110,60 @@ class Specification(Model):
                 f'full model, but fidelity = "{self.fidelity}": leave check_every out, or set '
                 'fidelity = "frame"'
             )
+        if getattr(self.design, "check", 0) and self.fidelity != "frame":
+            raise ValueError(
+                "design.check repeats runs of the frame engine with the full model, but "
+                f'fidelity = "{self.fidelity}": leave design.check out, or set fidelity = "frame"'
+            )
         if self.max_difference is not None and not self.check_every:
             raise ValueError(
                 f"max_difference = {show(self.max_difference)} says nothing without check_every: "
                 "give both"
             )
         for name in self.max_difference if isinstance(self.max_difference, dict) else ():
-            if name not in compared():
+            if name not in quantities():
                 raise ValueError(
                     f"max_difference.{name}: there is no such output to compare engines by "
-                    f"({known_or_nearest(name, compared())})"
+                    f"({known_or_nearest(name, quantities())})"
                 )
         return self
+
+    @model_validator(mode="after")
+    def _can_stop(self) -> "Specification":
+        if not self.stop_when:
+            if "looks" in self.model_fields_set:
+                raise ValueError("looks says nothing without stop_when: give both, or neither")
+            return self
+        kind = str(kind_of(self.design))
+        if not self.design.extendable:
+            raise ValueError(
+                f"stop_when: the first samples of a design of kind {kind} are no such design, so "
+                "that it cannot end before its last one: leave stop_when out, or set design.kind "
+                'to "random", or to "sobol" with design.replicates = 8'
+            )
+        if not self.design.independent and self.rule_replicates < 2:
+            raise ValueError(
+                f"stop_when: the samples of one {kind} design do not tell how certain they are: "
+                'give design.replicates = 8, or set design.kind to "random"'
+            )
+        for each in self.stop_when:
+            name = each.requirement
+            if name is not None and name not in self.requirements:
+                raise ValueError(
+                    f"stop_when.requirement = {name} is not among the requirements of this file "
+                    f"({known_or_nearest(name, self.requirements)}): give it under [requirements]"
+                )
+        return self
+
+    @property
+    def rule_replicates(self) -> int:
+        """Independent replicates of the design."""
+        return int(getattr(self.design, "replicates", 1))
+
+    @property
+    def rule(self) -> Rule | None:
+        """When the campaign may end before its last sample; None if only there."""
+        return Rule(conditions=self.stop_when, looks=self.looks) if self.stop_when else None
 
 
 @dataclass(frozen=True)
@@ -127,6 +174,8 @@ class Campaign:
     text: str
     specification: Specification
     scene: Scene
+    suspects: tuple[int, ...] = ()
+    """Samples that run with the full model, too, because of their results."""
 
     def draw(self) -> Table:
         """All inputs of all samples; InputError if the scene refuses one."""
@@ -185,10 +234,12 @@ def load_campaign(
         scene = base.with_values(specification.set)
     except InputError as error:
         raise InputError(f"{path.name}: {key}: {error}") from None
-    for name in specification.requirements:
+    wanted = {f"requirements.{name}": name for name in specification.requirements}
+    wanted |= {f"stop_when.of = {each.of}": each.of for each in specification.stop_when if each.of}
+    for where, name in wanted.items():
         if absent := sorted(set(VARIABLES[name].needs) - holds(scene)):
             raise InputError(
-                f"{path.name}: requirements.{name}: runs of this scene have no such output, "
+                f"{path.name}: {where}: runs of this scene have no such output, "
                 f"because it has no {absent[0]}: leave it out, or add that to the scene"
             )
     return Campaign(path, text, specification, scene)

@@ -12,6 +12,7 @@ from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.campaign.folder import Folder, opened_as
 from ringsim.campaign.run import Share
 from ringsim.campaign.specification import Campaign
+from ringsim.campaign.stopping import End, decided, looks_of
 from ringsim.choice import kind_of
 from ringsim.execution.local import Local
 from ringsim.execution.work import Work, relative_cost
@@ -42,6 +43,9 @@ def in_words(seconds: float) -> str:
 
 def status_lines(campaign: Folder) -> list[str]:
     """Where a campaign stands, from its results and its progress files, as text."""
+    planned, end = campaign.table.samples, decided(campaign)
+    if end is not None:
+        campaign = campaign.first(end.samples)
     found, now = campaign.survey(), time.time()
     left = len(found.missing)
     counts = Counter(found.status.tolist())
@@ -49,6 +53,7 @@ def status_lines(campaign: Folder) -> list[str]:
     lines = [
         f"{campaign.attributes['campaign_name']}: {campaign.table.samples - left} of "
         f"{campaign.table.samples} samples done, {left} left",
+        *_stopping(campaign, planned, end),
         *(f"  {words[code]:<14} {counts[code]}" for code in words if counts[code]),
     ]
     endings = ending_lines(found.fate, found.status, lambda k: next(found.results([k])).reason)
@@ -89,6 +94,16 @@ def status_lines(campaign: Folder) -> list[str]:
     return lines
 
 
+def _stopping(campaign: Folder, planned: int, end: End | None) -> list[str]:
+    """Whether the campaign's rule has ended it, or when it looks again; nothing without a rule."""
+    if end is not None:
+        return [f"  ended          {end.samples} of at most {planned} samples: {end.told}"]
+    missing = campaign.survey().missing
+    first = int(missing[0]) if len(missing) else planned
+    coming = [count for count in looks_of(campaign) if count > first]
+    return [f"  next look      after {coming[0]} samples (stop_when)"] if coming else []
+
+
 def _named(number: int) -> str:
     return str(number) if number >= 0 else f"check of {sample_of(number)}"
 
@@ -118,6 +133,10 @@ def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver
         f"  workers        {workers}",
         *map(_extent, table.columns),
     ]
+    if rule := campaign.specification.rule:
+        numbers = rule.numbers(table.samples, campaign.specification.rule_replicates)
+        told = ", ".join(map(str, numbers)) or "none before the last sample"
+        lines.append(f"  looks          {told} (stop_when)")
     if every := campaign.specification.check_every:
         number = len(range(0, table.samples, every))
         lines.append(f"  checks         {number} samples with the full engine, too (not predicted)")

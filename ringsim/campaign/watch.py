@@ -29,6 +29,8 @@ class StopRequest:
     reason: str = ""
     signalled: bool = False
     """Whether a signal asked for it."""
+    enough: bool = False
+    """Whether the samples are enough, by the campaign's rule."""
     at_once: bool = False
     """Whether a signal interrupts what is being done, instead of waiting to be asked for."""
 

@@ -7,10 +7,12 @@ from typing import Any
 import click
 
 from ringsim.campaign.folder import open_folder, prepare_folder
+from ringsim.campaign.growing import grown, grows, is_open
 from ringsim.campaign.retry import FAILED, check_settings
 from ringsim.campaign.run import Choices, Share, run_campaign
 from ringsim.campaign.specification import SOLVERS, load_campaign
 from ringsim.campaign.status import plan
+from ringsim.campaign.stopping import as_decided
 from ringsim.cli.options import PATH, PLOT_FORMAT, SETTINGS, require_plot
 from ringsim.execution.local import Local, Serial
 from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
@@ -69,6 +71,16 @@ def command(
         # With --retry-failed they are settings of the failed samples alone.
         own, theirs = ({}, settings) if retry_failed else (settings, {})
         campaign, share = load_campaign(file, own, samples), Share.parse(part)
+        if grows(campaign) and share.count > 1:
+            raise InputError(
+                f"--part {part}: which samples a design of kind subset-simulation has depends on "
+                "the results of all others: leave it out, and use --workers or MPI"
+            )
+        if grows(campaign) and retry_failed:
+            raise InputError(
+                "--retry-failed: later samples of a design of kind subset-simulation follow from "
+                "the results as they are: leave it out, or choose another folder with --out"
+            )
         check_settings(campaign.scene, theirs)
         wanted = campaign.specification
         folder, name = out or Path("runs") / wanted.name, solver or SOLVERS[wanted.fidelity]
@@ -84,13 +96,16 @@ def command(
                     "its folder with --out"
                 )
         else:
+            campaign = grown(campaign, folder)
             prepare_folder(campaign, folder, solver=name, judge=judge)
         again = FAILED if retry_failed else frozenset[Status]()
-        return folder, (wanted.limits, wanted.max_failed, share, again, theirs)
+        # To be asked again as long as samples follow from the results of others.
+        more = grows(campaign) and not retry_failed and not dry_run and is_open(campaign)
+        return folder, (wanted.limits, wanted.max_failed, share, again, theirs, more)
 
     def draw(folder: Path) -> None:
         # As long as samples are left, a file would be an older one.
-        if not plot or len(open_folder(folder).survey().missing):
+        if not plot or len(as_decided(open_folder(folder)).survey().missing):
             return
         import xarray as xr
 
@@ -115,17 +130,21 @@ def _run(
     draw: Callable[[Path], None],
 ) -> int:  # fmt: skip
     """Prepare on rank 0, run on all ranks, draw on rank 0; what is refused is told once."""
-    prepared: Any = None
-    if scheduler.rank == 0:
-        try:
-            prepared = prepare()
-        except InputError as error:
-            prepared = error
     try:
-        if isinstance(prepared := scheduler.from_first(prepared), InputError):
-            raise prepared
-        folder, choices = prepared
-        code = run_campaign(folder, Choices(scheduler, *choices))
+        while True:
+            prepared: Any = None
+            if scheduler.rank == 0:
+                try:
+                    prepared = prepare()
+                except InputError as error:
+                    prepared = error
+            if isinstance(prepared := scheduler.from_first(prepared), InputError):
+                raise prepared
+            folder, choices = prepared
+            how = Choices(scheduler, *choices)
+            code = run_campaign(folder, how)
+            if not how.more or scheduler.from_first(code) != EXIT_DONE:
+                break
         if scheduler.rank == 0:
             draw(folder)
         return code

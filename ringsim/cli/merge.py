@@ -7,7 +7,9 @@ import xarray as xr
 
 from ringsim.analysis.campaign_notes import notes
 from ringsim.analysis.engines import check_lines
-from ringsim.campaign.folder import merge, open_folder
+from ringsim.campaign.folder import open_folder
+from ringsim.campaign.merging import merge
+from ringsim.campaign.stopping import as_decided
 from ringsim.cli.options import FOLDER
 
 
@@ -18,11 +20,13 @@ def command(folder: Path) -> None:
 
     It may be called at any time and any number of times, also while the campaign runs.
     """
+    from ringsim.analysis.study_text import verdict_lines
+
     campaign = open_folder(folder)
-    samples = campaign.table.samples
     left, failed, path = merge(campaign, execution="merged on its own", partly=True)
+    samples = as_decided(campaign).table.samples
     click.echo(f"{path}: {samples} samples, {samples - left} done, {left} not run, {failed} failed")
     if path is not None:
         with xr.open_dataset(path) as dataset:
-            for line in notes(dataset) + check_lines(dataset):
+            for line in [*notes(dataset), *check_lines(dataset), *verdict_lines(dataset)]:
                 click.echo(f"  {line}")

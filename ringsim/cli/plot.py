@@ -17,29 +17,21 @@ def command(file: Path, formats: tuple[str, ...] | None, out: Path | None) -> No
 
     FILE is what ringsim run, ringsim replay --save, ringsim campaign or ringsim merge has written.
     """
-    import xarray as xr
-
+    from ringsim.analysis.stored import open_stored
     from ringsim.plots.campaign.figures import draw_campaign
     from ringsim.plots.run import draw_run
 
-    try:
-        dataset = xr.load_dataset(file, engine="netcdf4")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(
-            f"{file}: cannot be read as a netCDF file: {reason}; give a file that ringsim run has "
-            "written"
-        ) from None
-    campaign = "sample" in dataset.dims
-    needed = {"scene", "campaign"} if campaign else {"scene", "reason"}
-    if not needed <= dataset.attrs.keys() or "status" not in dataset:
-        raise InputError(
-            f"{file}: holds neither a run nor a campaign: give a file that ringsim run or ringsim "
-            "campaign has written (campaign.nc)"
-        )
-    draw = draw_campaign if campaign else draw_run
-    drawn = draw(dataset, file.parent if out is None else out, file.stem, formats or ("png",))
-    for picture in drawn:
-        click.echo(f"wrote {picture}")
-    if not drawn:
-        click.echo(f"{file}: nothing to draw: no run got as far as its first record")
+    with open_stored(file) as dataset:
+        campaign = "sample" in dataset.dims
+        needed = {"scene", "campaign"} if campaign else {"scene", "reason"}
+        if not needed <= dataset.attrs.keys() or "status" not in dataset:
+            raise InputError(
+                f"{file}: holds neither a run nor a campaign: give a file that ringsim run or "
+                "ringsim campaign has written (campaign.nc)"
+            )
+        draw = draw_campaign if campaign else draw_run
+        drawn = draw(dataset, file.parent if out is None else out, file.stem, formats or ("png",))
+        for picture in drawn:
+            click.echo(f"wrote {picture}")
+        if not drawn:
+            click.echo(f"{file}: nothing to draw: no run got as far as its first record")

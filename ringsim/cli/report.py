@@ -22,7 +22,6 @@ def command(folder: Path, out: Path, analysis: Path | None) -> None:
 
     The page holds all that it shows, and loads nothing: it can be mailed, printed and kept.
     """
-    from ringsim.report.page import LARGEST, write_report
     from ringsim.storage.merge import NAME
 
     require_place(out)
@@ -33,7 +32,15 @@ def command(folder: Path, out: Path, analysis: Path | None) -> None:
         what = f"holds no {NAME}: merge its results with ringsim merge {folder}"
         what = what if folder.is_dir() else "there is no such folder: give that of a campaign"
         raise InputError(f"{folder}: {what}")
-    campaign = _load(file)
+    from ringsim.analysis.stored import open_stored
+
+    with open_stored(file) as campaign:
+        _write(campaign, file, out, analysis)
+
+
+def _write(campaign: Any, file: Path, out: Path, analysis: Path | None) -> None:
+    from ringsim.report.page import LARGEST, write_report
+
     if "sample" not in campaign.dims or not {"scene", "campaign"} <= campaign.attrs.keys():
         raise InputError(f"{file}: holds no campaign: give the folder that ringsim campaign named")
     if analysis is not None:

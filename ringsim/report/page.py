@@ -8,6 +8,9 @@ import xarray as xr
 
 from ringsim.analysis.campaign_notes import budget_lines, override_lines, peak_lines, restart_lines
 from ringsim.analysis.campaign_samples import campaign_file, endings
+from ringsim.analysis.design import placement
+from ringsim.analysis.quantities import good
+from ringsim.analysis.stopping import stopping_lines
 from ringsim.files import write_text
 from ringsim.plots.campaign.figures import figures_of
 from ringsim.plots.inline import inline
@@ -42,6 +45,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     failures, more = tables.failures(campaign, folder)
     values, head = model.values(campaign)
     figures = [(p.name, p.words, inline(f, p.name, p.words)) for p, f in figures_of(campaign)]
+    stopping = stopping_lines(campaign, placement(campaign))
     notes = [*restart_lines(campaign), *override_lines(campaign), *budget_lines(campaign)]
     shell = jinja2.Environment(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
@@ -52,13 +56,13 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     context: dict[str, Any] = {
         "title": campaign.attrs.get("title", "Campaign"),
         "name": campaign.attrs.get("campaign_name", ""),
-        "samples": campaign.sizes["sample"], "used": int(tables.used_places(campaign).sum()),
+        "samples": campaign.sizes["sample"], "used": int(good(campaign).sum()),
         "not_run": int((endings(campaign) == "not run").sum()),
         "design": design.pop("kind", "unknown"), "design_more": design,
         "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),
         "outcomes": tables.outcomes(campaign), "statistics": tables.statistics(campaign),
         "requirements": tables.requirements(campaign), "verdicts": tables.verdicts(analysis),
-        "matters": what_matters(analysis), "peaks": peak_lines(campaign),
+        "matters": what_matters(analysis), "peaks": peak_lines(campaign), "stopping": stopping,
         "figures": figures, "player": player(campaign), "failures": failures, "more": more,
         "truth": tables.truth(campaign), "notes": notes, "inputs": tables.drawn(campaign),
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),

@@ -7,7 +7,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.campaign_samples import endings, judged_by, median_and_worst, used
+from ringsim.analysis.campaign_samples import endings, judged_by, median_and_worst
+from ringsim.analysis.quantities import used
 from ringsim.layout.layout import layout_at_opening
 from ringsim.layout.lines import lines_of
 from ringsim.scene import Scene, scene_from_toml
@@ -40,8 +41,6 @@ def player(campaign: xr.Dataset) -> dict[str, Any] | None:
 def _chosen(campaign: xr.Dataset) -> list[tuple[int, str]]:
     """Samples with what they stand for: the median, the worst, then those that failed."""
     words, samples = endings(campaign), campaign["sample"].to_numpy()
-    known = campaign["opening_angle"].notnull().all(("plane", "section"))
-    there = set(samples[(known.sum("time") >= 2).to_numpy()].tolist())
     good, found = np.isin(samples, used(campaign)["sample"]), dict[int, str]()
     if (both := median_and_worst(campaign)) is not None:
         by = f" by {name}" if (name := judged_by(campaign)) else ""
@@ -55,8 +54,14 @@ def _chosen(campaign: xr.Dataset) -> list[tuple[int, str]]:
     ends = dict(zip(samples.tolist(), words.tolist(), strict=True))
     return [
         (sample, f"sample {sample}: {', '.join(filter(None, (word, ends[sample])))}")
-        for sample, word in found.items() if sample in there
+        for sample, word in found.items() if _recorded(campaign, sample)
     ]  # fmt: skip
+
+
+def _recorded(campaign: xr.Dataset, sample: int) -> bool:
+    """Whether there are two records of a sample, which a course takes."""
+    angle = campaign["opening_angle"].sel(sample=sample)
+    return int(angle.notnull().all(("plane", "section")).sum()) >= 2
 
 
 def _course(campaign: xr.Dataset, sample: int, name: str) -> dict[str, Any]:

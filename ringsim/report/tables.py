@@ -17,8 +17,9 @@ from ringsim.analysis.campaign_samples import (
     scalars,
     values_of,
 )
+from ringsim.analysis.quantities import CHECKED, good
 from ringsim.refusal import show
-from ringsim.variables import GOALS, Cause, Status
+from ringsim.variables import GOALS, Cause
 
 MOST_FAILURES = 100
 """Rows of the table of failures; the page says how many more there are."""
@@ -60,7 +61,7 @@ def requirements(campaign: xr.Dataset) -> Rows:
         if "is" in wanted:
             words, asked = endings(campaign), wanted["is"]
             asked = [asked] if isinstance(asked, str) else asked
-            told = words[used_places(campaign)]
+            told = words[good(campaign)]
             met, known = int(np.isin(told, [w.replace("_", " ") for w in asked]).sum()), len(told)
         elif name in campaign:
             values = values_of(campaign, name)[1]
@@ -98,11 +99,6 @@ def _flag(variable: xr.DataArray, code: int) -> str:
     codes = np.atleast_1d(variable.attrs["flag_values"]).tolist()
     word: str = str(variable.attrs["flag_meanings"]).split()[codes.index(code)]
     return word.replace("_", " ")
-
-
-def used_places(campaign: xr.Dataset) -> Any:
-    """Whether the numbers of each sample hold."""
-    return campaign["status"].to_numpy() == Status.OK
 
 
 def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
@@ -157,11 +153,11 @@ def truth(campaign: xr.Dataset) -> Rows:
             samples, values = values_of(campaign, name)
             rows += _row(campaign[name], "", samples, values, np.median)
     for name in scalars(campaign):
-        for suffix, words in (("_error", ""), ("_checked", "difference of the engines: ")):
+        for suffix, words in (("_error", ""), (CHECKED, "difference of the engines: ")):
             if (other := name + suffix) not in campaign:
                 continue
             samples, values = values_of(campaign, other)
-            if suffix == "_checked":
+            if suffix == CHECKED:
                 values = np.abs(values - campaign[name].sel(sample=samples).to_numpy())
                 samples, values = samples[np.isfinite(values)], values[np.isfinite(values)]
                 rows += _row(campaign[name], words, samples, values, _rms)

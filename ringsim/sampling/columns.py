@@ -1,7 +1,7 @@
 """The inputs of all samples, and how they lie in netCDF files."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -61,6 +61,11 @@ class Table:
     def values_of(self, sample: int) -> dict[str, Any]:
         """Values by path of one sample, as :meth:`Scene.with_values` takes them."""
         return {c.path: plain(c.values[sample]) for c in self.columns if c.path}
+
+    def first(self, samples: int) -> "Table":
+        """The first samples alone."""
+        columns = tuple(replace(each, values=each.values[:samples]) for each in self.columns)
+        return Table(columns, self.seeds[:samples])
 
     def starts_with(self, other: Self) -> bool:
         """Whether the first samples are those of ``other``, bit by bit."""

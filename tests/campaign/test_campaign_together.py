@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from campaign_bench import START, assert_same, finished, lose, opened, ranks_of
-from ringsim.campaign.folder import merge, open_folder
+from ringsim.campaign.folder import open_folder
+from ringsim.campaign.merging import merge
 from ringsim.campaign.run import Choices, run_campaign
 from ringsim.execution.local import Serial
 from ringsim.execution.work import Allowance

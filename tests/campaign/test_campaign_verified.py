@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from campaign_bench import START, assert_same, journals
-from ringsim.campaign.folder import merge, open_folder
+from ringsim.campaign.folder import open_folder
+from ringsim.campaign.merging import merge
 from ringsim.storage import journal as journal_file
 from ringsim.storage.journal import FOLDER, Journal, survey
 from ringsim.storage.result import Result

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from ringsim.analysis.engines import check_lines, compared, differences, main_outputs
+from ringsim.analysis.engines import check_lines, differences, main_outputs
+from ringsim.analysis.quantities import quantities
 from ringsim.variables import Fate, Status
 
 NAN = np.nan
@@ -29,8 +30,8 @@ def campaign(**changed: list[float]) -> xr.Dataset:
     return xr.Dataset({**columns, "reason_checked": reasons}, {"sample": np.arange(4)})
 
 
-def test_numbers_of_the_antenna_are_compared() -> None:
-    names = compared().keys()
+def test_numbers_of_the_antenna_are_quantities() -> None:
+    names = quantities().keys()
     assert names >= {"deployment_time", "asynchrony_max_time", "peak_tension", "locked_joints"}
     for other in ("energy_error", "steps", "cpu_time", "peak_tension_span", "opening_angle"):
         assert other not in names

@@ -11,12 +11,14 @@ from click.testing import CliRunner
 from made_campaign import SECTIONS, TIMES, lags, made_campaign
 from matplotlib.figure import Figure
 
+from ringsim.analysis import blocks as blocks_module
 from ringsim.analysis.campaign_samples import median_and_worst
 from ringsim.cli import cli
 from ringsim.dataset import save
+from ringsim.plots.campaign import courses as courses_module
 from ringsim.plots.campaign.by_input import by_input, drawn
 from ringsim.plots.campaign.convergence import convergence
-from ringsim.plots.campaign.courses import courses
+from ringsim.plots.campaign.courses import course, courses
 from ringsim.plots.campaign.distributions import distributions
 from ringsim.plots.campaign.fan import fan
 from ringsim.plots.campaign.figures import PICTURES, draw_campaign, figures_of
@@ -72,11 +74,29 @@ def test_runs_of_different_length_are_laid_over_each_other() -> None:
     slope = xr.DataArray([[1.0, 2.0, 3.0, 4.0]] * 2, dims=("plane", "section"))
     campaign["opening_angle"][:] = (campaign.time * slope).transpose("plane", "section", "time")
     campaign["deployment_time"][:] = [3.3, 5.0, 10.0]
-    found = courses(campaign)
+    share = np.linspace(0.0, 1.0, 7)
     for sample, end in enumerate((3.3, 5.0, 10.0)):
         np.testing.assert_allclose(
-            found.sel(sample=sample).isel(share=-1), end * (slope - 2.5), rtol=1e-6
+            course(campaign, sample, share).isel(share=-1), end * (slope - 2.5), rtol=1e-6
         )
+    np.testing.assert_allclose(courses(campaign).median.isel(share=-1), 5.0 * (slope - 2.5))
+
+
+def test_quantiles_do_not_depend_on_how_the_file_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sample at a time and a point of the axis at a time, with a record lost in one sample."""
+    campaign = made_campaign(9, failed=(2,), not_run=(5,))
+    campaign["opening_angle"][3, :, 1, 4] = np.nan
+    campaign["opening_angle"][4, :, :, 1:] = np.nan  # one record is no course
+    whole = courses(campaign)
+    monkeypatch.setattr(blocks_module, "BLOCK_BYTES", 1)
+    monkeypatch.setattr(courses_module, "_PASSES", 1000)
+    monkeypatch.setattr(courses_module, "HELD_BYTES", 4 * 8 * 8)
+    parts = courses(campaign)
+    xr.testing.assert_allclose(whole.bands, parts.bands, rtol=0.0, atol=1e-6)  # sums of floats
+    assert whole.samples.tolist() == parts.samples.tolist() == [0, 1, 3, 6, 7, 8]
+    single = [course(campaign, k, whole.bands["share"].values) for k in parts.samples]
+    expected = np.quantile(np.array(single), (0.0, 0.05, 0.5, 0.95, 1.0), axis=0)
+    np.testing.assert_allclose(parts.bands, expected, atol=1e-5)
 
 
 def test_the_map_shows_the_median_and_the_worst(mixed: xr.Dataset) -> None:

@@ -75,7 +75,7 @@ def test_files_that_hold_no_run_are_refused(file: Path, failed: xr.Dataset) -> N
         (campaign, "holds neither a run nor a campaign: give a file that ringsim run or ringsim"),
         (text, "cannot be read as a netCDF file: "),
         (other, "holds neither a run nor a campaign: give a file that"),
-        (file.with_name("c.nc"), "cannot be read as a netCDF file: No such file or directory"),
+        (file.with_name("c.nc"), "there is no such file or folder"),
     ):
         done = ringsim("plot", str(path))
         assert done.exit_code == EXIT_BAD_INPUT

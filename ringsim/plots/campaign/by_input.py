@@ -11,9 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from ringsim.analysis.campaign_samples import endings, inputs, judged_by, used
+from ringsim.analysis.campaign_samples import endings, inputs, judged_by
+from ringsim.analysis.quantities import used
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, head
+
+_MANY = 500
+"""Samples from which on marks are drawn as dots: as shapes they would make a page too large."""
 
 
 def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
@@ -85,7 +89,8 @@ def _scatter(axes: Axes, x: Any, y: Any, words: NDArray[np.str_]) -> None:
         colour, marker = looks[word]
         axes.scatter(x[own], y[own], s=26, color=colour, marker=marker, alpha=0.8,
                      linewidths=1.2 if marker in "x+1234|" else 0.0,
-                     label=f"{word} ({own.sum()})", zorder=3)  # fmt: skip
+                     label=f"{word} ({own.sum()})", zorder=3,
+                     rasterized=len(words) > _MANY)  # fmt: skip
 
 
 def _label(variable: xr.DataArray) -> str:

@@ -9,6 +9,9 @@ from ringsim.analysis.campaign_samples import requirements_of, scalars, told, va
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import head
 
+_STEPS = 2000
+"""Steps of a curve at most: more than a figure resolves."""
+
 
 def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
     """The least and the largest value of a number that ``[requirements]`` of the campaign allow."""
@@ -24,7 +27,8 @@ def distributions(campaign: xr.Dataset) -> Figure:
     for number, (axes, name) in enumerate(zip(panels, names, strict=True)):
         values = np.sort(values_of(campaign, name)[1])
         share = np.arange(1, len(values) + 1) / len(values)
-        axes.step(np.append(values[:1], values), np.append(0.0, share), where="post",
+        shown = np.unique(np.linspace(0, len(values) - 1, min(len(values), _STEPS)).astype(int))
+        axes.step(np.append(values[:1], values[shown]), np.append(0.0, share[shown]), where="post",
                   color=style.BLUE)  # fmt: skip
         for level in (0.05, 0.5, 0.95):
             at = np.quantile(values, level, method="inverted_cdf")

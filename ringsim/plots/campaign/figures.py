@@ -4,15 +4,16 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ringsim.analysis.campaign_samples import inputs, judged_by, scalars, used
+from ringsim.analysis.campaign_samples import inputs, judged_by, scalars
+from ringsim.analysis.reading import any_finite
 from ringsim.files import writing
 from ringsim.plots import style
 from ringsim.plots.campaign.by_input import by_input
 from ringsim.plots.campaign.convergence import convergence
+from ringsim.plots.campaign.courses import courses
 from ringsim.plots.campaign.distributions import distributions
 from ringsim.plots.campaign.fan import fan
 from ringsim.plots.campaign.lag_map import lag_map
@@ -25,13 +26,15 @@ class Picture(NamedTuple):
     """A figure of a campaign, and what it needs."""
 
     name: str
-    draw: Callable[[xr.Dataset], Figure]
+    draw: Callable[..., Figure]
     words: str
     """What it shows, for those who cannot see it."""
     needs: tuple[str, ...] = ()
     """Variables that must be there; some used sample must have a value of the first."""
     of: Callable[[xr.Dataset], object] = bool
     """What must hold beyond that."""
+    read: Callable[[xr.Dataset], object] | None = None
+    """What several figures read of the campaign, once: their second argument."""
 
 
 _COURSES = ("asynchrony", "opening_angle", "final_time", "deployment_time")
@@ -43,11 +46,11 @@ PICTURES = (
     ),
     Picture(
         "fan", fan, "Deviation of each section from the mean opening angle, over all samples",
-        _COURSES, judged_by,
+        _COURSES, judged_by, courses,
     ),
     Picture(
         "lag_map", lag_map, "Section by time: lag of the median and of the worst sample",
-        _COURSES, judged_by,
+        _COURSES, judged_by, courses,
     ),
     Picture(
         "lock_order", lock_order, "How often each V-joint locks first, last and not at all",
@@ -70,15 +73,18 @@ PICTURES = (
 
 def figures_of(campaign: xr.Dataset) -> Iterator[tuple[Picture, Figure]]:
     """Every figure for which the samples of a merged campaign recorded something."""
-    good = used(campaign)
+    read: dict[object, object] = {}
     for picture in PICTURES:
-        # Of a number that no run has reached the file still has the variable.
-        needed = [good[n] for n in picture.needs if n in good]
-        there = len(needed) == len(picture.needs)
+        there = all(name in campaign for name in picture.needs)
         if there and picture.needs[:1]:
-            there = bool(np.isfinite(needed[0]).any())
-        if there and picture.of(campaign):
-            yield picture, picture.draw(campaign)
+            # Of a number that no run has reached the file still has the variable.
+            there = any_finite(campaign, picture.needs[0])
+        if not there or not picture.of(campaign):
+            continue
+        if picture.read is not None and picture.read not in read:
+            read[picture.read] = picture.read(campaign)
+        shared = [] if picture.read is None else [read[picture.read]]
+        yield picture, picture.draw(campaign, *shared)
 
 
 def draw_campaign(

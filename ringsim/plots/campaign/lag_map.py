@@ -7,21 +7,24 @@ from matplotlib.ticker import MaxNLocator
 
 from ringsim.analysis.campaign_samples import median_and_worst, told
 from ringsim.plots import style
-from ringsim.plots.campaign.courses import courses
+from ringsim.plots.campaign.courses import Courses, course, courses
 from ringsim.plots.campaign.frame import head
 from ringsim.plots.opening_angles import LEAST_SPAN
 
 
 @style.styled
-def lag_map(campaign: xr.Dataset) -> Figure:
+def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     """Deviation from the mean opening angle as a colour: at each place the median of all samples,
     beside the sample with the largest asynchrony; each column has a colour scale of its own.
+    ``read`` is what ``courses`` gives, if it is there already.
     """
-    found = courses(campaign)
+    read = courses(campaign) if read is None else read
+    found = read.bands
     chosen = median_and_worst(campaign)
-    columns = [("median of all samples", found.median("sample"))]
-    if chosen is not None and chosen[1] in found["sample"]:
-        columns.append((f"worst: sample {chosen[1]}", found.sel(sample=chosen[1])))
+    columns = [("median of all samples", read.median)]
+    if chosen is not None and chosen[1] in read.samples:
+        one = course(campaign, chosen[1], found["share"].to_numpy())
+        columns.append((f"worst: sample {chosen[1]}", one))
     planes, sections = found["plane"].values.tolist(), found["section"].values
     figure = Figure(figsize=(4.9 * len(columns), 2.2 * len(planes) + 1.3))
     grid = figure.subplots(len(planes), len(columns), sharex=True, sharey=True, squeeze=False)
@@ -43,5 +46,5 @@ def lag_map(campaign: xr.Dataset) -> Figure:
         bar.set_label(style.label(found, width=30), fontsize=9)
     grid[0, 0].yaxis.set_major_locator(MaxNLocator(10, integer=True, min_n_ticks=1))
     figure.supylabel(style.label(campaign["section"]), fontsize=10.5)
-    head(figure, campaign, "Lag map", f"{told(campaign, found.sizes['sample'])}.")
+    head(figure, campaign, "Lag map", f"{told(campaign, len(read.samples))}.")
     return figure

@@ -5,10 +5,17 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from ringsim.analysis.campaign_samples import told, used
+from ringsim.analysis.campaign_samples import told
+from ringsim.analysis.quantities import good
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import head
+
+
+def locks_of(campaign: xr.Dataset) -> Array:
+    """Lock times of the samples whose numbers hold, (sample, plane, section), s."""
+    times = campaign["lock_time"].transpose("sample", "plane", "section").to_numpy()
+    return np.asarray(times[good(campaign)])
 
 
 def shares(campaign: xr.Dataset) -> tuple[Array, Array, Array]:
@@ -16,7 +23,7 @@ def shares(campaign: xr.Dataset) -> tuple[Array, Array, Array]:
 
     V-joints that lock at one time share it; nobody is last in a sample in which some stay open.
     """
-    locks = used(campaign)["lock_time"].transpose("sample", "plane", "section").to_numpy()
+    locks = locks_of(campaign)
     flat = locks.reshape(len(locks), -1)
     none = np.isnan(flat)
     begun, done = ~none.all(axis=1), ~none.any(axis=1)
@@ -60,13 +67,12 @@ def lock_order(campaign: xr.Dataset) -> Figure:
     figure.supylabel("Share of the samples", fontsize=10.5)
     handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
-    good = used(campaign)
-    done = int(np.isfinite(good["lock_time"].to_numpy()).all(axis=(1, 2)).sum())
+    locks = locks_of(campaign)
+    done = int(np.isfinite(locks).all(axis=(1, 2)).sum())
     head(
         figure,
         campaign,
         "Lock order",
-        f"{told(campaign, good.sizes['sample'])}; all V-joints "
-        f"lock in {done}, only these have a last one.",
+        f"{told(campaign, len(locks))}; all V-joints lock in {done}, only these have a last one.",
     )
     return figure

@@ -5,7 +5,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ringsim.analysis.campaign_samples import told, used, values_of
+from ringsim.analysis.campaign_samples import told, values_of
+from ringsim.analysis.quantities import used
+from ringsim.analysis.reading import blocks
 from ringsim.plots import style
 from ringsim.plots.campaign.courses import ends
 from ringsim.plots.campaign.frame import bands, head
@@ -13,9 +15,12 @@ from ringsim.plots.campaign.frame import bands, head
 
 def peaks(campaign: xr.Dataset) -> xr.DataArray:
     """Largest recorded tension of each span until the last lock, (sample, plane, span), N."""
-    good = used(campaign)
-    until = xr.DataArray(ends(good), dims="sample")
-    return good["cable_tension"].where(good["time"] <= until).max("time", keep_attrs=True)
+    found = []
+    for block in blocks(campaign, ["cable_tension", "status", "final_time", "deployment_time"]):
+        own = used(block)
+        until = xr.DataArray(ends(own), dims="sample")
+        found.append(own["cable_tension"].where(own["time"] <= until).max("time", keep_attrs=True))
+    return xr.concat(found, "sample")
 
 
 @style.styled

@@ -27,6 +27,10 @@ class Design(Model):
     """Whether its samples stand for the distributions of the inputs, so that they have a mean."""
     independent: ClassVar[bool] = False
     """Whether every sample is drawn apart from the others; else only replicates are."""
+    extendable: ClassVar[bool] = False
+    """Whether the first samples of the design are such a design, too."""
+    grows: ClassVar[bool] = False
+    """Whether which samples come next depends on the results of those before."""
     cure: ClassVar[str] = "change or truncate the inputs"
     """What helps against samples that the scene refuses."""
 

@@ -15,6 +15,7 @@ class RandomDesign(Design):
         "replicates": "samples of a random design are independent as they are; leave it out",
     }
     independent: ClassVar[bool] = True
+    extendable: ClassVar[bool] = True
 
     kind: Literal["random"] = "random"
     samples: Samples

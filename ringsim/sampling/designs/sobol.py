@@ -1,6 +1,6 @@
 """Scrambled Sobol samples."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -15,6 +15,8 @@ class Sobol(Replicated):
     Balanced at powers of two; fewer samples are the first ones of the next power of two.
     Source: Joe and Kuo (2008) directions, Matousek (1998) scrambling, as in scipy.
     """
+
+    extendable: ClassVar[bool] = True
 
     kind: Literal["sobol"] = "sobol"
 

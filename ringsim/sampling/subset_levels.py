@@ -1,0 +1,159 @@
+"""Subset simulation: the levels of a rare event, as far as results are known.
+
+Each level holds samples beyond a threshold that a given share of those before have passed; from
+these few, chains of candidates start.  A candidate keeps a part of its parent in standard normal
+space and draws the rest anew, so that it is distributed as the inputs are; the chain moves there
+if it is beyond the threshold, else it stays.
+Sources: Au and Beck, Probabilistic Engineering Mechanics 16 (2001), levels and coefficient of
+variation; Papaioannou, Betz, Zwirglmaier and Straub, ibid. 41 (2015), conditional sampling.
+"""
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+_WISHED = 0.44
+"""Share of candidates that move a chain, for which chains forget fastest (Papaioannou 2015)."""
+_FIRST = 0.6
+"""Part that candidates of the first chains draw anew, as a standard deviation."""
+
+
+class Batch(NamedTuple):
+    """Samples that can run at the same time."""
+
+    parents: Numbers
+    """Sample whose point each one keeps a part of; -1 for none."""
+    anew: float
+    """Standard deviation of what is drawn anew; 1 for all of it."""
+    level: int
+
+
+class Answer(NamedTuple):
+    """Their numbers and responses, the larger the nearer to the event."""
+
+    numbers: Numbers
+    responses: Array
+
+
+@dataclass
+class Repetition:
+    """What one subset simulation gave."""
+
+    probability: float = np.nan
+    """NaN until it has ended, or if too few samples have a response."""
+    variation: float = np.nan
+    """Coefficient of variation by the correlation within chains; too small if levels depend."""
+    thresholds: list[float] = field(default_factory=list)
+    """Of the levels passed."""
+
+
+@dataclass
+class Levels:
+    """All samples that the known responses determine."""
+
+    parents: Numbers
+    anew: Array
+    level: Numbers
+    replicate: Numbers
+    """Shape (samples,) each."""
+    batches: list[slice]
+    """Samples of each batch of each repetition, in order."""
+    repetitions: list[Repetition]
+    ended: bool
+    """Whether nothing is left to run."""
+
+
+def levels(
+    responses: Array, samples: int, share: float, replicates: int, target: float, most: int
+) -> Levels:
+    """Samples of independent simulations, whose batches run side by side.
+
+    ``responses`` of the first samples are known; an event is a response above ``target``.
+    ``samples`` are those of a level, a ``share`` of which passes to the next, at most ``most``.
+    """
+    found = [Repetition() for _ in range(replicates)]
+    running = {k: _simulation(found[k], samples, share, target, most) for k in range(replicates)}
+    waiting = {k: next(each) for k, each in running.items()}
+    parents, anew, level, replicate, batches = [], [], [], [], list[slice]()
+    begin, ended = 0, False
+    while True:
+        first, numbers = begin, dict[int, Numbers]()
+        for k, batch in waiting.items():
+            count = len(batch.parents)
+            numbers[k], begin = np.arange(begin, begin + count), begin + count
+            batches.append(slice(begin - count, begin))
+            parents.append(batch.parents)
+            anew.append(np.full(count, batch.anew))
+            level.append(np.full(count, batch.level))
+            replicate.append(np.full(count, k))
+        ended = first == begin
+        if ended or begin > len(responses):
+            break
+        asked, waiting = waiting, {}
+        for k in asked:
+            try:
+                waiting[k] = running[k].send(Answer(numbers[k], responses[numbers[k]]))
+            except StopIteration:
+                continue
+    joined = (_joined(each, np.int64) for each in (parents, level, replicate))
+    of_parents, of_level, of_replicate = joined
+    return Levels(of_parents, np.concatenate(anew), of_level, of_replicate, batches, found, ended)
+
+
+def _joined(parts: Sequence[Numbers], kind: type[np.int64]) -> Numbers:
+    return np.concatenate(parts).astype(kind)
+
+
+def _simulation(
+    found: Repetition, samples: int, share: float, target: float, most: int
+) -> Generator[Batch, Answer, None]:
+    """One simulation, which asks for batches and is sent their responses."""
+    length = round(1.0 / share)
+    chains = samples // length
+    here, response = yield Batch(np.full(samples, -1), 1.0, 0)
+    probability, squares, anew = 1.0, 0.0, _FIRST
+    for level in range(most + 1):
+        seeds = np.argsort(-response, kind="stable")[:chains]
+        bound = float(response[seeds[-1]])
+        beyond = response > target
+        last = beyond.sum() >= chains or level == most
+        inside = beyond if last else response >= bound
+        if not last and bound == -np.inf:
+            return  # too few samples tell anything
+        probability *= float(inside.mean())
+        squares += _variance(inside, chains if level else samples)
+        if last:
+            found.probability, found.variation = probability, float(np.sqrt(squares))
+            return
+        found.thresholds.append(bound)
+        states, values = here[seeds], response[seeds]
+        course, heights = [states], [values]
+        for step in range(1, length):
+            numbers, candidates = yield Batch(states, anew, level + 1)
+            moved = candidates >= bound
+            states, values = np.where(moved, numbers, states), np.where(moved, candidates, values)
+            course.append(states)
+            heights.append(values)
+            anew = min(1.0, anew * float(np.exp((moved.mean() - _WISHED) / np.sqrt(step))))
+        here, response = np.concatenate(course), np.concatenate(heights)
+
+
+def _variance(inside: NDArray[np.bool_], chains: int) -> float:
+    """Square of the coefficient of variation of a level's share; infinite if nothing is inside.
+
+    ``inside`` are the states of all ``chains``, step after step; Au and Beck (2001), eqs. 27 to 29.
+    """
+    share, count = float(inside.mean()), len(inside)
+    if share == 0.0:
+        return np.inf
+    steps = inside.reshape(-1, chains).astype(float)
+    variance, factor = share * (1.0 - share), 0.0
+    for lag in range(1, len(steps)) if variance else ():
+        together = float((steps[:-lag] * steps[lag:]).mean()) - share**2
+        factor += 2.0 * (1.0 - lag / len(steps)) * together / variance
+    return (1.0 - share) / (share * count) * (1.0 + max(factor, 0.0))
