@@ -67,8 +67,11 @@ class Specification(Model):
     }
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
+    """Word for the campaign, and for the folder of its results below ``runs``."""
     title: Annotated[str, Field(max_length=300)] = ""
+    """One line for figures and reports."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    """With its number, all that the inputs of a sample depend on."""
     scene: str
     """Built-in scene, or scene file looked up beside the campaign file."""
     set: Annotated[dict[str, Any], BeforeValidator(flat)] = Field(default_factory=dict)
@@ -78,8 +81,11 @@ class Specification(Model):
     ] = Field(default_factory=dict)
     """Distribution by scene path."""
     correlations: list[Correlation] = Field(default_factory=list)
+    """Pairs of inputs that depend on each other."""
     design: AnyDesign
+    """How the samples are placed."""
     limits: Allowance = Allowance()
+    """What one run may use before it is ended."""
     fidelity: Literal["full", "frame", "ideal"] = "full"
     """full: the flexible multibody model; frame: the same in joint coordinates, several times as
     fast; ideal: rigid rods."""
@@ -96,6 +102,7 @@ class Specification(Model):
     requirements: Requirements = Field(default_factory=dict)
     """What outputs must be, how probably, and how surely; ``ringsim analyse`` judges it."""
     output: OutputTable = OutputTable()
+    """How ``campaign.nc`` stores the results."""
 
     @model_validator(mode="after")
     def _can_be_checked(self) -> "Specification":
