@@ -53,13 +53,12 @@ class Key:
         return typing.cast(list[type[Model]], models_in(self.field.annotation))
 
     @property
-    def holder(self) -> type[dict[Any, Any]] | type[tuple[Any, ...]] | None:
-        """``dict`` where names of the user's choice lead to its values, ``tuple`` for lists."""
-        plain = [part for part in nested_in(self.field.annotation) if part is not type(None)]
-        origins = [typing.get_origin(part) for part in plain]
+    def holder(self) -> str:
+        """``names`` where names of the user's choice lead to its values, ``list``, or nothing."""
+        origins = [typing.get_origin(part) for part in nested_in(self.field.annotation)]
         if dict in origins:
-            return dict
-        return tuple if (tuple in origins or list in origins) and not self.each else None
+            return "names"
+        return "list" if (tuple in origins or list in origins) and not self.each else ""
 
     @property
     def each(self) -> bool:
@@ -83,17 +82,17 @@ class Key:
                 if "kind" in one.model_fields
             ]
             what = f"table with a kind: {', '.join(kinds)}" if kinds else "table"
-            many = {dict: "tables by name, each a ", tuple: "list of tables, each a "}
-            return f"{many[self.holder] if self.holder else ''}{what}"
+            many = {"names": "tables by name, each a ", "list": "list of tables, each a "}
+            return f"{many.get(self.holder, '')}{what}"
         if self.choices:
             return " or ".join(map(json.dumps, self.choices))
         annotation = self.field.annotation
         what = " or ".join(dict.fromkeys(_plain(annotation))) or "any value"
-        if self.holder is dict and typing.get_origin(annotation) is dict:
+        if self.holder == "names" and typing.get_origin(annotation) is dict:
             return f"{what} by name"
-        if self.holder is dict:
+        if self.holder == "names":
             return f"{what}, or a table of them by name"
-        return f"list, each {what}" if self.holder is tuple else what
+        return f"list, each {what}" if self.holder == "list" else what
 
     @property
     def default(self) -> str:

@@ -16,7 +16,7 @@ ROOTS: dict[str, type[Model]] = {"scene": Scene, "campaign": Specification}
 """What a file may be."""
 ANY = "*"
 """Stands in a path for a name of the user's choice."""
-_INSIDE = {None: "", dict: f".{ANY}", tuple: "[k]"}
+_INSIDE = {"": "", "names": f".{ANY}", "list": "[k]"}
 _STEP = re.compile(r"""(?:"([^"]*)"|'([^']*)'|([\w*-]+))(?:\[[^\]]*\])?(?:\.|$)""")
 
 
@@ -86,10 +86,10 @@ def _follow(
     step, *rest = steps
     for key in (key for owner in owners for key in keys_of(owner) if step in (key.name, ANY)):
         path = [*done, key.name]
-        if not rest or (key.holder is dict and len(rest) == 1):
+        if not rest or (key.holder == "names" and len(rest) == 1):
             yield ".".join(path), key
         else:
-            named = [ANY] if key.holder is dict else []
+            named = [ANY] if key.holder == "names" else []
             yield from _follow(key.models, rest[len(named) :], [*path, *named])
 
 
