@@ -96,7 +96,9 @@ class Key:
 
     @property
     def default(self) -> str:
-        """Its value if it is not given, as a file would have it; empty if it must be given."""
+        """Its value if it is not given, as a file would have it; empty if it must be given, and of
+        a table whose keys all have their own defaults.
+        """
         value = self.field.get_default(call_default_factory=True)
         if value is PydanticUndefined:
             return ""
@@ -153,7 +155,7 @@ def _table(record: Model) -> str:
     if kind := kind_in(type(record)):
         return f'kind = "{kind}"'
     values = record.model_dump(exclude_defaults=True)
-    return ", ".join(f"{name} = {value}" for name, value in values.items()) or "its defaults"
+    return ", ".join(f"{name} = {value}" for name, value in values.items())
 
 
 def _plain(annotation: Any) -> Iterator[str]:

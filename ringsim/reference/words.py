@@ -19,9 +19,8 @@ def facts(key: Key, path: str = "") -> str:
     """
     unit = "" if key.unit == "1" else f" in {key.unit}"
     each = f", or a list with one for each {_place(path)}" if key.each else ""
-    said = [f"{key.form}{unit}{each}", key.range]
-    said.append("must be given" if key.required else _default(key.default))
-    return "; ".join(filter(None, said))
+    default = "must be given" if key.required else _default(key.default)
+    return "; ".join(filter(None, [f"{key.form}{unit}{each}", key.range, default]))
 
 
 def told(found: Found) -> str:
@@ -94,7 +93,8 @@ def _place(path: str) -> str:
 
 
 def _default(value: str) -> str:
-    return "left out by default" if value == LEFT_OUT else f"default {value}"
+    """What holds where a key is not given; nothing for a table whose keys have their defaults."""
+    return {LEFT_OUT: "left out by default", "": ""}.get(value, f"default {value}")
 
 
 def _indented(text: str, indent: int, hang: int = 0) -> list[str]:
