@@ -1,8 +1,10 @@
 """``ringsim explain``: what results, scenes and campaigns hold."""
 
 import json
+from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
@@ -11,8 +13,18 @@ from ringsim.refusal import InputError
 from ringsim.variables import Variable
 
 
+def _names(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:
+    """Variables, and paths of keys as far as the next dot."""
+    from ringsim.reference import tree
+
+    every = [*VARIABLES, *tree.ROOTS, *(path for root in tree.ROOTS for path in tree.paths(root))]
+    depth = begun.count(".") + 1
+    found = {".".join(name.split(".")[:depth]) for name in every if name.startswith(begun)}
+    return [CompletionItem(name) for name in sorted(found)]
+
+
 @click.command()
-@click.argument("names", metavar="[NAME]...", nargs=-1)
+@click.argument("names", metavar="[NAME]...", nargs=-1, shell_complete=_names)
 @click.option("--schema", metavar="scene|campaign", help="Print the JSON Schema of such files.")
 def command(names: tuple[str, ...], schema: str | None) -> None:
     """Say what the variables of a result, or the keys of a scene or campaign file, mean.

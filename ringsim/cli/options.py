@@ -4,9 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from ringsim.overrides import parse_assignment
 from ringsim.refusal import InputError, known_or_nearest
+from ringsim.scene import builtin_scenes
 
 PATH = click.Path(path_type=Path)
 WORKERS = click.IntRange(1, 4096)
@@ -27,12 +29,18 @@ def _formats(_context: Any, _option: Any, text: str | None) -> tuple[str, ...] |
     return asked
 
 
+def _scenes(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:
+    """Built-in scenes, or files where none begins so."""
+    found = [CompletionItem(name) for name in builtin_scenes() if name.startswith(begun)]
+    return found or [CompletionItem(begun, type="file")]
+
+
 PLOT_FORMATS = ("png", "svg", "pdf")
 PLOT_FORMAT = click.option(
     "--plot-format", "formats", metavar="png,svg,pdf", callback=_formats,
     help="Formats of the figures, one or more (default png).",
 )  # fmt: skip
-SCENE = click.argument("scene", metavar="SCENE")
+SCENE = click.argument("scene", metavar="SCENE", shell_complete=_scenes)
 FOLDER = click.argument("folder", type=PATH)
 SETTINGS = click.option(
     "--set", "settings", metavar="PATH=VALUE", multiple=True, callback=_assigned,
