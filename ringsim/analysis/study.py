@@ -85,7 +85,7 @@ def analyse(
     for name in quantities():
         if name in campaign and np.isfinite(numbers(campaign, name)[good(campaign)]).any():
             found = found.assign(_output(campaign, name, placed))
-    found = found.merge(_outcomes(campaign, placed), combine_attrs="override")
+    found = found.merge(outcomes(campaign, placed), combine_attrs="override")
     if wanted:
         found = found.merge(judge(campaign, wanted, placed), combine_attrs="override")
     return found.merge(influence(campaign, wanted, placed), combine_attrs="override")
@@ -187,7 +187,7 @@ def _root_mean_square(values: Array) -> float:
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
-def _outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
+def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
     """Counts and shares of what the antenna did, and of how runs were lost, along ``kind``.
 
     Shares of outcomes are of the samples whose numbers hold, those of lost ones of all that ran.

@@ -157,12 +157,21 @@ class Campaign:
 def load_campaign(
     path: Path, settings: Mapping[str, Any] | None = None, samples: int | None = None
 ) -> Campaign:
-    """Read a campaign file; InputError if it, its content or its scene is refused.
+    """Read a campaign file; see :func:`campaign_of`."""
+    return campaign_of(read_text(path), path, settings, samples)
 
-    ``settings`` are values by scene path beyond those under [set], ``samples`` another size of the
-    design; both become comments at the end of the campaign's text.
+
+def campaign_of(
+    text: str, path: Path, settings: Mapping[str, Any] | None = None, samples: int | None = None,
+    scene: Scene | None = None,
+) -> Campaign:  # fmt: skip
+    """The campaign that a text describes; InputError if it, its content or its scene is refused.
+
+    ``path`` is where the text is from: files that it names are looked up beside it.  ``settings``
+    are values by scene path beyond those under [set], ``samples`` another size of the design; both
+    become comments at the end of the campaign's text.  A ``scene`` takes the place of the one that
+    the text names.
     """
-    text = read_text(path)
     table = parse_toml(text, path.name)
     if "structure" in table and not {"scene", "design"} & set(table):
         raise InputError(
@@ -187,15 +196,15 @@ def load_campaign(
         text += f"\n# called with --set {name} = {json.dumps(value, default=str)}"
     key = "scene"
     try:
-        base = load_scene(specification.scene, beside=path)
+        base = load_scene(specification.scene, beside=path) if scene is None else scene
         key = "set"
-        scene = base.with_values(specification.set)
+        varied = base.with_values(specification.set)
     except InputError as error:
         raise InputError(f"{path.name}: {key}: {error}") from None
     for name in specification.requirements:
-        if absent := sorted(set(VARIABLES[name].needs) - holds(scene)):
+        if absent := sorted(set(VARIABLES[name].needs) - holds(varied)):
             raise InputError(
                 f"{path.name}: requirements.{name}: runs of this scene have no such output, "
                 f"because it has no {absent[0]}: leave it out, or add that to the scene"
             )
-    return Campaign(path, text, specification, scene)
+    return Campaign(path, text, specification, varied)

@@ -57,6 +57,9 @@ def command(
     if fidelity == "ideal" and chosen.record.stress:
         chosen = chosen.with_values({"record.stress": False})
         click.echo("stress is left out: the rods of the ideal ring are rigid")
+    if fidelity == "ideal" and chosen.record.positions:
+        chosen = chosen.with_values({"record.positions": False})
+        click.echo("positions are left out: those of the ideal ring follow from its angle")
     target = out or Path(f"{chosen.name}.nc")
 
     from ringsim.cli.progress import watched

@@ -101,3 +101,6 @@ class Record(Model):
     stress: bool = False
     """Record axial + bending stress, elastic + viscous, at the ends of every rod.  Steps then
     resolve the ring's own vibrations (``solver.deviation_tolerance``)."""
+    positions: bool = False
+    """Record where corners, pins, joints and the hub are, so that drawings show what was computed;
+    of 18 sections 4 kB an output time."""

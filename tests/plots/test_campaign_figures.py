@@ -12,11 +12,11 @@ from made_campaign import SECTIONS, TIMES, lags, made_campaign
 from matplotlib.figure import Figure
 
 from ringsim.analysis.campaign_samples import median_and_worst
+from ringsim.analysis.courses import courses
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.plots.campaign.by_input import by_input, drawn
 from ringsim.plots.campaign.convergence import convergence
-from ringsim.plots.campaign.courses import courses
 from ringsim.plots.campaign.distributions import distributions
 from ringsim.plots.campaign.fan import fan
 from ringsim.plots.campaign.figures import PICTURES, draw_campaign, figures_of

@@ -176,7 +176,7 @@ def test_the_players_ring_is_that_of_the_figure() -> None:
     places = np.concatenate([points[pose, :fixed], middle + folded * aside])
     wanted = lines_at(made_scene(), openings)
     wanted.pop("V-joints")
-    wanted["net, taut"] = np.concatenate(
+    wanted["net"] = np.concatenate(
         [wanted.pop(n) for n in ("net, taut", "net, slack") if n in wanted]
     )
     assert set(ring["groups"]) == set(wanted)

@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ringsim.analysis.campaign_samples import told, used, values_of
+from ringsim.analysis.courses import ends
 from ringsim.plots import style
-from ringsim.plots.campaign.courses import ends
 from ringsim.plots.campaign.frame import bands, head
 
 
