@@ -38,6 +38,6 @@ nb_merge_streams = True
 autodoc_member_order = "bysource"
 
 
-def setup(app):  # noqa: ANN001, ANN201
+def setup(app):
     """Fill the places of pages that are made from the code."""
     app.connect("source-read", fill)

@@ -82,7 +82,7 @@ def _meaning(variable: Variable) -> str:
 
 
 def places_of_cables() -> str:
-    """Numbers and names of pulleys and spans of a ring of two sections, by where the winches are."""
+    """Numbers and names of pulleys and spans of two sections, by where the winches are."""
     parts = []
     for end, words in {
         "first": "one winch at section 1",
@@ -126,7 +126,7 @@ def python() -> str:
 
 
 def _own_members(found: type) -> list[str]:
-    """Methods and properties that a class defines itself, without its fields and what is private."""
+    """Public methods and properties that a class defines itself, without its fields."""
     fields = getattr(found, "model_fields", {})
     return [
         name for name, value in vars(found).items()

@@ -40,7 +40,7 @@ def main() -> None:
             save(fan(campaign), "fan.png")
 
 
-def save(figure, name: str) -> None:  # noqa: ANN001
+def save(figure, name: str) -> None:
     """Write a figure as a PNG of 64 colours."""
     path = IMAGES / name
     figure.savefig(path, dpi=WIDTH / figure.get_figwidth())
