@@ -18,11 +18,14 @@ project, author = "ringsim", "the ringsim developers"
 project_copyright = "2026, the ringsim developers"
 release = importlib.metadata.version("ringsim")
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "offline_math"]
 exclude_patterns = ["_build", "README.md"]
 html_theme = "furo"
+html_math_renderer = "mathml"
 html_title = f"ringsim {release}"
 html_copy_source = False
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
 smartquotes = False  # quotes are part of what is written in files
 
 myst_enable_extensions = ["amsmath", "dollarmath", "colon_fence"]
@@ -32,8 +35,7 @@ nb_execution_cache_path = os.environ.get("RINGSIM_DOCS_CACHE", str(HERE / "_buil
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_execution_in_temp = True
-nb_execution_excludepatterns = [] if "RINGSIM_DOCS_PLAIN" not in os.environ else ["*"]
-nb_merge_streams = True
+nb_output_stderr = "remove"  # progress
 
 autodoc_member_order = "bysource"
 

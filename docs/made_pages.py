@@ -115,7 +115,7 @@ def python() -> str:
     parts = []
     for name in ringsim.__all__:
         found = getattr(ringsim, name)
-        where = f"{found.__module__}.{found.__qualname__}"
+        where = f"ringsim.{name}"
         shown = f".. autofunction:: {where}"
         if isinstance(found, type):
             record = issubclass(found, Model)  # whose fields the reference of keys has
