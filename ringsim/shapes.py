@@ -52,6 +52,29 @@ class Shape:
         """Ends of all lines by what they are part of; see ``Points.drawn``."""
         return self.points.drawn(places, self.taut_beyond)
 
+    def lags(self, run: xr.Dataset, time: float) -> dict[str, Array]:
+        """Deviation (degree) from the mean opening angle of the joint that each line ends at, by
+        what the lines are part of, NaN for those that end at none; linear between records.
+        """
+        angles = _rows(run, "opening_angle", ("plane", "section"), time).ravel()
+        lag = np.full(len(self.points.names) + 1, np.nan)
+        lag[self.points.openings.ravel()] = angles - angles.mean()
+        joints = np.zeros(len(lag), dtype=bool)
+        joints[self.points.openings.ravel()] = True
+        found = {}
+        for name, pairs in self.points.lines.items():
+            first, second = pairs.T
+            found[name] = lag[np.where(joints[first], first, np.where(joints[second], second, -1))]
+        return found | {"V-joints": angles - angles.mean()}
+
+    def stresses(self, run: xr.Dataset, time: float) -> dict[str, Array]:
+        """Stress (Pa) of the rods' lines, by what they are part of; see ``rod_stress``."""
+        rows = _rows(run, "rod_stress", ("rod", "section"), time)
+        layout, found = layout_of(self.scene), dict[str, list[Array]]()
+        for row, halves in zip(rows, layout.halves().values(), strict=True):
+            found.setdefault(layout.rods[halves[0].rod].group, []).append(row)
+        return {group: np.concatenate(own) for group, own in found.items()}
+
     def _places(self, known: Array) -> Array:
         return known if self.computed else places_at(self.scene, self.points, known)
 
@@ -92,3 +115,14 @@ def middle_of(layout: Layout) -> Array:
     places = np.array([body.pose.place for body in layout.bodies])
     middle: Array = 0.5 * (places.min(axis=0) + places.max(axis=0)) * [1.0, 1.0, 0.0]
     return middle
+
+
+def _rows(run: xr.Dataset, name: str, dims: tuple[str, str], time: float) -> Array:
+    """A variable of a run over two dimensions at a time (s), linear between records."""
+    known = run[name].transpose("time", *dims).dropna("time", how="all")
+    times, values = known["time"].to_numpy(), known.to_numpy()
+    if len(times) < 2:
+        return np.asarray(values[0], dtype=float)
+    after = int(np.clip(np.searchsorted(times, time), 1, len(times) - 1))
+    share = np.clip((time - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)
+    return np.asarray((1.0 - share) * values[after - 1] + share * values[after], dtype=float)

@@ -1,5 +1,6 @@
 """Arguments and options that several verbs have."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,16 @@ def _assigned(_context: Any, _option: Any, texts: tuple[str, ...]) -> dict[str, 
 def _formats(_context: Any, _option: Any, text: str | None) -> tuple[str, ...] | None:
     if text is None:
         return None
+    return listed("--plot-format", text, PLOT_FORMATS, "is no format of a figure")
+
+
+def listed(option: str, text: str, known: Sequence[str], wrong: str) -> tuple[str, ...]:
+    """The words of a list with commas, each once; InputError if one is not known."""
     asked = tuple(dict.fromkeys(word.strip().lower() for word in text.split(",")))
     for word in asked:
-        if word not in PLOT_FORMATS:
-            known = known_or_nearest(word, PLOT_FORMATS)
-            raise InputError(f"--plot-format {text}: {word!r} is no format of a figure ({known})")
+        if word not in known:
+            hint = known_or_nearest(word, known)
+            raise InputError(f"{option} {text}: {word!r} {wrong} ({hint})")
     return asked
 
 
