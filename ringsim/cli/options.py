@@ -38,6 +38,14 @@ PLOT_FORMAT = click.option(
     "--plot-format", "formats", metavar="png,svg,pdf", callback=_formats,
     help="Formats of the figures, one or more (default png).",
 )  # fmt: skip
+ANIMATE = click.option(
+    "--animate", is_flag=True, help="Write a GIF of the structure as it moves, too."
+)
+COLOUR = click.option(
+    "--colour", metavar="lag|stress", default=None,
+    type=click.Choice(["lag", "stress"]),
+    help="Colours of --animate: deviation from the mean opening angle (default), or stress.",
+)  # fmt: skip
 SCENE = click.argument("scene", metavar="SCENE")
 FOLDER = click.argument("folder", type=PATH)
 SETTINGS = click.option(
@@ -53,3 +61,9 @@ def require_plot(formats: tuple[str, ...] | None, *, plot: bool) -> None:
         raise InputError(
             f"--plot-format {','.join(formats)}: says nothing without --plot; give both"
         )
+
+
+def require_animate(colour: str | None, *, animate: bool) -> None:
+    """Refuse (InputError) a colour of an animation that nobody draws."""
+    if colour is not None and not animate:
+        raise InputError(f"--colour {colour}: says nothing without --animate; give both")

@@ -16,7 +16,7 @@ from ringsim.files import whole
 from ringsim.layout.pose import Array
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
-from ringsim.shapes import Shape, shape_of
+from ringsim.shapes import ByLine, Shape, shape_of
 
 _LINE = 3
 """VTK's number of a cell that is a line."""
@@ -51,32 +51,39 @@ def write_pvd(run: xr.Dataset, folder: Path, stem: str) -> list[Path]:
     words = escape(f"{run.attrs.get('title', '')}: {shape.words}; {parts}").replace("--", "- -")
     inner.mkdir(exist_ok=True)
     entries = ""
-    for number, time in enumerate(shape.times):
+    values = _values(run, shape)
+    for number, time in enumerate(shape.times.tolist()):
         name = f"{number:05d}.vtu"
         with whole(inner / name, lasting=False) as draft:
-            draft.write_text(_grid(run, shape, float(time), words), encoding="utf-8")
+            draft.write_text(_grid(shape, values, time, words), encoding="utf-8")
         entries += f'<DataSet timestep="{time:.9g}" part="0" file="{inner.name}/{name}"/>\n'
     with whole(path, lasting=False) as draft:
         draft.write_text(_COLLECTION.format(words=words, body=entries), encoding="utf-8")
     return [path]
 
 
-def _grid(run: xr.Dataset, shape: Shape, time: float, words: str) -> str:
+def _values(run: xr.Dataset, shape: Shape) -> dict[str, ByLine]:
+    """What lines carry, by name."""
+    found = {}
+    if "opening_angle" in run and shape.points.openings.size:
+        found["lag"] = shape.lags(run)
+    if "rod_stress" in run:
+        found["stress"] = shape.stresses(run)
+    return found
+
+
+def _grid(shape: Shape, values: dict[str, ByLine], time: float, words: str) -> str:
     lines, places = shape.points.lines, shape.at(time)
     pairs = np.concatenate([*lines.values()])
     part = np.repeat(np.arange(len(lines)), [len(each) for each in lines.values()])
     of_cells: dict[str, Array | NDArray[np.int_]] = {"part": part}
-    of_points: dict[str, Array | NDArray[np.int_]] = {}
-    if "opening_angle" in run and shape.points.openings.size:
-        lags = shape.lags(run, time)
-        lag = np.full(len(places), np.nan)
-        lag[shape.points.openings.ravel()] = lags["V-joints"]
-        of_points["lag"] = lag
-        of_cells["lag"] = np.concatenate([lags[name] for name in lines])
-    if "rod_stress" in run:
-        stress = shape.stresses(run, time)
-        nothing = {name: np.full(len(each), np.nan) for name, each in lines.items()}
-        of_cells["stress"] = np.concatenate([(nothing | stress)[name] for name in lines])
+    of_points: dict[str, Array] = {}
+    for name, value in values.items():
+        known = {group: np.full(len(each), np.nan) for group, each in lines.items()} | value(time)
+        of_cells[name] = np.concatenate([known[group] for group in lines])
+        if "V-joints" in known:
+            of_points[name] = np.full(len(places), np.nan)
+            of_points[name][shape.points.openings.ravel()] = known["V-joints"]
     body = (
         _section("PointData", (_array(*each) for each in of_points.items()))
         + _section("CellData", (_array(*each) for each in of_cells.items()))
