@@ -5,6 +5,7 @@ A page asks for it with a line such as ``<!-- made: keys scene -->``; nothing of
 
 import ast
 import importlib
+import os
 import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -150,6 +151,21 @@ def gallery() -> str:
     return "\n\n".join(parts)
 
 
+def rest() -> str:
+    """A list of the pages that no other list names."""
+    here = Path(__file__).parent
+    pages = {path.relative_to(here).with_suffix("") for path in here.rglob("*.md")}
+    listed = {Path("index")}
+    for path in here.rglob("*.md"):
+        for names in re.findall(r"```\{toctree\}(.*?)```", path.read_text("utf-8"), re.DOTALL):
+            for name in re.findall(r"^(?!:)\S+$", names, re.MULTILINE):
+                listed.add(Path(os.path.normpath(path.relative_to(here).parent / name)))
+    left = sorted(str(page) for page in pages - listed if page.parts[0] != "_build")
+    if not left:
+        return ""
+    return "```{toctree}\n:caption: More\n:maxdepth: 1\n\n" + "\n".join(left) + "\n```"
+
+
 def _markdown(words: str) -> str:
     """A docstring as Markdown: its code spans, and its equations as blocks."""
     return words.replace("``", "`")
@@ -169,4 +185,5 @@ MAKERS: dict[str, Callable[..., str]] = {
     "commands": commands,
     "python": python,
     "gallery": gallery,
+    "rest": rest,
 }

@@ -17,6 +17,7 @@ VERBS = {
     "check": "Check a scene file and say what it builds.",
     "run": "Run one scene.",
     "plot": "Draw the figures of a run or a campaign from its file.",
+    "export": "Write results as tables, for MATLAB or for ParaView.",
     "explain": "Say what variables of results, and keys of files, mean.",
     "campaign": "Run a campaign, or finish an interrupted one.",
     "status": "Tell how far a campaign is.",

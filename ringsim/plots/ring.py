@@ -16,7 +16,7 @@ from ringsim.layout.layout import layout_of
 from ringsim.layout.points import points_of
 from ringsim.plots import style
 from ringsim.scene import Scene, scene_from_toml
-from ringsim.shapes import Shape, places_at, shape_of
+from ringsim.shapes import Shape, Track, places_at, shape_of
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ _FADE = 0.6
 """Share of white in the farthest line."""
 _POINT = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1e-3]])
 """Ends of the line, m, that stands for a point: one without a length is not drawn."""
-_LOOKS: dict[str, dict[str, Any]] = {
+LOOKS: dict[str, dict[str, Any]] = {
     "diagonals": {"color": style.BLUE, "linewidth": 1.5},
     "bars": {"color": style.VERMILLION, "linewidth": 1.5, "label": "folding bars"},
     "hinge assemblies": {"color": style.INK, "linewidth": 3.0},
@@ -71,7 +71,7 @@ def ring(dataset: xr.Dataset) -> Figure:
         _caption(axes, middles[number], *moments[number])
     _scale_bar(axes, _WIDTH / scale, height)
     drawn = {name for names, _, _ in shots for name in names}
-    looks = [{"label": name} | look for name, look in _LOOKS.items() if name in drawn]
+    looks = [{"label": name} | look for name, look in LOOKS.items() if name in drawn]
     looks = [look | {"linestyle": "none"} if "marker" in look else look for look in looks]
     entries = [Line2D([], [], **look) for look in looks]
     figure.legend(handles=entries, loc="lower center", ncols=len(entries))
@@ -83,7 +83,7 @@ def ring(dataset: xr.Dataset) -> Figure:
 def lines_at(scene: Scene, openings: Array) -> dict[str, Array]:
     """Lines of a scene at opening angles in rad, shape (planes, sections): see ``Points.drawn``."""
     points = points_of(layout_of(scene))
-    shape = Shape(scene, points, np.zeros(1), computed=False, known=openings[None])
+    shape = Shape(scene, points, computed=False, track=Track(np.zeros(1), openings[None]))
     return shape.lines(places_at(scene, points, openings))
 
 
@@ -199,7 +199,7 @@ def _shot(
 def _draw(axes: Axes, names: list[str], lines: Array, near: Array, scale: float) -> None:
     """Lines, the far ones paler; thinner where a metre is short."""
     thin = float(np.clip(scale / 1.3, 0.45, 1.0))
-    looks = [_LOOKS[name] for name in names]
+    looks = [LOOKS[name] for name in names]
     depth = max(float(np.ptp(near)), 0.8 * float(np.ptp(lines[..., 0])))
     fade = (_FADE * (near.max() - near) / depth)[:, None]
     colours = np.array([to_rgb(look["color"]) for look in looks])
