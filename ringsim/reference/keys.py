@@ -76,11 +76,7 @@ class Key:
     def form(self) -> str:
         """What it is made of: a number, a table, one of some words."""
         if self.models:
-            kinds = [
-                one.model_fields["kind"].default
-                for one in self.models
-                if "kind" in one.model_fields
-            ]
+            kinds = dict.fromkeys(filter(None, map(kind_in, self.models)))
             what = f"table with a kind: {', '.join(kinds)}" if kinds else "table"
             many = {"names": "tables by name, each a ", "list": "list of tables, each a "}
             return f"{many.get(self.holder, '')}{what}"
