@@ -16,7 +16,12 @@ SCHEMA = "scene.schema.json"
 
 @click.command()
 @click.argument("name", required=False)
-@click.option("--out", type=PATH, help="Write it to this file, and a schema for editors beside it.")
+@click.option(
+    "--out",
+    metavar="FILE",
+    type=PATH,
+    help="Write it to this file, and a schema for editors beside it.",
+)
 def command(name: str | None, out: Path | None) -> None:
     """List the built-in scenes, or print the TOML of one.
 
