@@ -14,16 +14,25 @@ Its public words are loaded when they are used, so that importing ringsim costs 
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from ringsim.on_import import when_imported
+
 if TYPE_CHECKING:
     from ringsim.analysis.comparison import compare
     from ringsim.analysis.study import analyse
+    from ringsim.campaign.python import Campaign, CampaignError, open_campaign
+    from ringsim.refusal import InputError
     from ringsim.scene import Scene, load_scene
     from ringsim.simulation import simulate
 
-__all__ = ["Scene", "analyse", "compare", "load_scene", "simulate"]
+__all__ = [
+    "Campaign", "CampaignError", "InputError", "Scene", "analyse", "compare", "load_scene",
+    "open_campaign", "simulate",
+]  # fmt: skip
 
 _HOMES = {
     "analyse": "analysis.study", "compare": "analysis.comparison",
+    "Campaign": "campaign.python", "CampaignError": "campaign.python",
+    "open_campaign": "campaign.python", "InputError": "refusal",
     "Scene": "scene", "load_scene": "scene", "simulate": "simulation",
 }  # fmt: skip
 
@@ -37,3 +46,13 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+def _register() -> None:
+    """Let datasets have ``dataset.ring``."""
+    from ringsim.analysis.accessor import register
+
+    register()
+
+
+when_imported("xarray", _register)

@@ -31,7 +31,9 @@ class OneOf:
             # pydantic passes the errors of this inner reader on with their places and values.
             return _reader(tuple(kinds_of(family).values())).validate_python(value)
 
-        return core_schema.no_info_plain_validator_function(read)
+        # What writes a schema of files needs to know what a reader hides.
+        marks = {"family": family, "one_of": self}
+        return core_schema.no_info_plain_validator_function(read, metadata=marks)
 
 
 def kinds_of(family: type[Model]) -> dict[str, type[Model]]:

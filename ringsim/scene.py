@@ -41,19 +41,33 @@ class Scene(Model):
     """A structure with its loads and how to solve it.  Parts left out are not built."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
+    """Word for the scene in files and messages."""
     title: Annotated[str, Field(max_length=300)] = ""
+    """One line for figures and reports."""
     structure: Annotated[Structure, OneOf(default="pantograph-ring")] = PantographRing()
+    """What deploys."""
     rods: Annotated[Rods, OneOf()] = GeometricallyExactRods()
+    """Material, cross-sections and beam formulation of all rods."""
     joints: Joints = Joints()
+    """Friction in pivots, hinges and V-joints."""
     stop: Annotated[Stop, OneOf(default="spring-damper")] | None = SpringDamperStop()
+    """What ends the travel of every V-joint; built unless it is "none"."""
     boom: Annotated[Boom, OneOf()] | None = None
+    """Tube at the first corner along which the ring slides; left out, there is none."""
     net: Net | None = None
+    """Springs from the upper corners to a hub; left out, there is none."""
     loads: Loads | None = None
+    """Forces on the V-joints; left out, there are none."""
     cables: Cables | None = None
+    """Driving cables with their winches; left out, there are none."""
     limits: Limits = Limits()
+    """What counts as overloaded."""
     faults: Annotated[tuple[Annotated[Fault, OneOf()], ...], ListIn] = ()
+    """What breaks, when and where."""
     solver: Solver = Solver()
+    """Time integration."""
     record: Record = Record()
+    """What a run writes down."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

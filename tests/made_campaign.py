@@ -11,6 +11,7 @@ import xarray as xr
 from ringsim.dataset import to_dataset
 from ringsim.outputs.family import span_names
 from ringsim.scene import Scene, load_scene
+from ringsim.shapes import shape_of
 from ringsim.variables import PLANES, Cause, Fate, Outcome, Status
 
 SECTIONS = 4
@@ -103,3 +104,26 @@ def made_campaign(
     found.attrs |= {"campaign": text, "campaign_name": "made", "title": "Made by hand <&> quoted",
                     "seed": 3}  # fmt: skip
     return found
+
+
+def with_positions(campaign: xr.Dataset, shift: float = 0.5) -> xr.Dataset:
+    """The same, with positions as its angles give them, moved along y by ``shift`` m a second."""
+    scene = made_scene()
+    found, names = np.full((0,), np.nan), dict[str, np.ndarray]()
+    rows = []
+    for sample in range(campaign.sizes["sample"]):
+        run = campaign.isel(sample=sample)
+        known = np.isfinite(run["opening_angle"]).all(("plane", "section")).to_numpy()
+        if not rows:
+            shape = shape_of(campaign.isel(sample=0), scene)
+            names = dict(shape.points.coordinates)
+        found = np.full((len(names["point"]), 3, len(TIMES)), np.nan)
+        if known.any():
+            shape = shape_of(run, scene)
+            for k in np.flatnonzero(known):
+                found[..., k] = shape.at(TIMES[k])
+                found[:, 1, k] += shift * TIMES[k]
+        rows.append(found)
+    told = {"long_name": "position of a point of the structure", "units": "m"}
+    more = campaign.assign_coords(names)
+    return more.assign(position=(("sample", "point", "axis", "time"), np.array(rows), told))

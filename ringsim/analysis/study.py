@@ -95,7 +95,7 @@ def analyse(
         if name in stand and np.isfinite(numbers(stand, name)[good(stand)]).any():
             found = found.assign(_output(stand, name, placed))
     found = found.assign(tail(campaign))
-    more = [_outcomes(stand, placed), influence(stand, wanted, placed)]
+    more = [outcomes(stand, placed), influence(stand, wanted, placed)]
     more += [judge(stand, wanted, placed)] if wanted else []
     more += [sensitivity(campaign, wanted, placed)]
     if reweighted:
@@ -201,7 +201,7 @@ def _root_mean_square(values: Array) -> float:
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
 
 
-def _outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
+def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
     """Counts and shares of what the antenna did, and of how runs were lost, along ``kind``.
 
     Shares of outcomes are of the samples whose numbers hold, those of lost ones of all that ran.

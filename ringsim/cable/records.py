@@ -38,6 +38,7 @@ class Winch(Model):
     """A motor with a drum: a winding law between a start and a stop."""
 
     winding: AnyWinding
+    """Rope taken up over time, or as the tension asks."""
     start_time: SecondOrZero = 0.0
     """Start of the law's time; the drum stands still before."""
     stop_time: SecondOrZero | None = None
@@ -97,6 +98,7 @@ class Cable(Model):
     end: Literal["first", "last", "both"] = "first"
     """Where the winch is: at section 1, at the last section, or one at either end."""
     winch: Winch
+    """Motor at the beginning of the path, or, with two, the one at section 1."""
     far_winch: Winch | None = None
     """With end = "both", the winch at the last section; left out, it is like the first."""
     axial_stiffness: AxialStiffness = 1e5
@@ -104,7 +106,9 @@ class Cable(Model):
     damping_time: SecondOrZero = 0.0
     """Kelvin-Voigt time t_d: stress = E (strain + t_d * strain rate)."""
     pulley_radius: Metre = 0.01
+    """Radius R of the pulleys in the laws of friction; spans run between their centres."""
     friction: AnyFriction = Frictionless()
+    """Law by which tension falls over a pulley."""
     slip_speed: PositiveSpeed | None = None
     """Rope speed over a pulley at which 76 % of its friction acts; left out, it follows the winding
     (``ringsim.cable.regularisation``)."""
@@ -152,7 +156,9 @@ class Cables(Model):
     """
 
     upper: Cable | None = None
+    """Cable in the upper plane."""
     lower: Cable | None = None
+    """Cable in the lower plane."""
     winch_distance: Metre = 0.3
     """From a winch to its nearest pulley, along the boom; that span keeps its length."""
 

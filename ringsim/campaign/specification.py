@@ -68,8 +68,11 @@ class Specification(Model):
     }
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
+    """Word for the campaign, and for the folder of its results below ``runs``."""
     title: Annotated[str, Field(max_length=300)] = ""
+    """One line for figures and reports."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    """With its number, all that the inputs of a sample depend on."""
     scene: str
     """Built-in scene, or scene file looked up beside the campaign file."""
     set: Annotated[dict[str, Any], BeforeValidator(flat)] = Field(default_factory=dict)
@@ -79,8 +82,11 @@ class Specification(Model):
     ] = Field(default_factory=dict)
     """Distribution by scene path."""
     correlations: list[Correlation] = Field(default_factory=list)
+    """Pairs of inputs that depend on each other."""
     design: AnyDesign
+    """How the samples are placed."""
     limits: Allowance = Allowance()
+    """What one run may use before it is ended."""
     fidelity: Literal["full", "frame", "ideal"] = "full"
     """full: the flexible multibody model; frame: the same in joint coordinates, several times as
     fast; ideal: rigid rods."""
@@ -101,6 +107,7 @@ class Specification(Model):
     looks: Looks = Looks()
     """After how many samples that is judged."""
     output: OutputTable = OutputTable()
+    """How ``campaign.nc`` stores the results."""
 
     @model_validator(mode="after")
     def _can_be_checked(self) -> "Specification":
@@ -199,12 +206,21 @@ class Campaign:
 def load_campaign(
     path: Path, settings: Mapping[str, Any] | None = None, samples: int | None = None
 ) -> Campaign:
-    """Read a campaign file; InputError if it, its content or its scene is refused.
+    """Read a campaign file; see :func:`campaign_of`."""
+    return campaign_of(read_text(path), path, settings, samples)
 
-    ``settings`` are values by scene path beyond those under [set], ``samples`` another size of the
-    design; both become comments at the end of the campaign's text.
+
+def campaign_of(
+    text: str, path: Path, settings: Mapping[str, Any] | None = None, samples: int | None = None,
+    scene: Scene | None = None,
+) -> Campaign:  # fmt: skip
+    """The campaign that a text describes; InputError if it, its content or its scene is refused.
+
+    ``path`` is where the text is from: files that it names are looked up beside it.  ``settings``
+    are values by scene path beyond those under [set], ``samples`` another size of the design; both
+    become comments at the end of the campaign's text.  A ``scene`` takes the place of the one that
+    the text names.
     """
-    text = read_text(path)
     table = parse_toml(text, path.name)
     if "structure" in table and not {"scene", "design"} & set(table):
         raise InputError(
@@ -229,17 +245,17 @@ def load_campaign(
         text += f"\n# called with --set {name} = {json.dumps(value, default=str)}"
     key = "scene"
     try:
-        base = load_scene(specification.scene, beside=path)
+        base = load_scene(specification.scene, beside=path) if scene is None else scene
         key = "set"
-        scene = base.with_values(specification.set)
+        varied = base.with_values(specification.set)
     except InputError as error:
         raise InputError(f"{path.name}: {key}: {error}") from None
     wanted = {f"requirements.{name}": name for name in specification.requirements}
     wanted |= {f"stop_when.of = {each.of}": each.of for each in specification.stop_when if each.of}
     for where, name in wanted.items():
-        if absent := sorted(set(VARIABLES[name].needs) - holds(scene)):
+        if absent := sorted(set(VARIABLES[name].needs) - holds(varied)):
             raise InputError(
                 f"{path.name}: {where}: runs of this scene have no such output, "
                 f"because it has no {absent[0]}: leave it out, or add that to the scene"
             )
-    return Campaign(path, text, specification, scene)
+    return Campaign(path, text, specification, varied)

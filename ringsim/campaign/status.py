@@ -1,28 +1,16 @@
-"""What a campaign is going to do, and how far it is, also while its folder is being filled."""
+"""How far a campaign is, also while its folder is being filled."""
 
 import contextlib
 import json
 import time
 from collections import Counter
-from pathlib import Path
-
-import numpy as np
 
 from ringsim.analysis.campaign_notes import ending_lines
-from ringsim.campaign.folder import Folder, opened_as
-from ringsim.campaign.run import Share
-from ringsim.campaign.specification import Campaign
+from ringsim.campaign.folder import Folder
 from ringsim.campaign.stopping import End, decided, looks_of
-from ringsim.choice import kind_of
-from ringsim.execution.local import Local
-from ringsim.execution.work import Work, relative_cost
-from ringsim.sampling.columns import Column
-from ringsim.sampling.designs.grouped import Grouped
-from ringsim.sampling.values import labels_of
-from ringsim.storage.journal import survey
 from ringsim.storage.locks import in_use
 from ringsim.storage.netcdf import NOT_RUN
-from ringsim.storage.result import Result, sample_of
+from ringsim.storage.result import sample_of
 from ringsim.variables import Status
 
 _TOLD = {"state", "host", "pid", "workers", "elapsed", "updated", "done", "done_before", "running"}
@@ -106,75 +94,3 @@ def _stopping(campaign: Folder, planned: int, end: End | None) -> list[str]:
 
 def _named(number: int) -> str:
     return str(number) if number >= 0 else f"check of {sample_of(number)}"
-
-
-def plan(campaign: Campaign, folder: Path, *, workers: int, share: Share, solver: str) -> list[str]:
-    """The plan as text; InputError if the folder, which need not exist, is another campaign's.
-
-    The cost is predicted from samples that are done; if there are none, one sample of middling
-    cost runs as a trial, and nothing of it is kept.
-    """
-    table = campaign.draw()
-    old = opened_as(campaign, folder, table, solver)
-    found = survey(folder, old.attributes["identity"] if old is not None else "", table.samples)
-    todo = found.missing[share.holds(found.missing)]
-    cost = relative_cost(table, campaign.scene)
-    design = campaign.specification.design
-    kind = kind_of(design)
-    lines = [
-        f"{campaign.specification.name}: {table.samples} samples "
-        f"({kind} design), {len(todo)} to run here",
-        *(
-            [f"  runs           {design.runs_told(table.samples)}"]
-            if isinstance(design, Grouped)
-            else []
-        ),
-        f"  folder         {folder}",
-        f"  workers        {workers}",
-        *map(_extent, table.columns),
-    ]
-    if rule := campaign.specification.rule:
-        numbers = rule.numbers(table.samples, campaign.specification.rule_replicates)
-        told = ", ".join(map(str, numbers)) or "none before the last sample"
-        lines.append(f"  looks          {told} (stop_when)")
-    if every := campaign.specification.check_every:
-        number = len(range(0, table.samples, every))
-        lines.append(f"  checks         {number} samples with the full engine, too (not predicted)")
-    if len(todo) == 0:
-        return [*lines, "  nothing is left to run"]
-    known = np.flatnonzero(np.isfinite(found.seconds))
-    if len(known):
-        per_cost = float(found.seconds[known].sum() / cost[known].sum())
-        basis = f"from {len(known)} samples that are done"
-    else:
-        trial = int(todo[np.argsort(cost[todo])[len(todo) // 2]])
-        kept: list[Result] = []
-        work = Work(
-            solver=solver, scene=campaign.scene.to_table(), values_of=table.values_of,
-            allowance=campaign.specification.limits, keep=kept.append, stop=lambda: "",
-        )  # fmt: skip
-        Local(1).run([trial], work)
-        (result,) = kept
-        per_cost = result.seconds / cost[trial]
-        basis = f"from a trial run of sample {trial}: {result.status.word}, {result.reason}"
-    each = per_cost * cost[todo]
-    whole = max(each.sum() / min(workers, len(todo)), each.max())
-    return [
-        *lines,
-        f"  cost           {each.mean():.3g} s a sample ({each.min():.3g} to {each.max():.3g} s), "
-        f"{basis}",
-        f"  predicted      about {in_words(float(whole))}",
-    ]
-
-
-def _extent(column: Column) -> str:
-    values = column.values
-    if values.dtype.kind in "iuf":
-        unit = "" if column.units == "1" else f" {column.units}"
-        extent = f"{values.min():.6g} to {values.max():.6g}{unit}"
-    else:
-        words = sorted(set(labels_of(values).ravel().tolist()))
-        more = [f"and {len(words) - _MOST_SHOWN} more"] if len(words) > _MOST_SHOWN else []
-        extent = ", ".join(words[:_MOST_SHOWN] + more)
-    each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
-    return f"  {column.path or f'label {column.name}'}: {extent}{each}"

@@ -6,13 +6,12 @@ import os
 import platform
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-
-from tqdm import tqdm
 
 from ringsim.files import whole
 from ringsim.storage.result import Result, sample_of
@@ -42,8 +41,14 @@ class StopRequest:
 
 @contextlib.contextmanager
 def stopping_on_signals() -> Iterator[StopRequest]:
-    """Turn the first stop signal into a request; a second one ends the process as usual."""
+    """Turn the first stop signal into a request; a second one ends the process as usual.
+
+    Only a main thread can: in another one, signals do what they always do.
+    """
     stop = StopRequest()
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
 
     def note(number: int, _frame: Any) -> None:
         stop.note(f"stopped by {signal.Signals(number).name}", signalled=True)
@@ -76,9 +81,14 @@ class Progress:
     def __post_init__(self) -> None:
         self._before, self._news, self._written = self.done, False, -_FILE_SECONDS
         self._begin = self._told = time.monotonic()
+        notebook = "ipykernel" in sys.modules
+        if notebook:
+            from tqdm.auto import tqdm
+        else:  # tqdm.auto takes 0.1 s to find out where it is
+            from tqdm import tqdm
         self._bar = tqdm(
             total=self.total, initial=self.done, desc=self.name, unit="sample", smoothing=0.1,
-            postfix={"failed": self.failed}, disable=not sys.stderr.isatty(),
+            postfix={"failed": self.failed}, disable=not (notebook or sys.stderr.isatty()),
         )  # fmt: skip
         if self._bar.disable:
             self._tell(f"{self.done} of {self.total} samples done, {self.workers} workers")

@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE, EXIT_INTERRUPTED
 from ringsim.refusal import InputError, known_or_nearest
@@ -16,7 +17,8 @@ VERBS = {
     "check": "Check a scene file and say what it builds.",
     "run": "Run one scene.",
     "plot": "Draw the figures of a run or a campaign from its file.",
-    "explain": "Say what the variables of a result mean.",
+    "export": "Write results as tables, for MATLAB or for ParaView.",
+    "explain": "Say what variables of results, and keys of files, mean.",
     "campaign": "Run a campaign, or finish an interrupted one.",
     "status": "Tell how far a campaign is.",
     "merge": "Put the results of a campaign into one file.",
@@ -38,10 +40,17 @@ class _Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import the verb's file; InputError if there is no such verb."""
         if cmd_name not in VERBS:
+            if ctx.resilient_parsing:  # a shell completes what is being typed
+                return None
             hint = known_or_nearest(cmd_name, VERBS)
             raise InputError(f"ringsim {cmd_name}: there is no such verb ({hint})")
         command: click.Command = importlib.import_module(f"ringsim.cli.{cmd_name}").command
         return command
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Verbs, without importing any of them."""
+        found = [CompletionItem(v, help=h) for v, h in VERBS.items() if v.startswith(incomplete)]
+        return found or click.Command.shell_complete(self, ctx, incomplete)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Turn refused input into one line and its exit code."""

@@ -1,27 +1,20 @@
 """``ringsim campaign``: run a campaign, or finish an interrupted one."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ringsim.campaign.folder import open_folder, prepare_folder
-from ringsim.campaign.growing import grown, grows, is_open
-from ringsim.campaign.retry import FAILED, check_settings
-from ringsim.campaign.run import Choices, Share, run_campaign
+from ringsim.campaign.folder import open_folder
+from ringsim.campaign.plan import plan
+from ringsim.campaign.run import Share
 from ringsim.campaign.specification import SOLVERS, load_campaign
-from ringsim.campaign.status import plan
+from ringsim.campaign.start import Order, require_no_launcher, start
 from ringsim.campaign.stopping import as_decided
 from ringsim.cli.options import PATH, PLOT_FORMAT, SETTINGS, require_plot
-from ringsim.execution.local import Local, Serial
-from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
-from ringsim.execution.work import Scheduler
+from ringsim.execution.mpi import launched_size
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
-from ringsim.refusal import InputError
 from ringsim.storage.merge import NAME as MERGED
-from ringsim.storage.netcdf import DESIGN
-from ringsim.variables import Status
 
 
 @click.command()
@@ -59,49 +52,16 @@ def command(
     samples have run (some may have failed, up to max_failed), 3 too many or all of them failed, or
     the frame engine differs from the full one by more than max_difference, 130 stopped by a signal.
     """
-    size = launched_size()
     require_plot(formats, plot=plot)
 
-    def prepare() -> tuple[Path, tuple[Any, ...]]:
-        if size > 1 and workers is not None and not dry_run:
-            raise InputError(
-                f"--workers {workers}: under an MPI launcher every rank drives one solver "
-                "process: leave out --workers"
-            )
+    def order() -> Order:
+        if not dry_run:
+            require_no_launcher(workers)
         # With --retry-failed they are settings of the failed samples alone.
         own, theirs = ({}, settings) if retry_failed else (settings, {})
         campaign, share = load_campaign(file, own, samples), Share.parse(part)
-        if grows(campaign) and share.count > 1:
-            raise InputError(
-                f"--part {part}: which samples a design of kind subset-simulation has depends on "
-                "the results of all others: leave it out, and use --workers or MPI"
-            )
-        if grows(campaign) and retry_failed:
-            raise InputError(
-                "--retry-failed: later samples of a design of kind subset-simulation follow from "
-                "the results as they are: leave it out, or choose another folder with --out"
-            )
-        check_settings(campaign.scene, theirs)
-        wanted = campaign.specification
-        folder, name = out or Path("runs") / wanted.name, solver or SOLVERS[wanted.fidelity]
-        if dry_run:
-            count = max(1, workers or size)
-            for line in plan(campaign, folder, workers=count, share=share, solver=name):
-                click.echo(line)
-        elif retry_failed and (folder / DESIGN).exists():
-            begun = open_folder(folder).attributes["campaign_name"]
-            if begun != wanted.name:
-                raise InputError(
-                    f"{folder}: this folder holds the campaign {begun}, not {wanted.name}: choose "
-                    "its folder with --out"
-                )
-        else:
-            campaign = grown(campaign, folder)
-            prepare_folder(campaign, folder, solver=name, judge=judge)
-        again = FAILED if retry_failed else frozenset[Status]()
-        # To be asked again as long as samples follow from the results of others.
-        more = grows(campaign) and not retry_failed and not dry_run and is_open(campaign)
-        return folder, (wanted.limits, wanted.max_failed, share, again, theirs, more)
+        folder = out or Path("runs") / campaign.specification.name
+        return Order(campaign, folder, share, retry_failed, theirs, solver, judge)
 
     def draw(folder: Path) -> None:
         # As long as samples are left, a file would be an older one.
@@ -116,39 +76,12 @@ def command(
             click.echo(f"wrote {picture}")
 
     if dry_run:
-        prepare()
+        for line in plan(order(), max(1, workers or launched_size())):
+            click.echo(line)
         return EXIT_DONE
-    if size == 1:
-        return _run(Serial() if workers == 0 else Local(workers or 1), prepare, draw)
-    world = mpi_world()
-    with aborting(world):
-        return _run(Mpi(world), prepare, draw)
-
-
-def _run(
-    scheduler: Scheduler, prepare: Callable[[], tuple[Path, tuple[Any, ...]]],
-    draw: Callable[[Path], None],
-) -> int:  # fmt: skip
-    """Prepare on rank 0, run on all ranks, draw on rank 0; what is refused is told once."""
-    try:
-        while True:
-            prepared: Any = None
-            if scheduler.rank == 0:
-                try:
-                    prepared = prepare()
-                except InputError as error:
-                    prepared = error
-            if isinstance(prepared := scheduler.from_first(prepared), InputError):
-                raise prepared
-            folder, choices = prepared
-            how = Choices(scheduler, *choices)
-            code = run_campaign(folder, how)
-            if not how.more or scheduler.from_first(code) != EXIT_DONE:
-                break
-        if scheduler.rank == 0:
-            draw(folder)
-        return code
-    except InputError as error:
-        if scheduler.rank == 0:
-            click.echo(str(error), err=True)
-        return EXIT_BAD_INPUT
+    ended = start(workers, order, draw)
+    if ended.refused is None:
+        return ended.code
+    if ended.first:
+        click.echo(str(ended.refused), err=True)
+    return EXIT_BAD_INPUT

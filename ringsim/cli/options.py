@@ -1,12 +1,15 @@
 """Arguments and options that several verbs have."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from ringsim.overrides import parse_assignment
 from ringsim.refusal import InputError, known_or_nearest
+from ringsim.scene import builtin_scenes
 
 PATH = click.Path(path_type=Path)
 WORKERS = click.IntRange(1, 4096)
@@ -19,12 +22,23 @@ def _assigned(_context: Any, _option: Any, texts: tuple[str, ...]) -> dict[str, 
 def _formats(_context: Any, _option: Any, text: str | None) -> tuple[str, ...] | None:
     if text is None:
         return None
+    return listed("--plot-format", text, PLOT_FORMATS, "is no format of a figure")
+
+
+def listed(option: str, text: str, known: Sequence[str], wrong: str) -> tuple[str, ...]:
+    """The words of a list with commas, each once; InputError if one is not known."""
     asked = tuple(dict.fromkeys(word.strip().lower() for word in text.split(",")))
     for word in asked:
-        if word not in PLOT_FORMATS:
-            known = known_or_nearest(word, PLOT_FORMATS)
-            raise InputError(f"--plot-format {text}: {word!r} is no format of a figure ({known})")
+        if word not in known:
+            hint = known_or_nearest(word, known)
+            raise InputError(f"{option} {text}: {word!r} {wrong} ({hint})")
     return asked
+
+
+def _scenes(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:
+    """Built-in scenes, or files where none begins so."""
+    found = [CompletionItem(name) for name in builtin_scenes() if name.startswith(begun)]
+    return found or [CompletionItem(begun, type="file")]
 
 
 PLOT_FORMATS = ("png", "svg", "pdf")
@@ -32,7 +46,15 @@ PLOT_FORMAT = click.option(
     "--plot-format", "formats", metavar="png,svg,pdf", callback=_formats,
     help="Formats of the figures, one or more (default png).",
 )  # fmt: skip
-SCENE = click.argument("scene", metavar="SCENE")
+ANIMATE = click.option(
+    "--animate", is_flag=True, help="Write a GIF of the structure as it moves, too."
+)
+COLOUR = click.option(
+    "--colour", metavar="lag|stress", default=None,
+    type=click.Choice(["lag", "stress"]),
+    help="Colours of --animate: deviation from the mean opening angle (default), or stress.",
+)  # fmt: skip
+SCENE = click.argument("scene", metavar="SCENE", shell_complete=_scenes)
 FOLDER = click.argument("folder", type=PATH)
 SETTINGS = click.option(
     "--set", "settings", metavar="PATH=VALUE", multiple=True, callback=_assigned,
@@ -47,3 +69,9 @@ def require_plot(formats: tuple[str, ...] | None, *, plot: bool) -> None:
         raise InputError(
             f"--plot-format {','.join(formats)}: says nothing without --plot; give both"
         )
+
+
+def require_animate(colour: str | None, *, animate: bool) -> None:
+    """Refuse (InputError) a colour of an animation that nobody draws."""
+    if colour is not None and not animate:
+        raise InputError(f"--colour {colour}: says nothing without --animate; give both")

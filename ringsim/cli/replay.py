@@ -12,7 +12,7 @@ from ringsim.execution.solve import load_solver, solve
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.outputs import COORDINATES
 from ringsim.refusal import InputError
-from ringsim.storage.result import Result
+from ringsim.storage.result import Result, check_of
 from ringsim.variables import TIMINGS, Outcome
 
 
@@ -20,8 +20,9 @@ from ringsim.variables import TIMINGS, Outcome
 @FOLDER
 @click.argument("sample", type=int)
 @click.option("--scene", is_flag=True, help="Print the sample's scene and do not run it.")
+@click.option("--check", is_flag=True, help="Repeat the sample's check by the full engine instead.")
 @click.option("--save", metavar="FILE", type=PATH, help="Write the run to a netCDF file.")
-def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
+def command(folder: Path, sample: int, *, scene: bool, check: bool, save: Path | None) -> int:
     """Run SAMPLE of the campaign in FOLDER again in this process, and compare the results.
 
     Nothing in the folder changes.  Everything that the solver prints is shown; a crash or a hang
@@ -37,7 +38,14 @@ def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
         raise InputError(
             f"sample {sample} is not in {folder}: choose one from 0 to {campaign.table.samples - 1}"
         )
-    before = next(campaign.survey().results([sample]), None)
+    solver, number = campaign.attributes["solver"], sample
+    if check:
+        if "judge" not in campaign.attributes:
+            raise InputError(
+                f"--check: the samples of {folder} have no checks (check_every): leave it out"
+            )
+        solver, number = campaign.attributes["judge"], check_of(sample)
+    before = next(campaign.survey(checks=check).results([sample]), None)
     values = campaign.table.values_of(sample) | (before.overrides if before is not None else {})
     exact = campaign.scene.with_values(values)
     if scene:
@@ -46,10 +54,11 @@ def command(folder: Path, sample: int, scene: bool, save: Path | None) -> int:
     faulthandler.enable()
     for path, value in values.items():
         click.echo(f"{path} = {value}")
-    result = solve(load_solver(campaign.attributes["solver"]), campaign.scene, sample, values)
+    result = solve(load_solver(solver), campaign.scene, number, values)
     if result.log:
         click.echo(result.log)
-    click.echo(f"sample {sample}: {result.status.word}: {result.reason} ({result.seconds:.2f} s)")
+    name = f"{'check of ' * check}sample {sample}"
+    click.echo(f"{name}: {result.status.word}: {result.reason} ({result.seconds:.2f} s)")
     if save is not None:
         from ringsim.dataset import to_dataset
 

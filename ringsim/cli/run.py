@@ -7,7 +7,16 @@ import click
 import numpy as np
 
 from ringsim.choice import kind_of
-from ringsim.cli.options import PATH, PLOT_FORMAT, SCENE, SETTINGS, require_plot
+from ringsim.cli.options import (
+    ANIMATE,
+    COLOUR,
+    PATH,
+    PLOT_FORMAT,
+    SCENE,
+    SETTINGS,
+    require_animate,
+    require_plot,
+)  # fmt: skip
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
@@ -39,10 +48,12 @@ from ringsim.scene import Scene, load_scene
 )  # fmt: skip
 @click.option("--plot", is_flag=True, help="Draw figures beside the netCDF file.")
 @PLOT_FORMAT
+@ANIMATE
+@COLOUR
 def command(
     scene: str, settings: dict[str, Any], out: Path | None, fidelity: str | None,
     accuracy: float | None, of: str | None, evidence: Path | None, *, plot: bool,
-    formats: tuple[str, ...] | None,
+    formats: tuple[str, ...] | None, animate: bool, colour: str | None,
 ) -> int:  # fmt: skip
     """Run SCENE (a built-in name or a TOML file) and write SCENE.nc."""
     chosen = load_scene(scene)
@@ -53,10 +64,19 @@ def command(
         if value is not None and accuracy is None:
             raise InputError(f"{name} {value}: says nothing without --accuracy; give both")
     require_plot(formats, plot=plot)
+    require_animate(colour, animate=animate)
     chosen = chosen.with_values(settings)
+    if colour == "stress" and not (chosen.record.stress and fidelity != "ideal"):
+        raise InputError(
+            "--colour stress: needs the stresses: give --set record.stress=true, too, and a "
+            "fidelity with elastic rods"
+        )
     if fidelity == "ideal" and chosen.record.stress:
         chosen = chosen.with_values({"record.stress": False})
         click.echo("stress is left out: the rods of the ideal ring are rigid")
+    if fidelity == "ideal" and chosen.record.positions:
+        chosen = chosen.with_values({"record.positions": False})
+        click.echo("positions are left out: those of the ideal ring follow from its angle")
     target = out or Path(f"{chosen.name}.nc")
 
     from ringsim.cli.progress import watched
@@ -107,6 +127,13 @@ def command(
         # Not recorded for the figure: steps that resolve the rods' vibration are another run.
         if ring and fidelity != "ideal" and not chosen.record.stress:
             click.echo("stresses are drawn with --set record.stress=true")
+    if animate:
+        from ringsim.plots.animation import animate as write_animation
+
+        moving = write_animation(dataset, target.with_suffix(".gif"), colour or "lag")
+        click.echo(f"wrote {moving}")
+        if not chosen.record.positions and fidelity != "ideal":
+            click.echo("it shows computed positions with --set record.positions=true")
     failed = any(outcome.status.failed for outcome in outcomes.values())
     return EXIT_FAILED if failed else EXIT_DONE
 

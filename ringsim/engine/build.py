@@ -14,6 +14,7 @@ from ringsim.engine.model import Multibody
 from ringsim.engine.rods import Ancf
 from ringsim.layout.bodies import OnBody
 from ringsim.layout.layout import BoomBeam
+from ringsim.layout.points import BOOM_TIP
 from ringsim.parts.boom.flexible import FlexibleBoom
 from ringsim.scene import Scene
 
@@ -81,6 +82,7 @@ def _add_boom(model: Multibody, beam: BoomBeam) -> None:
         point = item.NodePointSlope1(referenceCoordinates=[*(top + arm), *down])
         start_of = [start[:3] + np.cross(spin, arm), np.cross(spin, down)]
         nodes.append(assembly.add_node(point, np.concatenate(start_of)))
+    model.loose[BOOM_TIP] = nodes[-1]
     length = boom.length / boom.elements
     cables = [
         assembly.system.AddObject(

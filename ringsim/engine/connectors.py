@@ -20,6 +20,7 @@ from ringsim.engine.model import BuiltJoint, Multibody
 from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.rotations import Array
 from ringsim.layout.layout import Contact, HubNet
+from ringsim.layout.points import HUB
 from ringsim.layout.pose import turned_about_z
 from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
@@ -203,6 +204,7 @@ def _net(model: Multibody, held: HubNet) -> Reacting:
         item.NodePoint(referenceCoordinates=list(held.hub)),
         np.mean([assembly.starts[int(node)][:3] for node in nodes], axis=0),
     )
+    model.loose[HUB] = hub
     mass = item.ObjectMassPoint(nodeNumber=hub, mass=net.hub_mass)
     assembly.bodies.append(assembly.system.AddObject(mass))
 

@@ -15,6 +15,7 @@ from ringsim.cable.state import ChainState
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.build import Built, build
 from ringsim.engine.meters import BendingMeter, EnergyMeter, StressMeter
+from ringsim.engine.positions import PositionMeter
 from ringsim.engine.readings import Openings, State, joint_groups
 from ringsim.engine.rotations import Array
 from ringsim.engine.settings import newton_norm, solver_settings
@@ -59,7 +60,10 @@ class Integration:
         self._stress = StressMeter(model) if scene.record.stress else None
         gauge = scene.structure.gauge
         self._bending = BendingMeter(model, gauge) if gauge else None
+        self._position = PositionMeter(model) if scene.record.positions else None
         coordinates = {"rod": np.array(list(model.layout.halves()))}
+        if self._position is not None:
+            coordinates |= self._position.coordinates
         if self._bending is not None:
             coordinates["station"] = self._bending.stations
         self._gaps = joint_groups(model)
@@ -199,6 +203,7 @@ class Integration:
                 chain=self._chain,
                 planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
                 stress=None if self._stress is None else self._stress.read(),
+                places=None if self._position is None else self._position.read(self._state),
                 strain=None if self._bending is None else self._bending.read(),
             )
         )

@@ -37,7 +37,7 @@ class BuiltJoint(NamedTuple):
 
 class Multibody:
     """Bodies (each with its node), rods, joints and loads of a scene's layout at the start, in the
-    layout's order.
+    layout's order; ``loose`` are nodes of neither, by the names of ``ringsim.layout.points``.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -53,6 +53,7 @@ class Multibody:
                 (assembly.add_body(node, body.mass, body.inertia, body.centre), node)
             )
         self.rods: list[BuiltRod] = []
+        self.loose: dict[str, Any] = {}
         for part in self.layout.rods:
             poses = [started(part.station(share)) for share in part.stations]
             rod = add_rod(assembly, formulation, part, poses, scene.rods)

@@ -10,6 +10,7 @@ from ringsim.cable.faults.family import CableFault
 from ringsim.frame.kernels import Strains, move, moved_between, straighten
 from ringsim.frame.meter import EnergyMeter
 from ringsim.frame.model import FrameModel
+from ringsim.frame.positions import PositionMeter
 from ringsim.frame.secants import Secants
 from ringsim.frame.state import State
 from ringsim.frame.stresses import StressMeter
@@ -65,12 +66,14 @@ class Integration:
         self._faults = sorted(scene.faults, key=lambda fault: fault.time)
         self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
         self._stress = StressMeter(model.mesh, model.layout) if scene.record.stress else None
+        self._position = PositionMeter(model) if scene.record.positions else None
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
         first = self._measure(0.0, self._now)
         self._locks = (
             Locks(first.angles, stowed, scene.structure.planes) if scene.structure.locks else None
         )
-        self.history = Recorder(scene, {"rod": np.array(list(model.layout.halves()))})
+        own = {} if self._position is None else self._position.coordinates
+        self.history = Recorder(scene, own | {"rod": np.array(list(model.layout.halves()))})
         ropes = None if model.cables is None else model.cables.ropes.content
         self._control = RunControl(
             scene.solver,
@@ -229,6 +232,7 @@ class Integration:
                 chain=self._now.chain,
                 planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
                 stress=None if self._stress is None else self._stress.read(self._strains),
+                places=None if self._position is None else self._position.read(self._now),
             )
         )
         return now

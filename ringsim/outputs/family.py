@@ -115,6 +115,7 @@ def holds(scene: Scene) -> set[str]:
     held |= {
         kind_of(scene.structure): True,
         "stress": scene.record.stress,
+        "positions": scene.record.positions,
         "error bars": scene.solver.error_bars,
         "gauge": bool(scene.structure.gauge),
     }

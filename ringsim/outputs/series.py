@@ -30,6 +30,9 @@ class Reading(Instant):
     """Planes of each cable of the chain: one may stand for two cables that pull alike."""
     stress: Array | None = None
     """Axial + bending stress, shape (rod halves, sections), Pa; None unless recorded."""
+    places: Array | None = None
+    """Places (m) and velocities (m/s) of the structure's points, shape (points, 2, 3); None unless
+    recorded."""
     strain: Array | None = None
     """Bending strain at the stations of the rod with the gauge, if the structure has one."""
 

@@ -14,3 +14,4 @@ class Loads(Model):
     """
 
     force: PerSection[Newton]
+    """Force on the V-joints of a section, up on the upper and down on the lower one."""

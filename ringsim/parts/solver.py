@@ -35,7 +35,10 @@ class Solver(Model):
     step: Second = 0.2
     """Largest step, or the step if it is constant."""
     step_control: Literal["motion", "constant"] = "motion"
+    """Whether steps follow the motion, or all are equal."""
     tolerance: Annotated[float, Field(ge=_LEAST_TOLERANCE, le=_LARGEST_TOLERANCE)] = 3e-4
+    """Relative error in time per step that the step control aims at; errors of a run grow like
+    it."""
     spectral_radius: Ratio = 0.8
     """High-frequency amplification per step: 1 keeps every vibration, lower damps it."""
     newton_tolerance: Annotated[float, Field(ge=1e-12, le=1e-2)] = 1e-4
@@ -98,3 +101,6 @@ class Record(Model):
     stress: bool = False
     """Record axial + bending stress, elastic + viscous, at the ends of every rod.  Steps then
     resolve the ring's own vibrations (``solver.deviation_tolerance``)."""
+    positions: bool = False
+    """Record where corners, pins, joints and the hub are, so that drawings show what was computed;
+    of 18 sections 4 kB an output time."""

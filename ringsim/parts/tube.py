@@ -12,7 +12,9 @@ class Tube(Model):
     """A circular tube; inner_diameter = 0 is a solid rod."""
 
     outer_diameter: Metre
+    """Outer diameter of the tube."""
     inner_diameter: MetreOrZero
+    """Inner diameter; 0 for a solid rod."""
 
     @model_validator(mode="after")
     def _inside(self) -> Self:

@@ -12,10 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from ringsim.layout.layout import layout_at_opening, layout_of
-from ringsim.layout.lines import lines_of
+from ringsim.layout.layout import layout_of
+from ringsim.layout.points import points_of
 from ringsim.plots import style
 from ringsim.scene import Scene, scene_from_toml
+from ringsim.shapes import Shape, Track, places_at, shape_of
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ _FADE = 0.6
 """Share of white in the farthest line."""
 _POINT = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1e-3]])
 """Ends of the line, m, that stands for a point: one without a length is not drawn."""
-_LOOKS: dict[str, dict[str, Any]] = {
+LOOKS: dict[str, dict[str, Any]] = {
     "diagonals": {"color": style.BLUE, "linewidth": 1.5},
     "bars": {"color": style.VERMILLION, "linewidth": 1.5, "label": "folding bars"},
     "hinge assemblies": {"color": style.INK, "linewidth": 3.0},
@@ -44,12 +45,14 @@ def ring(dataset: xr.Dataset) -> Figure:
     """Three instants of a run side by side, all to one scale, with a scale bar in metre.
 
     Orthographic views in which nearer lines are darker.  ``dataset`` is a run with
-    ``opening_angle`` (plane, section, time), its scene as TOML in the attribute ``scene``.
+    ``opening_angle`` (plane, section, time), its scene as TOML in the attribute ``scene``; where it
+    has ``position`` (point, axis, time) this is drawn.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
     azimuth = facing_azimuth(scene)
     moments = instants(dataset)
-    shots = [_shot(scene, angles, _locked(dataset, angles), azimuth) for _, angles in moments]
+    shape = shape_of(dataset, scene)
+    shots = [_shot(shape, angles, _locked(dataset, angles), azimuth) for _, angles in moments]
     low = np.array([lines.min(axis=(0, 1)) for _, lines, _ in shots])
     sizes = np.array([lines.max(axis=(0, 1)) for _, lines, _ in shots]) - low
     height = float(sizes[:, 1].max())
@@ -68,19 +71,20 @@ def ring(dataset: xr.Dataset) -> Figure:
         _caption(axes, middles[number], *moments[number])
     _scale_bar(axes, _WIDTH / scale, height)
     drawn = {name for names, _, _ in shots for name in names}
-    looks = [{"label": name} | look for name, look in _LOOKS.items() if name in drawn]
+    looks = [{"label": name} | look for name, look in LOOKS.items() if name in drawn]
     looks = [look | {"linestyle": "none"} if "marker" in look else look for look in looks]
     entries = [Line2D([], [], **look) for look in looks]
     figure.legend(handles=entries, loc="lower center", ncols=len(entries))
-    style.head(figure, axes, dataset, "Deployment", pad=72.0 * _BAR)
+    subject = "Deployment as computed" if shape.computed else "Deployment"
+    style.head(figure, axes, dataset, subject, pad=72.0 * _BAR)
     return figure
 
 
 def lines_at(scene: Scene, openings: Array) -> dict[str, Array]:
-    """Lines of a scene at opening angles in rad, shape (planes, sections): see ``lines_of``."""
-    beyond = 0.0 if scene.net is None or scene.net.two_sided else scene.net.neutral_length
-    mean = min(float(openings.mean()), np.pi)  # joints may be past it, the ring cannot
-    return lines_of(layout_at_opening(scene, mean), openings, taut_beyond=beyond)
+    """Lines of a scene at opening angles in rad, shape (planes, sections): see ``Points.drawn``."""
+    points = points_of(layout_of(scene))
+    shape = Shape(scene, points, computed=False, track=Track(np.zeros(1), openings[None]))
+    return shape.lines(places_at(scene, points, openings))
 
 
 def facing_azimuth(scene: Scene) -> float:
@@ -172,10 +176,14 @@ def _caption(axes: Axes, middle: float, name: str, angles: xr.DataArray) -> None
 
 
 def _shot(
-    scene: Scene, angles: xr.DataArray, locked: NDArray[np.bool_], azimuth: float
+    shape: Shape, angles: xr.DataArray, locked: NDArray[np.bool_], azimuth: float
 ) -> tuple[list[str], Array, Array]:
     """Parts, ends on the paper and nearness of all lines at one instant, the farthest first."""
-    parts = lines_at(scene, np.radians(angles.transpose("plane", "section").values))
+    openings = np.radians(angles.transpose("plane", "section").values)
+    parts = (
+        shape.lines(shape.at(float(angles["time"]))) if shape.computed
+        else lines_at(shape.scene, openings)
+    )  # fmt: skip
     joints = parts.pop("V-joints") + _POINT
     for name, own in (("V-joints, locked", locked.ravel()), ("V-joints, free", ~locked.ravel())):
         parts |= {name: joints[own]} if own.any() else {}
@@ -191,7 +199,7 @@ def _shot(
 def _draw(axes: Axes, names: list[str], lines: Array, near: Array, scale: float) -> None:
     """Lines, the far ones paler; thinner where a metre is short."""
     thin = float(np.clip(scale / 1.3, 0.45, 1.0))
-    looks = [_LOOKS[name] for name in names]
+    looks = [LOOKS[name] for name in names]
     depth = max(float(np.ptp(near)), 0.8 * float(np.ptp(lines[..., 0])))
     fade = (_FADE * (near.max() - near) / depth)[:, None]
     colours = np.array([to_rgb(look["color"]) for look in looks])

@@ -4,12 +4,14 @@
   const UNKNOWN = -32768;
   const ints = (text) =>
     new Int16Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
-  const samples = data.samples.map((each) => ({ ...each, angles: ints(each.angles) }));
+  const unpacked = (places) => places && { ...places, points: ints(places.points) };
+  const samples = data.samples.map(
+    (each) => ({ ...each, angles: ints(each.angles), places: unpacked(each.places) }));
   const ring = { ...data.ring, points: ints(data.ring.points) };
   const joints = ring.joints;
   const LOOKS = {
     diagonals: ["#0072b2", 1.5], bars: ["#b5552a", 1.5], "hinge assemblies": ["#222222", 3],
-    boom: ["#6e6e6e", 5], "net, taut": ["#8fcfb5", 0.9],
+    boom: ["#6e6e6e", 5], net: ["#8fcfb5", 0.9],
   };
   const byId = (name) => document.getElementById(name);
   const canvas = byId("scene"), pen = canvas.getContext("2d");
@@ -18,13 +20,24 @@
 
   const end = () => sample.times[sample.times.length - 1];
 
+  // The frame after a value, and how far that is on the way to it.
+  function between(values, value) {
+    let k = 1;
+    while (k < values.length - 1 && values[k] < value) k += 1;
+    return [k, Math.min(1, Math.max(0, (value - values[k - 1]) / (values[k] - values[k - 1])))];
+  }
+
+  // Point n of the points of all frames, [x, y, z] in m, linear between two frames.
+  function mixed({ points, unit }, all, k, w, n) {
+    return [0, 1, 2].map((i) => {
+      const a = points[((k - 1) * all + n) * 3 + i], b = points[(k * all + n) * 3 + i];
+      return unit * (a + w * (b - a));
+    });
+  }
+
   // Opening angles in degree of all V-joints at a time, linear between frames.
   function anglesAt(moment) {
-    const times = sample.times;
-    let k = 1;
-    while (k < times.length - 1 && times[k] < moment) k += 1;
-    const w = Math.min(1, Math.max(0, (moment - times[k - 1]) / (times[k] - times[k - 1])));
-    const found = [];
+    const [k, w] = between(sample.times, moment), found = [];
     for (let j = 0; j < joints; j += 1) {
       const a = sample.angles[(k - 1) * joints + j], b = sample.angles[k * joints + j];
       found.push(a === UNKNOWN || b === UNKNOWN ? NaN : (a + w * (b - a)) / 100);
@@ -32,17 +45,14 @@
     return found;
   }
 
-  // Points of the ring, [x, y, z] in m: the fixed ones, then the V-joints.
+  // Points of the ring, [x, y, z] in m, the V-joints last: as computed, or from the angles.
   function pointsAt(angles, mean) {
-    const means = ring.means, all = ring.fixed + 2 * joints;
-    let k = 1;
-    while (k < means.length - 1 && means[k] < mean) k += 1;
-    const w = Math.min(1, Math.max(0, (mean - means[k - 1]) / (means[k] - means[k - 1])));
-    const at = (n) => [0, 1, 2].map((i) => {
-      const a = ring.points[((k - 1) * all + n) * 3 + i], b = ring.points[(k * all + n) * 3 + i];
-      return ring.unit * (a + w * (b - a));
-    });
-    const found = [];
+    if (sample.places) {
+      const [k, w] = between(sample.places.times, time), count = ring.fixed + joints;
+      return Array.from({ length: count }, (_, n) => mixed(sample.places, count, k, w, n));
+    }
+    const [k, w] = between(ring.means, mean), found = [];
+    const at = (n) => mixed(ring, ring.fixed + 2 * joints, k, w, n);
     for (let n = 0; n < ring.fixed; n += 1) found.push(at(n));
     for (let j = 0; j < joints; j += 1) {
       const middle = at(ring.fixed + j), aside = at(ring.fixed + joints + j);
@@ -84,11 +94,13 @@
   // The size of the deployed ring, so that it grows into the sheet.
   const reach = (() => {
     let flat = 0, high = 0;
-    for (let n = 0; n < ring.points.length; n += 3) {
-      flat = Math.max(flat, Math.hypot(ring.points[n], ring.points[n + 1]));
-      high = Math.max(high, Math.abs(ring.points[n + 2]));
+    for (const { points, unit } of [ring, ...samples.map((each) => each.places).filter(Boolean)]) {
+      for (let n = 0; n < points.length; n += 3) {
+        flat = Math.max(flat, unit * Math.hypot(points[n], points[n + 1]));
+        high = Math.max(high, unit * Math.abs(points[n + 2]));
+      }
     }
-    return [ring.unit * flat, ring.unit * high];
+    return [flat, high];
   })();
 
   function drawRing(width, height, angles, mean) {

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from ringsim.analysis.campaign_samples import endings, judged_by, median_and_worst
 from ringsim.analysis.quantities import used
-from ringsim.layout.layout import layout_at_opening
-from ringsim.layout.lines import lines_of
+from ringsim.layout.layout import layout_at_opening, layout_of
+from ringsim.layout.points import points_of
 from ringsim.scene import Scene, scene_from_toml
+from ringsim.shapes import COMPUTED, FROM_ANGLES, middle_of
 from ringsim.structures.pantograph_ring import PantographRing
 
 POSES = 25
@@ -20,6 +21,8 @@ MOST_FRAMES, MOST_OTHERS = 240, 5
 UNKNOWN = -32768
 """An opening angle that was not recorded."""
 _LARGEST = 32767
+_MOST_BYTES, _LEAST_FRAMES = 60_000, 30
+"""Of the positions of a sample: seven samples and all figures are to fit into one mail."""
 
 
 def player(campaign: xr.Dataset) -> dict[str, Any] | None:
@@ -31,8 +34,10 @@ def player(campaign: xr.Dataset) -> dict[str, Any] | None:
     if not shown:
         return None
     lowest = min(each.pop("lowest") for each in shown)
+    computed = sum(each["places"] is not None for each in shown)
+    words = {0: FROM_ANGLES, len(shown): COMPUTED}.get(computed, f"{COMPUTED}, or {FROM_ANGLES}")
     return {
-        "planes": campaign["plane"].values.tolist(),
+        "words": words, "planes": campaign["plane"].values.tolist(),
         "sections": campaign["section"].values.tolist(),
         "samples": shown, "ring": _poses(scene, np.radians(lowest)),
     }  # fmt: skip
@@ -75,7 +80,27 @@ def _course(campaign: xr.Dataset, sample: int, name: str) -> dict[str, Any]:
         "name": name, "times": np.round(angle["time"].to_numpy(), 4).tolist(),
         "angles": packed(np.clip(100.0 * rows, UNKNOWN, _LARGEST)),
         "lowest": float(rows.mean(axis=1).min()),
+        "places": _places(campaign, sample),
     }  # fmt: skip
+
+
+def _places(campaign: xr.Dataset, sample: int) -> dict[str, Any] | None:
+    """Times, unit (m) and positions, (frame, point, axis), of one sample; None if not recorded."""
+    if "position" not in campaign:
+        return None
+    found = campaign["position"].sel(sample=sample).transpose("time", "point", "axis")
+    found = found.dropna("time", how="any")
+    if found.sizes["time"] < 2:
+        return None
+    most = min(MOST_FRAMES, max(_LEAST_FRAMES, _MOST_BYTES // (6 * found.sizes["point"])))
+    frames = np.unique(np.linspace(0, found.sizes["time"] - 1, most).round().astype(int))
+    found = found.isel(time=frames)
+    values = found.to_numpy()
+    # The player turns the ring about its middle at the end; on the way it is where it is.
+    values = values - 0.5 * (values[-1].min(axis=0) + values[-1].max(axis=0))
+    unit = float(np.abs(values).max()) / _LARGEST
+    times = np.round(found["time"].to_numpy(), 4).tolist()
+    return {"times": times, "unit": unit, "points": packed(values / unit)}
 
 
 def _poses(scene: Scene, lowest: float) -> dict[str, Any]:
@@ -85,36 +110,24 @@ def _poses(scene: Scene, lowest: float) -> dict[str, Any]:
     all other points follow the mean, as in the figure ``ringsim.plots.ring``.
     """
     means = np.linspace(min(lowest, 0.98 * np.pi), np.pi, POSES)
-    ends, moves, middles, asides, names = [], [], [], [], list[str]()
+    points = points_of(layout_of(scene))
+    fixed, shape = len(points.names) - points.openings.size, np.ones(points.openings.shape)
+    poses = []
     for mean in means:
         layout = layout_at_opening(scene, float(mean))
-        shape = np.ones([len(layout.openings), len(layout.openings[0])])
-        flat, folded = lines_of(layout, np.pi * shape), lines_of(layout, 0.0 * shape)
-        middle, aside = flat.pop("V-joints")[:, 0], folded.pop("V-joints")[:, 0]
-        middles.append(middle)
-        asides.append(aside - middle)
-        names = [name for name, lines in flat.items() for _ in lines]
-        ends.append(np.concatenate([*flat.values()]).reshape(-1, 3))
-        moves.append(np.concatenate([folded[name] for name in flat]).reshape(-1, 3))
-    tracks = np.array(ends).transpose(1, 0, 2)
-    # An end that a joint moves is that joint's; poses agree in which.
-    moved = np.abs(moves[0] - ends[0]).max(axis=1) > 1e-9
-    apart = np.abs(moves[0][:, None] - (middles[0] + asides[0])[None]).max(axis=2)
-    _, first, place = np.unique(
-        np.round(tracks[~moved], 6).reshape((~moved).sum(), -1), axis=0, return_index=True,
-        return_inverse=True,
-    )  # fmt: skip
-    points = tracks[~moved][first].transpose(1, 0, 2)
-    number = np.empty(len(moved), dtype=int)
-    number[~moved], number[moved] = place.ravel(), len(first) + apart[moved].argmin(axis=1)
-    whole = np.concatenate([points, np.array(middles), np.array(asides)], axis=1)
+        flat, folded = (
+            points.places(layout, angle * shape) - middle_of(layout) for angle in (np.pi, 0.0)
+        )
+        poses.append(np.concatenate([flat, folded[fixed:] - flat[fixed:]]))
+    whole = np.array(poses)
     unit = float(np.abs(whole).max()) / _LARGEST
-    groups = list(dict.fromkeys(names))
     return {
         "means": np.degrees(means).round(4).tolist(), "unit": unit, "points": packed(whole / unit),
-        "fixed": len(first), "joints": len(middles[0]), "groups": groups,
-        "lines": [[*pair, groups.index(n)] for pair, n in
-                  zip(number.reshape(-1, 2).tolist(), names, strict=True)],
+        "fixed": fixed, "joints": points.openings.size, "groups": [*points.lines],
+        "lines": [
+            [*pair, group] for group, pairs in enumerate(points.lines.values())
+            for pair in pairs.tolist()
+        ],
     }  # fmt: skip
 
 

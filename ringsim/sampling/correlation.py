@@ -20,7 +20,9 @@ class Correlation(Model):
     """
 
     between: Annotated[tuple[str, str], ListIn]
+    """Scene paths, or names, of the two inputs."""
     coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]
+    """Correlation of the underlying normal variables."""
 
 
 def correlate(points: Array, paths: Sequence[str], correlations: Sequence[Correlation]) -> Array:

@@ -32,17 +32,23 @@ class PantographRing(Structure):
 
     kind: Literal["pantograph-ring"] = "pantograph-ring"
     sections: Annotated[int, Field(ge=1, le=360)] = 18
+    """Number of sections, each of two diagonals and an upper and a lower folding bar."""
     closed: bool = True
+    """Whether the last section meets the first; otherwise an open arc."""
     polygon_sections: Annotated[int, Field(ge=3, le=720)] = 18
     """Sides of the full polygon that an open arc is cut from; a closed ring is its own."""
     aspect_ratio: Annotated[float, Field(ge=0.05, le=1.0), Unit("1")] = 3.2856 / 3.5184
     """Minor over major axis of the ellipse."""
     half_bar: Metre = 0.2889
+    """Length of each half of a folding bar, from hinge pin to V-joint."""
     half_diagonal: Metre = 0.4275
+    """Half the length of a diagonal, from hinge pin to pivot."""
     hinge_offset: MetreOrZero = 0.006554
     """Distance of the pins from the vertical line of their hinge assembly."""
     corner_mass: KilogramOrZero = 0.0198
+    """Mass of each hinge assembly."""
     vjoint_mass: KilogramOrZero = 0.0198
+    """Point mass at each V-joint."""
     hinge_size: Metre = 0.0112
     """Edge of the cube whose inertia a hinge assembly has (its density is 13 975 kg/m^3)."""
     opening_angle: Degree = 46.0

@@ -27,9 +27,11 @@ class DeployingSpring(Model):
     """Compression spring inside the telescopic strut, with its damping."""
 
     stiffness: SpringRate = 2030.0
+    """Force of the spring over the strut's change of length."""
     free_length: Metre = 0.316
     """Length of the strut at which the spring is without force."""
     damping: DampingRate = 5.0
+    """Force over the rate of the strut's length."""
 
     def tension(self, length: Any, rate: Any = 0.0) -> Reaction:
         """Of a strut of some length (m), at its rate (m/s); the spring pushes: negative."""
@@ -46,7 +48,9 @@ class Rest(Model):
     buffer: Metre = 0.0118
     """Between the fixed axis and the synchronising beam at the end of contraction."""
     stiffness: SpringRate = 1e5
+    """Force of the buffers over their depth."""
     damping: DampingRate = 100.0
+    """Force over the rate of the depth, while in contact."""
 
     def push(self, depth: Any, rate: Any, xp: Any = np) -> Reaction:
         """Against a depth (m) and its rate (m/s), none where it is negative."""
@@ -77,6 +81,7 @@ class PlanarTruss(Structure):
 
     kind: Literal["planar-truss"] = "planar-truss"
     beam_length: Metre = 0.627
+    """Length of the upper and the lower beam between their joints."""
     axis_length: Metre = 0.72
     """Distance of the two joints on the fixed axis."""
     strut_foot: Metre = 0.05
@@ -88,13 +93,17 @@ class PlanarTruss(Structure):
     cable_length: Metre = 0.9
     """Initial distance from the lower joint to the upper outer joint: 0.9 m deployed."""
     axis: Tube = Tube(outer_diameter=0.030, inner_diameter=0.028)
+    """Cross-section of the fixed axis."""
     strut_inner: Tube = Tube(outer_diameter=0.029, inner_diameter=0.027)
+    """Cross-section of the strut's inner tube."""
     bar_width: Metre = 0.015
     """Synchronising beam, in the plane of the truss."""
     bar_depth: Metre = 0.008
     """Synchronising beam, across the plane of the truss."""
     spring: DeployingSpring = DeployingSpring()
+    """Spring in the strut that opens the truss."""
     rest: Rest = Rest()
+    """Buffers that end the contraction."""
 
     @model_validator(mode="after")
     def _possible(self) -> "PlanarTruss":

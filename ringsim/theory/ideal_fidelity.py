@@ -53,6 +53,12 @@ def refuse_if_not_ideal(scene: Scene) -> None:
             "record.stress = true: rigid rods carry no stress in the ideal fidelity (set it to "
             "false, or use the full fidelity)"
         )
+    if scene.record.positions:
+        raise InputError(
+            "record.positions = true: the ideal ring's shape follows from its one opening angle, "
+            "and what it floats along is not integrated (set it to false: drawings need none, or "
+            "use the full fidelity)"
+        )
     if scene.net is None:
         return
     net, layout = scene.net, layout_of(scene)

@@ -56,10 +56,15 @@ def test_shipped_campaigns_can_be_drawn(file):
     assert campaign.draw().samples >= 1
 
 
-def test_example_in_the_readme_can_be_drawn(tmp_path):
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    (example,) = re.findall(r'```toml\n(name = "study".*?)```', readme, re.DOTALL)
-    assert loaded(tmp_path, example).draw().samples == 256
+def test_example_in_the_guide_can_be_drawn(tmp_path):
+    guide = ROOT / "docs" / "guide"
+    page = (guide / "campaigns.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r'```toml\n(name = "study".*?)```', page, re.DOTALL)
+    page = (guide / "requirements.md").read_text(encoding="utf-8")
+    (required,) = re.findall(r"```toml\n(\[requirements\].*?)```", page, re.DOTALL)
+    campaign = loaded(tmp_path, example + required)
+    assert campaign.draw().samples == 256
+    assert len(campaign.specification.requirements) == 2
 
 
 @pytest.mark.parametrize(

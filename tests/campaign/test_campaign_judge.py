@@ -86,7 +86,7 @@ def test_campaign_merge_and_status_tell_of_the_checks(checked, finished):
         assert (int(sample), float(share), bars) == (k, pytest.approx(0.001, rel=0.01), "-")
         assert float(error) == pytest.approx(times.std(ddof=1) / np.sqrt(5), rel=0.05)
     assert "checked        3 of 3" in checked.run("status", "out")
-    assert "3 samples with the full engine, too" in checked.run(*START, "--dry-run")
+    assert "3 samples with the full engine, too, 0 to run" in checked.run(*START, "--dry-run")
 
 
 @pytest.mark.parametrize(
@@ -183,3 +183,31 @@ def test_senseless_checks_are_refused_in_one_line(bench, top, words):
     with pytest.raises(InputError, match=words) as refusal:
         load_campaign(written(bench, top))
     assert "\n" not in str(refusal.value)
+
+
+def test_a_dry_run_tells_what_checks_cost(checked):
+    """From one trial check, or from those that are done."""
+    written(checked, samples=9)
+    for out, open_, basis in (("new", 5, "from a trial run of sample"), ("out", 2, "from 3 sam")):
+        command = ("campaign", "small.toml", "--out", out, *START[4:])
+        printed = checked.run(*command, "--dry-run")
+        assert f"5 samples with the full engine, too, {open_} to run here" in printed
+        (cost,) = (line for line in printed.splitlines() if "cost of checks" in line)
+        assert basis in cost
+        assert "predicted      about" in printed
+    assert not (checked.folder / "new").exists()
+
+
+def test_replay_repeats_the_check_too(checked):
+    printed = checked.run("replay", "out", 2, "--check", "--save", "full.nc")
+    assert "check of sample 2: ok" in printed
+    assert "identical to the stored result" in printed
+    full = xr.load_dataset(checked.folder / "full.nc")
+    both = checked.result("out").sel(sample=2)
+    assert float(full.deployment_time) == float(both.deployment_time_checked)
+    assert float(full.deployment_time) != float(both.deployment_time)
+    assert "no stored result" in checked.run("replay", "out", 1, "--check")
+    checked.write(5)
+    checked.run("campaign", "small.toml", "--out", "alone")
+    refused = checked.run("replay", "alone", 1, "--check", code=2)
+    assert "--check: the samples of alone have no checks (check_every): leave it out" in refused

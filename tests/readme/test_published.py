@@ -1,4 +1,4 @@
-"""The README's table of published cases: what it says of ringsim is what a run gives.
+"""The table of published cases: what it says of ringsim is what a run gives.
 
 Whole rings of 18 sections and the truss of paper 000: about half a minute for all.  The truss of
 paper 001 has its own tests (tests/physics_planar), and so has case 1 of paper 002, the main line.
@@ -11,9 +11,9 @@ import re
 import pytest
 
 import ringsim
-from main_line import README
+from main_line import ROOT
 
-TABLE = README.partition("## Comparison with published results")[2].partition("## ")[0]
+TABLE = (ROOT / "docs" / "published.md").read_text(encoding="utf-8")
 
 
 def stated(case: str) -> list[float]:

@@ -9,9 +9,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from made_campaign import made_campaign
+from made_campaign import made_campaign, with_positions
 
 from ringsim.report.page import page
+from ringsim.shapes import COMPUTED, FROM_ANGLES
 
 BROWSER = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -60,9 +61,11 @@ const waiting = setInterval(() => {
 
 
 @pytest.mark.skipif(BROWSER is None, reason="there is no chromium or chrome")
-@pytest.mark.parametrize("width", [1000, 500])
-def test_the_page_plays_offline(tmp_path: Path, width: int) -> None:
-    text = page(made_campaign(8, failed=(2, 5)), "runs/made")
+@pytest.mark.parametrize(("width", "computed"), [(1000, False), (500, True)])
+def test_the_page_plays_offline(tmp_path: Path, width: int, computed: bool) -> None:
+    campaign = made_campaign(8, failed=(2, 5))
+    text = page(with_positions(campaign) if computed else campaign, "runs/made")
+    assert f"Drawn: {COMPUTED if computed else FROM_ANGLES}." in text
     text = text.replace("<head>", HEAD, 1).replace("</body>", TAIL, 1)
     (tmp_path / "page.html").write_text(text, encoding="utf-8")
     done = subprocess.run(

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from made_campaign import SECTIONS, TIMES, made_campaign, made_scene
+from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_positions
 
 from ringsim.cli import cli
 from ringsim.dataset import save
@@ -22,6 +22,7 @@ from ringsim.plots.ring import lines_at
 from ringsim.report import tables
 from ringsim.report.page import LARGEST, page
 from ringsim.report.player import player
+from ringsim.shapes import COMPUTED, FROM_ANGLES
 
 VOID = {"meta", "br", "img", "input", "link", "hr"}
 KINDS = {
@@ -177,13 +178,33 @@ def test_the_players_ring_is_that_of_the_figure() -> None:
     places = np.concatenate([points[pose, :fixed], middle + folded * aside])
     wanted = lines_at(made_scene(), openings)
     wanted.pop("V-joints")
-    wanted["net, taut"] = np.concatenate(
+    wanted["net"] = np.concatenate(
         [wanted.pop(n) for n in ("net, taut", "net, slack") if n in wanted]
     )
     assert set(ring["groups"]) == set(wanted)
     for number, name in enumerate(ring["groups"]):
         own = places[[line[:2] for line in ring["lines"] if line[2] == number]]
         np.testing.assert_allclose(own, wanted[name], atol=1e-4)
+
+
+def test_the_player_has_the_positions_that_were_computed() -> None:
+    campaign = with_positions(made_campaign(8, **KINDS["mixed"]))
+    data = player(campaign)
+    assert data is not None
+    assert data["words"] == COMPUTED
+    chosen = [int(each["name"].split()[1].rstrip(":")) for each in data["samples"]]
+    for sample, each in zip(chosen, data["samples"], strict=True):
+        known = campaign["position"].sel(sample=sample).dropna("time").transpose("time", ...)
+        assert each["places"]["times"] == known["time"].to_numpy().tolist()
+        found = np.frombuffer(base64.b64decode(each["places"]["points"]), "<i2")
+        found = each["places"]["unit"] * found.reshape(known.shape)
+        moved = found - known.to_numpy()
+        np.testing.assert_allclose(moved, np.broadcast_to(moved[-1:, :1], moved.shape), atol=3e-4)
+        middle = 0.5 * (found[-1].min(axis=0) + found[-1].max(axis=0))
+        np.testing.assert_allclose(middle, 0.0, atol=3e-4)
+    only = campaign.copy(deep=True)
+    only["position"][chosen[0]] = np.nan
+    assert player(only)["words"] == f"{COMPUTED}, or {FROM_ANGLES}"  # type: ignore[index]
 
 
 def run(*words: str) -> tuple[int, str]:

@@ -17,7 +17,7 @@ class CutCable(CableFault):
 
     kind: Literal["cut-cable"] = "cut-cable"
     span: Annotated[int, Field(ge=1)]
-    """Counted from 1 at the winch."""
+    """Name, as "section 6 V to second hinge", or number, counted from 1 at the winch."""
 
     def strike(self, ropes: Ropes, state: ChainState) -> Ropes:
         """Let go of the rope that holds the span."""

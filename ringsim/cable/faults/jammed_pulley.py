@@ -14,7 +14,7 @@ class JammedPulley(CableFault):
 
     kind: Literal["jammed-pulley"] = "jammed-pulley"
     pulley: Annotated[int, Field(ge=1)]
-    """Counted from 1 at the winch."""
+    """Name, as "section 6 V", or number, counted from 1 at the winch."""
 
     def strike(self, ropes: Ropes, state: ChainState) -> Ropes:
         """Split the rope at the pulley; each part keeps the rope that its spans hold."""

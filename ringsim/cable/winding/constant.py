@@ -11,6 +11,7 @@ class ConstantWinding(PrescribedWinding):
 
     kind: Literal["constant"] = "constant"
     speed: Speed
+    """Rope taken up per second; negative pays out."""
 
     def usual_speed(self) -> float:
         """The speed, in m/s."""

@@ -21,8 +21,11 @@ class RampWinding(PrescribedWinding):
 
     kind: Literal["ramp"] = "ramp"
     speed: Speed
+    """Speed after the ramp; negative pays out."""
     duration: Second
+    """Time from standstill to full speed."""
     shape: Literal["cubic", "quintic"] = "quintic"
+    """How smooth the ramp is: continuous acceleration (cubic) or jerk (quintic)."""
 
     def usual_speed(self) -> float:
         """The speed after the ramp, in m/s."""

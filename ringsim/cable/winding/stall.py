@@ -16,7 +16,9 @@ class StallWinding(FeedbackWinding):
 
     kind: Literal["stall"] = "stall"
     speed: PositiveSpeed
+    """Speed while the tension is low."""
     max_tension: Tension
+    """Tension at which the motor stands still."""
     band: Ratio = 0.05
     """Width of the passage from constant speed to constant tension, over max_tension."""
     backdrivable: bool = False

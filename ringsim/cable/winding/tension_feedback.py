@@ -22,10 +22,13 @@ class TensionFeedbackWinding(FeedbackWinding):
 
     kind: Literal["tension-feedback"] = "tension-feedback"
     target: Tension
+    """Tension wanted at the winch."""
     gain: ControlGain = 0.02
     """Added speed per newton of missing tension."""
     max_speed: PositiveSpeed
+    """Fastest winding of the motor."""
     max_payout: SpeedOrZero = 0.0
+    """Fastest paying out; 0: it never pays out."""
     opening_rate: AngularRate | None = None
     """Wanted rate of the opening angle; left out, the winch follows the structure."""
 

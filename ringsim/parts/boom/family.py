@@ -17,8 +17,11 @@ class Boom(Model):
     base: Literal["free", "fixed"] = "free"
     """free: the ring floats with its boom; fixed: the boom's upper end is clamped."""
     length: Metre = 0.9
+    """Length of the tube, at least the height of the stowed ring."""
     tube: Tube = Tube(outer_diameter=0.06, inner_diameter=0.058)
+    """Cross-section."""
     density: Density = 1800.0
+    """Mass over volume of the tube's material."""
 
     @property
     def mass(self) -> float:

@@ -16,4 +16,6 @@ class FlexibleBoom(Boom):
 
     kind: Literal["flexible"] = "flexible"
     elements: Annotated[int, Field(ge=1, le=64)] = 4
+    """Beam elements along the boom."""
     young_modulus: Pascal = 120e9
+    """Young's modulus of the tube."""

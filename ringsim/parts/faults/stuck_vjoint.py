@@ -14,10 +14,13 @@ class StuckVJoint(Fault):
 
     kind: Literal["stuck-vjoint"] = "stuck-vjoint"
     plane: Literal["upper", "lower"] = "upper"
+    """Plane of the V-joint."""
     section: Annotated[int, Field(ge=1)]
     """Counted from 1 at the boom."""
     stiffness: TorsionRate = 1000.0
+    """Of the spring that holds the joint."""
     damping: TorsionDamping = 1.0
+    """Of the damper beside it."""
 
     def torque(self, turned: Any, rate: Any) -> Reaction:
         """Against the angle (rad) by which the joint has turned since, and its rate (rad/s)."""

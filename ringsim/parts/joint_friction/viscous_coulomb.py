@@ -15,7 +15,9 @@ class ViscousCoulombFriction(JointFriction):
 
     kind: Literal["viscous-coulomb"] = "viscous-coulomb"
     viscous: PerSection[TorsionDamping] = 0.0
+    """Torque over rate."""
     coulomb: PerSection[Torque] = 0.0
+    """Torque of dry friction at rates far above ``rate``."""
     rate: AngularRate = 0.01
     """Rate that regularises the Coulomb torque: 76 % of it acts at this rate."""
 

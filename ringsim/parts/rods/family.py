@@ -15,12 +15,17 @@ class Rods(Model):
     elements: Annotated[int, Field(ge=1, le=64)] = 1
     """Elements per rod half."""
     young_modulus: PerSection[Pascal] = 120e9
+    """Young's modulus of the rods of a section."""
     density: Density = 1800.0
+    """Mass over volume of the rods' material."""
     poisson_ratio: PoissonRatio = 0.3
+    """Poisson's ratio, which gives shear modulus and shear coefficient."""
     damping: SecondOrZero = 0.0
     """Stiffness-proportional (Kelvin-Voigt) damping: stress = E (strain + damping * rate)."""
     diagonal: Tube = Tube(outer_diameter=0.010, inner_diameter=0.00915)
+    """Cross-section of the diagonals."""
     bar: Tube = Tube(outer_diameter=0.012, inner_diameter=0.01115)
+    """Cross-section of the folding bars."""
 
     @property
     def shear_modulus_ratio(self) -> float:

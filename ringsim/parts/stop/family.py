@@ -18,6 +18,7 @@ class Stop(Model):
     stiffness: TorsionRate = 200.0
     """Of the latch, and of the stop at small depths: the steps of a contact follow from it."""
     damping: TorsionDamping = 0.5
+    """Torque over rate while the stop is in contact, and of the latch."""
     latch: bool = False
     """Hold the joint from both sides once it has reached 180 deg."""
     stowed_angle: DegreeOrZero = 0.0

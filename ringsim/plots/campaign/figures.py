@@ -8,12 +8,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ringsim.analysis.campaign_samples import inputs, judged_by, scalars
+from ringsim.analysis.courses import courses
 from ringsim.analysis.reading import any_finite
 from ringsim.files import writing
 from ringsim.plots import style
 from ringsim.plots.campaign.by_input import by_input
 from ringsim.plots.campaign.convergence import convergence
-from ringsim.plots.campaign.courses import courses
 from ringsim.plots.campaign.distributions import distributions
 from ringsim.plots.campaign.fan import fan
 from ringsim.plots.campaign.lag_map import lag_map

@@ -7,10 +7,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ringsim.analysis.courses import QUANTILES
 from ringsim.plots import style
 
-QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
-"""What bands show: all samples, nine in ten, the median."""
 LOOKS = {
     "deployed": (style.BLUE, "o"),
     "ok": (style.BLUE, "o"),

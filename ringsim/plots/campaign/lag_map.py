@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ringsim.analysis.campaign_samples import median_and_worst, told
+from ringsim.analysis.courses import Courses, course, courses
 from ringsim.plots import style
-from ringsim.plots.campaign.courses import Courses, course, courses
 from ringsim.plots.campaign.frame import head
 from ringsim.plots.opening_angles import LEAST_SPAN
 

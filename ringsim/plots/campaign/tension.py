@@ -6,10 +6,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ringsim.analysis.campaign_samples import told, values_of
+from ringsim.analysis.courses import ends
 from ringsim.analysis.quantities import used
 from ringsim.analysis.reading import blocks
 from ringsim.plots import style
-from ringsim.plots.campaign.courses import ends
 from ringsim.plots.campaign.frame import bands, head
 
 

@@ -19,6 +19,7 @@ class RandomDesign(Design):
 
     kind: Literal["random"] = "random"
     samples: Samples
+    """Number of samples."""
 
     def points(self, factors: Factors, seed: int) -> Array:
         """One stream of random numbers per sample, in the order of the factors."""

@@ -19,7 +19,9 @@ class Replicated(Design):
     """
 
     samples: Samples
+    """Number of samples, a multiple of ``replicates``."""
     replicates: Annotated[int, Field(ge=1, le=10_000)] = 1
+    """Independent designs among which the samples are divided; from 2 on there are intervals."""
 
     @model_validator(mode="after")
     def _whole_replicates(self) -> "Replicated":

@@ -24,6 +24,7 @@ class Discrete(Distribution):
     values: Annotated[tuple[Any, ...], ListIn]
     """Numbers, words, true and false, whole tables or lists of them, mixed as the field allows."""
     probabilities: Annotated[tuple[Annotated[float, Field(gt=0.0)], ...] | None, ListIn] = None
+    """One for each value, which add up to 1; left out, all alike."""
 
     @model_validator(mode="after")
     def _fitting(self) -> Self:

@@ -22,7 +22,9 @@ class Lognormal(Continuous):
 
     kind: Literal["lognormal"] = "lognormal"
     mean: Annotated[float, Field(gt=0.0)]
+    """Mean of the values themselves, in the unit of the input."""
     standard_deviation: Annotated[float, Field(gt=0.0)]
+    """Standard deviation of the values themselves, in the unit of the input."""
 
     @property
     def _logarithm(self) -> Normal:

@@ -20,7 +20,9 @@ class Normal(Continuous):
 
     kind: Literal["normal"] = "normal"
     mean: float
+    """Mean of the values, in the unit of the input."""
     standard_deviation: Annotated[float, Field(gt=0.0)]
+    """Standard deviation, in the unit of the input."""
 
     def quantile(self, probability: Array) -> Array:
         """Inverse of the cumulative distribution."""

@@ -24,8 +24,11 @@ class Truncated(Distribution):
 
     kind: Literal["truncated"] = "truncated"
     of: Annotated[Continuous, OneOf()]
+    """Distribution that is cut off."""
     low: float | None = None
+    """Smallest value; left out, no lower bound."""
     high: float | None = None
+    """Largest value; left out, no upper bound."""
 
     @model_validator(mode="after")
     def _some_mass(self) -> Self:

@@ -18,7 +18,9 @@ class Uniform(Continuous):
 
     kind: Literal["uniform"] = "uniform"
     low: float
+    """Smallest value."""
     high: float
+    """Largest value."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

@@ -4,7 +4,7 @@ Angles of all samples are never in memory together: blocks of samples are read a
 for a part of the axis at a time, over which the quantiles of all samples are then exact.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from ringsim.analysis.quantities import good
 from ringsim.analysis.reading import blocks
 from ringsim.outputs.family import Array
-from ringsim.plots.campaign.frame import QUANTILES
 
+QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
+"""What bands show: all samples, nine in ten, the median."""
 MOST, FEWER = 401, 101
 """Points along the axis at most: more than a figure resolves; fewer where samples are many."""
 HELD_BYTES = 200 << 20
@@ -32,7 +33,7 @@ class Courses:
     """Quantiles over the samples of each section's deviation from the mean opening angle."""
 
     bands: xr.DataArray
-    """Shape (quantile, plane, section, share), degree; quantiles as in ``frame.QUANTILES``."""
+    """Shape (quantile, plane, section, share), degree."""
     samples: NDArray[np.int64]
     """Samples whose numbers hold and that were recorded."""
 
@@ -50,7 +51,7 @@ def ends(campaign: xr.Dataset) -> Array:
     return np.asarray(np.where(np.isfinite(found), found, time[-1]), dtype=float)
 
 
-def courses(campaign: xr.Dataset) -> Courses:
+def courses(campaign: xr.Dataset, quantiles: Sequence[float] = QUANTILES) -> Courses:
     """Quantiles of the deviations of a campaign that is in memory, or opened.
 
     Of the samples whose numbers hold and that were recorded; linear between records, which is
@@ -65,15 +66,15 @@ def courses(campaign: xr.Dataset) -> Courses:
     found, kept = [], np.empty(0, dtype=np.int64)
     for part in parts:
         held, kept = _held(campaign, part)
-        bands = np.full((len(QUANTILES), *held.shape[:-1]), np.nan)
+        bands = np.full((len(quantiles), *held.shape[:-1]), np.nan)
         for place in np.ndindex(held.shape[:2] if len(kept) else (0, 0)):
             # Sorted in place: nothing else reads it.
-            levels = np.quantile(held[place], QUANTILES, axis=-1, overwrite_input=True)
+            levels = np.quantile(held[place], quantiles, axis=-1, overwrite_input=True)
             bands[(slice(None), *place)] = levels
         found.append(bands)
         del held
     every = np.concatenate(found, axis=-1)
-    return Courses(_labelled(campaign, every, share, quantile=list(QUANTILES)), kept)
+    return Courses(_labelled(campaign, every, share, quantile=list(quantiles)), kept)
 
 
 def course(campaign: xr.Dataset, sample: int, share: Array) -> xr.DataArray:

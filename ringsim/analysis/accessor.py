@@ -1,0 +1,89 @@
+"""What every dataset of ringsim can be asked as ``dataset.ring``."""
+
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NAME = "ring"
+
+
+class Ring:
+    """Questions to a run or a campaign: ``dataset.ring.outcomes()`` and others.
+
+    Imports stand in the methods: it is there wherever xarray and ringsim are, and costs nothing.
+    """
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    def leader(self) -> xr.Dataset:
+        """Which V-joint is most open and which least.
+
+        Of a run over time: ``leader`` and ``laggard`` as words ("upper 3"), and how far they are
+        apart (degree).  Of a campaign ``leads`` and ``lags``, (plane, section): in how many of the
+        samples whose numbers hold the joint was the one when they were farthest apart.
+
+        InputError if opening angles are not there, as of the ideal ring asynchrony.
+        """
+        from ringsim.analysis import leaders
+
+        found = leaders.often if "sample" in self._dataset.dims else leaders.over_time
+        return found(self._dataset)
+
+    def outcomes(self) -> "pd.DataFrame":
+        """What became of the samples of a campaign: a row for each kind of outcome and of loss.
+
+        ``samples`` are of the kind, of the ``of`` that count; ``share`` with its exact interval of
+        95 %, ``lower`` and ``upper``, as the design allows it, else NaN; see ``ringsim.analyse``.
+
+        InputError if it is no campaign.
+        """
+        from ringsim.analysis.design import placement
+        from ringsim.analysis.study import outcomes
+
+        self._require_samples("outcomes")
+        found = outcomes(self._dataset, placement(self._dataset))
+        ends = found["outcome_share_interval"]
+        table: dict[str, Any] = {
+            "samples": found["outcome_samples"], "of": found["outcome_of"],
+            "share": found["outcome_share"], "lower": ends[:, 0], "upper": ends[:, 1],
+        }  # fmt: skip
+        return xr.Dataset({k: ("kind", v.to_numpy()) for k, v in table.items()},
+                          coords={"kind": found["kind"]}).to_dataframe()  # fmt: skip
+
+    def fan(self, quantiles: tuple[float, ...] = (0.0, 0.05, 0.5, 0.95, 1.0)) -> xr.DataArray:
+        """Quantiles over the samples of each V-joint's deviation from the mean opening angle.
+
+        Along (quantile, plane, section, share), degree; ``share`` is that of the run until its last
+        lock or its end, as runs last differently long.
+
+        InputError if it is no campaign, or no sample has recorded opening angles.
+        """
+        from ringsim.analysis.courses import courses
+        from ringsim.refusal import InputError
+
+        self._require_samples("a fan")
+        if "opening_angle" not in self._dataset:
+            raise InputError("a fan needs opening_angle, which this campaign has left out")
+        found = courses(self._dataset, quantiles)
+        if not len(found.samples):
+            raise InputError("a fan needs a sample that has run, and none has")
+        return found.bands
+
+    def _require_samples(self, what: str) -> None:
+        from ringsim.refusal import InputError
+
+        if "sample" not in self._dataset.dims or "status" not in self._dataset:
+            raise InputError(
+                f"{what}: only a campaign has them, and this holds no samples: open one with "
+                "ringsim.open_campaign"
+            )
+
+
+def register() -> None:
+    """Let all datasets have it; once, since xarray warns of a second time."""
+    if getattr(xr.Dataset, NAME, None) is not Ring:
+        xr.register_dataset_accessor(NAME)(Ring)  # type: ignore[no-untyped-call]

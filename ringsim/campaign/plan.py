@@ -1,0 +1,113 @@
+"""What a campaign is going to do, and what that will cost."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.campaign.folder import opened_as
+from ringsim.campaign.start import Order
+from ringsim.campaign.status import in_words
+from ringsim.choice import kind_of
+from ringsim.execution.local import Local
+from ringsim.execution.work import Array, Work, relative_cost
+from ringsim.sampling.columns import Column, Table
+from ringsim.sampling.designs.grouped import Grouped
+from ringsim.sampling.values import labels_of
+from ringsim.storage.journal import Survey, survey
+from ringsim.storage.result import Result, check_of, sample_of
+
+Samples = NDArray[np.int64]
+_MOST_SHOWN = 10
+
+
+def plan(order: Order, workers: int) -> list[str]:
+    """The plan as text; InputError if the folder, which need not exist, is another campaign's.
+
+    The cost is predicted from samples that are done; if there are none, one sample of middling
+    cost runs as a trial, and nothing of it is kept.  So is that of checks by the judging engine.
+    """
+    order.check()
+    campaign, share = order.campaign, order.share
+    table = campaign.draw()
+    old = opened_as(campaign, order.folder, table, order.solving)
+    identity = old.attributes["identity"] if old is not None else ""
+    found = survey(order.folder, identity, table.samples)
+    todo = found.missing[share.holds(found.missing)]
+    design = campaign.specification.design
+    lines = [
+        f"{campaign.specification.name}: {table.samples} samples "
+        f"({kind_of(design)} design), {len(todo)} to run here",
+        *(
+            [f"  runs           {design.runs_told(table.samples)}"]
+            if isinstance(design, Grouped)
+            else []
+        ),
+        f"  folder         {order.folder}",
+        f"  workers        {workers}",
+        *map(_extent, table.columns),
+    ]
+    if rule := campaign.specification.rule:
+        numbers = rule.numbers(table.samples, campaign.specification.rule_replicates)
+        looks = ", ".join(map(str, numbers)) or "none before the last sample"
+        lines.append(f"  looks          {looks} (stop_when)")
+    each, told = _predicted(order, table, found, todo, lambda sample: sample)
+    lines += [f"  cost           {words}" for words in told]
+    if every := campaign.specification.check_every:
+        checked = np.arange(0, table.samples, every)
+        judged = survey(order.folder, identity, table.samples, checks=True)
+        open_ = np.intersect1d(checked, judged.missing)
+        open_ = open_[share.holds(open_)]
+        lines.append(
+            f"  checks         {len(checked)} samples with the full engine, too, {len(open_)} to "
+            "run here"
+        )
+        more, told = _predicted(order, table, judged, open_, check_of)
+        lines += [f"  cost of checks {words}" for words in told]
+        each = np.concatenate([each, more])
+    if not len(each):
+        return [*lines, "  nothing is left to run"]
+    whole = max(each.sum() / min(workers, len(each)), each.max())
+    return [*lines, f"  predicted      about {in_words(float(whole))}"]
+
+
+def _predicted(
+    order: Order, table: Table, found: Survey, todo: Samples, number: Callable[[int], int]
+) -> tuple[Array, list[str]]:
+    """Time of each run (s), and in words; ``number`` is that of a sample's run."""
+    if not len(todo):
+        return np.empty(0), []
+    campaign, cost = order.campaign, relative_cost(table, order.campaign.scene)
+    known = np.flatnonzero(np.isfinite(found.seconds))
+    if len(known):
+        per_cost = float(found.seconds[known].sum() / cost[known].sum())
+        basis = f"from {len(known)} samples that are done"
+    else:
+        trial = int(todo[np.argsort(cost[todo])[len(todo) // 2]])
+        kept: list[Result] = []
+        work = Work(
+            solver=order.solving, scene=campaign.scene.to_table(),
+            values_of=lambda sample: table.values_of(sample_of(sample)),
+            allowance=campaign.specification.limits, keep=kept.append, stop=lambda: "",
+            judge=order.judge,
+        )  # fmt: skip
+        Local(1).run([number(trial)], work)
+        (result,) = kept
+        per_cost = result.seconds / cost[trial]
+        basis = f"from a trial run of sample {trial}: {result.status.word}, {result.reason}"
+    each = per_cost * cost[todo]
+    words = f"{each.mean():.3g} s each ({each.min():.3g} to {each.max():.3g} s), {basis}"
+    return each, [words]
+
+
+def _extent(column: Column) -> str:
+    values = column.values
+    if values.dtype.kind in "iuf":
+        unit = "" if column.units == "1" else f" {column.units}"
+        extent = f"{values.min():.6g} to {values.max():.6g}{unit}"
+    else:
+        words = sorted(set(labels_of(values).ravel().tolist()))
+        more = [f"and {len(words) - _MOST_SHOWN} more"] if len(words) > _MOST_SHOWN else []
+        extent = ", ".join(words[:_MOST_SHOWN] + more)
+    each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
+    return f"  {column.path or f'label {column.name}'}: {extent}{each}"

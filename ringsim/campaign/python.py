@@ -1,0 +1,210 @@
+"""Campaigns from Python: the tables of a campaign file as arguments, the same way from there."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+import xarray as xr
+
+from ringsim.analysis.engines import too_far
+from ringsim.analysis.stored import MERGED, open_stored
+from ringsim.campaign.folder import open_folder
+from ringsim.campaign.merging import merge
+from ringsim.campaign.plan import plan
+from ringsim.campaign.run import Share
+from ringsim.campaign.specification import campaign_of, load_campaign
+from ringsim.campaign.start import Order, require_no_launcher, start
+from ringsim.execution.mpi import launched_size
+from ringsim.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED
+from ringsim.refusal import InputError
+from ringsim.scene import Scene
+from ringsim.storage.journal import FOLDER
+from ringsim.storage.netcdf import DESIGN
+from ringsim.units import Model
+
+IN_MEMORY = 200e6
+"""Bytes of a merged file up to which ``open_campaign`` reads all of it at once."""
+_NAME = "ringsim.Campaign"
+"""How refusals of arguments begin, as those of files with the file's name."""
+
+
+class CampaignError(RuntimeError):
+    """A campaign that did not give what it is to give: too many samples failed, or its engines
+    differ by more than it allows.  What was computed is in its folder.
+    """
+
+
+class Campaign:
+    """A campaign; ``run`` runs it, or finishes it.
+
+    Parameters
+    ----------
+    scene
+        A scene, the name of a built-in one, or a scene file.
+    inputs, design, seed, name, keys
+        What a campaign file says under these keys, and any other key that it may have (``set``,
+        ``fidelity``, ``limits``, ``requirements``, ...): tables are dicts.  Paths are relative to
+        the present folder.
+
+    Raises
+    ------
+    InputError
+        Naming key, value, bound and cure, if something is refused.
+
+    Examples
+    --------
+    >>> force = {"kind": "uniform", "low": 0.01, "high": 0.02}
+    >>> Campaign("truss2", {"loads.force": force}, {"kind": "sobol", "sample": 8})
+    Traceback (most recent call last):
+    ringsim.refusal.InputError: ringsim.Campaign: design.sample is not a known key (did you mean \
+samples?); also at fault: design.samples
+    """
+
+    def __init__(
+        self, scene: Scene | str | Path, inputs: Mapping[str, Any] | None = None,
+        design: Mapping[str, Any] | Model | None = None, seed: int = 0, *,
+        name: str = "campaign", **keys: Any,
+    ) -> None:  # fmt: skip
+        given = scene if isinstance(scene, Scene) else None
+        called = scene.name if isinstance(scene, Scene) else str(scene)
+        table = {"name": name, "seed": seed, "scene": called, "inputs": inputs, "design": design}
+        text = tomli_w.dumps({k: _plain(v) for k, v in (table | keys).items() if v is not None})
+        if given is not None:
+            text += "\n# The scene was given as an object: the attribute scene holds all of it."
+        self._described = campaign_of(text, Path(_NAME), scene=given)
+
+    @classmethod
+    def read(
+        cls, file: str | Path, settings: Mapping[str, Any] | None = None, samples: int | None = None
+    ) -> "Campaign":
+        """The campaign of a file, with values by scene path and another number of samples, as
+        ``ringsim campaign FILE --set ... --samples ...`` reads it; InputError if it is refused.
+        """
+        campaign = cls.__new__(cls)
+        campaign._described = load_campaign(Path(file), settings, samples)
+        return campaign
+
+    def run(
+        self, workers: int | None = None, *, out: str | Path | None = None,
+        retry_failed: bool = False, settings: Mapping[str, Any] | None = None, part: str = "1/1",
+    ) -> xr.Dataset:  # fmt: skip
+        """Run what is missing in the folder ``out`` (runs/NAME), and return the merged campaign.
+
+        Solver processes are programs of their own (``python -m ringsim.execution.child``), not
+        copies of the script: it needs no ``if __name__ == "__main__"``.  What it has defined they
+        do not know, so that kinds of parts of one's own need ``workers = 0``.
+
+        Parameters
+        ----------
+        workers
+            Solver processes; None for one, 0 for this very process, which has no limits of time and
+            memory.  Under an MPI launcher each rank has one: leave it out.
+        retry_failed, settings
+            Whether failed samples run again, too, and with which solver and record settings.
+        part
+            "I/N" runs every N-th sample alone.
+
+        Raises
+        ------
+        InputError
+            If something is refused, or the folder holds another campaign or is in use.
+        KeyboardInterrupt
+            After Ctrl-C or another signal: the same call goes on with what is left.
+        CampaignError
+            If more than ``max_failed`` samples failed, or engines differ by more than
+            ``max_difference``.  Failed samples alone are no error: see ``status``.
+        """
+        order = self._order(out, retry_failed, settings or {}, part)
+
+        def placed() -> Order:
+            require_no_launcher(workers)
+            return order
+
+        ended = start(workers, placed, lambda _: None)
+        if ended.refused is not None:
+            raise ended.refused
+        if ended.code == EXIT_INTERRUPTED:
+            raise KeyboardInterrupt
+        found = open_campaign(order.folder)
+        if ended.code == EXIT_FAILED and (why := self._fault(order.folder, found)):
+            found.close()
+            raise CampaignError(why)
+        return found
+
+    def plan(self, workers: int | None = None, *, out: str | Path | None = None) -> str:
+        """What ``run`` would do and about how long it would take, as ``--dry-run`` tells it."""
+        count = max(1, workers or launched_size())
+        return "\n".join(plan(self._order(out, again=False, settings={}, part="1/1"), count))
+
+    def _order(
+        self, out: str | Path | None, again: bool, settings: Mapping[str, Any], part: str
+    ) -> Order:
+        folder = Path(out) if out is not None else Path("runs") / self._described.specification.name
+        return Order(self._described, folder, Share.parse(part), again, dict(settings))
+
+    def _fault(self, folder: Path, found: xr.Dataset) -> str:
+        if left := len(open_folder(folder).survey().missing):
+            most = self._described.specification.max_failed
+            return (
+                f"{folder}: more than max_failed = {most} samples failed, {left} are left: raise "
+                "it, or mend what fails and run with retry_failed=True (and settings={...})"
+            )
+        if apart := too_far(found):
+            return f"{folder}: {apart[0]}"
+        return ""
+
+
+def open_campaign(path: str | Path) -> xr.Dataset:
+    """The merged campaign in a folder or a file, along ``sample``.
+
+    A folder whose results are not merged yet, or have become more since, is merged first: samples
+    that are left have the status -1.  A file of more than 200 MB is read as far as it is used:
+    close it, or open it in ``with``.
+
+    Raises
+    ------
+    InputError
+        If there is no campaign.
+    """
+    path = Path(path)
+    if path.is_dir() and _is_behind(path):
+        merge(open_folder(path), execution="merged on its own", partly=True)
+    found = open_stored(path)
+    if "sample" not in found.dims or "status" not in found:
+        found.close()
+        raise InputError(
+            f"{path}: holds no campaign: give the folder that ringsim campaign named, or its "
+            f"{MERGED}"
+        )
+    file = path / MERGED if path.is_dir() else path
+    if file.stat().st_size > IN_MEMORY:
+        return found
+    with found:
+        return found.load()
+
+
+def _is_behind(folder: Path) -> bool:
+    """Whether there are results that the merged file cannot have."""
+    if not (folder / DESIGN).exists():
+        return False
+    merged = folder / MERGED
+    if not merged.exists():
+        return True
+    newest = max((f.stat().st_mtime for f in (folder / FOLDER).glob("*.journal")), default=0.0)
+    return newest > merged.stat().st_mtime and os.access(folder, os.W_OK)
+
+
+def _plain(value: Any) -> Any:
+    """A value as TOML has it: nothing of numpy, no models, no paths, nothing that is not there."""
+    if isinstance(value, Model):
+        value = value.model_dump(exclude_none=True)
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items() if each is not None}
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [_plain(each) for each in value]
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,100 @@
+"""``dataset.ring``: there for every dataset, and what it says is what the data say."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+from made_campaign import SECTIONS, made_campaign
+from scipy.stats import binomtest
+
+import ringsim
+from ringsim.analysis.courses import courses
+from ringsim.refusal import InputError
+
+
+@pytest.fixture(scope="module")
+def campaign() -> xr.Dataset:
+    """Sample k lags by (1 + k / 4) from -1 to 1 over the sections; in the lower plane by half."""
+    found = made_campaign(9, failed=(2,), stalled=(4, 5), not_run=(8,))
+    for who, section in (("leader", SECTIONS), ("laggard", 1)):
+        planes = np.full(9, "upper", dtype=object)
+        planes[[2, 8]] = ""
+        found[f"asynchrony_{who}_plane"] = ("sample", planes)
+        numbers = np.where(planes == "upper", float(section), -1.0)
+        numbers[3] = 2.0
+        found[f"asynchrony_{who}_section"] = ("sample", numbers)
+    return found
+
+
+@pytest.mark.parametrize("order", ["import ringsim, xarray", "import xarray, ringsim"])
+def test_every_dataset_has_it(order: str) -> None:
+    """Whoever comes first, and without loading anything but xarray."""
+    code = (
+        f"{order}, sys\nprint(type(xarray.Dataset().ring).__name__, 'scipy' in sys.modules)\n"
+        "import importlib; importlib.reload(ringsim)"
+    )
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True,
+                          text=True, check=True)  # fmt: skip
+    assert done.stdout.split() == ["Ring", "False"]
+
+
+def test_outcomes_are_counted_with_exact_intervals(campaign: xr.Dataset) -> None:
+    table = campaign.ring.outcomes()
+    assert table["samples"].to_dict() == {"deployed": 5, "stalled": 2, "lost: timeout": 1}
+    assert table["of"].to_dict() == {"deployed": 7, "stalled": 7, "lost: timeout": 8}
+    for kind, row in table.iterrows():
+        known = binomtest(int(row["samples"]), int(row["of"])).proportion_ci(0.95, "exact")
+        assert (row["lower"], row["upper"]) == pytest.approx((known.low, known.high)), kind
+        assert row["share"] == row["samples"] / row["of"]
+
+
+def test_a_fan_is_of_the_samples_that_count(campaign: xr.Dataset) -> None:
+    found = campaign.ring.fan()
+    assert found.dims == ("quantile", "plane", "section", "share")
+    assert found.attrs["units"] == "degree"
+    known = courses(campaign)
+    assert known["sample"].to_numpy().tolist() == [0, 1, 3, 4, 5, 6, 7]
+    np.testing.assert_allclose(found.sel(quantile=0.5), np.median(known, axis=0), atol=1e-5)
+    np.testing.assert_allclose(found.sel(quantile=1.0), known.max("sample"), atol=1e-5)
+    # Half-way through, 4 * 1/4 * (1 + k / 4) degree at the last section: sample 5 is the fourth.
+    middle = found.sel(plane="upper", section=SECTIONS, quantile=0.5).sel(share=0.5)
+    assert float(middle) == pytest.approx(1.0 + 4 / 4, abs=1e-3)
+
+
+def test_who_leads_and_lags_how_often(campaign: xr.Dataset) -> None:
+    found = campaign.ring.leader()
+    assert found.attrs == {"samples": 7, "of": 9}
+    for word, section in (("leads", SECTIONS), ("lags", 1)):
+        assert int(found[word].sum()) == 7
+        assert int(found[word].sel(plane="upper", section=section)) == 6
+        assert int(found[word].sel(plane="upper", section=2)) == 1
+
+
+def test_who_leads_and_lags_when(campaign: xr.Dataset) -> None:
+    run = campaign.isel(sample=2)  # it broke at 4 s
+    found = run.drop_vars("sample").ring.leader()
+    moving = found.sel(time=slice(0.5, 4.0))
+    assert set(moving["leader"].to_numpy()) == {f"upper {SECTIONS}"}
+    assert set(moving["laggard"].to_numpy()) == {"upper 1"}
+    np.testing.assert_allclose(found["asynchrony"], run["asynchrony"], atol=1e-9)
+    assert set(found["leader"].sel(time=slice(4.1, None)).to_numpy()) == {""}
+
+
+@pytest.mark.parametrize("ask", ["outcomes", "fan"])
+def test_of_a_run_there_are_no_shares(ask: str, campaign: xr.Dataset) -> None:
+    with pytest.raises(InputError, match="only a campaign has them"):
+        getattr(campaign.isel(sample=0, drop=True).ring, ask)()
+
+
+def test_what_was_left_out_is_refused(campaign: xr.Dataset) -> None:
+    with pytest.raises(InputError, match="opening_angle, which this campaign has left out"):
+        campaign.drop_vars("opening_angle").ring.fan()
+    with pytest.raises(InputError, match="asynchrony_leader_plane, which this campaign"):
+        campaign.drop_vars("asynchrony_leader_plane").ring.leader()
+    with pytest.raises(InputError, match="opening_angle, which this dataset"):
+        xr.Dataset().ring.leader()
+    assert "Campaign" in dir(ringsim)

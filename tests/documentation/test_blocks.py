@@ -1,0 +1,107 @@
+"""What README and pages tell users to type works: commands, scripts, campaigns, links."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from pages import PAGES, ROOT, blocks, calls
+from ringsim.cli import VERBS, cli
+
+TUTORIAL = ROOT / "docs" / "tutorial.md"
+CALLS = [
+    pytest.param(call, id=f"{page.relative_to(ROOT)}: {' '.join(call)[:60]}")
+    for page in PAGES for text in blocks(page, "sh") for call in calls(text)
+]  # fmt: skip
+SCRIPTS = [
+    ROOT / "README.md",
+    ROOT / "docs" / "guide" / "commands.md",
+    ROOT / "docs" / "howto" / "own_structure.md",
+]
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_commands_and_their_options_exist(call: list[str]) -> None:
+    verb, *arguments = call
+    assert verb in VERBS
+    command = importlib.import_module(f"ringsim.cli.{verb}").command
+    arguments = [each.strip("[]").split("|")[0] for each in arguments if each != "|"]
+    command.make_context(verb, arguments).close()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_lead_to_files(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for target in re.findall(r"\]\(([^)#\s]+)", text):
+        if "://" not in target:
+            assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", SCRIPTS, ids=lambda path: path.stem)
+def test_python_of_a_page_runs(page: Path, tmp_path: Path) -> None:
+    (script,) = blocks(page, "python")
+    (tmp_path / "script.py").write_text(script, encoding="utf-8")
+    run([sys.executable, "-W", "error", "script.py"], tmp_path)
+
+
+def run(command: list[str], folder: Path) -> str:
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, check=False,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_the_tutorial_takes_five_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As they stand, but with the first three samples, of a ring of three sections.
+
+    The figures of a campaign are drawn in tests/readme.
+    """
+    commands = [calls(text)[0] for text in blocks(TUTORIAL, "sh", mark="tutorial")]
+    assert [len(calls(text)) for text in blocks(TUTORIAL, "sh", mark="tutorial")] == [1] * 5
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "campaigns").symlink_to(ROOT / "campaigns")
+    printed = []
+    for verb, *arguments in commands:
+        smaller = ["--samples=3", "--set=structure.sections=3", "--workers=1"]
+        if verb == "campaign":
+            arguments = [each for each in arguments if each != "--plot"] + smaller
+        if verb == "replay":  # which hands its own output to the sample's process
+            printed.append(run([sys.executable, "-m", "ringsim", verb, *arguments], tmp_path))
+            continue
+        done = CliRunner().invoke(cli, [verb, *arguments])
+        assert done.exit_code == 0, done.output
+        printed.append(done.output)
+    assert "3 to run here" in printed[0]
+    assert "partly deployed: 1 of 3 (sample 2)" in printed[1]  # the one whose motor stops
+    assert "outcome is deployed" in printed[2]
+    assert (tmp_path / "late-motor.html").stat().st_size < 2e6
+    assert "identical to the stored result" in printed[4]
+    assert (tmp_path / "stopped.nc").exists()
+
+
+def test_the_tutorial_takes_twelve_lines_of_python(tmp_path: Path) -> None:
+    """The same study: inputs, design and seed are those of the file; two samples of it run."""
+    (text,) = blocks(TUTORIAL, "python", mark="tutorial")
+    assert len([line for line in text.splitlines() if line.strip()]) <= 12
+    smaller = text.replace('"structure.sections": 6', '"structure.sections": 3')
+    smaller = smaller.replace('"samples": 24', '"samples": 2')
+    assert smaller.count("3,") == text.count("3,") + 1
+    (tmp_path / "study.py").write_text(smaller, encoding="utf-8")
+    printed = run([sys.executable, "study.py"], tmp_path)
+    assert re.search(r"^deployed +2 +2 ", printed, re.MULTILINE)
+    names: dict[str, object] = {}
+    exec(text.partition("campaign = ")[0], names)
+    file = tomllib.loads((ROOT / "campaigns" / "late_motor.toml").read_text(encoding="utf-8"))
+    assert names["inputs"] == file["inputs"]
+    written = names["study"]._described.specification
+    assert (written.seed, written.design.samples) == (file["seed"], file["design"]["samples"])

@@ -1,0 +1,173 @@
+"""What other programs read of an export is what the file held."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_positions
+from scipy.io import loadmat
+
+from ringsim.cli import cli
+from ringsim.dataset import save
+from ringsim.export import csv, matlab
+from ringsim.shapes import COMPUTED, FROM_ANGLES, shape_of
+
+
+def export(*words: object, code: int = 0) -> str:
+    done = CliRunner().invoke(cli, ["export", *map(str, words)])
+    assert done.exit_code == code, done.output
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def campaign() -> xr.Dataset:
+    found = with_positions(made_campaign(4, failed=(2,), not_run=(3,)))
+    codes = found["status"].attrs  # as merging writes them
+    codes["flag_values"] = np.append(np.int8(-1), codes["flag_values"])
+    codes["flag_meanings"] = f"not_run {codes['flag_meanings']}"
+    return found
+
+
+@pytest.fixture
+def file(campaign: xr.Dataset, tmp_path: Path) -> Path:
+    save(campaign, tmp_path / "campaign.nc")
+    return tmp_path / "campaign.nc"
+
+
+@pytest.fixture
+def run_file(campaign: xr.Dataset, tmp_path: Path) -> Path:
+    """The run of sample 1, with a stress of 1000 r + s Pa in row r, section s."""
+    run = campaign.isel(sample=1, drop=True)
+    rods = [f"{rod}_{half}" for rod in ("diagonal_rising", "diagonal_falling", "bar_upper",
+                                        "bar_lower") for half in ("left", "right")]  # fmt: skip
+    rows = 1000.0 * np.arange(8)[:, None, None] + np.arange(1, SECTIONS + 1)[:, None]
+    stress = rows * np.ones(len(TIMES))
+    told = {"units": "Pa", "long_name": "stress"}
+    run = run.assign_coords(rod=rods).assign(rod_stress=(("rod", "section", "time"), stress, told))
+    save(run, tmp_path / "run.nc")
+    return tmp_path / "run.nc"
+
+
+@pytest.mark.parametrize("block", [1 << 22, 100])
+def test_tables(
+    file: Path, campaign: xr.Dataset, block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same whether they are written at once or in blocks of samples."""
+    monkeypatch.setattr(csv, "BLOCK", block)
+    printed = export(file.parent, "--out", file.parent / "tables")
+    known = {Path(line.removeprefix("wrote ")).name for line in printed.splitlines()}
+    assert known == {path.name for path in (file.parent / "tables").iterdir()}
+    samples = pd.read_csv(file.parent / "tables" / "campaign-sample.csv", keep_default_na=False)
+    assert samples["status"].tolist() == ["ok", "ok", "timeout", "not_run"]
+    assert samples["sample"].tolist() == [0, 1, 2, 3]
+    assert samples["rods_young_modulus (Pa)"].astype(float).tolist() == [
+        1e11 + 1e9 * k for k in range(4)
+    ]
+    assert samples["cables_lower_winch_stop_time"].tolist() == ["3.0", "none"] * 2
+    courses = pd.read_csv(file.parent / "tables" / "campaign-sample-plane-section-time.csv")
+    assert list(courses) == ["sample", "plane", "section", "time (s)", "opening_angle (degree)"]
+    found = courses.set_index(["sample", "plane", "section", "time (s)"]).iloc[:, 0].to_xarray()
+    expected = campaign["opening_angle"].isel(sample=[0, 1, 2]).dropna("time", how="all")
+    expected = expected.reindex(plane=found["plane"].to_numpy().astype(str))
+    np.testing.assert_array_equal(found.to_numpy(), expected.to_numpy())
+    assert courses["opening_angle (degree)"].notna().all()  # nothing after the end of a run
+    about = pd.read_csv(file.parent / "tables" / "campaign-variables.csv").set_index("name")
+    assert about.loc["rods_young_modulus", "meaning"] == "rods.young_modulus"
+    assert about.loc["opening_angle", "dimensions"] == "sample plane section time"
+
+
+def test_matlab(file: Path, run_file: Path, campaign: xr.Dataset) -> None:
+    for where in (file, run_file):
+        export(where, "--format", "mat")
+    found = loadmat(file.with_suffix(".mat"), simplify_cells=True)
+    for name in ("opening_angle", "position", "status", "time", "rods_young_modulus"):
+        np.testing.assert_array_equal(found[name], campaign[name].to_numpy())
+    assert found["reason"].tolist() == campaign["reason"].to_numpy().tolist()
+    assert found["units"]["opening_angle"] == "degree"
+    assert found["dimensions"]["position"] == "sample point axis time"
+    assert found["codes"]["status"].startswith("-1 not_run, 0 ok, ")
+    assert found["meaning"]["rods_young_modulus"] == "rods.young_modulus"
+    assert 'name = "ring18-cable"' in found["attributes"]["scene"]
+    run = loadmat(run_file.with_suffix(".mat"), simplify_cells=True)
+    assert run["peak_tension"] == 21.0
+    assert run["dimensions"]["peak_tension"] == "none"
+
+
+def grids(path: Path) -> dict[float, meshio.Mesh]:
+    """What a collection lists, by time, as meshio reads it."""
+    sets = ElementTree.parse(path).getroot().findall("./Collection/DataSet")
+    return {float(e.attrib["timestep"]): meshio.read(path.parent / e.attrib["file"]) for e in sets}
+
+
+def test_paraview(run_file: Path) -> None:
+    run, scene = xr.load_dataset(run_file), made_scene()
+    export(run_file, "--format", "pvd")
+    found, shape = grids(run_file.with_suffix(".pvd")), shape_of(run, scene)
+    assert [*found] == pytest.approx(TIMES.tolist())
+    assert COMPUTED in run_file.with_suffix(".pvd").read_text()
+    names = run["point"].to_numpy().tolist()
+    for moment in (0, 13):
+        mesh = found[float(TIMES[moment])]
+        expected = run["position"].isel(time=moment).transpose("point", "axis").to_numpy()
+        np.testing.assert_allclose(mesh.points, expected, atol=1e-8)
+        (cells,) = mesh.cells
+        assert cells.type == "line"
+        lengths = np.linalg.norm(np.diff(mesh.points[cells.data], axis=1)[:, 0], axis=1)
+        part = [*shape.points.lines].index("bars")
+        bars = mesh.cell_data["part"][0] == part
+        rods = mesh.cell_data["part"][0] == [*shape.points.lines].index("diagonals")
+        np.testing.assert_allclose(lengths[rods], scene.structure.half_diagonal, atol=1e-7)
+        angle = run["opening_angle"].isel(time=moment)
+        lag = angle - angle.mean()
+        for plane in ("upper", "lower"):
+            for section in range(1, SECTIONS + 1):
+                joint = names.index(f"{plane} V-joint {section}")
+                own = float(lag.sel(plane=plane, section=section))
+                assert mesh.point_data["lag"][joint] == pytest.approx(own, abs=1e-7)
+                ends = bars & (cells.data == joint).any(axis=1)
+                assert ends.sum() == 2
+                np.testing.assert_allclose(mesh.cell_data["lag"][0][ends], own, atol=1e-7)
+                # Rows 4 and 5 are the halves of the upper bar, 6 and 7 those of the lower.
+                rows = 1000.0 * (np.array([4, 5]) + 2 * (plane == "lower")) + section
+                assert sorted(mesh.cell_data["stress"][0][ends]) == rows.tolist()
+
+
+def test_paraview_of_samples(file: Path, campaign: xr.Dataset) -> None:
+    """Without positions they follow from the angles, which is told."""
+    save(campaign.drop_vars("position").drop_dims(["point", "axis"]), file)
+    export(file, "--format", "pvd", "--sample", 0, "--sample", 2)
+    assert len(grids(file.with_name("campaign-sample0.pvd"))) == len(TIMES)
+    assert max(grids(file.with_name("campaign-sample2.pvd"))) == 4.0
+    assert FROM_ANGLES in file.with_name("campaign-sample2.pvd").read_text()
+
+
+def test_what_cannot_be_exported_is_refused(
+    file: Path, run_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    xr.Dataset({"verdict": 1.0}).to_netcdf(file.with_name("analysis.nc"))
+    refusals = [
+        ((file, "--format", "xls"), "--format xls: 'xls' is no format to export to (known: csv"),
+        ((file, "--format", "pvd"), "shows runs, and this is a campaign: choose"),
+        ((file, "--sample", 9), "--sample 9: "),
+        ((run_file, "--sample", 0), "holds one run: leave it out"),
+        ((file, "--format", "pvd", "--sample", 3), "ended before its first record: there is noth"),
+        ((file.with_name("analysis.nc"),), "holds neither a run nor a campaign"),
+        ((file.with_name("gone.nc"),), "there is no such file"),
+    ]  # fmt: skip
+    for words, told in refusals:
+        assert told in export(*words, code=2)
+    for bound, most, told in (
+        ("MOST_BYTES", 1000, "of a MATLAB file at most 2.1 GB: choose fewer"),
+        ("LONGEST_NAME", 20, "and MATLAB's names at most 20"),
+    ):
+        with monkeypatch.context() as patched:
+            patched.setattr(matlab, bound, most)
+            assert told in export(file, "--format=mat", code=2)
+    assert not list(file.parent.glob("*.mat"))
