@@ -57,10 +57,9 @@ class Campaign:
     Examples
     --------
     >>> force = {"kind": "uniform", "low": 0.01, "high": 0.02}
-    >>> Campaign("truss2", {"loads.force": force}, {"kind": "sobol", "sample": 8})
+    >>> Campaign("truss2", {"loads.force": force}, {"kind": "sobol"})
     Traceback (most recent call last):
-    ringsim.refusal.InputError: ringsim.Campaign: design.sample is not a known key (did you mean \
-samples?); also at fault: design.samples
+    ringsim.refusal.InputError: ringsim.Campaign: design.samples is missing: give it a value
     """
 
     def __init__(

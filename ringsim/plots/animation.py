@@ -108,7 +108,7 @@ def stage(run: xr.Dataset, shape: Shape, paint: _Paint) -> tuple[Figure, Callabl
     style.title(figure, style.scene_title(run))
     axes = figure.add_axes((0.02, 0.26, 0.96, 0.61))
     axes.set_axis_off()
-    few = np.linspace(shape.times[0], shape.times[-1], 40)
+    few = np.linspace(shape.times[0], shape.times[-1], 16)
     papers = np.concatenate([view(shape.at(float(time)), azimuth, _ELEVATION)[0] for time in few])
     low, high = papers.min(axis=0), papers.max(axis=0)
     room = 0.02 * (high - low).max()

@@ -207,7 +207,3 @@ def test_replay_repeats_the_check_too(checked):
     assert float(full.deployment_time) == float(both.deployment_time_checked)
     assert float(full.deployment_time) != float(both.deployment_time)
     assert "no stored result" in checked.run("replay", "out", 1, "--check")
-    checked.write(5)
-    checked.run("campaign", "small.toml", "--out", "alone")
-    refused = checked.run("replay", "alone", 1, "--check", code=2)
-    assert "--check: the samples of alone have no checks (check_every): leave it out" in refused

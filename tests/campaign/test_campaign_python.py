@@ -197,3 +197,11 @@ def test_the_plan_tells_the_cost() -> None:
     assert "4 samples (random design), 4 to run here" in told
     assert "from a trial run of sample" in told
     assert not Path("runs").exists()
+
+
+def test_replay_refuses_checks_that_a_campaign_does_not_have() -> None:
+    small().run(workers=0)
+    done = CliRunner().invoke(cli, ["replay", "runs/small", "1", "--check"])
+    assert done.exit_code == 2
+    told = "--check: the samples of runs/small have no checks (check_every): leave it out"
+    assert told in done.output

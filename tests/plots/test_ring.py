@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from made_campaign import made_campaign, with_positions
 from matplotlib.collections import LineCollection
 
 from ringsim.plots.ring import facing_azimuth, instants, lines_at, ring, view
@@ -165,3 +166,18 @@ def test_joints_change_their_colour_when_they_lock(deployed):
     free = deployed.assign(lock_time=deployed.lock_time.where(False), deployment_time=np.nan)
     words = [text.get_text() for text in ring(free).legends[0].get_texts()]
     assert "V-joints, locked" not in words
+
+
+def test_positions_are_drawn_where_they_were_computed():
+    """Stretched by a tenth along z, which no opening angle would do, the drawing is, too."""
+    run = with_positions(made_campaign(1), 0.0).isel(sample=0, drop=True)
+    tall = run.copy(deep=True)
+    tall["position"].loc[{"axis": "z"}] *= 1.1
+    heights = []
+    for one in (run.drop_vars("position"), run, tall):
+        figure = ring(one)
+        heights.append(figure.axes[0].get_ylim()[1])
+        subject = figure.get_suptitle().split(":")[0]
+        assert subject == ("Deployment as computed" if "position" in one else "Deployment")
+    assert heights[1] == pytest.approx(heights[0], rel=1e-6)
+    assert 1.02 * heights[0] < heights[2] <= 1.1 * heights[0]

@@ -1,0 +1,61 @@
+"""The blocks of docs/python.md run as they stand there, as one script without a main guard."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from scipy.io import loadmat
+
+from ringsim.cli import cli
+from ringsim.plots import animation
+from ringsim.plots.campaign import figures
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+
+
+def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "page.py").write_text("\n".join(blocks("python")), encoding="utf-8")
+    path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+
+    def call(*words: str) -> list[str]:
+        done = subprocess.run(
+            [sys.executable, *words], cwd=tmp_path, env=os.environ | {"PYTHONPATH": path},
+            capture_output=True, text=True, timeout=600, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return done.stdout.splitlines()
+
+    printed = call("page.py")
+    assert printed[0] == "all V-joints have reached 180 deg"
+    assert float(printed[1]) > 0.0
+    assert "8 of 8 samples are ok" in printed
+    assert any(line.startswith("deployed") for line in printed)
+    assert re.fullmatch(r"(upper|lower) [1-4]", printed[-2])
+    low, high = map(float, printed[-1].strip("[]").split())
+    assert 0.0 < low < high
+
+    monkeypatch.chdir(tmp_path)
+    # All figures and frames have tests of their own.
+    monkeypatch.setattr(figures, "PICTURES", figures.PICTURES[:1])
+    monkeypatch.setattr(animation, "FRAMES", 2)
+    (commands,) = blocks("sh")
+    *others, replay = (command.split()[1:] for command in commands.splitlines())
+    for words in others:
+        told = CliRunner().invoke(cli, words)
+        assert told.exit_code == 0, told.output
+    assert call("-m", "ringsim", *replay)[-1] == "identical to the stored result"
+    assert (tmp_path / "tables" / "campaign-sample.csv").exists()
+    assert loadmat(tmp_path / "tables" / "campaign.mat")["status"].ravel().tolist() == [0] * 8
+    assert (tmp_path / "paraview" / "campaign-sample0.pvd").exists()
+    assert list((tmp_path / "figures").glob("campaign-sample*.gif"))
