@@ -30,6 +30,7 @@ class Morris(Grouped):
     samples: Samples
     """Trajectories."""
     levels: Annotated[int, Field(ge=2, le=1000, multiple_of=2)] = 4
+    """Levels of each continuous input; a move crosses half of them."""
 
     def block(self, groups: int) -> int:
         """Runs of a trajectory."""

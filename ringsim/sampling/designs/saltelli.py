@@ -30,6 +30,7 @@ class Saltelli(Grouped, Replicated):
     kind: Literal["saltelli"] = "saltelli"
     replicates: Annotated[int, Field(ge=1, le=10_000)] = 8
     second_order: bool = False
+    """Whether interactions of pairs of groups are wanted, too: nearly twice the runs."""
 
     def block(self, groups: int) -> int:
         """Runs of a block."""
