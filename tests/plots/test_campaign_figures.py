@@ -12,11 +12,11 @@ from made_campaign import SECTIONS, TIMES, lags, made_campaign
 from matplotlib.figure import Figure
 
 from ringsim.analysis import blocks as blocks_module
+from ringsim.analysis import courses as courses_module
 from ringsim.analysis.campaign_samples import median_and_worst
 from ringsim.analysis.courses import course, courses
 from ringsim.cli import cli
 from ringsim.dataset import save
-from ringsim.plots.campaign import courses as courses_module
 from ringsim.plots.campaign.by_input import by_input, drawn
 from ringsim.plots.campaign.convergence import convergence
 from ringsim.plots.campaign.distributions import distributions
