@@ -11,8 +11,8 @@ from click.testing import CliRunner
 from made_campaign import SECTIONS, TIMES, lags, made_campaign
 from matplotlib.figure import Figure
 
-from ringsim.analysis import blocks as blocks_module
 from ringsim.analysis import courses as courses_module
+from ringsim.analysis import reading as blocks_module
 from ringsim.analysis.campaign_samples import median_and_worst
 from ringsim.analysis.courses import course, courses
 from ringsim.cli import cli
