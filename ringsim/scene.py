@@ -137,8 +137,9 @@ class Scene(Model):
         """
         table = self.to_table()
         # Where winches are comes first: names of pulleys depend on it, numbers count from there.
-        ordered = sorted(copy.deepcopy(values).items(), key=lambda item: not _tells_end(item[0]))
-        for path, value in ordered:  # later paths may lead into its tables
+        ordered = sorted(values.items(), key=lambda item: not _tells_end(item[0]))
+        # Later paths may lead into its tables; a copy each, as two parts may be given the same one.
+        for path, value in ((path, copy.deepcopy(value)) for path, value in ordered):
             if _tells_end(path):
                 _refuse_renumbering(table, path, value, values)
             set_path(table, path, value)

@@ -31,6 +31,10 @@ class Winding(Model):
         """
         raise NotImplementedError
 
+    def available_tension(self) -> float:
+        """Largest tension at which the winch still winds as it is told, N; infinite if any is."""
+        return math.inf
+
 
 class PrescribedWinding(Winding):
     """A law of time alone."""

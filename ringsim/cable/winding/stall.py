@@ -26,6 +26,10 @@ class StallWinding(FeedbackWinding):
         """The speed below the stall, in m/s."""
         return self.speed
 
+    def available_tension(self) -> float:
+        """The maximum tension, in N."""
+        return self.max_tension
+
     def command(self, tension: float, reading: WinchReading) -> float:
         """Speed of the motor at a tension (N), in m/s."""
         return self.speed * (1.0 - tension / self.max_tension) / self.band
