@@ -11,9 +11,10 @@ import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from ringsim.cable.faults.family import CableFault
+from ringsim.cable.limited import why_unlimited
 from ringsim.cable.places import CABLES, numbered, path_of, spans_of
 from ringsim.cable.records import Cable, Cables
-from ringsim.choice import OneOf
+from ringsim.choice import OneOf, kind_of
 from ringsim.files import parse_toml, read_text
 from ringsim.overrides import at_path, length_at, points_in, set_path
 from ringsim.parts.boom.family import Boom
@@ -21,6 +22,7 @@ from ringsim.parts.faults.family import Fault
 from ringsim.parts.joints import Joints
 from ringsim.parts.limits import Limits
 from ringsim.parts.loads import Loads
+from ringsim.parts.margin.family import MarginStandard
 from ringsim.parts.net import Net
 from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
@@ -51,6 +53,8 @@ class Scene(Model):
     loads: Loads | None = None
     cables: Cables | None = None
     limits: Limits = Limits()
+    margin: Annotated[MarginStandard, OneOf()] | None = None
+    """Standard by which runs tell the margin of their drive (``drive_margin``)."""
     faults: Annotated[tuple[Annotated[Fault, OneOf()], ...], ListIn] = ()
     solver: Solver = Solver()
     record: Record = Record()
@@ -81,6 +85,8 @@ class Scene(Model):
                 f"limits.tension = {self.limits.tension:g} N needs a cable: add [cables.upper], or "
                 "leave the limit out"
             )
+        if self.margin is not None:
+            self._check_margin()
         if self.record.interval > self.solver.end_time:
             raise ValueError(
                 f"record.interval = {self.record.interval} s must not exceed solver.end_time = "
@@ -93,6 +99,19 @@ class Scene(Model):
                 "solver.end_time: the result would not fit in memory"
             )
         return self
+
+    def _check_margin(self) -> None:
+        if (kind := kind_of(self.structure)) != "pantograph-ring":
+            raise ValueError(
+                f'margin needs structure.kind = "pantograph-ring", not "{kind}" (leave it out)'
+            )
+        if self.cables is None and self.loads is None:
+            raise ValueError(
+                "margin: nothing drives the ring (add [cables.upper] with a motor, or leave margin "
+                "out)"
+            )
+        if reason := why_unlimited(self.cables, self.structure.planes):
+            raise ValueError(reason)
 
     @model_validator(mode="before")
     @classmethod

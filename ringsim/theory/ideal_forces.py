@@ -49,7 +49,7 @@ class Forces:
         self.loaded = bool(loads.any())
         self._lift = np.tensordot(loads[:, 2], places, 1)
         laws = scene.joints.present()
-        self._joints = [_friction_joints(points, *item) for item in laws.items()]
+        self._joints = [friction_joints(points, *item) for item in laws.items()]
         rates = [law.characteristic_rate() for law in laws.values()]
         self.slowest = min(rates, default=math.inf)
         self._stops = sum(map(len, points.layout.openings))
@@ -81,7 +81,7 @@ class Forces:
         return Acting(force, cross(lifted, up), elastic, float(up @ lifted), loss)
 
 
-def _friction_joints(
+def friction_joints(
     points: Points, family: str, law: JointFriction
 ) -> tuple[JointFriction, list[tuple[Array, Array]]]:
     """The law at the joints of a family; z x x and x of their first and second parts."""

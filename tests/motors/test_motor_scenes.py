@@ -6,33 +6,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from motor_rings import MOTOR, STALL, TRAVEL, ring
 from ringsim.outputs.family import holds
-from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
 from ringsim.variables import Fate
-
-MOTOR = {
-    "kind": "motor", "no_load_speed": 600.0, "stall_torque": 0.002, "gear_ratio": 100.0,
-    "efficiency": 0.6, "drum_radius": 0.01,
-}  # fmt: skip
-TRAVEL = 0.01 / 100.0
-
-
-def ring(**values: object) -> Scene:
-    """Six even sections from 60 deg on, without a boom; two underscores stand for a dot."""
-    plain = {
-        "structure.sections": 6, "structure.aspect_ratio": 1.0, "structure.opening_angle": 60.0,
-        "boom": "none", "net": "none", "record.interval": 0.05,
-    }  # fmt: skip
-    plain |= {f"cables.{plane}.winch.winding": MOTOR for plane in ("upper", "lower")}
-    chosen = {name.replace("__", "."): value for name, value in values.items()}
-    return load_scene("ring18-cable").with_values(plain | chosen)
 
 
 def test_motors_stall_where_they_meet_the_net() -> None:
     """Virtual work: every V span shortens by dL, every corner moves out by dR."""
     offset, bar, pin = 0.105, 0.2889, 0.006554
-    stall, stiffness, neutral = 0.002 * 0.6 / TRAVEL, 300.0, 0.4
+    stiffness, neutral = 300.0, 0.4
     scene = ring(
         net__stiffness=stiffness, net__neutral_length=neutral, solver__end_time=20.0,
         cables__upper__friction={"kind": "none"}, cables__lower__friction={"kind": "none"},
@@ -42,7 +25,7 @@ def test_motors_stall_where_they_meet_the_net() -> None:
     def unbalanced(phi: float) -> float:
         span = np.sqrt(bar**2 + offset**2 + 2.0 * bar * offset * np.sin(phi))
         radius = 2.0 * (bar * np.cos(phi) + pin)  # a hexagon's, as long as its chord
-        drive = 2 * 12 * stall * bar * offset * np.cos(phi) / span
+        drive = 2 * 12 * STALL * bar * offset * np.cos(phi) / span
         stretch = max(radius - neutral, 0.0)
         return drive - 6.0 * stiffness * stretch * 2.0 * bar * np.sin(phi)
 

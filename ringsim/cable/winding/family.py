@@ -32,8 +32,12 @@ class Winding(Model):
         raise NotImplementedError
 
     def available_tension(self) -> float:
-        """Largest tension at which the winch still winds as it is told, N; infinite if any is."""
+        """Largest tension against which the winch still winds, N; infinite if it is any."""
         return math.inf
+
+    def commanded_speed(self) -> float:
+        """Speed that it keeps at this tension, in m/s; 0 where it is about to stall."""
+        return 0.0
 
 
 class PrescribedWinding(Winding):

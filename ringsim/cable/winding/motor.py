@@ -1,4 +1,4 @@
-r"""Winding by a motor behind a gear."""
+"""Winding by a motor behind a gear."""
 
 import math
 from typing import Annotated, Any, Literal
@@ -20,7 +20,7 @@ from ringsim.units import (
 
 
 class MotorWinding(FeedbackWinding):
-    r"""A motor with a straight torque-speed line, a gear and a drum.
+    """A motor with a straight torque-speed line, a gear and a drum.
 
     At the shaft's speed w the motor has at most the torque
 
@@ -156,6 +156,10 @@ class MotorWinding(FeedbackWinding):
     def available_tension(self) -> float:
         """Tension that it winds at the commanded speed, or just before it stalls, in N."""
         return float(self.available(self.speed or 0.0)) * self.efficiency / self.travel
+
+    def commanded_speed(self) -> float:
+        """The command, in m/s; 0 without one: the motor slows down until it has the torque."""
+        return 0.0 if self.speed is None else self.travel * self.speed
 
     def command(self, tension: float, reading: WinchReading) -> float:
         """Speed of the motor at a tension (N), in m/s."""
