@@ -27,7 +27,7 @@ class Reeved(NamedTuple):
 
 
 class Drive:
-    """Cables and loads of a scene.
+    """Cables and loads of a scene, whose winches wind at all, or ``at_speed`` as commanded.
 
     Raises
     ------
@@ -35,8 +35,8 @@ class Drive:
         If a winch pulls with any force, so that nothing resists too much, or nothing drives.
     """
 
-    def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
-        self._scene, points = scene, mechanism.points
+    def __init__(self, scene: Scene, mechanism: Mechanism, *, at_speed: bool = False) -> None:
+        points, self._at_speed = mechanism.points, at_speed
         self._cables = [] if scene.cables is None else scene.cables.present()
         self._paths = [points.path(number) for number in range(len(self._cables))]
         self._loads = points.forces
@@ -73,9 +73,9 @@ class Drive:
     def speed(self, now: Configuration) -> float:
         """Rate of the opening angle at which winches wind as commanded, rad/s; the least of all.
 
-        0 without a command: a motor on its voltage slows down until it has the torque.
+        0 where they need not, or have no command: a motor slows down until it has the torque.
         """
-        rates = []
+        rates = [] if self._at_speed else [0.0]
         for cable, reeved in zip(self.cables, self.reeved(now), strict=True):
             commands = sum(winch.winding.commanded_speed() for winch in cable.winches)
             rates.append(commands / max(float(reeved.shortening.sum()), 1e-300))
@@ -92,7 +92,7 @@ class Drive:
             tensions = np.zeros(len(reeved.shortening))
             for winch, way in zip(cable.winches, _ways(cable), strict=True):
                 on = time is None or winch.turns(time)
-                pull = winch.winding.available_tension() if on else 0.0
+                pull = winch.winding.available_tension(at_speed=self._at_speed) if on else 0.0
                 shares = np.exp(np.append(0.0, np.cumsum(steps[::way])))[::way]
                 tensions = np.maximum(tensions, pull * shares)
             found += float(tensions @ reeved.shortening)

@@ -53,7 +53,8 @@ class DriveMargin:
                 "(leave margin out)"
             )
         self._mechanism = Mechanism(scene)
-        self._standard, self._drive = standard, Drive(scene, self._mechanism)
+        self._standard = standard
+        self._drive = Drive(scene, self._mechanism, at_speed=standard.keep_speed)
         self._resistances = resistances(scene, self._mechanism)
         self.kinds = [PULLEYS, *(one.kind for one in self._resistances)]
         self.start = math.pi - 2.0 * scene.structure.coordinate

@@ -70,7 +70,11 @@ def test_it_stalls_where_its_line_meets_the_resistance():
         assert law.speed_at(stall * (1.0 + 1e-9)) == 0.0
         assert law.torque(stall, 0.0) == pytest.approx(law.available(0.0))
     assert motor().stall_tension == pytest.approx(STALLING)
-    assert motor(speed=300.0).available_tension() == pytest.approx(0.5 * STALLING)
+    assert motor(speed=300.0).available_tension() == pytest.approx(STALLING)
+    assert motor(speed=300.0).available_tension(at_speed=True) == pytest.approx(0.5 * STALLING)
+    limited = motor(speed=300.0, torque_limit=0.0008).available_tension(at_speed=True)
+    assert limited == pytest.approx(0.4 * (1.0 - 0.05 * 0.5) * STALLING)
+    assert motor(speed=300.0, torque_limit=0.0008).speed_at(limited) == pytest.approx(0.5 * FREE)
     assert motor(voltage=0.5).available_tension() == pytest.approx(0.5 * STALLING)
 
 

@@ -117,7 +117,11 @@ def test_a_commanded_speed_leaves_less_torque_and_counts_viscous_friction() -> N
              ("upper", "lower")}  # fmt: skip
     scene = ring(joints__vjoint={"viscous": 0.5}).with_values(quick)
     angle = ANGLES[2]
-    found = DriveMargin(scene, PLAIN).at(angle)
+    slow = DriveMargin(scene, PLAIN).at(angle)
+    assert slow.resisting["joint friction"] == 0.0
+    assert slow.available == pytest.approx(driven(scene, angle, 0.0), rel=1e-6)
+    assert slow.margin == np.inf
+    found = DriveMargin(scene, PLAIN.model_copy(update={"keep_speed": True})).at(angle)
     shortening = -by_differences(lambda at: spans(scene, at)[0][0].sum(), angle)
     rate = 300.0 * 1e-4 / shortening
     assert found.resisting["joint friction"] == pytest.approx(12 * 0.5 * rate, rel=1e-6)

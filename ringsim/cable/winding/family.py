@@ -31,12 +31,14 @@ class Winding(Model):
         """
         raise NotImplementedError
 
-    def available_tension(self) -> float:
-        """Largest tension against which the winch still winds, N; infinite if it is any."""
+    def available_tension(self, *, at_speed: bool = False) -> float:
+        """Tension against which the winch still winds, N, at its commanded speed or however slowly;
+        infinite if it is any.
+        """
         return math.inf
 
     def commanded_speed(self) -> float:
-        """Speed that it keeps at this tension, in m/s; 0 where it is about to stall."""
+        """Speed that the winch is told to keep, in m/s; 0 if none is."""
         return 0.0
 
 

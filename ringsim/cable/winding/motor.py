@@ -36,9 +36,9 @@ class MotorWinding(FeedbackWinding):
     ...     no_load_speed=500.0, stall_torque=0.02, gear_ratio=1000.0, efficiency=0.5,
     ...     drum_radius=0.01,
     ... )
-    >>> motor.stall_tension  # 0.02 N m * 1000 * 0.5 / 0.01 m
+    >>> round(motor.stall_tension, 9)  # 0.02 N m * 1000 * 0.5 / 0.01 m
     1000.0
-    >>> motor.speed_at(500.0)  # half the stalling tension: half the speed of 5 mm/s
+    >>> round(motor.speed_at(500.0), 9)  # half the stalling tension: half the speed of 5 mm/s
     0.0025
     """
 
@@ -153,12 +153,16 @@ class MotorWinding(FeedbackWinding):
         half = 0.5 * self.voltage * self.no_load_speed
         return self.travel * (half if self.speed is None else min(self.speed, half))
 
-    def available_tension(self) -> float:
-        """Tension that it winds at the commanded speed, or just before it stalls, in N."""
-        return float(self.available(self.speed or 0.0)) * self.efficiency / self.travel
+    def available_tension(self, *, at_speed: bool = False) -> float:
+        """Tension at which it stalls, or that it winds at its commanded speed, in N."""
+        if not at_speed or self.speed is None:
+            return self.stall_tension
+        limited = self.limit * (1.0 - self.band * self.speed / (self.voltage * self.no_load_speed))
+        torque = min(self.available(self.speed), self.derating * limited)
+        return float(torque) * self.efficiency / self.travel
 
     def commanded_speed(self) -> float:
-        """The command, in m/s; 0 without one: the motor slows down until it has the torque."""
+        """The command, in m/s; 0 without one."""
         return 0.0 if self.speed is None else self.travel * self.speed
 
     def command(self, tension: float, reading: WinchReading) -> float:

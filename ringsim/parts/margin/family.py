@@ -37,6 +37,10 @@ class MarginStandard(Model):
     motorisation: Annotated[float, Field(ge=1.0, le=100.0), Unit("1")]
     """Of the sum of all factored resistances."""
 
+    keep_speed: bool = False
+    """Whether winches must keep their commanded speed, with the viscous friction that comes of it;
+    else it is enough that they wind, however slowly."""
+
     def factor(self, category: Category) -> float:
         """The factor of a category of resistance."""
         return float(getattr(self, category))
