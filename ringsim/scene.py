@@ -18,7 +18,9 @@ from ringsim.choice import OneOf, kind_of
 from ringsim.files import parse_toml, read_text
 from ringsim.overrides import at_path, length_at, points_in, set_path
 from ringsim.parts.boom.family import Boom
+from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import Fault
+from ringsim.parts.hinge_spring.family import HingeSpring
 from ringsim.parts.joints import Joints
 from ringsim.parts.limits import Limits
 from ringsim.parts.loads import Loads
@@ -47,6 +49,8 @@ class Scene(Model):
     structure: Annotated[Structure, OneOf(default="pantograph-ring")] = PantographRing()
     rods: Annotated[Rods, OneOf()] = GeometricallyExactRods()
     joints: Joints = Joints()
+    hinge_spring: Annotated[HingeSpring, OneOf()] | None = None
+    """A spring in every V-joint."""
     stop: Annotated[Stop, OneOf(default="spring-damper")] | None = SpringDamperStop()
     boom: Annotated[Boom, OneOf()] | None = None
     net: Net | None = None
@@ -105,10 +109,9 @@ class Scene(Model):
             raise ValueError(
                 f'margin needs structure.kind = "pantograph-ring", not "{kind}" (leave it out)'
             )
-        if self.cables is None and self.loads is None:
+        if self.cables is None and self.loads is None and self.hinge_spring is None:
             raise ValueError(
-                "margin: nothing drives the ring (add [cables.upper] with a motor, or leave margin "
-                "out)"
+                "margin: nothing drives the ring (add [cables.upper], or leave it out)"
             )
         if reason := why_unlimited(self.cables, self.structure.planes):
             raise ValueError(reason)
@@ -221,6 +224,11 @@ def _check_faults(scene: Scene) -> None:
     cables = [] if scene.cables is None else scene.cables.present()
     for number, fault in enumerate(scene.faults, 1):
         places = {"section": scene.structure.sections, "cable": len(cables)}
+        if isinstance(fault, FailedSpring) and scene.hinge_spring is None:
+            raise ValueError(
+                f"faults[{number}] is a fault of a spring, but the scene has none: add "
+                "[hinge_spring], or leave the fault out"
+            )
         if isinstance(fault, CableFault):
             if not cables:
                 raise ValueError(

@@ -13,6 +13,8 @@ from ringsim.refusal import show
 from ringsim.scene import Scene, load_scene
 from ringsim.units import Model
 
+_ASKED = ("margin", "hinge_spring")
+"""What few scenes name: not told of as left out."""
 MOST_SECTIONS_FOR_MOBILITY = 72
 """Larger rings take seconds, and their answer is the same."""
 
@@ -57,7 +59,7 @@ def _summary(scene: Scene) -> dict[str, str]:
     """What a scene builds; an empty text has no line."""
     friction = scene.joints.model_dump()
     parts = {name: getattr(scene, name) for name in sorted(type(scene).parts())}
-    absent = {name: part is None for name, part in parts.items() if name != "margin"}
+    absent = {name: part is None for name, part in parts.items() if name not in _ASKED}
     absent |= {"joint friction": not friction, "stress output": not scene.record.stress}
     return {
         "scene": f"{scene.name}: {scene.title}" if scene.title else scene.name,

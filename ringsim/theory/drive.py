@@ -44,7 +44,7 @@ class Drive:
         reason = why_unlimited(scene.cables, scene.structure.planes)
         if reason:
             raise InputError(reason)
-        if scene.cables is None and scene.loads is None:
+        if scene.cables is None and scene.loads is None and scene.hinge_spring is None:
             raise InputError(
                 "cables and loads are both left out: nothing drives the ring, so that there is no "
                 "margin (add [cables.upper] with a motor, or leave margin out)"

@@ -21,6 +21,7 @@ from ringsim.parts.persection import at_section
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
 from ringsim.theory.ideal_points import Points
+from ringsim.theory.spring_energy import SpringEnergy
 
 
 class Acting(NamedTuple):
@@ -53,6 +54,7 @@ class Forces:
         rates = [law.characteristic_rate() for law in laws.values()]
         self.slowest = min(rates, default=math.inf)
         self._stops = sum(map(len, points.layout.openings))
+        self.springs = SpringEnergy(scene)
 
     def act(self, now: Configuration, up: Array, latched: bool) -> Acting:
         """Forces, energies and powers, ``latched`` or not.
@@ -78,6 +80,9 @@ class Forces:
             force[0] -= 2.0 * self._stops * float(reaction.total)
             elastic += self._stops * float(reaction.stored)
             loss += self._stops * float(reaction.damping) * rate
+        torque, stored = self.springs.at(folded)
+        force[0] -= 2.0 * torque
+        elastic += stored
         return Acting(force, cross(lifted, up), elastic, float(up @ lifted), loss)
 
 
