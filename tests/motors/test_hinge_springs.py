@@ -93,6 +93,7 @@ def test_engines_agree_with_the_ideal_ring(fidelity: str) -> None:
         0.01 * folded + 0.5 * 0.005 * folded**2, rel=1e-4
     )
     assert float(found.energy_error) < 1e-3
+    assert float(truth.energy_error) < 1e-6
 
 
 @pytest.mark.parametrize(
