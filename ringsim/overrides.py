@@ -124,6 +124,8 @@ def place_of(path: str, *, closed: bool) -> str | None:
         return "corner"
     if path.startswith("cables."):
         return "pulley" if path.endswith(".coefficient") else None
+    if path in ("hinge_spring.angles", "hinge_spring.torques"):
+        return None
     return "section"
 
 

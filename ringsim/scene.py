@@ -11,16 +11,20 @@ import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from ringsim.cable.faults.family import CableFault
+from ringsim.cable.limited import why_unlimited
 from ringsim.cable.places import CABLES, numbered, path_of, spans_of
 from ringsim.cable.records import Cable, Cables
-from ringsim.choice import OneOf
+from ringsim.choice import OneOf, kind_of
 from ringsim.files import parse_toml, read_text
 from ringsim.overrides import at_path, length_at, points_in, set_path
 from ringsim.parts.boom.family import Boom
+from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import Fault
+from ringsim.parts.hinge_spring.family import HingeSpring
 from ringsim.parts.joints import Joints
 from ringsim.parts.limits import Limits
 from ringsim.parts.loads import Loads
+from ringsim.parts.margin.family import MarginStandard
 from ringsim.parts.net import Net
 from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
@@ -50,6 +54,8 @@ class Scene(Model):
     """Material, cross-sections and beam formulation of all rods."""
     joints: Joints = Joints()
     """Friction in pivots, hinges and V-joints."""
+    hinge_spring: Annotated[HingeSpring, OneOf()] | None = None
+    """A spring in every V-joint."""
     stop: Annotated[Stop, OneOf(default="spring-damper")] | None = SpringDamperStop()
     """What ends the travel of every V-joint; built unless it is "none"."""
     boom: Annotated[Boom, OneOf()] | None = None
@@ -62,6 +68,8 @@ class Scene(Model):
     """Driving cables with their winches; left out, there are none."""
     limits: Limits = Limits()
     """What counts as overloaded."""
+    margin: Annotated[MarginStandard, OneOf()] | None = None
+    """Standard by which runs tell the margin of their drive (``drive_margin``)."""
     faults: Annotated[tuple[Annotated[Fault, OneOf()], ...], ListIn] = ()
     """What breaks, when and where."""
     solver: Solver = Solver()
@@ -95,6 +103,8 @@ class Scene(Model):
                 f"limits.tension = {self.limits.tension:g} N needs a cable: add [cables.upper], or "
                 "leave the limit out"
             )
+        if self.margin is not None:
+            self._check_margin()
         if self.record.interval > self.solver.end_time:
             raise ValueError(
                 f"record.interval = {self.record.interval} s must not exceed solver.end_time = "
@@ -107,6 +117,18 @@ class Scene(Model):
                 "solver.end_time: the result would not fit in memory"
             )
         return self
+
+    def _check_margin(self) -> None:
+        if (kind := kind_of(self.structure)) != "pantograph-ring":
+            raise ValueError(
+                f'margin needs structure.kind = "pantograph-ring", not "{kind}" (leave it out)'
+            )
+        if self.cables is None and self.loads is None and self.hinge_spring is None:
+            raise ValueError(
+                "margin: nothing drives the ring (add [cables.upper], or leave it out)"
+            )
+        if reason := why_unlimited(self.cables, self.structure.planes):
+            raise ValueError(reason)
 
     @model_validator(mode="before")
     @classmethod
@@ -151,8 +173,9 @@ class Scene(Model):
         """
         table = self.to_table()
         # Where winches are comes first: names of pulleys depend on it, numbers count from there.
-        ordered = sorted(copy.deepcopy(values).items(), key=lambda item: not _tells_end(item[0]))
-        for path, value in ordered:  # later paths may lead into its tables
+        ordered = sorted(values.items(), key=lambda item: not _tells_end(item[0]))
+        # Later paths may lead into its tables; a copy each, as two parts may be given the same one.
+        for path, value in ((path, copy.deepcopy(value)) for path, value in ordered):
             if _tells_end(path):
                 _refuse_renumbering(table, path, value, values)
             set_path(table, path, value)
@@ -215,6 +238,11 @@ def _check_faults(scene: Scene) -> None:
     cables = [] if scene.cables is None else scene.cables.present()
     for number, fault in enumerate(scene.faults, 1):
         places = {"section": scene.structure.sections, "cable": len(cables)}
+        if isinstance(fault, FailedSpring) and scene.hinge_spring is None:
+            raise ValueError(
+                f"faults[{number}] is a fault of a spring, but the scene has none: add "
+                "[hinge_spring], or leave the fault out"
+            )
         if isinstance(fault, CableFault):
             if not cables:
                 raise ValueError(

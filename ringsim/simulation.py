@@ -22,6 +22,7 @@ from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene, load_scene
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.restarts import run_with_restarts
+from ringsim.theory.drive_margin import with_margin
 from ringsim.theory.ideal_fidelity import run_ideal, with_remark
 from ringsim.threads import one_thread
 from ringsim.variables import Cause, Fidelity, Outcome, Status
@@ -152,7 +153,7 @@ def _run(
     bars = partial(error_bars, elements=scene.rods.elements)
     outcome = run_with_restarts(start, scene.solver, bars)
     outcome.values["fidelity"] = np.array(int(fidelity))
-    return with_remark(outcome, scene)
+    return with_remark(with_margin(outcome, scene), scene)
 
 
 FIDELITIES: dict[str, Callable[[Scene], Outcome]] = {

@@ -13,6 +13,8 @@ from ringsim.refusal import show
 from ringsim.scene import Scene, load_scene
 from ringsim.units import Model
 
+_ASKED = ("margin", "hinge_spring")
+"""What few scenes name: not told of as left out."""
 MOST_SECTIONS_FOR_MOBILITY = 72
 """Larger rings take seconds, and their answer is the same."""
 
@@ -24,7 +26,11 @@ MOST_SECTIONS_FOR_MOBILITY = 72
     "--deploys-in", "time", type=click.FloatRange(0.0, min_open=True), metavar="SECONDS",
     help="Find the initial opening angle from which the ideal fidelity deploys in this time.",
 )  # fmt: skip
-def command(scene: str, settings: dict[str, Any], time: float | None) -> None:
+@click.option(
+    "--margin", is_flag=True,
+    help="Tell what drives and what resists at every opening angle, and the margin by standards.",
+)  # fmt: skip
+def command(scene: str, settings: dict[str, Any], time: float | None, margin: bool) -> None:
     """Check FILE (a scene file, or the name of a built-in scene) without running it.
 
     Bad input ends with exit code 2 and one line that names the field, its value and the cure.
@@ -38,6 +44,12 @@ def command(scene: str, settings: dict[str, Any], time: float | None) -> None:
             f"structure.opening_angle = {angle:.6g} deg: the ideal ring deploys in {time:g} s"
         )
         return
+    if margin:
+        from ringsim.cli.margin_table import margin_lines
+
+        for text in margin_lines(loaded):
+            click.echo(text)
+        return
     for label, text in _summary(loaded).items():
         if text:
             click.echo(f"{label:<12}{text}")
@@ -47,7 +59,7 @@ def _summary(scene: Scene) -> dict[str, str]:
     """What a scene builds; an empty text has no line."""
     friction = scene.joints.model_dump()
     parts = {name: getattr(scene, name) for name in sorted(type(scene).parts())}
-    absent = {name: part is None for name, part in parts.items()}
+    absent = {name: part is None for name, part in parts.items() if name not in _ASKED}
     absent |= {"joint friction": not friction, "stress output": not scene.record.stress}
     return {
         "scene": f"{scene.name}: {scene.title}" if scene.title else scene.name,

@@ -9,7 +9,8 @@ from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
 from ringsim.choice import kind_of
 from ringsim.engine.cable_path import CablePath
 from ringsim.engine.cables import CableDrive
-from ringsim.engine.connectors import Faults, Reacting, Stops, connect
+from ringsim.engine.connectors import Reacting, Springs, Stops, connect
+from ringsim.engine.faults import Faults
 from ringsim.engine.model import Multibody
 from ringsim.engine.rods import Ancf
 from ringsim.layout.bodies import OnBody
@@ -37,18 +38,21 @@ def build(scene: Scene) -> Built:
     InputError
         If the structure has no joint for a friction law, the stop or a fault.
     """
-    model, stops, cables = Multibody(scene), None, None
+    model, stops, springs, cables = Multibody(scene), None, None, None
     if model.layout.boom is not None:
         _add_boom(model, model.layout.boom)
     connectors = connect(model)
     if scene.stop is not None:
         stops = Stops(model, scene.stop)
         connectors.append(stops.reaction)
+    if scene.hinge_spring is not None:
+        springs = Springs(model, scene.hinge_spring)
+        connectors.append(springs.reaction)
     if scene.cables is not None:
         paths = [[_on_nodes(model, sheave) for sheave in path] for path in model.layout.paths]
         path = CablePath(paths, slopes=isinstance(model.formulation, Ancf))
         cables = CableDrive(model.assembly, scene.cables, path, len(scene.faults))
-    faults = Faults(model, cables)
+    faults = Faults(model, cables, springs)
     connectors += [joint.reaction for joint in faults.joints]
     model.assembly.finish()
     return Built(model, connectors, stops, cables, faults)

@@ -1,4 +1,4 @@
-"""What pushes, pulls and brakes between the parts of a model, and the faults that strike it.
+"""What pushes, pulls and brakes between the parts of a model.
 
 Each law of ``ringsim.parts`` acts in exudyn's connectors, as exudyn's expression, while a step is
 solved, and is evaluated again with numpy for the energy balance.
@@ -12,18 +12,14 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.cable.faults.family import CableFault
-from ringsim.cable.state import ChainState
 from ringsim.engine.assembly import SYMBOLIC, TORSION
-from ringsim.engine.cables import CableDrive
 from ringsim.engine.model import BuiltJoint, Multibody
 from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.rotations import Array
 from ringsim.layout.layout import Contact, HubNet
 from ringsim.layout.points import HUB
 from ringsim.layout.pose import turned_about_z
-from ringsim.parts.faults.family import AT_ONCE
-from ringsim.parts.faults.stuck_vjoint import StuckVJoint
+from ringsim.parts.hinge_spring.family import HingeSpring
 from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.net import Net
 from ringsim.parts.persection import at_section
@@ -58,7 +54,7 @@ class Stops:
 
     def __init__(self, model: Multibody, stop: Stop) -> None:
         self._law, self._system = stop, model.assembly.system
-        planes = _opening_joints(model, "stop", 'stop = "none"')
+        planes = opening_joints(model, "stop", 'stop = "none"')
         self._objects = [[self._add(model, *one) for one in plane] for plane in planes]
         self._latched = np.zeros((len(planes), len(planes[0])), dtype=bool)
 
@@ -70,7 +66,7 @@ class Stops:
         quarter = turned_about_z(sense * 0.5 * math.pi)
         markers = model.assembly.node_marker(joint.nodes[0], quarter), joint.markers[1]
         law = model.assembly.symbolic_law(TORSION, ("stop", sense), torque)
-        return _torsion(model, markers, **law)
+        return torsion(model, markers, **law)
 
     def latch(self, deployed: NDArray[np.bool_]) -> None:
         """Hold these V-joints, (planes, sections), from both sides from now on, if it latches."""
@@ -85,66 +81,40 @@ class Stops:
         return self._law.torque(np.pi - angles, -rates, self._latched), -rates
 
 
-class StuckJoint:
-    """A V-joint that a fault will hold: a torsion spring that lies inactive until then."""
+class Springs:
+    """A spring in every V-joint; the angle is measured as that of ``Stops``."""
 
-    def __init__(self, model: Multibody, fault: StuckVJoint) -> None:
-        self._law, self._system = fault, model.assembly.system
-        self._place = model.scene.structure.planes.index(fault.plane), fault.section - 1
-        planes = _opening_joints(model, 'faults of kind "stuck-vjoint"', "faults")
-        joint, self._sense = planes[self._place[0]][self._place[1]]
-        linear = {"stiffness": fault.stiffness, "damping": fault.damping, "activeConnector": False}
-        self._object, self._angle = _torsion(model, joint.markers, **linear), math.nan
+    def __init__(self, model: Multibody, spring: HingeSpring) -> None:
+        self._system = model.assembly.system
+        planes = opening_joints(model, "hinge_spring", 'hinge_spring = "none"')
+        self._objects = [
+            [self._add(model, *one, spring.at(k)) for k, one in enumerate(plane)]
+            for plane in planes
+        ]
+        self._law = spring.at(np.arange(len(planes[0])))
+        self._alive = np.ones((len(planes), len(planes[0])))
 
-    def strike(self, angles: Array) -> None:
-        """Hold the joint at the opening angle that it has now."""
-        self._angle = float(angles[self._place])
-        offset = self._sense * (math.pi - self._angle)
-        self._system.SetObjectParameter(self._object, "offset", offset)
-        self._system.SetObjectParameter(self._object, "activeConnector", True)
+    def _add(self, model: Multibody, joint: BuiltJoint, sense: float, law: HingeSpring) -> Any:
+        def torque(angle: Any, rate: Any, _: Any) -> Any:
+            return sense * law.torque(sense * angle + 0.5 * math.pi, SYMBOLIC).elastic
+
+        quarter = turned_about_z(sense * 0.5 * math.pi)
+        markers = model.assembly.node_marker(joint.nodes[0], quarter), joint.markers[1]
+        return torsion(model, markers, **model.assembly.symbolic_law(TORSION, (law, sense), torque))
+
+    def fail(self, place: tuple[int, int]) -> None:
+        """Break the spring of a V-joint, (plane, section)."""
+        self._alive[place] = 0.0
+        self._system.SetObjectParameter(self._objects[place[0]][place[1]], "activeConnector", False)
 
     def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
         """See ``Reacting``."""
-        rate = rates[self._place]
-        if math.isnan(self._angle):  # the fault has not struck
-            return Reaction(0.0, 0.0, 0.0), rate
-        return self._law.torque(float(angles[self._place]) - self._angle, rate), rate
+        reaction = self._law.torque(np.pi - angles)
+        return Reaction(*(self._alive * part for part in reaction)), -rates
 
 
-class Faults:
-    """The faults of a scene, in the order of their times, each struck between two steps.
-
-    ``joints`` are the V-joints that will stick.
-    """
-
-    def __init__(self, model: Multibody, drive: CableDrive | None) -> None:
-        self._drive = drive
-        self._waiting = [
-            (fault, StuckJoint(model, fault) if isinstance(fault, StuckVJoint) else None)
-            for fault in sorted(model.scene.faults, key=lambda fault: fault.time)
-        ]
-        self.joints = [joint for _, joint in self._waiting if joint is not None]
-
-    @property
-    def next_time(self) -> float:
-        """Time of the next fault, s; infinite if there is none left."""
-        return self._waiting[0][0].time if self._waiting else math.inf
-
-    def strike(self, time: float, angles: Array, state: ChainState | None) -> bool:
-        """Strike all faults that are due, at opening angles (rad) of shape (planes, sections) and
-        a state of the cables; returns whether there was one.
-        """
-        due = [one for one in self._waiting if one[0].time <= time + AT_ONCE]
-        del self._waiting[: len(due)]
-        for fault, joint in due:
-            if joint is not None:
-                joint.strike(angles)
-            elif isinstance(fault, CableFault) and self._drive is not None and state is not None:
-                self._drive.ropes = fault.strike(self._drive.ropes, state)
-        return bool(due)
-
-
-def _opening_joints(model: Multibody, part: str, out: str) -> list[list[tuple[BuiltJoint, float]]]:
+def opening_joints(model: Multibody, part: str, out: str) -> list[list[tuple[BuiltJoint, float]]]:
+    """The V-joints with their senses, by plane; InputError, which names ``part``, without any."""
     planes = model.openings()
     if not all(planes):
         raise InputError(
@@ -154,7 +124,7 @@ def _opening_joints(model: Multibody, part: str, out: str) -> list[list[tuple[Bu
     return planes
 
 
-def _torsion(model: Multibody, markers: Sequence[Any], **settings: Any) -> Any:
+def torsion(model: Multibody, markers: Sequence[Any], **settings: Any) -> Any:
     """A torsion spring-damper about the common z axis of two markers."""
     return model.assembly.system.AddObject(
         item.ObjectConnectorTorsionalSpringDamper(markerNumbers=list(markers), **settings)
@@ -181,7 +151,7 @@ def _friction(model: Multibody, family: str, law: JointFriction) -> Reacting:
 
     for joint in joints:
         if found := settings(at_section(law, joint.part.section)):
-            _torsion(model, joint.markers, **found)
+            torsion(model, joint.markers, **found)
     group = JointGroup(model, joints)
     each = at_section(law, np.array([joint.part.section for joint in joints]))
 

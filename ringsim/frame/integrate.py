@@ -17,6 +17,7 @@ from ringsim.frame.stresses import StressMeter
 from ringsim.layout.pose import Array
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
+from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.scene import Scene
@@ -245,6 +246,10 @@ class Integration:
             if isinstance(fault, StuckVJoint):
                 place = self._scene.structure.planes.index(fault.plane), fault.section - 1
                 self._model.laws.stick(fault, place, float(now.angles[place]))
+            elif isinstance(fault, FailedSpring):
+                self._model.laws.fail(
+                    (self._scene.structure.planes.index(fault.plane), fault.section - 1)
+                )
             elif isinstance(fault, CableFault) and self._model.cables is not None:
                 assert self._now.chain is not None
                 self._model.cables.strike(fault, self._now.chain)

@@ -94,6 +94,9 @@ class JointLaws:
         self._friction: list[tuple[JointFriction, Indices, Array]] = []
         for family, law in scene.joints.present().items():
             self._rub(family, law, skeleton)
+        spring, sections = scene.hinge_spring, openings.angle.shape[1]
+        self._spring = None if spring is None else spring.at(np.arange(sections))
+        self._sprung = np.ones(openings.angle.shape)
         self.latched = np.zeros(openings.angle.shape, dtype=bool)
         self._latches = False
         self._stuck: list[tuple[StuckVJoint, tuple[int, int], float]] = []
@@ -129,6 +132,10 @@ class JointLaws:
         """Hold a V-joint, (plane, section), at an opening angle (rad)."""
         self._stuck.append((fault, place, opening))
 
+    def fail(self, place: tuple[int, int]) -> None:
+        """Break the spring of a V-joint, (plane, section)."""
+        self._sprung[place] = 0.0
+
     def _acting(
         self, angles: Array, rates: Array
     ) -> list[tuple[Indices, Array, Array, Array, Law]]:
@@ -151,6 +158,13 @@ class JointLaws:
                     return stop.torque(x, rate, latched)
 
                 found.append((own, sense, folded, sense * rates[own], hold))
+        if self._spring is not None:
+            spring, alive = self._spring, self._sprung
+
+            def drive(x: Array, rate: Array) -> Reaction:
+                return Reaction(*(alive * part for part in spring.torque(x)))
+
+            found.append((own, sense, sense * angles[own], sense * rates[own], drive))
         for fault, place, opening in self._stuck:
             where = np.array([own[place]])
             turned = np.pi - sense[place] * angles[where] - opening

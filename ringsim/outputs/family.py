@@ -6,6 +6,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.cable.records import Cable
+from ringsim.cable.winding.motor import MotorWinding
 from ringsim.choice import kind_of
 from ringsim.outputs.peaks import Peak, SpanNames, Values
 from ringsim.outputs.series import Reading, Run, Series, output_times
@@ -37,6 +39,7 @@ COORDINATES = {
     "section": Variable("section", ("section",), "1", "section number, from 1", "i4"),
     "time": Variable("time", ("time",), "s", "time since the start of the run"),
     "span": Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
+    "winch": Variable("winch", ("winch",), "1", "winch: 1 where a path begins, 2 at its end", "i4"),
 }
 """Dimensions of the variables; an output may declare more."""
 
@@ -118,18 +121,29 @@ def holds(scene: Scene) -> set[str]:
         "positions": scene.record.positions,
         "error bars": scene.solver.error_bars,
         "gauge": bool(scene.structure.gauge),
+        "motors": any(
+            isinstance(winch.winding, MotorWinding)
+            for cable in _cables(scene)
+            for winch in cable.winches
+        ),
     }
     return {name for name, present in held.items() if present}
 
 
 def axes(scene: Scene) -> dict[str, NDArray[Any]]:
     """Values of the dimensions that a scene tells before it runs."""
+    most = max((len(cable.winches) for cable in _cables(scene)), default=0)
     return {
         "plane": np.array(scene.structure.planes),
         "section": np.arange(1, scene.structure.sections + 1),
         "time": output_times(scene),
         "span": np.arange(1, scene.spans + 1),
+        "winch": np.arange(1, most + 1),
     }
+
+
+def _cables(scene: Scene) -> list[Cable]:
+    return [] if scene.cables is None else [cable for _, cable in scene.cables.present()]
 
 
 def span_names(scene: Scene) -> NDArray[Any]:

@@ -12,6 +12,7 @@ from ringsim.files import writing
 from ringsim.plots import style
 from ringsim.plots.asynchrony import asynchrony
 from ringsim.plots.cables import cables
+from ringsim.plots.drive import drive
 from ringsim.plots.energy import energy
 from ringsim.plots.opening_angles import opening_angles
 from ringsim.plots.planar_truss import strain_over_length, tension_over_length
@@ -39,6 +40,7 @@ PICTURES = (
     _Picture("cables", cables, ("cable_tension",), ring_only=True),
     _Picture("tension", tension_over_length, ("cable_tension", "cable_length")),
     _Picture("bending_strain", strain_over_length, ("bending_strain", "cable_length")),
+    _Picture("drive", drive, ("drive_margin", "opening_angle")),
     _Picture("energy", energy, ("work", "kinetic_energy", "elastic_energy", "dissipation")),
 )
 

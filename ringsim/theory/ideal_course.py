@@ -38,7 +38,7 @@ _ROUND_OFF = 1e-9
 
 @dataclass
 class Piece:
-    """Steps between two events.
+    """Steps between two events, while the same ropes and springs (``sprung``) are whole.
 
     ``times`` and ``states`` are those at the steps' ends, ``rates`` the states' derivatives;
     ``inner``, where cables are, times and states at the collocation points within the steps: what
@@ -47,6 +47,7 @@ class Piece:
 
     latched: bool
     ropes: Ropes | None
+    sprung: Array
     times: list[float] = field(default_factory=list)
     states: list[Array] = field(default_factory=list)
     rates: list[Array] = field(default_factory=list)
@@ -155,7 +156,8 @@ class Course:
     def _begin(self) -> None:
         """Open a piece at the present state."""
         cables = self.motion.cables
-        self.pieces.append(Piece(self.motion.latched, None if cables is None else cables.ropes))
+        ropes = None if cables is None else cables.ropes
+        self.pieces.append(Piece(self.motion.latched, ropes, self.motion.forces.springs.alive))
         self._file(self._time, self._state)
 
     def _file(self, time: float, state: Array) -> None:

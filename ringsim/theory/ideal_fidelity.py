@@ -16,6 +16,7 @@ from ringsim.layout.layout import layout_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.theory.drive_margin import with_margin
 from ringsim.theory.ideal_course import Course
 from ringsim.theory.ideal_outcome import to_outcome
 from ringsim.threads import one_thread
@@ -100,7 +101,7 @@ def run_ideal(scene: Scene) -> Outcome:
             outcome = Outcome(Status.SOLVER_FAILED, reason, cause=Cause.REFUSED)
     outcome.values["wall_time"] = np.array(time.perf_counter() - wall)
     outcome.values["cpu_time"] = np.array(time.process_time() - cpu)
-    return with_remark(outcome, scene)
+    return with_remark(with_margin(outcome, scene), scene)
 
 
 def with_remark(outcome: Outcome, scene: Scene) -> Outcome:

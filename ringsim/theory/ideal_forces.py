@@ -21,6 +21,7 @@ from ringsim.parts.persection import at_section
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
 from ringsim.theory.ideal_points import Points
+from ringsim.theory.spring_energy import SpringEnergy
 
 
 class Acting(NamedTuple):
@@ -49,10 +50,11 @@ class Forces:
         self.loaded = bool(loads.any())
         self._lift = np.tensordot(loads[:, 2], places, 1)
         laws = scene.joints.present()
-        self._joints = [_friction_joints(points, *item) for item in laws.items()]
+        self._joints = [friction_joints(points, *item) for item in laws.items()]
         rates = [law.characteristic_rate() for law in laws.values()]
         self.slowest = min(rates, default=math.inf)
         self._stops = sum(map(len, points.layout.openings))
+        self.springs = SpringEnergy(scene)
 
     def act(self, now: Configuration, up: Array, latched: bool) -> Acting:
         """Forces, energies and powers, ``latched`` or not.
@@ -78,10 +80,13 @@ class Forces:
             force[0] -= 2.0 * self._stops * float(reaction.total)
             elastic += self._stops * float(reaction.stored)
             loss += self._stops * float(reaction.damping) * rate
+        torque, stored = self.springs.at(folded)
+        force[0] -= 2.0 * torque
+        elastic += stored
         return Acting(force, cross(lifted, up), elastic, float(up @ lifted), loss)
 
 
-def _friction_joints(
+def friction_joints(
     points: Points, family: str, law: JointFriction
 ) -> tuple[JointFriction, list[tuple[Array, Array]]]:
     """The law at the joints of a family; z x x and x of their first and second parts."""

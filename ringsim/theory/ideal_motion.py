@@ -14,6 +14,7 @@ import numpy as np
 
 from ringsim.cable.faults.family import CableFault
 from ringsim.layout.pose import Array, skew
+from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import Fault
 from ringsim.scene import Scene
 from ringsim.theory.ideal_forces import Acting, Forces, IdealCables, Pull
@@ -138,12 +139,13 @@ class IdealMotion:
         return found
 
     def strike(self, fault: Fault, time: float, state: Array) -> Array:
-        """The state after a cable fault; the energy that it lets go counts as lost."""
-        if self.cables is None or not isinstance(fault, CableFault):
-            return state
+        """The state after a fault; the energy that it lets go counts as lost."""
         before = self.instant(time, state)
-        assert before.pull is not None
-        self.cables.ropes = fault.strike(self.cables.ropes, before.pull.chain)
+        if isinstance(fault, FailedSpring):
+            self.forces.springs.fail(fault.plane, fault.section)
+        elif isinstance(fault, CableFault) and self.cables is not None:
+            assert before.pull is not None
+            self.cables.ropes = fault.strike(self.cables.ropes, before.pull.chain)
         found = state.copy()
         found[-2] += before.elastic - self.instant(time, state).elastic
         return found

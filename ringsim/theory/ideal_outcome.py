@@ -125,6 +125,7 @@ class _IdealRun:
         """A piece at times within it."""
         motion = self._course.motion
         motion.latched, motion.until = piece.latched, piece.times[-1]
+        motion.forces.springs.alive = piece.sprung
         if motion.cables is not None and piece.ropes is not None:
             motion.cables.ropes = piece.ropes
         times, states = np.array(piece.times), np.array(piece.states)

@@ -24,6 +24,7 @@ from ringsim.layout.layout import Layout
 from ringsim.layout.pose import Array
 from ringsim.scene import Scene
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
+from ringsim.theory.spring_energy import SpringEnergy
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
@@ -39,10 +40,11 @@ class Motion(NamedTuple):
 
 
 class OneCoordinate:
-    """Masses, loads and net of a scene; joint friction, stops, springs and cables are left out."""
+    """Masses, loads, net and hinge springs of a scene, without joint friction, stops and cables."""
 
     def __init__(self, scene: Scene, start: Layout | None = None) -> None:
         """Everywhere; or, with the layout at the start, there alone and sooner."""
+        self._springs = SpringEnergy(scene)
         if start is not None:
             begin = Mechanism(scene, scene.structure.coordinate, start)
             self._mechanism: Callable[[float], Mechanism] = lambda _: begin
@@ -62,13 +64,15 @@ class OneCoordinate:
         """Work function W(q) in J, up to a constant."""
         mechanism, now = self._at(q)
         done = np.tensordot(*mechanism.points.forces, 2) @ now.values
-        return float(done) - mechanism.net(now, 0.0 * now.rate).energy
+        stored = mechanism.net(now, 0.0 * now.rate).energy + self._springs.at(2.0 * q)[1]
+        return float(done) - stored
 
     def work_rate(self, q: float) -> float:
         """Generalised force dW/dq, J/rad."""
         mechanism, now = self._at(q)
         done = np.tensordot(*mechanism.points.forces, 2) @ now.by_place[:, 0]
-        return float(done + mechanism.net(now, 0.0 * now.rate).force[0])
+        pulled = done + mechanism.net(now, 0.0 * now.rate).force[0]
+        return float(pulled - 2.0 * self._springs.at(2.0 * q)[0])
 
     def _at(self, q: float) -> tuple[Mechanism, Configuration]:
         """The mechanism, folding at rate 1 without swings."""

@@ -112,6 +112,11 @@ LAWS = {
     # 2 s at 0.05, 5 s at rest, 7 s at 0.01 and 1 s at 0.2 m/s.
     "table": ({"times": [0, 2, 7, 14, 15], "lengths": [0.0, 0.1, 0.1, 0.17, 0.37]}, 0.01),
     "stall": ({"speed": 0.03, "max_tension": 1.0}, 0.03),
+    # Half of 600 rad/s at half load, on a drum of 1 cm behind a gear of 100.
+    "motor": (
+        {"no_load_speed": 600.0, "stall_torque": 0.01, "gear_ratio": 100.0, "drum_radius": 0.01},
+        0.03,
+    ),
     "tension-feedback": ({"target": 0.5, "gain": 0.02, "max_speed": 0.3}, 0.01),
 }
 

@@ -16,6 +16,7 @@ from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winches import Winches
 from ringsim.cable.winding.constant import ConstantWinding
 from ringsim.cable.winding.family import Winding
+from ringsim.cable.winding.motor import MotorWinding
 from ringsim.cable.winding.ramp import RampWinding
 from ringsim.cable.winding.stall import StallWinding
 from ringsim.cable.winding.table import TableWinding
@@ -32,11 +33,14 @@ LAWS_OF_TIME = {
 }
 STALL = StallWinding(speed=0.1, max_tension=20.0)
 FEEDBACK = TensionFeedbackWinding(target=5.0, max_speed=0.3, max_payout=0.3)
+MOTOR = MotorWinding(
+    no_load_speed=500.0, stall_torque=0.01, gear_ratio=50.0, drum_radius=0.01, efficiency=0.5
+)
 STIFFNESSES = [1e3, 1e5, 1e7]
 
 
 def test_the_laws_tested_here_are_all_laws_there_are():
-    tested = {law.kind for law in [*LAWS_OF_TIME.values(), STALL, FEEDBACK]}
+    tested = {law.kind for law in [*LAWS_OF_TIME.values(), STALL, FEEDBACK, MOTOR]}
     assert tested == set(kinds_of(Winding))
 
 
@@ -218,7 +222,7 @@ def test_a_reading_foresees_the_tension_at_another_speed(end, speed):
     stiffness=st.floats(1e3, 1e7),
     duration=st.floats(1e-5, 1.0),
     slack=st.floats(-0.01, 0.01),
-    law=st.sampled_from([STALL, FEEDBACK]),
+    law=st.sampled_from([STALL, FEEDBACK, MOTOR]),
 )
 def test_the_speed_answers_to_the_tension_that_it_causes(stiffness, duration, slack, law):
     case = still(

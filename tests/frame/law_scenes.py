@@ -114,6 +114,12 @@ CABLES: dict[str, Values] = {
         kind="stall", speed=0.05, max_tension=3.0, band=0.6, backdrivable=True
     )
     | STALLING,
+    "motor": winding(
+        kind="motor", no_load_speed=150.0, stall_torque=0.002, gear_ratio=100.0, efficiency=0.6,
+        back_efficiency=0.5, drum_radius=0.01,
+    )
+    | STALLING
+    | {"solver.end_time": 0.05},
     "feedback": winding(kind="tension-feedback", target=2.0, max_speed=0.2, max_payout=0.1)
     | SUDDEN,
     "damped-rope": cables(damping_time=2e-3),

@@ -116,6 +116,13 @@ IMPOSSIBLE = [
            f"{RODS}\nstructure.hinge_offset = 0.0\n[cables.upper]\n"
            'winch.winding = { kind = "constant", speed = 0.01 }',
            "structure.hinge_offset = 0.0 m", "at least 1e-06 m", "leave the cables out"),
+    _scene("motor without torque at its speed",
+           "[cables.upper.winch.winding]\nkind = 'motor'\nno_load_speed = 500.0\n"
+           "stall_torque = 0.01\ndrum_radius = 0.01\nspeed = 700.0",
+           "cables.upper.winch.winding", "speed = 700.0 rad/s must be below", "no torque at its"),
+    _scene("gear that gains", "[cables.upper.winch.winding]\nkind = 'motor'\n"
+           "no_load_speed = 500.0\nstall_torque = 0.01\ndrum_radius = 0.01\nefficiency = 1.5",
+           "cables.upper.winch.winding.efficiency = 1.5", "at most 1"),
     _scene("step longer than the run", "solver = { step = 2.0, end_time = 1.0 }",
            "solver.step = 2.0 s", "end_time = 1.0 s"),
     _scene("result beyond memory", "record.interval = 1e-8", "record.interval = 1e-08 s", "at least"),

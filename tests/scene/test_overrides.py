@@ -170,3 +170,12 @@ def test_command_line_applies_assignments_in_their_order() -> None:
     )
     assert result.exit_code == 0, result.output
     assert "6 sections" in result.stdout
+
+
+def test_two_parts_may_be_given_the_same_table() -> None:
+    law = {"kind": "stall", "speed": 0.1, "max_tension": 5.0}
+    values = {f"cables.{plane}.winch.winding": law for plane in ("upper", "lower")}
+    scene = load_scene("truss2").with_values(values | {"cables.upper.winch.winding.speed": 0.2})
+    assert scene.cables.upper.winch.winding.speed == 0.2
+    assert scene.cables.lower.winch.winding.speed == 0.1
+    assert law["speed"] == 0.1

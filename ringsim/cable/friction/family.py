@@ -1,5 +1,7 @@
 """The family of friction laws: the loss of tension over a pulley."""
 
+from typing import Self
+
 import numpy as np
 
 from ringsim.cable.ropes import Array
@@ -23,6 +25,20 @@ class PulleyFriction(Model):
     def refusal(self, radius: float) -> str | None:
         """Why the law has no solution on pulleys of this radius (m), or None if it has."""
         return None
+
+    def factored(self, factor: float) -> Self:
+        """The law with its coefficients multiplied; see ``bound_decay`` for what that may break."""
+        if "coefficient" not in type(self).model_fields:
+            return self
+        own = self.coefficients * factor
+        return self.model_copy(update={"coefficient": tuple(own) if own.ndim else float(own)})
+
+    def bound_decay(self, angle: Array, radius: float) -> Array:
+        """ln(eta) of a law that was factored: minus infinity where it has no solution any more."""
+        if self.refusal(radius) is not None:
+            with np.errstate(all="ignore"):
+                return np.nan_to_num(self.log_decay(angle, radius), nan=-np.inf, neginf=-np.inf)
+        return self.log_decay(angle, radius)
 
     def log_decay(self, angle: Array, radius: float) -> Array:
         """ln(eta) for the angles (rad, shape (pulleys,)) on pulleys of ``radius`` (m)."""

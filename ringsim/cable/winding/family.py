@@ -31,6 +31,16 @@ class Winding(Model):
         """
         raise NotImplementedError
 
+    def available_tension(self, *, at_speed: bool = False) -> float:
+        """Tension against which the winch still winds, N, at its commanded speed or however slowly;
+        infinite if it is any.
+        """
+        return math.inf
+
+    def commanded_speed(self) -> float:
+        """Speed that the winch is told to keep, in m/s; 0 if none is."""
+        return 0.0
+
 
 class PrescribedWinding(Winding):
     """A law of time alone."""

@@ -28,6 +28,14 @@ class StallWinding(FeedbackWinding):
         """The speed below the stall, in m/s."""
         return self.speed
 
+    def available_tension(self, *, at_speed: bool = False) -> float:
+        """The maximum tension, or that up to which the speed is kept, in N."""
+        return self.max_tension * (1.0 - self.band * at_speed)
+
+    def commanded_speed(self) -> float:
+        """The speed below the stall, in m/s."""
+        return self.speed
+
     def command(self, tension: float, reading: WinchReading) -> float:
         """Speed of the motor at a tension (N), in m/s."""
         return self.speed * (1.0 - tension / self.max_tension) / self.band

@@ -18,6 +18,12 @@ class JointFriction(Model):
         """Torque in N m against a rate in rad/s, of the rate's sign; ``xp``: see ``springs``."""
         raise NotImplementedError
 
+    def resistance(self, rate: Any) -> Any:
+        """Torque in N m at a rate of at least 0 rad/s, with dry friction in full."""
+        # Ten times the rate over which it comes in: tanh(10) is 1 to 4e-9.
+        full = 10.0 * self.characteristic_rate()
+        return self.torque(np.maximum(rate, full) if math.isfinite(full) else rate)
+
     def linear_damping(self) -> float | None:
         """Torque over rate where that is one number for all rates, N m s/rad; else None."""
         return None

@@ -25,6 +25,10 @@ class ViscousCoulombFriction(JointFriction):
         """See ``JointFriction``."""
         return self.viscous * rate + self.coulomb * xp.tanh(rate / self.rate)
 
+    def resistance(self, rate: Any) -> Any:
+        """See ``JointFriction``."""
+        return self.viscous * rate + self.coulomb
+
     def linear_damping(self) -> float | None:
         """See ``JointFriction``."""
         return None if np.any(self.coulomb) else float(np.max(self.viscous))

@@ -1,0 +1,49 @@
+"""The table of ``ringsim check --margin``."""
+
+import math
+from collections.abc import Iterator
+
+from ringsim.choice import kind_of, kinds_of
+from ringsim.parts.margin.family import MarginStandard
+from ringsim.scene import Scene
+from ringsim.tables import text_table
+from ringsim.theory.drive_margin import DriveMargin, Margin
+
+_ANGLES = 13
+
+
+def margin_lines(scene: Scene) -> Iterator[str]:
+    """Drive, resistances and margins of the ideal ring over the opening angle.
+
+    By the scene's standard, or else by all there are with their own factors.
+    """
+    known = (kind.model_validate({}) for kind in kinds_of(MarginStandard).values())
+    standards = known if scene.margin is None else [scene.margin]
+    drives = {
+        kind_of(each): DriveMargin(scene, each)
+        for each in standards
+        if isinstance(each, MarginStandard)
+    }
+    courses = {name: drive.course(_ANGLES) for name, drive in drives.items()}
+    first = next(iter(courses.values()))
+    # At rest nothing is accelerated, and a net may be slack at every angle.
+    kinds = [k for k in first[0].resisting if any(now.resisting[k] for now in first)]
+    yield "Forces on the opening angle in N m, without factors; margins with those of the standard."
+    rows = [
+        [
+            f"{math.degrees(now.angle):.1f}",
+            *(f"{force:.4g}" for force in (now.available, *(now.resisting[k] for k in kinds))),
+            *(f"{course[row].margin:.3f}" for course in courses.values()),
+        ]
+        for row, now in enumerate(first)
+    ]
+    yield from text_table(["angle (deg)", "drive", *kinds, *drives], rows)
+    for name, drive in drives.items():
+        yield f"{name}: {_verdict(drive.least(courses[name]))}"
+
+
+def _verdict(least: Margin) -> str:
+    if not math.isfinite(least.margin):
+        return "nothing resists"
+    word = "enough" if least.margin >= 0.0 else "NOT enough"
+    return f"least margin {least.margin:.3f} at {math.degrees(least.angle):.2f} deg: {word}"

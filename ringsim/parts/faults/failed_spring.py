@@ -1,0 +1,16 @@
+"""A spring that breaks."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ringsim.parts.faults.family import Fault
+
+
+class FailedSpring(Fault):
+    """The spring of a V-joint gives no torque any more; what it had stored is lost."""
+
+    kind: Literal["failed-spring"] = "failed-spring"
+    plane: Literal["upper", "lower"] = "upper"
+    section: Annotated[int, Field(ge=1)]
+    """Counted from 1 at the boom."""

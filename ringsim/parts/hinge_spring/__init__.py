@@ -1,0 +1,1 @@
+"""Kinds of springs in the V-joints, one file each."""

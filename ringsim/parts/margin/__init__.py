@@ -1,0 +1,1 @@
+"""Standards for the margin of a drive, one file each."""

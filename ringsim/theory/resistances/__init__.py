@@ -1,0 +1,1 @@
+"""Kinds of resistance to opening, one file each."""

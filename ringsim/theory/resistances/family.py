@@ -1,0 +1,59 @@
+"""The family of resistances to the opening of a ring of rigid rods."""
+
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from ringsim.choice import load_package
+from ringsim.parts.margin.family import Category
+from ringsim.scene import Scene
+from ringsim.theory.ideal_mechanism import Configuration, Mechanism
+
+
+class Opening(NamedTuple):
+    """The ring at an opening angle (rad) while it opens at a rate (rad/s) and an acceleration.
+
+    ``now`` is the mechanism folding at the unit rate of its coordinate q = (pi - angle) / 2.
+    """
+
+    angle: float
+    rate: float
+    acceleration: float
+    now: Configuration
+
+
+def folding(mechanism: Mechanism, q: float) -> Configuration:
+    """The mechanism at a coordinate (rad), folding at 1 rad/s with its end assemblies upright."""
+    free = np.eye(mechanism.freedom)[0]
+    return mechanism.configuration(q * free, free)
+
+
+class Resistance:
+    """A kind of resistance: one file in this folder with a subclass.
+
+    All joints open alike; forces are generalised: power over the rate of the opening angle, N m.
+    """
+
+    kind: ClassVar[str]
+    """Its name in results."""
+    category: ClassVar[Category]
+    """The factor of a standard that it takes."""
+
+    def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
+        self.scene, self.mechanism = scene, mechanism
+
+    @property
+    def present(self) -> bool:
+        """Whether the scene has it."""
+        return True
+
+    def force(self, opening: Opening) -> float:
+        """What resists opening, N m; negative where it drives."""
+        raise NotImplementedError
+
+
+def resistances(scene: Scene, mechanism: Mechanism) -> list[Resistance]:
+    """All that a scene has, by name."""
+    load_package(__name__.rpartition(".")[0])
+    found = [kind(scene, mechanism) for kind in Resistance.__subclasses__()]
+    return sorted((one for one in found if one.present), key=lambda one: one.kind)

@@ -1,0 +1,32 @@
+"""Inertia of all moving parts."""
+
+import numpy as np
+
+from ringsim.theory.ideal_mechanism import Configuration
+from ringsim.theory.resistances.family import Opening, Resistance, folding
+
+_STEP = 1e-4
+"""Change of the coordinate for the slope of the inertia, rad: 1e-8 of it is left."""
+
+
+class InertiaResistance(Resistance):
+    """I a'' + I' a'^2 / 2 along a run, nothing where that drives: speed must not help."""
+
+    kind = "inertia"
+    category = "inertia"
+
+    def force(self, opening: Opening) -> float:
+        """See ``Resistance``."""
+        if opening.rate == 0.0 and opening.acceleration == 0.0:
+            return 0.0
+        q = float(opening.now.place[0])
+        beside = [self._inertia(folding(self.mechanism, q + by)) for by in (-_STEP, _STEP)]
+        slope = -0.5 * (beside[1] - beside[0]) / (2.0 * _STEP)
+        own = self._inertia(opening.now)
+        # Half of the coordinate's rate goes with the angle's: a quarter of the inertia.
+        force = 0.25 * (own * opening.acceleration + 0.5 * slope * opening.rate**2)
+        return max(force, 0.0)
+
+    def _inertia(self, now: Configuration) -> float:
+        rates = np.concatenate([self.mechanism.rigid_rates(now), now.rate])
+        return float(rates @ now.matrix @ rates)

@@ -1,0 +1,24 @@
+"""Springs in the V-joints."""
+
+import math
+
+from ringsim.theory.resistances.family import Opening, Resistance
+from ringsim.theory.spring_energy import SpringEnergy
+
+
+class SpringResistance(Resistance):
+    """Their torque, which drives where it opens the joints."""
+
+    kind = "springs"
+    category = "spring"
+
+    @property
+    def present(self) -> bool:
+        """See ``Resistance``."""
+        return self.scene.hinge_spring is not None
+
+    def force(self, opening: Opening) -> float:
+        """See ``Resistance``."""
+        springs = SpringEnergy(self.scene)
+        # One radian of every joint's angle for one of the opening angle.
+        return -springs.at(math.pi - opening.angle)[0]

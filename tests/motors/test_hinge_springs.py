@@ -1,0 +1,118 @@
+"""Springs in the V-joints: their laws, virtual work, the quadrature, and both engines."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.integrate import quad
+
+from motor_rings import ring
+from ringsim.parts.hinge_spring.family import HingeSpring
+from ringsim.parts.hinge_spring.linear import LinearSpring
+from ringsim.parts.hinge_spring.table import TableSpring
+from ringsim.parts.hinge_spring.tape import TapeSpring
+from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.refusal import InputError
+from ringsim.scene import Scene, load_scene
+from ringsim.simulation import simulate
+from ringsim.theory.drive_margin import DriveMargin
+from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+
+LINEAR = {"kind": "linear", "stiffness": 0.004, "preload": 0.01}
+LAWS = {
+    "linear": LinearSpring(stiffness=0.004, preload=0.01),
+    "tape": TapeSpring(force=2.0, radius=0.01),
+    "table": TableSpring(angles=(30.0, 90.0, 150.0), torques=(0.05, 0.01, 0.03)),
+}
+
+
+def sprung(**values: object) -> Scene:
+    """Three sections without cables, from 60 deg on."""
+    plain = {
+        "cables": "none", "structure.sections": 3, "hinge_spring": LINEAR, "solver.end_time": 1.5,
+        "joints": {}, "solver.tolerance": 1e-5, "solver.newton_tolerance": 1e-6,
+    }  # fmt: skip
+    return ring().with_values(plain | {k.replace("__", "."): v for k, v in values.items()})
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_the_energy_is_the_integral_of_the_torque(law: HingeSpring) -> None:
+    for begin, end in ((0.0, 0.3), (0.4, 2.0), (-0.1, 3.1)):
+        work, _ = quad(lambda x: law.torque(x).elastic, begin, end, points=[0.524, 1.571, 2.618])
+        gained = law.torque(end).stored - law.torque(begin).stored
+        assert gained == pytest.approx(work, rel=1e-7)
+
+
+def test_a_table_gives_its_torques() -> None:
+    law = LAWS["table"]
+    opened = np.array([10.0, 30.0, 60.0, 90.0, 120.0, 150.0, 175.0])
+    torques = law.torque(np.radians(180.0 - opened)).elastic
+    np.testing.assert_allclose(torques, [0.05, 0.05, 0.03, 0.01, 0.02, 0.03, 0.03], rtol=1e-12)
+    assert law.torque(0.5 * math.pi).elastic == pytest.approx(0.01)
+
+
+def test_the_ideal_ring_opens_in_the_time_of_the_quadrature() -> None:
+    scene = sprung(solver__end_time=10.0)
+    found = simulate(scene, "ideal")
+    truth = opening_time(OneCoordinate(scene), scene.structure.coordinate)
+    assert float(found.deployment_time) == pytest.approx(truth.time, rel=1e-6)
+    assert float(found.energy_error) < 1e-7
+
+
+def test_virtual_work() -> None:
+    """Six V-joints turn by twice the coordinate; the margin counts 0.8 of what drives."""
+    scene = sprung(joints__vjoint__coulomb=0.001)
+    for phi in (0.2, 0.7, 1.0):
+        torque = 0.01 + 0.004 * 2.0 * phi
+        assert OneCoordinate(scene).work_rate(phi) == pytest.approx(-6 * 2.0 * torque, rel=1e-12)
+        now = DriveMargin(scene, EcssMechanisms()).at(math.pi - 2.0 * phi)
+        assert now.resisting["springs"] == pytest.approx(-6 * torque)
+        assert now.margin == pytest.approx(0.8 * torque / (2.0 * 3.0 * 0.001) - 1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("fidelity", ["frame", "full"])
+def test_engines_agree_with_the_ideal_ring(fidelity: str) -> None:
+    """A spring of each section, of which one fails on the way."""
+    fault = {"kind": "failed-spring", "plane": "lower", "section": 2, "time": 0.2}
+    scene = sprung(
+        hinge_spring={"kind": "linear", "stiffness": [0.004, 0.005, 0.003], "preload": 0.01},
+        faults=[fault], solver__end_time=0.4, solver__tolerance=1e-4,
+    )  # fmt: skip
+    truth, found = simulate(scene, "ideal"), simulate(scene, fidelity)
+    opened = found.opening_angle.mean(("plane", "section"))
+    ideal = truth.opening_angle.mean(("plane", "section"))
+    assert float(ideal[-1]) > 75.0
+    np.testing.assert_allclose(opened, ideal, atol=0.02)
+    np.testing.assert_allclose(found.dissipation[-1], truth.dissipation[-1], rtol=2e-3)
+    # 0.01 N m of preload and what the stiffness has left at that time.
+    folded = math.radians(180.0 - float(ideal.sel(time=0.2)))
+    assert float(truth.dissipation[-1]) == pytest.approx(
+        0.01 * folded + 0.5 * 0.005 * folded**2, rel=1e-4
+    )
+    assert float(found.energy_error) < 1e-3
+    assert float(truth.energy_error) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"hinge_spring": {"kind": "table", "angles": [10.0, 20.0], "torques": [0.1]}},
+         "give one torque for each angle"),
+        ({"hinge_spring": {"kind": "table", "angles": [20.0, 10.0], "torques": [0.1, 0.2]}},
+         "must be above the angle before it"),
+        ({"hinge_spring": {"kind": "linear", "stiffness": [0.1, 0.2]}}, "needs 3"),
+        ({"hinge_spring": "none", "loads.force": 0.1,
+          "faults": [{"kind": "failed-spring", "section": 1, "time": 0.1}]},
+         "fault of a spring, but the scene has none"),
+    ],
+)  # fmt: skip
+def test_springs_that_cannot_be_are_refused(values: dict[str, object], text: str) -> None:
+    with pytest.raises((InputError, ValidationError), match=text):
+        sprung().with_values(values)
+
+
+def test_scenes_have_no_springs_of_themselves() -> None:
+    assert load_scene("ring18").hinge_spring is None

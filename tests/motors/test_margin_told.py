@@ -1,0 +1,68 @@
+"""Where the margin of a drive is told: ``check --margin``, files, figures, ``explain``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from motor_rings import ring
+from ringsim.cli import cli
+from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.plots.drive import drive
+from ringsim.plots.run import draw_run
+from ringsim.scene import Scene
+from ringsim.simulation import simulate
+from ringsim.theory.drive_margin import DriveMargin
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return ring(
+        joints__vjoint={"coulomb": 0.05}, net__stiffness=5.0, net__neutral_length=0.5,
+        margin={"kind": "ecss-e-st-33-01c"}, solver__end_time=1.0,
+    )  # fmt: skip
+
+
+def told(path: Path, scene: Scene) -> str:
+    path.write_text(scene.to_toml())
+    result = CliRunner().invoke(cli, ["check", str(path), "--margin"])
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def test_check_prints_the_margin_of_the_ideal_ring(scene: Scene, tmp_path: Path) -> None:
+    text = told(tmp_path / "one.toml", scene)
+    now = DriveMargin(scene, EcssMechanisms()).at(np.radians(60.0))
+    first = next(line for line in text.splitlines() if line.startswith("60.0")).split()
+    numbers = [now.available, *(now.resisting[k] for k in ("pulley friction", "joint friction"))]
+    assert first[1:4] == [f"{number:.4g}" for number in numbers]
+    assert first[-1] == f"{now.margin:.3f}"
+    assert re.search(r"^ecss-e-st-33-01c: least margin \S+ at 60.00 deg: NOT enough$", text, re.M)
+    assert "nasa" not in text
+    both = told(tmp_path / "all.toml", scene.with_values({"margin": "none"}))
+    assert re.search(r"^ecss-e-st-33-01c: least", both, re.M)
+    assert re.search(r"^nasa-std-5017b: least", both, re.M)
+
+
+def test_check_refuses_a_drive_without_limit() -> None:
+    result = CliRunner().invoke(cli, ["check", "truss2", "--margin"])
+    assert result.exit_code == 2
+    assert 'cables.upper.winch.winding.kind = "constant": it pulls with any force' in result.stderr
+
+
+def test_a_run_draws_what_resists_and_its_least_margin(scene: Scene, tmp_path: Path) -> None:
+    found = simulate(scene, "ideal")
+    assert "run-fig-drive.svg" in [p.name for p in draw_run(found, tmp_path, formats=["svg"])]
+    figure = drive(found)
+    upper, lower = figure.axes
+    labels = upper.get_legend_handles_labels()[1]
+    assert {"pulley friction", "joint friction"} < set(labels)
+    angles, available = upper.lines[0].get_data()
+    assert np.allclose(available, found.drive_available.dropna("time"))
+    assert np.all(np.diff(angles) >= 0.0)
+    words = " ".join(text.get_text() for text in lower.texts)
+    assert f"least margin {float(found.least_drive_margin):.2f}" in words

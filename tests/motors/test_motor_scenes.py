@@ -1,0 +1,94 @@
+"""Rings that motors open, as scenes: where they stall, what they give, and both engines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from motor_rings import MOTOR, STALL, TRAVEL, ring
+from ringsim.outputs.family import holds
+from ringsim.simulation import simulate
+from ringsim.variables import Fate
+
+
+def test_motors_stall_where_they_meet_the_net() -> None:
+    """Virtual work: every V span shortens by dL, every corner moves out by dR."""
+    offset, bar, pin = 0.105, 0.2889, 0.006554
+    stiffness, neutral = 300.0, 0.4
+    scene = ring(
+        net__stiffness=stiffness, net__neutral_length=neutral, solver__end_time=20.0,
+        cables__upper__friction={"kind": "none"}, cables__lower__friction={"kind": "none"},
+        joints__vjoint__viscous=2.0,
+    )  # fmt: skip
+
+    def unbalanced(phi: float) -> float:
+        span = np.sqrt(bar**2 + offset**2 + 2.0 * bar * offset * np.sin(phi))
+        radius = 2.0 * (bar * np.cos(phi) + pin)  # a hexagon's, as long as its chord
+        drive = 2 * 12 * STALL * bar * offset * np.cos(phi) / span
+        stretch = max(radius - neutral, 0.0)
+        return drive - 6.0 * stiffness * stretch * 2.0 * bar * np.sin(phi)
+
+    rest = np.degrees(np.pi - 2.0 * brentq(unbalanced, np.radians(15.0), np.radians(59.0)))
+    found = simulate(scene, "ideal")
+    assert Fate(found.outcome.item()) is Fate.STALLED
+    kept = found.dropna("time", subset=["opening_angle"]).isel(time=-1)
+    np.testing.assert_allclose(kept.opening_angle, rest, atol=2e-3)
+    np.testing.assert_allclose(kept.motor_torque, 0.002, rtol=1e-5)
+    np.testing.assert_allclose(kept.motor_speed, 0.0, atol=0.05)
+
+
+def test_outputs_of_motors_tell_what_their_words_say() -> None:
+    found = simulate(ring(solver__end_time=3.0), "ideal")
+    assert found.motor_torque.dims == ("plane", "winch", "time")
+    units = {name: found[f"motor_{name}"].attrs["units"] for name in ("torque", "speed", "power")}
+    assert units == {"torque": "N m", "speed": "rad/s", "power": "W"}
+    assert found.motor_energy.attrs["units"] == "J"
+    now = found.isel(winch=0).where(found.time > 0.3, drop=True)
+    product = now.motor_torque * now.motor_speed
+    np.testing.assert_allclose(now.motor_power, product, rtol=1e-5)
+    # Simpson's rule, as the energy is kept at the steps; power changes by 1 % in 0.05 s.
+    power, energy = now.motor_power.values, now.motor_energy.values
+    simpson = 0.05 / 3.0 * (power[:, :-2:2] + 4.0 * power[:, 1:-1:2] + power[:, 2::2]).cumsum(1)
+    np.testing.assert_allclose(energy[:, 2::2] - energy[:, :1], simpson, rtol=1e-3)
+    # Tension asks for its torque through the gear, on the line of the motor or at its command.
+    tension = now.cable_tension.isel(span=0).transpose("plane", "time").values
+    np.testing.assert_allclose(now.motor_torque, tension * TRAVEL / 0.6, rtol=1e-4)
+    line = 600.0 * (1.0 - now.motor_torque.values / 0.002)
+    np.testing.assert_allclose(now.motor_speed, line, rtol=1e-3)
+    # The shafts' energy less the gears' losses is what the winches put into the ring.
+    work = found.work.diff("time").sum().item()
+    given = 0.6 * found.motor_energy.isel(time=-1).sum().item()
+    assert work == pytest.approx(given, rel=2e-3)
+
+
+def test_a_motor_winds_as_commanded_and_gives_nothing_while_it_is_off() -> None:
+    values = {
+        f"cables.{plane}.winch": {
+            "winding": MOTOR | {"speed": 250.0}, "start_time": 0.2, "stop_time": 0.7
+        }
+        for plane in ("upper", "lower")
+    }  # fmt: skip
+    scene = ring(structure__sections=3, solver__end_time=1.0).with_values(values)
+    found = simulate(scene, "ideal").isel(plane=0, winch=0)
+    torque = found.motor_torque
+    off = np.concatenate([torque.sel(time=slice(None, 0.15)), torque.sel(time=slice(0.75, None))])
+    assert (off == 0.0).all()
+    on = found.sel(time=slice(0.3, 0.65))
+    assert (on.motor_torque > 1e-6).all()
+    np.testing.assert_allclose(on.motor_speed, 250.0, rtol=1e-6)
+    np.testing.assert_allclose(on.wound_length.diff("time"), 0.05 * 250.0 * TRAVEL, rtol=1e-6)
+    assert np.ptp(found.motor_energy.sel(time=slice(0.75, None)).values) == 0.0
+
+
+def test_winches_without_a_motor_have_no_such_output() -> None:
+    winding = {"kind": "stall", "speed": 0.05, "max_tension": 5.0}
+    brief = ring(structure__sections=3, solver__end_time=0.1, record__interval=0.1)
+    one = brief.with_values({"cables.upper.winch.winding": winding})
+    none = one.with_values({"cables.lower.winch.winding": winding})
+    assert [holds(scene) & {"motors"} for scene in (one, none)] == [{"motors"}, set()]
+    found = simulate(none, "ideal")
+    assert not [name for name in found.variables if str(name).startswith(("motor", "winch"))]
+    found = simulate(one, "ideal")
+    assert np.isnan(found.motor_torque.sel(plane="upper")).all()
+    assert np.isfinite(found.motor_torque.sel(plane="lower")).all()
