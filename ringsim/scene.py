@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, get_origin
 
 import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
@@ -26,6 +26,7 @@ from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.solver import Record, Solver
+from ringsim.parts.spacecraft import Spacecraft
 from ringsim.parts.stop.family import Stop
 from ringsim.parts.stop.spring_damper import SpringDamperStop
 from ringsim.refusal import InputError, explain, known_or_nearest, models_in, show
@@ -47,6 +48,7 @@ class Scene(Model):
     joints: Joints = Joints()
     stop: Annotated[Stop, OneOf(default="spring-damper")] | None = SpringDamperStop()
     boom: Annotated[Boom, OneOf()] | None = None
+    spacecraft: Spacecraft | None = None
     net: Net | None = None
     loads: Loads | None = None
     cables: Cables | None = None
@@ -66,6 +68,8 @@ class Scene(Model):
                 )
         _check_faults(self)
         self.structure.check(self)
+        if self.spacecraft is not None:
+            self.spacecraft.check(self)
         if self.record.stress and isinstance(self.rods, AncfRods):
             raise ValueError(
                 'record.stress = true is not possible with rods.kind = "ancf", whose elements '
@@ -106,6 +110,11 @@ class Scene(Model):
     def pulleys_of(self, cable: Cable) -> int:
         """Pulleys of one of the scene's cables: a second winch takes one more."""
         return len(self.path_of(cable)) - 2
+
+    @property
+    def held(self) -> bool:
+        """Whether a support holds the structure's base in space."""
+        return self.structure.supported or (self.boom is not None and self.boom.base == "fixed")
 
     @property
     def span_names(self) -> dict[str, tuple[str, ...]]:
@@ -221,8 +230,13 @@ def _lists(record: Model, prefix: str = "") -> Iterator[tuple[str, tuple[float, 
     for name, value in record:
         if isinstance(value, Model):
             yield from _lists(value, f"{prefix}{name}.")
-        elif isinstance(value, tuple) and name != "faults":
+        elif isinstance(value, tuple) and not _is_vector(record, name):
             yield f"{prefix}{name}", value
+
+
+def _is_vector(record: Model, name: str) -> bool:
+    """Whether a field is a vector of its own, not one value or one for each section."""
+    return get_origin(type(record).model_fields[name].annotation) is tuple
 
 
 def scene_from_table(table: dict[str, Any], *, source: str) -> Scene:

@@ -79,7 +79,7 @@ class Stops:
                 self._system.SetObjectParameter(self._objects[plane][section], "offset", 1.0)
             self._latched |= deployed
 
-    def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
+    def reaction(self, _: State | None, angles: Array, rates: Array) -> tuple[Reaction, Array]:
         """See ``Reacting``."""
         return self._law.torque(np.pi - angles, -rates, self._latched), -rates
 

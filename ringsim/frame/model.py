@@ -18,10 +18,11 @@ from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
 from ringsim.frame.state import State
 from ringsim.layout.layout import layout_of
-from ringsim.layout.pose import Array, cross
+from ringsim.layout.pose import Array
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.theory.first_reaction import first_acceleration
 from ringsim.theory.one_coordinate import OneCoordinate
 from ringsim.theory.scales import residual_tolerance
 
@@ -35,6 +36,10 @@ class FrameModel:
         The structure with rigid rods, at the start.
     size
         Number of unknowns: those of the mesh and the hub's three, if there is a net.
+    moving
+        Its acceleration then.
+    reaction
+        What was last out of balance on the unknowns that do not move, N and N m.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -42,6 +47,7 @@ class FrameModel:
             raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
         self.scene, self.layout = scene, layout_of(scene)
         self.ideal = OneCoordinate(scene, self.layout)
+        self.moving = first_acceleration(self.layout, self.ideal, scene.structure.coordinate)
         self.skeleton = skeleton = Skeleton(self.layout)
         beam = self.layout.boom
         boom = [] if beam is None else skeleton.add_beam(beam)
@@ -144,6 +150,7 @@ class FrameModel:
         if self.cables is not None:
             lines = now.place.lines, now.rate.lines
             self._pulled = self.cables.pull(time, self._arms, *lines, inner)
+        self.reaction = inner[self.mesh.fixed]
         inner[self.mesh.fixed] = 0.0
         return g
 
@@ -190,20 +197,13 @@ class FrameModel:
 
     def _started(self, pose: Pose) -> State:
         """At rest with the accelerations of the structure with rigid rods, as of the full model."""
-        skeleton, scene = self.skeleton, self.scene
-        pull, velocity, rotation = 0.0, np.zeros(3), np.zeros(3)
-        if not self.layout.springs:
-            q = scene.structure.coordinate
-            motion = self.ideal.motion(q)
-            pull = self.ideal.work_rate(q) / motion.inertia
-            velocity, rotation = motion.velocity, motion.rotation
+        skeleton, moving = self.skeleton, self.moving
         self.first = np.zeros(self.size)
         for f, (rate, turn) in enumerate(skeleton.rates):
-            moving = pull * (rate - velocity - cross(rotation, skeleton.places[f]))
-            turning = pull * (turn - rotation)
             k = self.mesh.home[f]
-            self.first[k : k + 3], self.first[k + 3 : k + 6] = moving, turning
-        angular = pull * np.array(skeleton.angle_rates)
+            self.first[k : k + 3] = moving.at(skeleton.places[f], rate)
+            self.first[k + 3 : k + 6] = moving.turning(turn)
+        angular = moving.coordinate * np.array(skeleton.angle_rates)
         self.first[self.mesh.angle_home] = angular
         hub = np.zeros(3) if self.layout.net is None else np.array(self.layout.net.hub)
         state = State(

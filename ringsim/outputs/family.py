@@ -37,6 +37,7 @@ COORDINATES = {
     "section": Variable("section", ("section",), "1", "section number, from 1", "i4"),
     "time": Variable("time", ("time",), "s", "time since the start of the run"),
     "span": Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
+    "axis": Variable("axis", ("axis",), "1", "axis of space", "str"),
 }
 """Dimensions of the variables; an output may declare more."""
 
@@ -117,6 +118,9 @@ def holds(scene: Scene) -> set[str]:
         "stress": scene.record.stress,
         "error bars": scene.solver.error_bars,
         "gauge": bool(scene.structure.gauge),
+        "reactions": scene.record.reactions,
+        "base": scene.boom is not None or scene.structure.supported,
+        "held base": scene.held or scene.spacecraft is not None,
     }
     return {name for name, present in held.items() if present}
 
@@ -128,6 +132,7 @@ def axes(scene: Scene) -> dict[str, NDArray[Any]]:
         "section": np.arange(1, scene.structure.sections + 1),
         "time": output_times(scene),
         "span": np.arange(1, scene.spans + 1),
+        "axis": np.array(["x", "y", "z"]),
     }
 
 

@@ -98,3 +98,5 @@ class Record(Model):
     stress: bool = False
     """Record axial + bending stress, elastic + viscous, at the ends of every rod.  Steps then
     resolve the ring's own vibrations (``solver.deviation_tolerance``)."""
+    reactions: bool = False
+    """Record force and torque at the base, how it turns, and the impulse of every lock."""
