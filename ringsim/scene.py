@@ -18,6 +18,7 @@ from ringsim.files import parse_toml, read_text
 from ringsim.overrides import at_path, length_at, points_in, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.faults.family import Fault
+from ringsim.parts.gravity import Gravity
 from ringsim.parts.joints import Joints
 from ringsim.parts.limits import Limits
 from ringsim.parts.loads import Loads
@@ -51,6 +52,7 @@ class Scene(Model):
     spacecraft: Spacecraft | None = None
     net: Net | None = None
     loads: Loads | None = None
+    gravity: Gravity | None = None
     cables: Cables | None = None
     limits: Limits = Limits()
     faults: Annotated[tuple[Annotated[Fault, OneOf()], ...], ListIn] = ()
@@ -68,8 +70,9 @@ class Scene(Model):
                 )
         _check_faults(self)
         self.structure.check(self)
-        if self.spacecraft is not None:
-            self.spacecraft.check(self)
+        for part in (self.spacecraft, self.gravity):
+            if part is not None:
+                part.check(self)
         if self.record.stress and isinstance(self.rods, AncfRods):
             raise ValueError(
                 'record.stress = true is not possible with rods.kind = "ancf", whose elements '

@@ -46,7 +46,9 @@ class BaseMeter:
         if craft is None or self._layout.base is None:
             return None
         kinds = _KIND.Acceleration, _KIND.AngularAcceleration, _KIND.AngularVelocity
-        return body_reaction(craft, self._axes(), *map(self._output, kinds))
+        moving, *turning = map(self._output, kinds)
+        gravity = np.zeros(3) if self._layout.gravity is None else self._layout.gravity
+        return body_reaction(craft, self._axes(), moving - gravity, *turning)
 
     def _turn(self) -> Array | None:
         """Rotation matrix since the start; None without a base."""

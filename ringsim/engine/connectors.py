@@ -19,6 +19,7 @@ from ringsim.engine.cables import CableDrive
 from ringsim.engine.model import BuiltJoint, Multibody
 from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.rotations import Array
+from ringsim.engine.weight import Weight
 from ringsim.layout.layout import Contact, HubNet
 from ringsim.layout.pose import turned_about_z
 from ringsim.parts.faults.family import AT_ONCE
@@ -35,7 +36,7 @@ Reacting = Callable[[State, Array, Array], tuple[Reaction, Array]]
 the state, the opening angles and their rates, shape (planes, sections), rad and rad/s."""
 
 
-def connect(model: Multibody) -> list[Reacting]:
+def connect(model: Multibody, weight: Weight | None = None) -> list[Reacting]:
     """Springs, contacts, net and friction of a model; before ``Assembly.finish``."""
     layout, found = model.layout, []
     for spring in layout.springs:
@@ -44,7 +45,7 @@ def connect(model: Multibody) -> list[Reacting]:
         found.append(_strings(model, [ends], law.tension, law.free_length, [linear]))
     found += [_contact(model, contact) for contact in layout.contacts]
     if layout.net is not None:
-        found.append(_net(model, layout.net))
+        found.append(_net(model, layout.net, weight))
     return found + [_friction(model, *one) for one in model.scene.joints.present().items()]
 
 
@@ -191,7 +192,7 @@ def _friction(model: Multibody, family: str, law: JointFriction) -> Reacting:
     return reaction
 
 
-def _net(model: Multibody, held: HubNet) -> Reacting:
+def _net(model: Multibody, held: HubNet, weight: Weight | None) -> Reacting:
     """The net's strings and their hub.
 
     The hub starts where its strings balance: from anywhere else it would swing for the whole run,
@@ -205,6 +206,8 @@ def _net(model: Multibody, held: HubNet) -> Reacting:
     )
     mass = item.ObjectMassPoint(nodeNumber=hub, mass=net.hub_mass)
     assembly.bodies.append(assembly.system.AddObject(mass))
+    if weight is not None:
+        weight.add_point(hub, net.hub_mass)
 
     def settings(law: Net) -> dict[str, Any]:
         if law.two_sided:

@@ -19,7 +19,7 @@ strings and its hub."""
 class Held(NamedTuple):
     """Where followed coordinates begin, shape (6,); bodies at the ends of strings; bodies with a
     boom and those that slide along it, with the stiffness that holds them (N/m); linear friction of
-    the angles, N m s/rad.
+    the angles, N m s/rad; whether there is gravity, and it, m/s^2.
     """
 
     cuts: Indices
@@ -28,6 +28,8 @@ class Held(NamedTuple):
     low: Indices
     stiffness: float
     damping: Array
+    weighs: bool
+    gravity: Array
 
 
 @compiled
@@ -59,6 +61,8 @@ def balance(
     first, last = held.cuts[POINTS], held.cuts[LINES]
     points = now.place[first:last].reshape((-1, 3))
     accelerations = now.acceleration[first:last].reshape((-1, 3))
+    if held.weighs:
+        accelerations = accelerations - held.gravity
     add_forces(mesh, pose, points, accelerations, strains, g)
     rates = now.rate[held.cuts[ANGLES] : held.cuts[ENDS]]
     for n in range(len(held.damping)):

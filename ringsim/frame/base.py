@@ -37,7 +37,7 @@ class BaseMeter:
         own = self._model.mesh.craft
         if not len(own):
             return None
-        pulled = self._mass * state.acceleration.points[own]
+        pulled = self._mass * (state.acceleration.points[own] - self._model.gravity)
         arms = state.place.points[own] - state.pose.place[self._base]
         return -np.array([pulled.sum(axis=0), np.cross(arms, pulled).sum(axis=0)])
 

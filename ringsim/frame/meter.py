@@ -53,7 +53,7 @@ class EnergyMeter:
                 driven, rubbed = work_between(chain_before, chain)
                 lost += rubbed
         self._last = force, place, chain
-        return Energies(kinetic, elastic, model.work(pose), lost, driven)
+        return Energies(kinetic, elastic, model.work(state), lost, driven)
 
     def keep(self) -> None:
         """Count from the last reading on."""

@@ -47,6 +47,7 @@ class FrameModel:
             raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
         self.scene, self.layout = scene, layout_of(scene)
         self.ideal = OneCoordinate(scene, self.layout)
+        self.gravity = np.zeros(3) if self.layout.gravity is None else self.layout.gravity
         self.moving = first_acceleration(self.layout, self.ideal, scene.structure.coordinate)
         self.skeleton = skeleton = Skeleton(self.layout)
         beam = self.layout.boom
@@ -86,6 +87,8 @@ class FrameModel:
         loaded = np.array(at, dtype=np.int64)
         self._loaded = loaded, pose.place[loaded], np.array(forces).reshape(-1, 3)
         self._tolerance = residual_tolerance(scene, self.layout, 0.0)
+        self._masses = mesh.point_mass.copy()
+        np.add.at(self._masses, mesh.point, mesh.mass.sum(axis=1)[:, None])
         self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
         lines = 0 if self.cables is None else self.cables.points
         ends = [] if self.layout.net is None else list(self.layout.net.bodies)
@@ -97,17 +100,26 @@ class FrameModel:
             low=np.array([slide.low for slide in slides], dtype=np.int64),
             stiffness=STIFFNESS * stiffest,
             damping=self.laws.damping,
+            weighs=self.layout.gravity is not None,
+            gravity=self.gravity,
         )
         self._string_spots = mesh.home[self._held.ends][:, None] + np.arange(3)
         self._lines = no_lines() if self.cables is None else self.cables.lines
         self._arms = Arms.empty(lines)
         self.start = self._started(pose)
+        self._begun = self.start.place.points.copy()
         self._fronts = np.zeros((len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]))
 
-    def work(self, pose: Pose) -> float:
-        """Of the loads since the start, J."""
+    def work(self, state: State) -> float:
+        """Of loads and gravity since the start, J."""
         at, start, forces = self._loaded
-        return float(np.sum(forces * (pose.place[at] - start)))
+        done = float(np.sum(forces * (state.pose.place[at] - start)))
+        if self._held.weighs:
+            moved = self._masses @ (state.place.points - self._begun)
+            if self.strings is not None:
+                moved += self.strings.hub_mass * (state.hub - self._hub)
+            done += float(moved @ self.gravity)
+        return done
 
     def gap(self, pose: Pose) -> float:
         """Largest distance of a body from the boom that it slides along, m; revolutes cannot come
@@ -142,7 +154,7 @@ class FrameModel:
         for slide in self._beam_slides:
             slide.hold(now.pose, inner)
         if self.strings is not None:
-            g[-3:] += self.strings.hub_mass * now.acceleration.hub[0]
+            g[-3:] += self.strings.hub_mass * (now.acceleration.hub[0] - self.gravity)
             pulls = self.strings.pulls(*now.net)
             if pulls is not None:
                 inner[self._string_spots] += pulls
@@ -160,9 +172,10 @@ class FrameModel:
         by_rate = self.coefficients.rate_by_place(step)
         by_place = self.coefficients.acceleration_by_place(step)
         fronts = self._fronts
-        begin_tangent(
-            mesh, now.pose, now.place.points, now.acceleration.points, strains, by_place, fronts
-        )
+        inertial = now.acceleration.points
+        if self._held.weighs:
+            inertial = inertial - self.gravity
+        begin_tangent(mesh, now.pose, now.place.points, inertial, strains, by_place, fronts)
         add_slides(mesh, self._held, now.pose, fronts)
         slopes = self.laws.slopes(now.pose.angle, now.rate.angles, by_rate)
         front, spot = mesh.angle_local.T
@@ -206,6 +219,7 @@ class FrameModel:
         angular = moving.coordinate * np.array(skeleton.angle_rates)
         self.first[self.mesh.angle_home] = angular
         hub = np.zeros(3) if self.layout.net is None else np.array(self.layout.net.hub)
+        self._hub = hub.copy()
         state = State(
             pose, hub, np.zeros((len(self.mesh.length), 6)),
             Followed.at_rest(np.zeros(self._held.cuts[-1]), np.zeros(self._held.cuts[-1])),

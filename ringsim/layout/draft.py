@@ -56,7 +56,8 @@ class Track(NamedTuple):
 class Draft:
     """Collects parts; ``finish`` adds what the scene names and gives the layout.
 
-    Of the scene it reads ``rods``, ``boom``, ``spacecraft``, ``net``, ``loads`` and ``cables``.
+    Of the scene it reads ``rods``, ``boom``, ``spacecraft``, ``net``, ``loads``, ``gravity`` and
+    ``cables``.
     """
 
     scene: Any
@@ -153,6 +154,7 @@ class Draft:
 
     def finish(self) -> Layout:
         """The layout, with boom, net, loads and cables of the scene."""
+        gravity = self.scene.gravity
         boom = add_boom(self)  # adds lumps and joints
         openings = tuple(tuple(self.openings[plane]) for plane in sorted(self.openings))
         return Layout(
@@ -168,6 +170,7 @@ class Draft:
             boom=boom,
             forces=self._forces(openings),
             base=base_of(self),
+            gravity=None if gravity is None else np.array(gravity.vector),
         )
 
     def _mount(self, part: Part | None, at: Any, axes: Array, what: str) -> Mount:

@@ -88,7 +88,8 @@ class Layout:
     ``openings`` are by plane and section, ``corners`` hinge assemblies by plane and corner, as
     numbers of bodies; ``paths`` sheaves of each cable of the scene in order, from its first winch
     to its far end; ``forces`` constant ones: number of the joint whose first mount they act on,
-    and vector, N; ``base`` the body that is held, or that a boom's upper end is fixed to.
+    and vector, N; ``base`` the body that is held, or that a boom's upper end is fixed to;
+    ``gravity`` the weight of a kilogram, m/s^2.
     """
 
     bodies: tuple[Body, ...]
@@ -103,6 +104,7 @@ class Layout:
     boom: BoomBeam | None
     forces: tuple[tuple[int, Array], ...]
     base: int | None = None
+    gravity: Array | None = None
 
     def pose(self, mount: Mount) -> Pose:
         """The frame of a mount, with its own axes."""

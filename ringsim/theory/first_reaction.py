@@ -45,15 +45,15 @@ def first_reaction(layout: Layout, moving: Acceleration) -> Array | None:
     if layout.base is None:
         return None
     base = layout.bodies[layout.base].pose
+    gravity = np.zeros(3) if layout.gravity is None else layout.gravity
     if layout.spacecraft is not None:
-        own = moving.at(base.place, base.rate), moving.turning(base.turn)
+        own = moving.at(base.place, base.rate) - gravity, moving.turning(base.turn)
         return body_reaction(layout.spacecraft, base.axes, *own, np.zeros(3))
     if not layout.supports:
         return None
     masses, _, places, rates = layout.point_masses()
-    pulled = masses[:, None] * np.array(
-        [moving.at(*one) for one in zip(places, rates, strict=True)]
-    )
+    accelerations = [moving.at(*one) - gravity for one in zip(places, rates, strict=True)]
+    pulled = masses[:, None] * np.array(accelerations)
     arms = places - base.place
     found = np.array([pulled.sum(axis=0), np.cross(arms, pulled).sum(axis=0)])
     for joint, force in layout.forces:

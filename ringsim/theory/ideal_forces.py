@@ -78,7 +78,13 @@ class Forces:
             force[0] -= 2.0 * self._stops * float(reaction.total)
             elastic += self._stops * float(reaction.stored)
             loss += self._stops * float(reaction.damping) * rate
-        return Acting(force, cross(lifted, up), elastic, float(up @ lifted), loss)
+        return Acting(
+            force,
+            cross(lifted, up),
+            elastic,
+            float(up @ lifted) + self._mechanism.weight_work(now),
+            loss,
+        )
 
 
 def _friction_joints(

@@ -96,6 +96,7 @@ class Mechanism:
         held = [body_of(support.second) for support in points.layout.supports]
         self.fixed = bool(held)
         self._held = points.frame(held[0]) if held else np.zeros(0)
+        self._gravity = points.layout.gravity
         swings = len(points.swinging)
         self._on_boom = swings > 0 and scene.boom is not None
         self.freedom = 1 + swings - self._on_boom
@@ -136,6 +137,24 @@ class Mechanism:
         """Unit vector that points up in space, in the structure's axes, if it cannot pitch."""
         return np.asarray(self._held[3] @ now.values) if self.fixed else UP
 
+    def weight(self, now: Configuration) -> Array:
+        """Generalised force of gravity on (V, W, p) where a support holds a body, N and N m."""
+        if self._gravity is None:
+            return np.zeros(len(now.matrix))
+        return np.asarray(now.matrix[:, :3] @ self._down(now))
+
+    def weight_work(self, now: Configuration) -> float:
+        """Work function of gravity, J, from the held body's place on."""
+        if self._gravity is None:
+            return 0.0
+        arm = now.first[:, 0] - self._mass * (self._held[0] @ now.values)
+        return float(arm @ self._down(now))
+
+    def _down(self, now: Configuration) -> Array:
+        """Gravity in the structure's axes."""
+        assert self._gravity is not None
+        return np.asarray(np.tensordot(self._gravity, self._held[1:], 1) @ now.values)
+
     def rigid_rates(self, now: Configuration, spin: Array | None = None) -> Array:
         """V and W, shape (6,), that hold the held body; else those without momentum, with the
         rotation ``spin`` (rad/s) or, if None, without angular momentum too.
@@ -162,6 +181,7 @@ class Mechanism:
         inertial = whirl @ first[:, 0] + 2.0 * turn @ first[:, -2] + first[:, -1]
         along = np.einsum("jaa->j", about[1:])
         load = np.concatenate([-inertial, torque - _axial(about[0]), forces - along])
+        load += self.weight(now)
         reach = np.zeros((len(matrix), rigid + self.freedom))
         reach[:rigid, :rigid] = np.eye(rigid)
         reach[6:, rigid:] = now.slopes

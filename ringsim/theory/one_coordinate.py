@@ -62,12 +62,14 @@ class OneCoordinate:
         """Work function W(q) in J, up to a constant."""
         mechanism, now = self._at(q)
         done = np.tensordot(*mechanism.points.forces, 2) @ now.values
+        done += mechanism.weight_work(now)
         return float(done) - mechanism.net(now, 0.0 * now.rate).energy
 
     def work_rate(self, q: float) -> float:
         """Generalised force dW/dq, J/rad."""
         mechanism, now = self._at(q)
         done = np.tensordot(*mechanism.points.forces, 2) @ now.by_place[:, 0]
+        done += np.concatenate([mechanism.rigid_rates(now), now.rate]) @ mechanism.weight(now)
         return float(done + mechanism.net(now, 0.0 * now.rate).force[0])
 
     def _at(self, q: float) -> tuple[Mechanism, Configuration]:
