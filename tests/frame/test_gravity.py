@@ -104,21 +104,22 @@ def test_engines_and_the_ideal_ring_agree() -> None:
 
 def test_a_hanging_boom_stretches() -> None:
     """Its lower end by rho g L^2 / 2 E, in both engines; 20 steps damp how it bounces.
-    It bends a little, too, where the ring holds it, and shortens by 0.4 % of that."""
-    boom = {"kind": "flexible", "young_modulus": 1e10, "elements": 3, "base": "fixed"}
+    It bends a little, too, where the ring holds it, and shortens by 0.4 % of that; exudyn's
+    clamp holds a tenth of the first element, too."""
+    boom = {"kind": "flexible", "young_modulus": 1e10, "elements": 48, "base": "fixed"}
     scene = heavy(0.0, 0.0, -1.0, boom=boom, solver__end_time=0.2, solver__spectral_radius=0.2)
     expected = 1800.0 * 0.9**2 / 2e10
     run = ByFrames(FrameModel(scene))
     run.run()
     top, low = run._model.skeleton.beam[0].frame, run._model.skeleton.beam[-1].frame
     places = run._now.pose.place
-    assert places[top, 2] - places[low, 2] - 0.9 == pytest.approx(expected, rel=1e-2)
+    assert places[top, 2] - places[low, 2] - 0.9 == pytest.approx(expected, rel=1.5e-2)
     built = build(scene)
     ByExudyn(built).run()
     assembly = built.model.assembly
     slopes = [node for node in assembly.starts if len(assembly.coordinates_of(node)) == 6]
     moved = assembly.system.systemData.GetODE2Coordinates()[assembly.coordinates_of(slopes[-1])[2]]
-    assert -moved == pytest.approx(expected, rel=1e-2)
+    assert -moved == pytest.approx(expected, rel=1.5e-2)
 
 
 def test_the_hub_of_a_net_weighs() -> None:
