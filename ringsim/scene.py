@@ -23,6 +23,7 @@ from ringsim.parts.joints import Joints
 from ringsim.parts.limits import Limits
 from ringsim.parts.loads import Loads
 from ringsim.parts.net import Net
+from ringsim.parts.offload import Offload
 from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
@@ -53,6 +54,7 @@ class Scene(Model):
     net: Net | None = None
     loads: Loads | None = None
     gravity: Gravity | None = None
+    offload: Offload | None = None
     cables: Cables | None = None
     limits: Limits = Limits()
     faults: Annotated[tuple[Annotated[Fault, OneOf()], ...], ListIn] = ()
@@ -70,7 +72,7 @@ class Scene(Model):
                 )
         _check_faults(self)
         self.structure.check(self)
-        for part in (self.spacecraft, self.gravity):
+        for part in (self.spacecraft, self.gravity, self.offload):
             if part is not None:
                 part.check(self)
         if self.record.stress and isinstance(self.rods, AncfRods):

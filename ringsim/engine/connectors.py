@@ -16,6 +16,7 @@ from ringsim.cable.faults.family import CableFault
 from ringsim.cable.state import ChainState
 from ringsim.engine.assembly import SYMBOLIC, TORSION
 from ringsim.engine.cables import CableDrive
+from ringsim.engine.hanging import Hanging
 from ringsim.engine.model import BuiltJoint, Multibody
 from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.rotations import Array
@@ -46,6 +47,9 @@ def connect(model: Multibody, weight: Weight | None = None) -> list[Reacting]:
     found += [_contact(model, contact) for contact in layout.contacts]
     if layout.net is not None:
         found.append(_net(model, layout.net, weight))
+    if layout.hung is not None and weight is not None:
+        weight.add_lines(layout.hung)
+        found.append(Hanging(model, layout.hung).reaction)
     return found + [_friction(model, *one) for one in model.scene.joints.present().items()]
 
 

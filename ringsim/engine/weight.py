@@ -9,6 +9,7 @@ import numpy as np
 from ringsim.engine.model import Multibody
 from ringsim.engine.readings import State
 from ringsim.engine.rotations import Array, axes_of
+from ringsim.layout.layout import Hung
 
 
 class Weight:
@@ -56,6 +57,12 @@ class Weight:
                 where = self._assembly.coordinates_of(node)
                 self._masses += [0.5 * mass, sign * mass * length / 12.0]
                 self._places += [where[:3], where[3:6]]
+
+    def add_lines(self, hung: Hung) -> None:
+        """Count the work of what lines carry: as much less mass that weighs."""
+        for place, lift in zip(hung.bodies, hung.lifts.tolist(), strict=True):
+            self._masses.append(-lift / float(np.linalg.norm(self._gravity)))
+            self._places.append(self._where[place, :3])
 
     def work(self, state: State) -> float:
         """Up to a constant, J."""

@@ -9,6 +9,7 @@ from ringsim.frame.balance import Held, add_slides, balance, put_in_place
 from ringsim.frame.cables import FrameCables
 from ringsim.frame.factored import Border, Factored
 from ringsim.frame.following import Coefficients, Followed
+from ringsim.frame.hanging import Hanging
 from ringsim.frame.kernels import Pose, Strains, begin_tangent, move
 from ringsim.frame.laws import JointLaws, Openings
 from ringsim.frame.lines import Arms, no_lines
@@ -92,10 +93,20 @@ class FrameModel:
         self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
         lines = 0 if self.cables is None else self.cables.points
         ends = [] if self.layout.net is None else list(self.layout.net.bodies)
-        sizes = 3 * len(mesh.point_mass), 3 * lines, len(angle), 3 * len(ends), 3 * bool(ends)
+        hung = self.layout.hung
+        lines_on = [] if hung is None else list(hung.bodies)
+        sizes = (
+            3 * len(mesh.point_mass),
+            3 * lines,
+            len(angle),
+            3 * len(ends),
+            3 * bool(ends),
+            3 * len(lines_on),
+        )
         self._held = Held(
             cuts=np.cumsum([0, *sizes]),
             ends=np.array(ends, dtype=np.int64),
+            hung=np.array(lines_on, dtype=np.int64),
             top=np.array([slide.top for slide in slides], dtype=np.int64),
             low=np.array([slide.low for slide in slides], dtype=np.int64),
             stiffness=STIFFNESS * stiffest,
@@ -107,6 +118,7 @@ class FrameModel:
         self._lines = no_lines() if self.cables is None else self.cables.lines
         self._arms = Arms.empty(lines)
         self.start = self._started(pose)
+        self.hanging = None if hung is None else Hanging(hung, mesh, self.start.place.hung.copy())
         self._begun = self.start.place.points.copy()
         self._fronts = np.zeros((len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]))
 
@@ -119,7 +131,7 @@ class FrameModel:
             if self.strings is not None:
                 moved += self.strings.hub_mass * (state.hub - self._hub)
             done += float(moved @ self.gravity)
-        return done
+        return done if self.hanging is None else done + self.hanging.work(state)
 
     def gap(self, pose: Pose) -> float:
         """Largest distance of a body from the boom that it slides along, m; revolutes cannot come
@@ -159,6 +171,8 @@ class FrameModel:
             if pulls is not None:
                 inner[self._string_spots] += pulls
                 g[-3:] -= pulls.sum(axis=0)
+        if self.hanging is not None:
+            self.hanging.push(now, inner)
         if self.cables is not None:
             lines = now.place.lines, now.rate.lines
             self._pulled = self.cables.pull(time, self._arms, *lines, inner)
@@ -182,6 +196,8 @@ class FrameModel:
         fronts[front, spot, spot] += slopes
         for slide in self._beam_slides:
             slide.add_tangent(now.pose, fronts)
+        if self.hanging is not None:
+            self.hanging.add_tangent(now, by_rate, by_place, fronts)
         blocks, inertia = None, math.nan
         if self.strings is not None:
             inertia = self.strings.hub_mass * by_place

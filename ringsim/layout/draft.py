@@ -16,6 +16,7 @@ from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
 from ringsim.layout.base import add_boom, base_of
 from ringsim.layout.bodies import SPACE, Body, InSpace, Lump, Mount, OnBody, OnRod, Rod, pose_of
 from ringsim.layout.free_hub import FreeHub
+from ringsim.layout.hung import hang
 from ringsim.layout.joints import ChordOpening, Joint, JointOpening, Opening
 from ringsim.layout.layout import Contact, HubNet, Layout, Spring
 from ringsim.layout.pose import Array, Pose, axes_along, rate_of, real_of
@@ -56,8 +57,8 @@ class Track(NamedTuple):
 class Draft:
     """Collects parts; ``finish`` adds what the scene names and gives the layout.
 
-    Of the scene it reads ``rods``, ``boom``, ``spacecraft``, ``net``, ``loads``, ``gravity`` and
-    ``cables``.
+    Of the scene it reads ``rods``, ``boom``, ``spacecraft``, ``net``, ``loads``, ``gravity``, ``offload``
+    and ``cables``.
     """
 
     scene: Any
@@ -154,7 +155,8 @@ class Draft:
 
     def finish(self) -> Layout:
         """The layout, with boom, net, loads and cables of the scene."""
-        gravity = self.scene.gravity
+        weight = self.scene.gravity
+        gravity = None if weight is None else np.array(weight.vector)
         boom = add_boom(self)  # adds lumps and joints
         openings = tuple(tuple(self.openings[plane]) for plane in sorted(self.openings))
         return Layout(
@@ -170,7 +172,8 @@ class Draft:
             boom=boom,
             forces=self._forces(openings),
             base=base_of(self),
-            gravity=None if gravity is None else np.array(gravity.vector),
+            gravity=gravity,
+            hung=None if gravity is None else hang(self, gravity, base_of(self)),
         )
 
     def _mount(self, part: Part | None, at: Any, axes: Array, what: str) -> Mount:

@@ -13,6 +13,7 @@ from ringsim.layout.bodies import Body, InSpace, Lump, Mount, OnBody, OnRod, Rod
 from ringsim.layout.joints import Joint, JointOpening, Opening
 from ringsim.layout.pose import STEP, Array, Pose, cross
 from ringsim.parts.net import Net
+from ringsim.parts.offload import Offload
 
 SPACECRAFT = "spacecraft"
 """Group of the lump that is one."""
@@ -48,6 +49,17 @@ class HubNet(NamedTuple):
     law: Net
     hub: Array
     bodies: tuple[int, ...]
+
+
+class Hung(NamedTuple):
+    """Lines that carry bodies at their origins: the law, numbers of the bodies, what each carries
+    at the start, N, and the unit vector along which they pull.
+    """
+
+    law: Offload
+    bodies: tuple[int, ...]
+    lifts: Array
+    up: Array
 
 
 class BoomBeam(NamedTuple):
@@ -89,7 +101,7 @@ class Layout:
     numbers of bodies; ``paths`` sheaves of each cable of the scene in order, from its first winch
     to its far end; ``forces`` constant ones: number of the joint whose first mount they act on,
     and vector, N; ``base`` the body that is held, or that a boom's upper end is fixed to;
-    ``gravity`` the weight of a kilogram, m/s^2.
+    ``gravity`` the weight of a kilogram, m/s^2; ``hung`` the lines of a ground test.
     """
 
     bodies: tuple[Body, ...]
@@ -105,6 +117,7 @@ class Layout:
     forces: tuple[tuple[int, Array], ...]
     base: int | None = None
     gravity: Array | None = None
+    hung: Hung | None = None
 
     def pose(self, mount: Mount) -> Pose:
         """The frame of a mount, with its own axes."""

@@ -29,8 +29,8 @@ class Gravity(Model):
 
     def check(self, scene: Any) -> None:
         """Raise a ValueError where nothing would carry the weight."""
-        if not scene.held:
+        if not scene.held and scene.offload is None:
             raise ValueError(
                 f"gravity.vector = {list(self.vector)} m/s^2 on a free base: the structure would "
-                'fall: hold it (boom.base = "fixed"), or leave gravity out'
+                'fall: hold it (boom.base = "fixed"), hang it up ([offload]), or leave gravity out'
             )

@@ -129,7 +129,7 @@ class PlanarTruss(Structure):
 
     def check(self, scene: Any) -> None:
         """See ``Structure``: parts of rings are refused, the cable is needed."""
-        for name in ("stop", "boom", "spacecraft", "net", "loads"):
+        for name in ("stop", "boom", "spacecraft", "offload", "net", "loads"):
             if getattr(scene, name) is not None:
                 raise ValueError(
                     f'{name} is a part of rings: leave it out of a planar truss ({name} = "none")'

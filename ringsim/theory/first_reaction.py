@@ -59,6 +59,11 @@ def first_reaction(layout: Layout, moving: Acceleration) -> Array | None:
     for joint, force in layout.forces:
         arm = layout.pose(layout.joints[joint].first).place - base.place
         found -= np.array([force, cross(arm, force)])
+    if layout.hung is not None:
+        for body, lift in zip(layout.hung.bodies, layout.hung.lifts, strict=True):
+            force = lift * layout.hung.up
+            arm = layout.bodies[body].pose.place - base.place
+            found -= np.array([force, cross(arm, force)])
     return found
 
 

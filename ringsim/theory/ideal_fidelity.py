@@ -53,6 +53,10 @@ def refuse_if_not_ideal(scene: Scene) -> None:
             "record.stress = true: rigid rods carry no stress in the ideal fidelity (set it to "
             "false, or use the full fidelity)"
         )
+    if scene.offload is not None:
+        raise InputError(
+            "offload: lines, trolleys and their friction are no part of the ideal fidelity " + cure
+        )
     if scene.net is None:
         return
     net, layout = scene.net, layout_of(scene)

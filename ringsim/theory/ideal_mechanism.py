@@ -96,7 +96,14 @@ class Mechanism:
         held = [body_of(support.second) for support in points.layout.supports]
         self.fixed = bool(held)
         self._held = points.frame(held[0]) if held else np.zeros(0)
-        self._gravity = points.layout.gravity
+        self._gravity, hung = points.layout.gravity, points.layout.hung
+        self._weighing, self._weighed = self._mass, self._first
+        if hung is not None and self._gravity is not None:
+            # A line takes as much from the mass that weighs.
+            taken = hung.lifts / np.linalg.norm(self._gravity)
+            self._weighing -= float(taken.sum())
+            lines = points.places([OnBody(body) for body in hung.bodies])
+            self._weighed = self._weighed - np.tensordot(taken, lines, 1)
         swings = len(points.swinging)
         self._on_boom = swings > 0 and scene.boom is not None
         self.freedom = 1 + swings - self._on_boom
@@ -138,21 +145,28 @@ class Mechanism:
         return np.asarray(self._held[3] @ now.values) if self.fixed else UP
 
     def weight(self, now: Configuration) -> Array:
-        """Generalised force of gravity on (V, W, p) where a support holds a body, N and N m."""
+        """Generalised force of gravity and of what lines carry on (V, W, p), N and N m."""
         if self._gravity is None:
             return np.zeros(len(now.matrix))
-        return np.asarray(now.matrix[:, :3] @ self._down(now))
+        down, n = self._down(now), len(now.place)
+        first = self._weighed @ now.functions
+        whole, turning = self._weighing * down, np.cross(first[:, 0], down)
+        return np.concatenate([whole, turning, first[:, 1 : n + 1].T @ down])
 
     def weight_work(self, now: Configuration) -> float:
-        """Work function of gravity, J, from the held body's place on."""
+        """Their work function, J, from the held body's place on."""
         if self._gravity is None:
             return 0.0
-        arm = now.first[:, 0] - self._mass * (self._held[0] @ now.values)
+        arm = self._weighed @ now.values
+        if self.fixed:
+            arm = arm - self._weighing * (self._held[0] @ now.values)
         return float(arm @ self._down(now))
 
     def _down(self, now: Configuration) -> Array:
         """Gravity in the structure's axes."""
         assert self._gravity is not None
+        if not self.fixed:
+            return self._gravity
         return np.asarray(np.tensordot(self._gravity, self._held[1:], 1) @ now.values)
 
     def rigid_rates(self, now: Configuration, spin: Array | None = None) -> Array:
