@@ -17,9 +17,9 @@ strings and its hub, bodies that hang on lines."""
 
 
 class Held(NamedTuple):
-    """Where followed coordinates begin, shape (7,); bodies at the ends of strings, and on lines; bodies with a
-    boom and those that slide along it, with the stiffness that holds them (N/m); linear friction of
-    the angles, N m s/rad; whether there is gravity, and it, m/s^2.
+    """Where followed coordinates begin, shape (7,); bodies at the ends of strings, and on lines;
+    bodies with a boom and those that slide along it, with the stiffness that holds them (N/m);
+    linear friction of the angles, N m s/rad; whether there is gravity, and it, m/s^2.
     """
 
     cuts: Indices

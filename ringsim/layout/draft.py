@@ -57,8 +57,8 @@ class Track(NamedTuple):
 class Draft:
     """Collects parts; ``finish`` adds what the scene names and gives the layout.
 
-    Of the scene it reads ``rods``, ``boom``, ``spacecraft``, ``net``, ``loads``, ``gravity``, ``offload``
-    and ``cables``.
+    Of the scene it reads ``rods``, ``boom``, ``spacecraft``, ``net``, ``loads``, ``gravity``,
+    ``offload`` and ``cables``.
     """
 
     scene: Any

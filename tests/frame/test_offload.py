@@ -38,10 +38,10 @@ def test_a_suspension_of_every_mass_point_is_flight() -> None:
     """Uneven forces, so that sections deviate, and a weight of many times the loads.  What is left
     is that of the rods, a millionth, between the corners.
     """
-    uneven = points(loads__force=[0.05, 0.06, 0.04, 0.055], solver__newton_tolerance=1e-9)
+    uneven = points(loads__force=[0.05, 0.06, 0.04, 0.055], solver__end_time=0.5)
     flight = by_frames(ring(**uneven)).values
     tested = by_frames(ground({"planes": "both"}, **uneven)).values
-    bounds = {"opening_angle": 1e-7, "asynchrony": 1e-4, "kinetic_energy": 1e-6, "work": 1e-6}
+    bounds = {"opening_angle": 1e-7, "asynchrony": 3e-4, "kinetic_energy": 1e-6, "work": 1e-6}
     for name, bound in bounds.items():
         largest = np.nanmax(np.abs(flight[name]))
         assert np.nanmax(np.abs(tested[name] - flight[name])) < bound * largest, name
@@ -54,8 +54,8 @@ def test_lines_carry_the_whole_weight() -> None:
         assert layout.hung is not None
         whole = 9.81 * sum(layout.masses().values())
         own = 9.81 * layout.bodies[0].mass
-        rest = whole - sum(9.81 * layout.bodies[k].mass for plane in layout.corners
-                           for k in plane if planes == "both" or plane is layout.corners[0])  # fmt: skip
+        hung = layout.corners if planes == "both" else layout.corners[:1]
+        rest = whole - sum(9.81 * layout.bodies[k].mass for plane in hung for k in plane)
         lines = 4 if planes == "upper" else 8
         expected = whole if base == "free" else whole - own - rest / lines
         assert layout.hung.lifts.sum() == pytest.approx(expected, rel=1e-12)
