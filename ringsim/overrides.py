@@ -120,7 +120,7 @@ def set_path(table: dict[str, Any], path: str, value: Any) -> None:
 
 def place_of(path: str, *, closed: bool) -> str | None:
     """What a list at ``path`` has one value for: a section, corner or pulley; None if nothing."""
-    if path == "net.stiffness" and not closed:
+    if path in ("net.stiffness", "offload.residual") and not closed:
         return "corner"
     if path.startswith("cables."):
         return "pulley" if path.endswith(".coefficient") else None

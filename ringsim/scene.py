@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, get_origin
 
 import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
@@ -20,16 +20,19 @@ from ringsim.overrides import at_path, length_at, points_in, set_path
 from ringsim.parts.boom.family import Boom
 from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import Fault
+from ringsim.parts.gravity import Gravity
 from ringsim.parts.hinge_spring.family import HingeSpring
 from ringsim.parts.joints import Joints
 from ringsim.parts.limits import Limits
 from ringsim.parts.loads import Loads
 from ringsim.parts.margin.family import MarginStandard
 from ringsim.parts.net import Net
+from ringsim.parts.offload import Offload
 from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.parts.solver import Record, Solver
+from ringsim.parts.spacecraft import Spacecraft
 from ringsim.parts.stop.family import Stop
 from ringsim.parts.stop.spring_damper import SpringDamperStop
 from ringsim.refusal import InputError, explain, known_or_nearest, models_in, show
@@ -60,10 +63,16 @@ class Scene(Model):
     """What ends the travel of every V-joint; built unless it is "none"."""
     boom: Annotated[Boom, OneOf()] | None = None
     """Tube at the first corner along which the ring slides; left out, there is none."""
+    spacecraft: Spacecraft | None = None
+    """Rigid body that holds the boom; left out, there is none."""
     net: Net | None = None
     """Springs from the upper corners to a hub; left out, there is none."""
     loads: Loads | None = None
     """Forces on the V-joints; left out, there are none."""
+    gravity: Gravity | None = None
+    """Weight of everything; left out, there is none."""
+    offload: Offload | None = None
+    """Lines that carry corners in a ground test; left out, there are none."""
     cables: Cables | None = None
     """Driving cables with their winches; left out, there are none."""
     limits: Limits = Limits()
@@ -88,6 +97,9 @@ class Scene(Model):
                 )
         _check_faults(self)
         self.structure.check(self)
+        for part in (self.spacecraft, self.gravity, self.offload):
+            if part is not None:
+                part.check(self)
         if self.record.stress and isinstance(self.rods, AncfRods):
             raise ValueError(
                 'record.stress = true is not possible with rods.kind = "ancf", whose elements '
@@ -142,6 +154,11 @@ class Scene(Model):
     def pulleys_of(self, cable: Cable) -> int:
         """Pulleys of one of the scene's cables: a second winch takes one more."""
         return len(self.path_of(cable)) - 2
+
+    @property
+    def held(self) -> bool:
+        """Whether a support holds the structure's base in space."""
+        return self.structure.supported or (self.boom is not None and self.boom.base == "fixed")
 
     @property
     def span_names(self) -> dict[str, tuple[str, ...]]:
@@ -263,8 +280,13 @@ def _lists(record: Model, prefix: str = "") -> Iterator[tuple[str, tuple[float, 
     for name, value in record:
         if isinstance(value, Model):
             yield from _lists(value, f"{prefix}{name}.")
-        elif isinstance(value, tuple) and name != "faults":
+        elif isinstance(value, tuple) and not _is_vector(record, name):
             yield f"{prefix}{name}", value
+
+
+def _is_vector(record: Model, name: str) -> bool:
+    """Whether a field is a vector of its own, not one value or one for each section."""
+    return get_origin(type(record).model_fields[name].annotation) is tuple
 
 
 def scene_from_table(table: dict[str, Any], *, source: str) -> Scene:

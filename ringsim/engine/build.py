@@ -13,6 +13,7 @@ from ringsim.engine.connectors import Reacting, Springs, Stops, connect
 from ringsim.engine.faults import Faults
 from ringsim.engine.model import Multibody
 from ringsim.engine.rods import Ancf
+from ringsim.engine.weight import Weight
 from ringsim.layout.bodies import OnBody
 from ringsim.layout.layout import BoomBeam
 from ringsim.layout.points import BOOM_TIP
@@ -28,6 +29,7 @@ class Built(NamedTuple):
     stops: Stops | None
     cables: CableDrive | None
     faults: Faults
+    weight: Weight | None
 
 
 def build(scene: Scene) -> Built:
@@ -39,9 +41,11 @@ def build(scene: Scene) -> Built:
         If the structure has no joint for a friction law, the stop or a fault.
     """
     model, stops, springs, cables = Multibody(scene), None, None, None
+    gravity = model.layout.gravity
+    weight = None if gravity is None else Weight(model, gravity)
     if model.layout.boom is not None:
-        _add_boom(model, model.layout.boom)
-    connectors = connect(model)
+        _add_boom(model, model.layout.boom, weight)
+    connectors = connect(model, weight)
     if scene.stop is not None:
         stops = Stops(model, scene.stop)
         connectors.append(stops.reaction)
@@ -55,7 +59,7 @@ def build(scene: Scene) -> Built:
     faults = Faults(model, cables, springs)
     connectors += [joint.reaction for joint in faults.joints]
     model.assembly.finish()
-    return Built(model, connectors, stops, cables, faults)
+    return Built(model, connectors, stops, cables, faults, weight)
 
 
 def _on_nodes(model: Multibody, sheave: Sheave) -> Sheave:
@@ -68,7 +72,7 @@ def _on_nodes(model: Multibody, sheave: Sheave) -> Sheave:
     return FixedSheave(node, arm + axes @ sheave.arm)
 
 
-def _add_boom(model: Multibody, beam: BoomBeam) -> None:
+def _add_boom(model: Multibody, beam: BoomBeam, weight: Weight | None) -> None:
     """A flexible boom: a chain of elements, clamped at its top, with a body that slides along it.
 
     A rigid one is part of its hinge assembly.
@@ -101,6 +105,8 @@ def _add_boom(model: Multibody, beam: BoomBeam) -> None:
         for k in range(boom.elements)
     ]
     assembly.bodies += cables
+    if weight is not None:
+        weight.add_beam(cables, nodes, boom.mass / boom.elements, length)
     # The elements' nodes have a slope but no orientation: a second spherical joint holds the
     # direction, and the boom is inextensible between the two.
     for drop in (0.0, 0.1 * length):

@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.engine.assembly import SYMBOLIC, TORSION
+from ringsim.engine.hanging import Hanging
 from ringsim.engine.model import BuiltJoint, Multibody
 from ringsim.engine.readings import JointGroup, State
 from ringsim.engine.rotations import Array
+from ringsim.engine.weight import Weight
 from ringsim.layout.layout import Contact, HubNet
 from ringsim.layout.points import HUB
 from ringsim.layout.pose import turned_about_z
@@ -32,7 +34,7 @@ Reacting = Callable[[State, Array, Array], tuple[Reaction, Array]]
 the state, the opening angles and their rates, shape (planes, sections), rad and rad/s."""
 
 
-def connect(model: Multibody) -> list[Reacting]:
+def connect(model: Multibody, weight: Weight | None = None) -> list[Reacting]:
     """Springs, contacts, net and friction of a model; before ``Assembly.finish``."""
     layout, found = model.layout, []
     for spring in layout.springs:
@@ -41,7 +43,10 @@ def connect(model: Multibody) -> list[Reacting]:
         found.append(_strings(model, [ends], law.tension, law.free_length, [linear]))
     found += [_contact(model, contact) for contact in layout.contacts]
     if layout.net is not None:
-        found.append(_net(model, layout.net))
+        found.append(_net(model, layout.net, weight))
+    if layout.hung is not None and weight is not None:
+        weight.add_lines(layout.hung)
+        found.append(Hanging(model, layout.hung).reaction)
     return found + [_friction(model, *one) for one in model.scene.joints.present().items()]
 
 
@@ -76,7 +81,7 @@ class Stops:
                 self._system.SetObjectParameter(self._objects[plane][section], "offset", 1.0)
             self._latched |= deployed
 
-    def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
+    def reaction(self, _: State | None, angles: Array, rates: Array) -> tuple[Reaction, Array]:
         """See ``Reacting``."""
         return self._law.torque(np.pi - angles, -rates, self._latched), -rates
 
@@ -162,7 +167,7 @@ def _friction(model: Multibody, family: str, law: JointFriction) -> Reacting:
     return reaction
 
 
-def _net(model: Multibody, held: HubNet) -> Reacting:
+def _net(model: Multibody, held: HubNet, weight: Weight | None) -> Reacting:
     """The net's strings and their hub.
 
     The hub starts where its strings balance: from anywhere else it would swing for the whole run,
@@ -177,6 +182,8 @@ def _net(model: Multibody, held: HubNet) -> Reacting:
     model.loose[HUB] = hub
     mass = item.ObjectMassPoint(nodeNumber=hub, mass=net.hub_mass)
     assembly.bodies.append(assembly.system.AddObject(mass))
+    if weight is not None:
+        weight.add_point(hub, net.hub_mass)
 
     def settings(law: Net) -> dict[str, Any]:
         if law.two_sided:

@@ -13,6 +13,7 @@ import numpy as np
 from ringsim.cable.ropes import Flags
 from ringsim.cable.state import ChainState
 from ringsim.engine.assembly import Assembly
+from ringsim.engine.base import BaseMeter
 from ringsim.engine.build import Built, build
 from ringsim.engine.meters import BendingMeter, EnergyMeter, StressMeter
 from ringsim.engine.positions import PositionMeter
@@ -58,6 +59,7 @@ class Integration:
         self._openings = Openings(model)
         self._energy = EnergyMeter(built)
         self._stress = StressMeter(model) if scene.record.stress else None
+        self._base = BaseMeter(built) if scene.record.reactions else None
         gauge = scene.structure.gauge
         self._bending = BendingMeter(model, gauge) if gauge else None
         self._position = PositionMeter(model) if scene.record.positions else None
@@ -205,6 +207,7 @@ class Integration:
                 stress=None if self._stress is None else self._stress.read(),
                 places=None if self._position is None else self._position.read(self._state),
                 strain=None if self._bending is None else self._bending.read(),
+                carried=None if self._base is None else self._base.read(now),
             )
         )
         return now

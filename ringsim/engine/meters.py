@@ -37,6 +37,8 @@ class EnergyMeter:
         found = [model.assembly.coordinates_of(node)[:3] for node in nodes]
         self._loaded = np.array(found, dtype=np.int64)
         self._forces = np.array([force for _, force in model.layout.forces])
+        self._weight = built.weight
+        self._lifted: float | None = None
         self._untold = model.scene.rods.damping > 0.0 and not model.formulation.has_strains
         self._kept: _Passing | None = None
         self._last: _Passing | None = None
@@ -71,6 +73,10 @@ class EnergyMeter:
                 driven, lost_in_cables = work_between(old_chain, chain)
                 lost += lost_in_cables
         work = float(np.sum(self._forces * (state.position - state.reference)[self._loaded]))
+        if self._weight is not None:
+            done = self._weight.work(state)
+            self._lifted = done if self._lifted is None else self._lifted
+            work += done - self._lifted
         return Energies(float(kinetic), float(elastic), work, lost, driven)
 
     def keep(self) -> None:

@@ -12,9 +12,10 @@ from ringsim.engine.rods import FORMULATIONS, BuiltRod, add_rod
 from ringsim.engine.rotations import Array
 from ringsim.layout import joints as parts
 from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod
-from ringsim.layout.layout import Layout, layout_of
-from ringsim.layout.pose import Pose, cross
+from ringsim.layout.layout import layout_of
+from ringsim.layout.pose import Pose
 from ringsim.scene import Scene
+from ringsim.theory.first_reaction import Acceleration, first_acceleration
 from ringsim.theory.one_coordinate import OneCoordinate
 
 _JOINTS: dict[str, Any] = {
@@ -27,9 +28,12 @@ _JOINTS: dict[str, Any] = {
 
 
 class BuiltJoint(NamedTuple):
-    """A joint as built: markers, nodes (None in space) and arms (m, in the nodes' axes) by side."""
+    """A joint as built: exudyn's object, markers, nodes (None in space) and arms (m, in the nodes'
+    axes) by side.
+    """
 
     part: parts.Joint
+    holder: Any
     markers: tuple[Any, Any]
     nodes: tuple[Any, Any]
     arms: tuple[Array, Array]
@@ -45,7 +49,8 @@ class Multibody:
         self.formulation = formulation = FORMULATIONS[type(scene.rods)]
         self.assembly = assembly = Assembly()
         self.ideal = OneCoordinate(scene, self.layout)
-        started = _started(scene, self.layout, self.ideal)
+        self.moving = first_acceleration(self.layout, self.ideal, scene.structure.coordinate)
+        started = _started(self.moving)
         self.bodies: list[tuple[Any, Any]] = []
         for body in self.layout.bodies:
             node = assembly.add_rigid_node(started(body.pose))
@@ -88,8 +93,9 @@ class Multibody:
         # whatever the rods are made of, and Newton's iterations depend on the choice.
         pinned = isinstance(joint.first, OnRod) and isinstance(joint.second, OnBody)
         ordered = markers[::-1] if pinned else markers
-        self.assembly.system.AddObject(_JOINTS[joint.kind](markerNumbers=list(ordered)))
-        return BuiltJoint(joint, markers, nodes, arms)
+        made = _JOINTS[joint.kind](markerNumbers=list(ordered))
+        holder = self.assembly.system.AddObject(made)
+        return BuiltJoint(joint, holder, markers, nodes, arms)
 
     def _marker(self, mount: Mount) -> Any:
         node, arm = self.side_of(mount)
@@ -101,21 +107,13 @@ class Multibody:
         return self.assembly.node_marker(node)
 
 
-def _started(scene: Scene, layout: Layout, ideal: OneCoordinate) -> Callable[[Pose], Pose]:
-    """Gives poses accelerations, those of the structure with rigid rods released at rest, in place
-    of their derivatives.
-
-    One with springs of its own starts without: it rests against them on its cables.
+def _started(moving: Acceleration) -> Callable[[Pose], Pose]:
+    """Gives poses accelerations, those of the structure released at rest, in place of their
+    derivatives.
     """
-    pull, velocity, rotation = 0.0, np.zeros(3), np.zeros(3)
-    if not layout.springs:
-        q = scene.structure.coordinate
-        motion = ideal.motion(q)
-        pull = ideal.work_rate(q) / motion.inertia
-        velocity, rotation = motion.velocity, motion.rotation
 
     def started(pose: Pose) -> Pose:
-        moving = pose.rate - velocity - cross(rotation, pose.place)
-        return Pose(pose.place, pose.axes, pull * moving, pull * (pose.turn - rotation))
+        first, turning = moving.at(pose.place, pose.rate), moving.turning(pose.turn)
+        return Pose(pose.place, pose.axes, first, turning)
 
     return started

@@ -11,23 +11,26 @@ from ringsim.frame.slide import aside
 from ringsim.frame.vectors import compiled
 from ringsim.layout.pose import Array
 
-POINTS, LINES, ANGLES, ENDS, HUB = range(5)
+POINTS, LINES, ANGLES, ENDS, HUB, HUNG = range(6)
 """Followed coordinates: points with mass, points of the cables, joint angles, the ends of the net's
-strings and its hub."""
+strings and its hub, bodies that hang on lines."""
 
 
 class Held(NamedTuple):
-    """Where followed coordinates begin, shape (6,); bodies at the ends of strings; bodies with a
-    boom and those that slide along it, with the stiffness that holds them (N/m); linear friction of
-    the angles, N m s/rad.
+    """Where followed coordinates begin, shape (7,); bodies at the ends of strings, and on lines;
+    bodies with a boom and those that slide along it, with the stiffness that holds them (N/m);
+    linear friction of the angles, N m s/rad; whether there is gravity, and it, m/s^2.
     """
 
     cuts: Indices
     ends: Indices
+    hung: Indices
     top: Indices
     low: Indices
     stiffness: float
     damping: Array
+    weighs: bool
+    gravity: Array
 
 
 @compiled
@@ -43,7 +46,10 @@ def put_in_place(
         k = cuts[ENDS] + 3 * n
         place[k : k + 3] = pose.place[held.ends[n]]
     if len(held.ends) > 0:
-        place[cuts[HUB] :] = hub
+        place[cuts[HUB] : cuts[HUNG]] = hub
+    for n in range(len(held.hung)):
+        k = cuts[HUNG] + 3 * n
+        place[k : k + 3] = pose.place[held.hung[n]]
 
 
 @compiled
@@ -59,6 +65,8 @@ def balance(
     first, last = held.cuts[POINTS], held.cuts[LINES]
     points = now.place[first:last].reshape((-1, 3))
     accelerations = now.acceleration[first:last].reshape((-1, 3))
+    if held.weighs:
+        accelerations = accelerations - held.gravity
     add_forces(mesh, pose, points, accelerations, strains, g)
     rates = now.rate[held.cuts[ANGLES] : held.cuts[ENDS]]
     for n in range(len(held.damping)):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ringsim.cable.faults.family import CableFault
+from ringsim.frame.base import BaseMeter
 from ringsim.frame.kernels import Strains, move, moved_between, straighten
 from ringsim.frame.meter import EnergyMeter
 from ringsim.frame.model import FrameModel
@@ -68,6 +69,7 @@ class Integration:
         self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
         self._stress = StressMeter(model.mesh, model.layout) if scene.record.stress else None
         self._position = PositionMeter(model) if scene.record.positions else None
+        self._base = BaseMeter(model) if scene.record.reactions else None
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
         first = self._measure(0.0, self._now)
         self._locks = (
@@ -234,6 +236,7 @@ class Integration:
                 planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
                 stress=None if self._stress is None else self._stress.read(self._strains),
                 places=None if self._position is None else self._position.read(self._now),
+                carried=None if self._base is None else self._base.read(self._now),
             )
         )
         return now

@@ -190,6 +190,14 @@ class JointLaws:
             stored += float(np.sum(reaction.stored))
         return Torques(lost, stored)
 
+    def stop_torques(self, angles: Array, rates: Array) -> Array | None:
+        """Torques of the stop, (planes, sections), N m; None without."""
+        if self._stop is None:
+            return None
+        own, sense = self._openings
+        folded, rate = sense * angles[own], sense * rates[own]
+        return np.asarray(self._stop.torque(folded, rate, self.latched).total)
+
     def slopes(self, angles: Array, rates: Array, rate_by_angle: float) -> Array:
         """Derivatives of the torques after the angles, whose rates follow them, N m/rad: (a,)."""
         found = self.damping * rate_by_angle

@@ -1,12 +1,14 @@
 """A layout in joint coordinates as arrays, for compiled code."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ringsim.frame.parts import Indices, Parts
 from ringsim.frame.skeleton import Element, Skeleton, inertia_of, stiffness_of
+from ringsim.layout.layout import SPACECRAFT
 from ringsim.layout.pose import Array
 from ringsim.parts.rods.family import Rods
 
@@ -49,6 +51,8 @@ class Mesh(NamedTuple):
     parent: Indices
     up: Indices
     fixed: Indices
+    craft: Indices
+    """Points of the spacecraft, four or none."""
     unknowns: int
 
 
@@ -74,8 +78,14 @@ def mesh_of(
             end = skeleton.end(number, station)
             points.add(end.frame, end.arm, own)
     for number, body in enumerate(layout.bodies):
-        for arm in tetrahedron(body.mass, body.centre, body.inertia):
-            points.add(number, arm, 0.25 * body.mass)
+        craft = [lump for lump in body.lumps if lump.group == SPACECRAFT]
+        rest = replace(body, lumps=tuple(lump for lump in body.lumps if lump not in craft))
+        for arm in tetrahedron(rest.mass, rest.centre, rest.inertia):
+            points.add(number, arm, 0.25 * rest.mass)
+        # A spacecraft has points of its own: what they weigh is what it feels.
+        for lump in craft:
+            for arm in tetrahedron(lump.mass, lump.centre, lump.inertia):
+                points.craft.append(points.add(number, arm, 0.25 * lump.mass))
     local = [
         parts.local(int(part), [(end.frame, end.angle) for end in pair])
         for part, pair in zip(parts.of_element, pairs, strict=True)
@@ -111,6 +121,7 @@ def mesh_of(
         fixed=np.array(
             [int(parts.home[body]) + k for body in skeleton.fixed for k in range(6)], dtype=np.int64
         ),
+        craft=np.array(points.craft, dtype=np.int64),
         unknowns=parts.unknowns,
     )
     return mesh, parts
@@ -137,6 +148,7 @@ class _Points:
         self.arms: list[Array] = []
         self.masses: list[float] = []
         self._known: dict[tuple[int, ...], int] = {}
+        self.craft: list[int] = []
 
     def at(self, frame: int, arm: Array) -> int:
         key = (frame, *np.round(arm * 1e9).astype(int))
@@ -147,5 +159,6 @@ class _Points:
             self.masses.append(0.0)
         return self._known[key]
 
-    def add(self, frame: int, arm: Array, mass: float) -> None:
+    def add(self, frame: int, arm: Array, mass: float) -> int:
         self.masses[self.at(frame, arm)] += mass
+        return self.at(frame, arm)

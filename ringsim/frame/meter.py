@@ -37,6 +37,12 @@ class EnergyMeter:
             elastic += stored
             forces.append(resisting)
             places.append(lengths)
+        if model.hanging is not None:
+            hold = model.hanging.hold(state)
+            kinetic += model.hanging.kinetic(state)
+            elastic += hold.stored
+            forces.append(-hold.friction.ravel())
+            places.append(state.place.hung.ravel())
         if mesh.tau.any():
             straining = strains.lead * state.strains + strains.before
             forces.append((mesh.tau[:, None] * mesh.stiffness * straining).ravel())
@@ -53,7 +59,7 @@ class EnergyMeter:
                 driven, rubbed = work_between(chain_before, chain)
                 lost += rubbed
         self._last = force, place, chain
-        return Energies(kinetic, elastic, model.work(pose), lost, driven)
+        return Energies(kinetic, elastic, model.work(state), lost, driven)
 
     def keep(self) -> None:
         """Count from the last reading on."""

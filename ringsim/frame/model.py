@@ -9,6 +9,7 @@ from ringsim.frame.balance import Held, add_slides, balance, put_in_place
 from ringsim.frame.cables import FrameCables
 from ringsim.frame.factored import Border, Factored
 from ringsim.frame.following import Coefficients, Followed
+from ringsim.frame.hanging import Hanging
 from ringsim.frame.kernels import Pose, Strains, begin_tangent, move
 from ringsim.frame.laws import JointLaws, Openings
 from ringsim.frame.lines import Arms, no_lines
@@ -18,10 +19,11 @@ from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
 from ringsim.frame.state import State
 from ringsim.layout.layout import layout_of
-from ringsim.layout.pose import Array, cross
+from ringsim.layout.pose import Array
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.theory.first_reaction import first_acceleration
 from ringsim.theory.one_coordinate import OneCoordinate
 from ringsim.theory.scales import residual_tolerance
 
@@ -35,6 +37,10 @@ class FrameModel:
         The structure with rigid rods, at the start.
     size
         Number of unknowns: those of the mesh and the hub's three, if there is a net.
+    moving
+        Its acceleration then.
+    reaction
+        What was last out of balance on the unknowns that do not move, N and N m.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -42,6 +48,8 @@ class FrameModel:
             raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
         self.scene, self.layout = scene, layout_of(scene)
         self.ideal = OneCoordinate(scene, self.layout)
+        self.gravity = np.zeros(3) if self.layout.gravity is None else self.layout.gravity
+        self.moving = first_acceleration(self.layout, self.ideal, scene.structure.coordinate)
         self.skeleton = skeleton = Skeleton(self.layout)
         beam = self.layout.boom
         boom = [] if beam is None else skeleton.add_beam(beam)
@@ -80,28 +88,50 @@ class FrameModel:
         loaded = np.array(at, dtype=np.int64)
         self._loaded = loaded, pose.place[loaded], np.array(forces).reshape(-1, 3)
         self._tolerance = residual_tolerance(scene, self.layout, 0.0)
+        self._masses = mesh.point_mass.copy()
+        np.add.at(self._masses, mesh.point, mesh.mass.sum(axis=1)[:, None])
         self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
         lines = 0 if self.cables is None else self.cables.points
         ends = [] if self.layout.net is None else list(self.layout.net.bodies)
-        sizes = 3 * len(mesh.point_mass), 3 * lines, len(angle), 3 * len(ends), 3 * bool(ends)
+        hung = self.layout.hung
+        lines_on = [] if hung is None else list(hung.bodies)
+        sizes = (
+            3 * len(mesh.point_mass),
+            3 * lines,
+            len(angle),
+            3 * len(ends),
+            3 * bool(ends),
+            3 * len(lines_on),
+        )
         self._held = Held(
             cuts=np.cumsum([0, *sizes]),
             ends=np.array(ends, dtype=np.int64),
+            hung=np.array(lines_on, dtype=np.int64),
             top=np.array([slide.top for slide in slides], dtype=np.int64),
             low=np.array([slide.low for slide in slides], dtype=np.int64),
             stiffness=STIFFNESS * stiffest,
             damping=self.laws.damping,
+            weighs=self.layout.gravity is not None,
+            gravity=self.gravity,
         )
         self._string_spots = mesh.home[self._held.ends][:, None] + np.arange(3)
         self._lines = no_lines() if self.cables is None else self.cables.lines
         self._arms = Arms.empty(lines)
         self.start = self._started(pose)
+        self.hanging = None if hung is None else Hanging(hung, mesh, self.start.place.hung.copy())
+        self._begun = self.start.place.points.copy()
         self._fronts = np.zeros((len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]))
 
-    def work(self, pose: Pose) -> float:
-        """Of the loads since the start, J."""
+    def work(self, state: State) -> float:
+        """Of loads and gravity since the start, J."""
         at, start, forces = self._loaded
-        return float(np.sum(forces * (pose.place[at] - start)))
+        done = float(np.sum(forces * (state.pose.place[at] - start)))
+        if self._held.weighs:
+            moved = self._masses @ (state.place.points - self._begun)
+            if self.strings is not None:
+                moved += self.strings.hub_mass * (state.hub - self._hub)
+            done += float(moved @ self.gravity)
+        return done if self.hanging is None else done + self.hanging.work(state)
 
     def gap(self, pose: Pose) -> float:
         """Largest distance of a body from the boom that it slides along, m; revolutes cannot come
@@ -136,14 +166,17 @@ class FrameModel:
         for slide in self._beam_slides:
             slide.hold(now.pose, inner)
         if self.strings is not None:
-            g[-3:] += self.strings.hub_mass * now.acceleration.hub[0]
+            g[-3:] += self.strings.hub_mass * (now.acceleration.hub[0] - self.gravity)
             pulls = self.strings.pulls(*now.net)
             if pulls is not None:
                 inner[self._string_spots] += pulls
                 g[-3:] -= pulls.sum(axis=0)
+        if self.hanging is not None:
+            self.hanging.push(now, inner)
         if self.cables is not None:
             lines = now.place.lines, now.rate.lines
             self._pulled = self.cables.pull(time, self._arms, *lines, inner)
+        self.reaction = inner[self.mesh.fixed]
         inner[self.mesh.fixed] = 0.0
         return g
 
@@ -153,15 +186,18 @@ class FrameModel:
         by_rate = self.coefficients.rate_by_place(step)
         by_place = self.coefficients.acceleration_by_place(step)
         fronts = self._fronts
-        begin_tangent(
-            mesh, now.pose, now.place.points, now.acceleration.points, strains, by_place, fronts
-        )
+        inertial = now.acceleration.points
+        if self._held.weighs:
+            inertial = inertial - self.gravity
+        begin_tangent(mesh, now.pose, now.place.points, inertial, strains, by_place, fronts)
         add_slides(mesh, self._held, now.pose, fronts)
         slopes = self.laws.slopes(now.pose.angle, now.rate.angles, by_rate)
         front, spot = mesh.angle_local.T
         fronts[front, spot, spot] += slopes
         for slide in self._beam_slides:
             slide.add_tangent(now.pose, fronts)
+        if self.hanging is not None:
+            self.hanging.add_tangent(now, by_rate, by_place, fronts)
         blocks, inertia = None, math.nan
         if self.strings is not None:
             inertia = self.strings.hub_mass * by_place
@@ -190,22 +226,16 @@ class FrameModel:
 
     def _started(self, pose: Pose) -> State:
         """At rest with the accelerations of the structure with rigid rods, as of the full model."""
-        skeleton, scene = self.skeleton, self.scene
-        pull, velocity, rotation = 0.0, np.zeros(3), np.zeros(3)
-        if not self.layout.springs:
-            q = scene.structure.coordinate
-            motion = self.ideal.motion(q)
-            pull = self.ideal.work_rate(q) / motion.inertia
-            velocity, rotation = motion.velocity, motion.rotation
+        skeleton, moving = self.skeleton, self.moving
         self.first = np.zeros(self.size)
         for f, (rate, turn) in enumerate(skeleton.rates):
-            moving = pull * (rate - velocity - cross(rotation, skeleton.places[f]))
-            turning = pull * (turn - rotation)
             k = self.mesh.home[f]
-            self.first[k : k + 3], self.first[k + 3 : k + 6] = moving, turning
-        angular = pull * np.array(skeleton.angle_rates)
+            self.first[k : k + 3] = moving.at(skeleton.places[f], rate)
+            self.first[k + 3 : k + 6] = moving.turning(turn)
+        angular = moving.coordinate * np.array(skeleton.angle_rates)
         self.first[self.mesh.angle_home] = angular
         hub = np.zeros(3) if self.layout.net is None else np.array(self.layout.net.hub)
+        self._hub = hub.copy()
         state = State(
             pose, hub, np.zeros((len(self.mesh.length), 6)),
             Followed.at_rest(np.zeros(self._held.cuts[-1]), np.zeros(self._held.cuts[-1])),

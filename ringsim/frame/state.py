@@ -12,7 +12,8 @@ from ringsim.layout.pose import Array
 
 class Groups(NamedTuple):
     """Followed coordinates by what they belong to: points with mass and points of the cables,
-    shape (n, 3); joint angles, (a,); ends of the net's strings, (n, 3), and its hub, (1, 3).
+    shape (n, 3); joint angles, (a,); ends of the net's strings, (n, 3), and its hub, (1, 3); bodies
+    that hang on lines, (n, 3).
     """
 
     points: Array
@@ -20,6 +21,7 @@ class Groups(NamedTuple):
     angles: Array
     ends: Array
     hub: Array
+    hung: Array
 
     @classmethod
     def of(cls, values: Array, held: Held) -> "Groups":

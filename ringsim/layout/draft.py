@@ -13,12 +13,13 @@ import numpy as np
 from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.cable.records import Cable
 from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
+from ringsim.layout.base import add_boom, base_of
 from ringsim.layout.bodies import SPACE, Body, InSpace, Lump, Mount, OnBody, OnRod, Rod, pose_of
 from ringsim.layout.free_hub import FreeHub
+from ringsim.layout.hung import hang
 from ringsim.layout.joints import ChordOpening, Joint, JointOpening, Opening
-from ringsim.layout.layout import BoomBeam, Contact, HubNet, Layout, Spring
+from ringsim.layout.layout import Contact, HubNet, Layout, Spring
 from ringsim.layout.pose import Array, Pose, axes_along, rate_of, real_of
-from ringsim.parts.boom.rigid import RigidBoom
 from ringsim.parts.persection import spread
 from ringsim.parts.tube import Tube
 
@@ -56,7 +57,8 @@ class Track(NamedTuple):
 class Draft:
     """Collects parts; ``finish`` adds what the scene names and gives the layout.
 
-    Of the scene it reads ``rods``, ``boom``, ``net``, ``loads`` and ``cables``.
+    Of the scene it reads ``rods``, ``boom``, ``spacecraft``, ``net``, ``loads``, ``gravity``,
+    ``offload`` and ``cables``.
     """
 
     scene: Any
@@ -153,7 +155,9 @@ class Draft:
 
     def finish(self) -> Layout:
         """The layout, with boom, net, loads and cables of the scene."""
-        boom = self._boom()  # adds a lump and joints
+        weight = self.scene.gravity
+        gravity = None if weight is None else np.array(weight.vector)
+        boom = add_boom(self)  # adds lumps and joints
         openings = tuple(tuple(self.openings[plane]) for plane in sorted(self.openings))
         return Layout(
             bodies=tuple(self.bodies),
@@ -167,6 +171,9 @@ class Draft:
             net=self._net(),
             boom=boom,
             forces=self._forces(openings),
+            base=base_of(self),
+            gravity=gravity,
+            hung=None if gravity is None else hang(self, gravity, base_of(self)),
         )
 
     def _mount(self, part: Part | None, at: Any, axes: Array, what: str) -> Mount:
@@ -192,38 +199,19 @@ class Draft:
             )
         return mount
 
-    def _require_corners(self, part: str, planes: int) -> None:
+    def require_corners(self, part: str, planes: int) -> None:
+        """Raise a ValueError if so many planes have no corners for a part."""
         if len(self.corners) < planes:
             raise ValueError(
                 f"{part}: this structure has no corners to hold one in {planes} of its planes: "
                 f'leave it out ({part} = "none")'
             )
 
-    def _boom(self) -> BoomBeam | None:
-        """A flexible boom; a rigid one becomes a lump of the body at its top."""
-        boom = self.scene.boom
-        if boom is None:
-            return None
-        self._require_corners("boom", 2)
-        top, low = (OnBody(plane[0].number) for plane in self.corners[:2])
-        body, tube = self.bodies[top.body], boom.tube
-        if boom.base == "fixed":
-            self.joints.append(Joint("weld", "", 0, InSpace(body.pose.place, SPACE), top))
-        across = 0.125 * boom.mass * (tube.outer_diameter**2 + tube.inner_diameter**2)
-        along = boom.mass * boom.length**2 / 3.0 + 0.5 * across
-        centre = np.array([0.0, 0.0, -0.5 * boom.length])
-        lump = Lump("boom", boom.mass, centre, np.diag([along, along, across]))
-        if not isinstance(boom, RigidBoom):
-            return BoomBeam(top, low, boom, lump)
-        self.bodies[top.body] = replace(body, lumps=(*body.lumps, lump))
-        self.joints.append(Joint("sleeve", "", 0, top, low))
-        return None
-
     def _net(self) -> HubNet | None:
         net = self.scene.net
         if net is None:
             return None
-        self._require_corners("net", 1)
+        self.require_corners("net", 1)
         held = tuple(ref.number for ref in self.corners[0])
         hub = FreeHub(net, len(held)).hub(np.array([self.bodies[k].pose.place for k in held]))
         return HubNet(net, hub, held)

@@ -13,6 +13,10 @@ from ringsim.layout.bodies import Body, InSpace, Lump, Mount, OnBody, OnRod, Rod
 from ringsim.layout.joints import Joint, JointOpening, Opening
 from ringsim.layout.pose import STEP, Array, Pose, cross
 from ringsim.parts.net import Net
+from ringsim.parts.offload import Offload
+
+SPACECRAFT = "spacecraft"
+"""Group of the lump that is one."""
 
 
 class Spring(NamedTuple):
@@ -45,6 +49,17 @@ class HubNet(NamedTuple):
     law: Net
     hub: Array
     bodies: tuple[int, ...]
+
+
+class Hung(NamedTuple):
+    """Lines that carry bodies at their origins: the law, numbers of the bodies, what each carries
+    at the start, N, and the unit vector along which they pull.
+    """
+
+    law: Offload
+    bodies: tuple[int, ...]
+    lifts: Array
+    up: Array
 
 
 class BoomBeam(NamedTuple):
@@ -85,7 +100,8 @@ class Layout:
     ``openings`` are by plane and section, ``corners`` hinge assemblies by plane and corner, as
     numbers of bodies; ``paths`` sheaves of each cable of the scene in order, from its first winch
     to its far end; ``forces`` constant ones: number of the joint whose first mount they act on,
-    and vector, N.
+    and vector, N; ``base`` the body that is held, or that a boom's upper end is fixed to;
+    ``gravity`` the weight of a kilogram, m/s^2; ``hung`` the lines of a ground test.
     """
 
     bodies: tuple[Body, ...]
@@ -99,6 +115,9 @@ class Layout:
     net: HubNet | None
     boom: BoomBeam | None
     forces: tuple[tuple[int, Array], ...]
+    base: int | None = None
+    gravity: Array | None = None
+    hung: Hung | None = None
 
     def pose(self, mount: Mount) -> Pose:
         """The frame of a mount, with its own axes."""
@@ -179,6 +198,12 @@ class Layout:
     def supports(self) -> tuple[Joint, ...]:
         """Joints to places in space."""
         return tuple(j for j in self.joints if isinstance(j.first, InSpace))
+
+    @property
+    def spacecraft(self) -> Lump | None:
+        """The spacecraft, which is a lump of the base."""
+        lumps = () if self.base is None else self.bodies[self.base].lumps
+        return next((lump for lump in lumps if lump.group == SPACECRAFT), None)
 
     def halves(self) -> dict[str, list[Half]]:
         """Rows of results by name, in the order of the layout, with a value a section: a rod with

@@ -40,6 +40,7 @@ COORDINATES = {
     "time": Variable("time", ("time",), "s", "time since the start of the run"),
     "span": Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
     "winch": Variable("winch", ("winch",), "1", "winch: 1 where a path begins, 2 at its end", "i4"),
+    "axis": Variable("axis", ("axis",), "1", "axis of space; z points upwards", "str"),
 }
 """Dimensions of the variables; an output may declare more."""
 
@@ -126,6 +127,9 @@ def holds(scene: Scene) -> set[str]:
             for cable in _cables(scene)
             for winch in cable.winches
         ),
+        "reactions": scene.record.reactions,
+        "base": scene.boom is not None or scene.structure.supported,
+        "held base": scene.held or scene.spacecraft is not None,
     }
     return {name for name, present in held.items() if present}
 
@@ -139,6 +143,7 @@ def axes(scene: Scene) -> dict[str, NDArray[Any]]:
         "time": output_times(scene),
         "span": np.arange(1, scene.spans + 1),
         "winch": np.arange(1, most + 1),
+        "axis": np.array(["x", "y", "z"]),
     }
 
 

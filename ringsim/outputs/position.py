@@ -14,7 +14,6 @@ class Position(Output):
     needs = ("positions",)
     coordinates = (
         Variable("point", ("point",), "1", "corner, pin, pivot, V-joint, hub or boom tip", "str"),
-        Variable("axis", ("axis",), "1", "axis of space; z points upwards", "str"),
     )
     variables = (
         Variable(

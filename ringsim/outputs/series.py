@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,19 @@ from ringsim.stepping.instant import Array, Instant
 
 _SAME = 1.0 + 1e-12
 """Times that differ by round-off alone are the same."""
+
+
+class Carried(NamedTuple):
+    """What base and stops carry.
+
+    Force (N) and torque (N m) of the base on the structure, shape (2, 3), about the base's origin,
+    None of a base that floats alone; rotation matrix of the base since the start, None without a
+    base; torque of the stop on every V-joint, shape (planes, sections), N m, None without stops.
+    """
+
+    reaction: Array | None
+    turn: Array | None
+    stops: Array | None
 
 
 @dataclass(frozen=True)
@@ -35,6 +48,9 @@ class Reading(Instant):
     recorded."""
     strain: Array | None = None
     """Bending strain at the stations of the rod with the gauge, if the structure has one."""
+
+    carried: Carried | None = None
+    """What base and stops carry; None unless recorded."""
 
     def by_plane(self, of_cables: NDArray[Any]) -> Array:
         """A number for each plane, from one for each cable; NaN where a plane has no cable."""

@@ -104,3 +104,5 @@ class Record(Model):
     positions: bool = False
     """Record where corners, pins, joints and the hub are, so that drawings show what was computed;
     of 18 sections 4 kB an output time."""
+    reactions: bool = False
+    """Record force and torque at the base, how it turns, and the impulse of every lock."""

@@ -38,6 +38,8 @@ class Structure(Model):
     locks: ClassVar[bool] = True
     """Whether it has opened, and a run ended, when every opening angle has reached 180 deg."""
 
+    supported: ClassVar[bool] = False
+    """Whether it stands on a support of its own, without a boom."""
     planes: ClassVar[tuple[str, ...]] = ("upper", "lower")
     """Planes that a cable can run in."""
     long_names: ClassVar[dict[str, str]] = {}

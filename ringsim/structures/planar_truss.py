@@ -73,6 +73,7 @@ class PlanarTruss(Structure):
     sections: ClassVar[int] = 1
     closed: ClassVar[bool] = False
     locks: ClassVar[bool] = False
+    supported: ClassVar[bool] = True
     gauge: ClassVar[str] = "upper_beam"
     long_names: ClassVar[dict[str, str]] = {
         "opening_angle": "angle between the beams and the fixed axis",
@@ -137,7 +138,7 @@ class PlanarTruss(Structure):
 
     def check(self, scene: Any) -> None:
         """See ``Structure``: parts of rings are refused, the cable is needed."""
-        for name in ("stop", "boom", "net", "loads"):
+        for name in ("stop", "boom", "spacecraft", "offload", "net", "loads"):
             if getattr(scene, name) is not None:
                 raise ValueError(
                     f'{name} is a part of rings: leave it out of a planar truss ({name} = "none")'

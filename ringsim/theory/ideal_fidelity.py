@@ -60,6 +60,10 @@ def refuse_if_not_ideal(scene: Scene) -> None:
             "and what it floats along is not integrated (set it to false: drawings need none, or "
             "use the full fidelity)"
         )
+    if scene.offload is not None:
+        raise InputError(
+            "offload: lines, trolleys and their friction are no part of the ideal fidelity " + cure
+        )
     if scene.net is None:
         return
     net, layout = scene.net, layout_of(scene)

@@ -82,8 +82,8 @@ class Forces:
             loss += self._stops * float(reaction.damping) * rate
         torque, stored = self.springs.at(folded)
         force[0] -= 2.0 * torque
-        elastic += stored
-        return Acting(force, cross(lifted, up), elastic, float(up @ lifted), loss)
+        work = float(up @ lifted) + self._mechanism.weight_work(now)
+        return Acting(force, cross(lifted, up), elastic + stored, work, loss)
 
 
 def friction_joints(

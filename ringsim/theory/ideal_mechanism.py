@@ -96,6 +96,14 @@ class Mechanism:
         held = [body_of(support.second) for support in points.layout.supports]
         self.fixed = bool(held)
         self._held = points.frame(held[0]) if held else np.zeros(0)
+        self._gravity, hung = points.layout.gravity, points.layout.hung
+        self._weighing, self._weighed = self._mass, self._first
+        if hung is not None and self._gravity is not None:
+            # A line takes as much from the mass that weighs.
+            taken = hung.lifts / np.linalg.norm(self._gravity)
+            self._weighing -= float(taken.sum())
+            lines = points.places([OnBody(body) for body in hung.bodies])
+            self._weighed = self._weighed - np.tensordot(taken, lines, 1)
         swings = len(points.swinging)
         self._on_boom = swings > 0 and scene.boom is not None
         self.freedom = 1 + swings - self._on_boom
@@ -136,6 +144,31 @@ class Mechanism:
         """Unit vector that points up in space, in the structure's axes, if it cannot pitch."""
         return np.asarray(self._held[3] @ now.values) if self.fixed else UP
 
+    def weight(self, now: Configuration) -> Array:
+        """Generalised force of gravity and of what lines carry on (V, W, p), N and N m."""
+        if self._gravity is None:
+            return np.zeros(len(now.matrix))
+        down, n = self._down(now), len(now.place)
+        first = self._weighed @ now.functions
+        whole, turning = self._weighing * down, np.cross(first[:, 0], down)
+        return np.concatenate([whole, turning, first[:, 1 : n + 1].T @ down])
+
+    def weight_work(self, now: Configuration) -> float:
+        """Their work function, J, from the held body's place on."""
+        if self._gravity is None:
+            return 0.0
+        arm = self._weighed @ now.values
+        if self.fixed:
+            arm = arm - self._weighing * (self._held[0] @ now.values)
+        return float(arm @ self._down(now))
+
+    def _down(self, now: Configuration) -> Array:
+        """Gravity in the structure's axes."""
+        assert self._gravity is not None
+        if not self.fixed:
+            return self._gravity
+        return np.asarray(np.tensordot(self._gravity, self._held[1:], 1) @ now.values)
+
     def rigid_rates(self, now: Configuration, spin: Array | None = None) -> Array:
         """V and W, shape (6,), that hold the held body; else those without momentum, with the
         rotation ``spin`` (rad/s) or, if None, without angular momentum too.
@@ -162,6 +195,7 @@ class Mechanism:
         inertial = whirl @ first[:, 0] + 2.0 * turn @ first[:, -2] + first[:, -1]
         along = np.einsum("jaa->j", about[1:])
         load = np.concatenate([-inertial, torque - _axial(about[0]), forces - along])
+        load += self.weight(now)
         reach = np.zeros((len(matrix), rigid + self.freedom))
         reach[:rigid, :rigid] = np.eye(rigid)
         reach[6:, rigid:] = now.slopes

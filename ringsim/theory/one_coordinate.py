@@ -64,6 +64,7 @@ class OneCoordinate:
         """Work function W(q) in J, up to a constant."""
         mechanism, now = self._at(q)
         done = np.tensordot(*mechanism.points.forces, 2) @ now.values
+        done += mechanism.weight_work(now)
         stored = mechanism.net(now, 0.0 * now.rate).energy + self._springs.at(2.0 * q)[1]
         return float(done) - stored
 
@@ -71,6 +72,7 @@ class OneCoordinate:
         """Generalised force dW/dq, J/rad."""
         mechanism, now = self._at(q)
         done = np.tensordot(*mechanism.points.forces, 2) @ now.by_place[:, 0]
+        done += np.concatenate([mechanism.rigid_rates(now), now.rate]) @ mechanism.weight(now)
         pulled = done + mechanism.net(now, 0.0 * now.rate).force[0]
         return float(pulled - 2.0 * self._springs.at(2.0 * q)[0])
 

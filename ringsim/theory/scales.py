@@ -59,6 +59,8 @@ def residual_tolerance(scene: Scene, layout: Layout, reached: float) -> float:
     if layout.net is not None:
         net, springs = layout.net.law, len(layout.net.bodies)
         drive += float(np.linalg.norm(spread(net.stiffness, springs))) * net.neutral_length
+    if drive == 0.0 and layout.gravity is not None:
+        drive = sum(layout.masses().values()) * float(np.linalg.norm(layout.gravity))
     stiffest = max(rod.young_modulus * rod.tube.area / rod.lengths.min() for rod in layout.rods)
     return max(scene.solver.newton_tolerance * drive, reached * float(stiffest))
 

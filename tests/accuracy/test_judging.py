@@ -216,7 +216,8 @@ def test_every_rung_of_every_scene_is_a_scene(name: str) -> None:
     for rung in rungs:
         assert set(rung.values) == set(PATHS)
         scene.with_values(dict(rung.values))
-    assert evidence_for(scene).scene == name
+    # A ground test is judged by the scene of its drive: nothing was measured with it.
+    assert evidence_for(scene).scene == name.replace("-ground", "-cable")
 
 
 @pytest.fixture(scope="module")

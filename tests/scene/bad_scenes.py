@@ -125,6 +125,21 @@ IMPOSSIBLE = [
            "cables.upper.winch.winding.efficiency = 1.5", "at most 1"),
     _scene("step longer than the run", "solver = { step = 2.0, end_time = 1.0 }",
            "solver.step = 2.0 s", "end_time = 1.0 s"),
+    _scene("spacecraft without boom", "spacecraft = { mass = 9.0, inertia = [1.0, 1.0, 1.0] }",
+           "spacecraft needs a boom", "add [boom]"),
+    _scene("spacecraft on a fixed boom",
+           'boom = { kind = "rigid", base = "fixed" }\n'
+           "spacecraft = { mass = 9.0, inertia = [1.0, 1.0, 1.0] }",
+           'boom.base = "fixed"', 'must be "free"'),
+    _scene("moments of no body", "spacecraft = { mass = 9.0, inertia = [1.0, 1.0, 2.1] }",
+           "spacecraft.inertia[3] = 2.1 kg m^2", "at most the sum of the others, 2"),
+    _scene("gravity on a free base", "gravity.vector = [0.0, 0.0, -9.81]",
+           "gravity.vector = [0.0, 0.0, -9.81] m/s^2", "would fall", 'boom.base = "fixed"'),
+    _scene("offload without weight", "[offload]", "offload", "add [gravity]"),
+    _scene("offload at no corner",
+           "gravity.vector = [0.0, 0.0, -9.81]\noffload.corners = [3, 19]",
+           "offload.corners[2] = 19", "at most 18", "no such corner"),
+    _scene("no gravity", "gravity.vector = [0.0, 0.0, 0.0]", "gravity.vector", "leave gravity out"),
     _scene("result beyond memory", "record.interval = 1e-8", "record.interval = 1e-08 s", "at least"),
 ]  # fmt: skip
 

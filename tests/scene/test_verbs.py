@@ -49,7 +49,10 @@ def test_check_says_what_is_built() -> None:
     assert line(summary, "points") == "36 hinge assemblies, 36 V-joints, 18 pivots"
     assert line(summary, "joints").startswith("198 revolutes")
     assert line(summary, "mobility").startswith("1 internal degree of freedom")
-    assert line(summary, "left out") == "cables, joint friction, stress output"
+    assert (
+        line(summary, "left out")
+        == "cables, gravity, offload, spacecraft, joint friction, stress output"
+    )
 
 
 def test_mass_is_the_sum_of_its_parts() -> None:

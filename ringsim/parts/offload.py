@@ -1,0 +1,87 @@
+"""The suspension that carries a structure's weight in a ground test."""
+
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from ringsim.parts.persection import PerSection
+from ringsim.units import KilogramOrZero, ListIn, Model, PositiveSpeed, SpringRate, Unit
+
+Array = NDArray[np.float64]
+_Share = Annotated[float, Field(ge=-1.0, le=1.0), Unit("1")]
+
+
+class Hold(NamedTuple):
+    """What lines do to their corners, n of them: forces (n, 3), N, of which ``friction`` resists
+    the corners' motion; and energy of the springs, J.
+    """
+
+    force: Array
+    friction: Array
+    stored: float
+
+
+class Offload(Model):
+    """Lines from trolleys on an ideal rail grid above to corners; lines hang along gravity.
+
+    Every chosen corner's line carries its hinge assembly and an equal share of all that hangs
+    between the chosen corners, less ``residual`` of both; where the base is fixed, it carries the
+    share of its own corner.  A line pulls with T = that + stiffness * drop, and its trolley
+    follows at once: the corner feels its mass along the grid, and friction * T against its
+    velocity v there, smooth below ``friction_speed``: v / sqrt(|v|^2 + friction_speed^2).
+    """
+
+    planes: Literal["upper", "lower", "both"] = "upper"
+    corners: Annotated[tuple[Annotated[int, Field(ge=1)], ...], ListIn] = ()
+    """Numbers of the corners in each plane, from 1 (at the boom) on; none given: all."""
+    stiffness: SpringRate = 0.0
+    """Of each line with what it hangs on: a counterweight has none."""
+    residual: PerSection[_Share] = 0.0
+    """Share of its weight that a line does not carry (negative: carries too much)."""
+    friction: Annotated[float, Field(ge=0.0, le=1.0), Unit("1")] = 0.0
+    friction_speed: PositiveSpeed = 1e-3
+    trolley_mass: KilogramOrZero = 0.0
+
+    def check(self, scene: Any) -> None:
+        """Raise a ValueError where there is no weight, or no such corner."""
+        if scene.gravity is None:
+            raise ValueError(
+                "offload carries the weight of a structure, and there is none: add [gravity], or "
+                "leave offload out"
+            )
+        count = scene.structure.sections + (0 if scene.structure.closed else 1)
+        for k, corner in enumerate(self.corners, 1):
+            if corner > count:
+                raise ValueError(
+                    f"offload.corners[{k}] = {corner} must be at most {count}: this structure has "
+                    "no such corner"
+                )
+        if len(set(self.corners)) < len(self.corners):
+            raise ValueError("offload.corners names a corner twice: leave one of them out")
+
+    def hold(self, up: Array, lifts: Array, moved: Array, rates: Array) -> Hold:
+        """Of lines that carry ``lifts`` (n,), N, at the start, of corners that have moved since, m,
+        and move, m/s, shape (n, 3) each; ``up`` is a unit vector.
+        """
+        drop = -moved @ up
+        tension = lifts + self.stiffness * drop
+        across = rates - (rates @ up)[:, None] * up
+        speed = np.sqrt(np.sum(across**2, axis=1) + self.friction_speed**2)
+        friction = -(self.friction * tension / speed)[:, None] * across
+        stored = 0.5 * self.stiffness * float(drop @ drop)
+        return Hold(tension[:, None] * up + friction, friction, stored)
+
+    def slopes(
+        self, up: Array, lifts: Array, moved: Array, rates: Array, rate_by_place: float
+    ) -> Array:
+        """Derivatives of the forces after the places, whose rates follow them, (n, 3, 3), N/m."""
+        tension = lifts - self.stiffness * (moved @ up)
+        level = np.eye(3) - np.outer(up, up)
+        across = rates @ level
+        speed = np.sqrt(np.sum(across**2, axis=1) + self.friction_speed**2)
+        along = across / speed[:, None]
+        bent = (level - along[:, :, None] * along[:, None, :]) / speed[:, None, None]
+        found = -self.stiffness * (up - self.friction * along)[:, :, None] * up
+        return np.asarray(found - (self.friction * tension)[:, None, None] * rate_by_place * bent)
