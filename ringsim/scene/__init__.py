@@ -10,15 +10,12 @@ from typing import Annotated, Any, Self, get_origin
 import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
-from ringsim.cable.faults.family import CableFault
-from ringsim.cable.limited import why_unlimited
 from ringsim.cable.places import CABLES, numbered, path_of, spans_of
 from ringsim.cable.records import Cable, Cables
-from ringsim.choice import OneOf, kind_of
+from ringsim.choice import OneOf
 from ringsim.files import parse_toml, read_text
 from ringsim.overrides import at_path, length_at, points_in, set_path
 from ringsim.parts.boom.family import Boom
-from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import Fault
 from ringsim.parts.gravity import Gravity
 from ringsim.parts.hinge_spring.family import HingeSpring
@@ -36,6 +33,7 @@ from ringsim.parts.spacecraft import Spacecraft
 from ringsim.parts.stop.family import Stop
 from ringsim.parts.stop.spring_damper import SpringDamperStop
 from ringsim.refusal import InputError, explain, known_or_nearest, models_in, show
+from ringsim.scene.checks import check_faults, check_margin
 from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import ListIn, Model
@@ -95,7 +93,7 @@ class Scene(Model):
                     f"{path} has {len(value)} values, but the structure needs {wanted}: give "
                     "one value for all, or a list of that length"
                 )
-        _check_faults(self)
+        check_faults(self)
         self.structure.check(self)
         for part in (self.spacecraft, self.gravity, self.offload):
             if part is not None:
@@ -116,7 +114,7 @@ class Scene(Model):
                 "leave the limit out"
             )
         if self.margin is not None:
-            self._check_margin()
+            check_margin(self)
         if self.record.interval > self.solver.end_time:
             raise ValueError(
                 f"record.interval = {self.record.interval} s must not exceed solver.end_time = "
@@ -129,18 +127,6 @@ class Scene(Model):
                 "solver.end_time: the result would not fit in memory"
             )
         return self
-
-    def _check_margin(self) -> None:
-        if (kind := kind_of(self.structure)) != "pantograph-ring":
-            raise ValueError(
-                f'margin needs structure.kind = "pantograph-ring", not "{kind}" (leave it out)'
-            )
-        if self.cables is None and self.loads is None and self.hinge_spring is None:
-            raise ValueError(
-                "margin: nothing drives the ring (add [cables.upper], or leave it out)"
-            )
-        if reason := why_unlimited(self.cables, self.structure.planes):
-            raise ValueError(reason)
 
     @model_validator(mode="before")
     @classmethod
@@ -249,31 +235,6 @@ def _take_kind(table: dict[str, Any], path: str, given: Mapping[str, Any]) -> No
             for name in part.keys() - kind.model_fields.keys():
                 if f"{path}.{name}" not in given:
                     del part[name]
-
-
-def _check_faults(scene: Scene) -> None:
-    cables = [] if scene.cables is None else scene.cables.present()
-    for number, fault in enumerate(scene.faults, 1):
-        places = {"section": scene.structure.sections, "cable": len(cables)}
-        if isinstance(fault, FailedSpring) and scene.hinge_spring is None:
-            raise ValueError(
-                f"faults[{number}] is a fault of a spring, but the scene has none: add "
-                "[hinge_spring], or leave the fault out"
-            )
-        if isinstance(fault, CableFault):
-            if not cables:
-                raise ValueError(
-                    f"faults[{number}] is a fault of a cable, but the scene has none: add "
-                    "[cables.upper], or leave the fault out"
-                )
-            pulleys = scene.pulleys_of(cables[min(fault.cable, len(cables)) - 1][1])
-            places |= {"pulley": pulleys, "span": pulleys + 1}
-        for name, most in places.items():
-            if getattr(fault, name, 0) > most:
-                raise ValueError(
-                    f"faults[{number}].{name} = {getattr(fault, name)} must be at most {most}: "
-                    f"there is no such {name}"
-                )
 
 
 def _lists(record: Model, prefix: str = "") -> Iterator[tuple[str, tuple[float, ...]]]:

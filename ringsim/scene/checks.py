@@ -1,0 +1,49 @@
+"""What the parts of a scene ask of each other."""
+
+from typing import TYPE_CHECKING
+
+from ringsim.cable.faults.family import CableFault
+from ringsim.cable.limited import why_unlimited
+from ringsim.choice import kind_of
+from ringsim.parts.faults.failed_spring import FailedSpring
+
+if TYPE_CHECKING:
+    from ringsim.scene import Scene
+
+
+def check_margin(scene: "Scene") -> None:
+    """Refuse (ValueError) a margin of what has none."""
+    if (kind := kind_of(scene.structure)) != "pantograph-ring":
+        raise ValueError(
+            f'margin needs structure.kind = "pantograph-ring", not "{kind}" (leave it out)'
+        )
+    if scene.cables is None and scene.loads is None and scene.hinge_spring is None:
+        raise ValueError("margin: nothing drives the ring (add [cables.upper], or leave it out)")
+    if reason := why_unlimited(scene.cables, scene.structure.planes):
+        raise ValueError(reason)
+
+
+def check_faults(scene: "Scene") -> None:
+    """Refuse (ValueError) faults of what is not there."""
+    cables = [] if scene.cables is None else scene.cables.present()
+    for number, fault in enumerate(scene.faults, 1):
+        places = {"section": scene.structure.sections, "cable": len(cables)}
+        if isinstance(fault, FailedSpring) and scene.hinge_spring is None:
+            raise ValueError(
+                f"faults[{number}] is a fault of a spring, but the scene has none: add "
+                "[hinge_spring], or leave the fault out"
+            )
+        if isinstance(fault, CableFault):
+            if not cables:
+                raise ValueError(
+                    f"faults[{number}] is a fault of a cable, but the scene has none: add "
+                    "[cables.upper], or leave the fault out"
+                )
+            pulleys = scene.pulleys_of(cables[min(fault.cable, len(cables)) - 1][1])
+            places |= {"pulley": pulleys, "span": pulleys + 1}
+        for name, most in places.items():
+            if getattr(fault, name, 0) > most:
+                raise ValueError(
+                    f"faults[{number}].{name} = {getattr(fault, name)} must be at most {most}: "
+                    f"there is no such {name}"
+                )
