@@ -15,7 +15,7 @@ _NAMED = {False: 5, True: 3}
 
 def influence_lines(analysis: xr.Dataset) -> Iterator[str]:
     """The inputs that go with each output most, and that separate each group best."""
-    if "input" not in analysis.dims:
+    if "input_is_place" not in analysis:  # too few samples
         return
     names, place = analysis["input"].values, analysis["input_is_place"].values
     rows, certain, least = [], False, 0

@@ -26,6 +26,7 @@ class Gravity(Model):
     vector: Annotated[
         tuple[_Acceleration, _Acceleration, _Acceleration], ListIn, AfterValidator(_some)
     ]
+    """Acceleration of what falls freely, along x, y and z of space."""
 
     def check(self, scene: Any) -> None:
         """Raise a ValueError where nothing would carry the weight."""

@@ -34,6 +34,7 @@ class Offload(Model):
     """
 
     planes: Literal["upper", "lower", "both"] = "upper"
+    """Planes whose corners hang on lines."""
     corners: Annotated[tuple[Annotated[int, Field(ge=1)], ...], ListIn] = ()
     """Numbers of the corners in each plane, from 1 (at the boom) on; none given: all."""
     stiffness: SpringRate = 0.0
@@ -41,8 +42,11 @@ class Offload(Model):
     residual: PerSection[_Share] = 0.0
     """Share of its weight that a line does not carry (negative: carries too much)."""
     friction: Annotated[float, Field(ge=0.0, le=1.0), Unit("1")] = 0.0
+    """Friction of a trolley over the tension of its line."""
     friction_speed: PositiveSpeed = 1e-3
+    """Speed below which the friction passes smoothly through zero."""
     trolley_mass: KilogramOrZero = 0.0
+    """Of each trolley, which its corner moves along the grid."""
 
     def check(self, scene: Any) -> None:
         """Raise a ValueError where there is no weight, or no such corner."""

@@ -19,8 +19,11 @@ class Spacecraft(Model):
     """
 
     mass: Kilogram
+    """Of the body without boom and ring."""
     inertia: Annotated[tuple[_Moment, _Moment, _Moment], ListIn]
+    """About its centre of mass, along x, y and z at the start."""
     centre: Annotated[tuple[SignedMetre, SignedMetre, SignedMetre], ListIn] = (0.0, 0.0, 0.0)
+    """Place of its centre of mass from the boom's upper end, at the start."""
 
     @model_validator(mode="after")
     def _a_body(self) -> Self:

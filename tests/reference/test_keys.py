@@ -81,7 +81,7 @@ def test_defaults_are_those_of_a_scene_that_leaves_them_out() -> None:
 def test_a_table_is_told_with_its_keys_and_kinds() -> None:
     words = explain("cables.upper.winch")
     assert "start_time: number in s" in words
-    assert "constant, ramp, stall, table, tension-feedback" in words
+    assert "constant, motor, ramp, stall, table, tension-feedback" in words
     words = explain("design")
     for kind in ("grid", "latin-hypercube", "list", "random", "sobol"):
         assert f'kind = "{kind}"' in words
@@ -111,7 +111,7 @@ def test_keys_that_scenes_and_campaigns_share_are_told_of_both() -> None:
     ("name", "meant"),
     [
         ("cables.upper.winsh", "did you mean cables.upper.winch?"),
-        ("winch", "did you mean cables.upper.winch or cables.lower.winch?"),
+        ("initial_slack", "did you mean cables.upper.initial_slack or "),
         ("structure.section", "did you mean structure.sections?"),
         ("rods.young_modulos[3]", "did you mean rods.young_modulus?"),
         ("dessign", "did you mean design?"),

@@ -172,7 +172,7 @@ def test_changed_distribution_is_told_with_its_input(tmp_path: Path) -> None:
     ("assignment", "named"),
     [
         ("end_time=3", "end_time is not a known key (did you mean solver.end_time?)"),
-        ("stiffness=3", "(did you mean stop.stiffness or net.stiffness or "),
+        ("stiffness=3", "(did you mean hinge_spring.stiffness or stop.stiffness or net.stiffness"),
         ("solver.end_time=0,5", 'solver.end_time = "0,5" must be a finite number in s, without '
          "quotes: write 0.5"),
         ("solver.end_time=3s", "without quotes: write 3"),
@@ -200,7 +200,7 @@ def test_plausible_assignments_are_told_what_they_mean(assignment: str, named: s
         ("loads.force = { mean = 0.01, standard_deviation = 0.001 }",
          "inputs.loads.force.kind is missing: say which kind it is"),
         ('"loads.force" = 0.02', "inputs.loads.force = 0.02 must be a table"),
-        ('"force" = { kind = "uniform", low = 0.01, high = 0.02 }', "did you mean loads.force?"),
+        ('"force" = { kind = "uniform", low = 0.01, high = 0.02 }', "did you mean hinge_spring.force or loads.force?"),
         ("[set]\nworkers = 2", "workers is not a known key"),
     ],
 )  # fmt: skip

@@ -67,6 +67,7 @@ class MotorWinding(FeedbackWinding):
     back_efficiency: Ratio | None = None
     """Of gear and drum while the rope turns the motor back; left out, the gear locks itself."""
     drum_radius: Metre
+    """Of the drum that winds the rope."""
     band: Ratio = 0.05
     """Width of the passage to the limited torque, over that torque: the motor has its full speed
     below it and stands still at the limit."""

@@ -12,5 +12,6 @@ class FailedSpring(Fault):
 
     kind: Literal["failed-spring"] = "failed-spring"
     plane: Literal["upper", "lower"] = "upper"
+    """Plane of the V-joint."""
     section: Annotated[int, Field(ge=1)]
     """Counted from 1 at the boom."""

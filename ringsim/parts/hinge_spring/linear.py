@@ -18,7 +18,9 @@ class LinearSpring(HingeSpring):
 
     kind: Literal["linear"] = "linear"
     stiffness: PerSection[Stiffness]
+    """Torque over the folded angle."""
     preload: PerSection[Torque] = 0.0
+    """Torque that is left at 180 deg."""
 
     def torque(self, folded: Any, xp: Any = np) -> Reaction:
         """See ``HingeSpring``."""
