@@ -175,15 +175,23 @@ def _draw(axes: Axes, bars: Bars, measure: str) -> None:
         axes.axvline(bars.chance, color=style.VERMILLION, linestyle="dashed", linewidth=1.2,
                      label="by chance in one case of 20")  # fmt: skip
     axes.axvline(0.0, color=style.INK, linewidth=0.8)
+    axes.locator_params(axis="x", nbins=5)
     axes.set_yticks(height, [_short(name) for name in bars.names], fontsize=8)
     axes.grid(axis="y", visible=False)
 
 
 def _short(name: str) -> str:
-    """A name on lines of bearable length, its place on one of its own."""
-    path, bracket, place = name.partition("[")
-    broken = bracket and len(name) > _WIDE
-    return textwrap.fill(path, _WIDE) + ("\n" if broken else "") + bracket + place
+    """A name on two lines of bearable length, the path on one of its own; three would overlap."""
+    if len(name) <= _WIDE:
+        return name
+    mean, path = (
+        ("mean of", name.removeprefix("mean of ")) if name.startswith("mean") else ("", name)
+    )
+    path, bracket, place = path.partition("[")
+    if not mean:
+        return textwrap.fill(path, _WIDE) + ("\n" if bracket else "") + bracket + place
+    part = f" {bracket}{place} of" if bracket else ""
+    return f"{mean}{part}\n{path}"
 
 
 def _row(
