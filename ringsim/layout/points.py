@@ -37,7 +37,7 @@ class Points:
     @property
     def coordinates(self) -> dict[str, NDArray[np.str_]]:
         """Of the dimensions of ``ringsim.outputs.position``."""
-        return {"point": np.array(self.names)}
+        return {"point": np.array(self.names), "axis": np.array(["x", "y", "z"])}
 
     def drawn(self, places: Array, taut_beyond: float = 0.0) -> dict[str, Array]:
         """Ends of lines, shape (lines, 2, 3), m, for points at some places, shape (points, 3), m.
