@@ -11,7 +11,7 @@ import numpy as np
 
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.parts import Indices
-from ringsim.frame.vectors import compiled_in_any_order
+from ringsim.frame.vectors import compiled
 from ringsim.layout.pose import Array
 
 LEAST_PIVOT = 1e-9
@@ -19,7 +19,7 @@ LEAST_PIVOT = 1e-9
 as many digits; Newton renews what they spoil, but not without end."""
 
 
-@compiled_in_any_order
+@compiled
 def factor(mesh: Mesh, fronts: Array) -> bool:
     """Eliminate all fronts, shape (n, most, most), in place, with inverse pivots; False where a
     pivot is too small.
@@ -50,7 +50,7 @@ def factor(mesh: Mesh, fronts: Array) -> bool:
     return sound
 
 
-@compiled_in_any_order
+@compiled
 def _reduce(a: Array, gone: int, size: int, up: Indices, parent: Array) -> None:
     """Eliminate the rows of a front that stay, and add them to its parent."""
     fours = gone - gone % 4
@@ -74,7 +74,7 @@ def _reduce(a: Array, gone: int, size: int, up: Indices, parent: Array) -> None:
             parent[row, up[j]] += a[i, j]
 
 
-@compiled_in_any_order
+@compiled
 def solve(mesh: Mesh, fronts: Array, x: Array) -> None:
     """Replace right-hand sides ``x``, shape (unknowns, n), by solutions with factored fronts."""
     columns = x.shape[1]
@@ -103,7 +103,7 @@ def solve(mesh: Mesh, fronts: Array, x: Array) -> None:
                 x[pivot, c] *= a[k, k]
 
 
-@compiled_in_any_order
+@compiled
 def solve_one(mesh: Mesh, fronts: Array, x: Array) -> None:
     """``solve`` for one right-hand side, shape (unknowns,): by rows, which lie together."""
     y = np.empty(fronts.shape[1])

@@ -38,7 +38,9 @@ def slope_of(
 
 @compiled
 def folded_between(angles: Array, own: Indices, sense: Array) -> tuple[float, float]:
-    """The least and the most folded V-joint, rad."""
+    """How far the least and the most folded V-joint are, rad; of angles (a,), rad, their numbers and
+    senses, (planes, sections).
+    """
     least, most = math.inf, -math.inf
     for plane in range(own.shape[0]):
         for section in range(own.shape[1]):

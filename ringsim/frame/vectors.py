@@ -20,14 +20,12 @@ leave out is below 1e-16."""
 
 
 def compiled(function: _Function) -> _Function:
-    """Compile a function, once a machine; its divisions by zero give infinity, as numpy's."""
+    """Compile a function, once a machine; its divisions by zero give infinity, as numpy's.
+
+    Sums keep their order: with sums in any order, code that a process has compiled and code that it
+    has loaded need not round alike, and samples would depend on who ran them.
+    """
     return cast(_Function, njit(cache=True, error_model="numpy")(function))
-
-
-def compiled_in_any_order(function: _Function) -> _Function:
-    """``compiled``, with sums in the order that is quickest, for linear algebra."""
-    fast = {"reassoc", "nsz", "contract"}
-    return cast(_Function, njit(cache=True, error_model="numpy", fastmath=fast)(function))
 
 
 @compiled
