@@ -38,8 +38,9 @@ def slope_of(
 
 @compiled
 def folded_between(angles: Array, own: Indices, sense: Array) -> tuple[float, float]:
-    """How far the least and the most folded V-joint are, rad; of angles (a,), rad, their numbers and
-    senses, (planes, sections).
+    """How far the least and the most folded V-joint are, rad.
+
+    Of angles (a,), rad; their numbers and senses are arrays (planes, sections).
     """
     least, most = math.inf, -math.inf
     for plane in range(own.shape[0]):
