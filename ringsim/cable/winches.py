@@ -18,7 +18,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.ropes import Array, Ropes
@@ -72,6 +71,8 @@ class _Rope:
         elif sum(commands(low)) <= low:
             total = low
         else:
+            from scipy.optimize import brentq  # here: prescribed laws do not need it
+
             total = brentq(lambda v: v - sum(commands(v)), low, high, xtol=1e-16, rtol=1e-14)
         found = np.array(commands(total))
         # Steep commands amplify the last bits of the total: share these out.

@@ -10,7 +10,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ringsim.frame.elimination import factor, solve, solve_one
 from ringsim.frame.mesh import Mesh
@@ -38,7 +37,9 @@ class Factored:
         self.sound = bool(factor(mesh, fronts))
         if len(border.corner):
             solve(mesh, fronts, border.columns)
-            self._corner = dgetrf(border.corner - border.rows.T @ border.columns)[:2]
+            corner = border.corner - border.rows.T @ border.columns
+            # Its few dozen rows and columns are solved with once an iteration.
+            self._corner = np.linalg.inv(corner) if self.sound else corner
 
     def solve(self, g: Array) -> Array:
         """The change of all unknowns, the hub's last, that takes a residual to zero."""
@@ -50,7 +51,7 @@ class Factored:
             right = -(x @ border.rows)
             if border.strung:
                 right[-3:] += hub
-            z = dgetrs(*self._corner, right)[0]
+            z = self._corner @ right
             x -= border.columns @ z
             if border.strung:
                 hub[:] = z[-3:]

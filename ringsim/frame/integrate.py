@@ -8,6 +8,7 @@ import numpy as np
 
 from ringsim.cable.faults.family import CableFault
 from ringsim.frame.base import BaseMeter
+from ringsim.frame.extrapolation import extrapolated
 from ringsim.frame.kernels import Strains, move, moved_between, straighten
 from ringsim.frame.meter import EnergyMeter
 from ringsim.frame.model import FrameModel
@@ -37,6 +38,9 @@ _DESCENT = 0.9
 """Ratio of successive residuals above which half the change is tried, and half of that ..."""
 _SMALLEST_SHARE = 0.1
 """... down to a sixteenth: by then the tangent of the other side is better."""
+_EASY = 3
+"""Newton iterations up to which a step was easy: the motion is smooth, and a cubic foretells it
+better than a parabola; where ropes swing within a step it does worse."""
 _SHORTEST = 1e-9
 """Step (s) below which Newton's failure ends a run, as of the full model."""
 
@@ -64,6 +68,7 @@ class Integration:
         scene, elements = model.scene, len(model.mesh.length)
         self._scene, self._now, self._energy = scene, model.start, EnergyMeter(model)
         self._moves: list[tuple[float, Array]] = []
+        self._easy = False
         self._steps: list[tuple[float, Array]] = []
         self._faults = sorted(scene.faults, key=lambda fault: fault.time)
         self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
@@ -148,7 +153,7 @@ class Integration:
         model, factored, last, share = self._model, None, math.inf, 1.0
         begun, change, fresh, secants = after.stand(), np.zeros(0), False, Secants()
         tolerance = model.tolerance(step, self._strains)
-        for _ in range(_MOST):
+        for taken in range(_MOST):
             try:
                 g = model.residual(time, step, self._now, after, self._strains)
             except ValueError as error:
@@ -157,6 +162,7 @@ class Integration:
             if not math.isfinite(norm):
                 raise NoBalanceError("the state is not finite")
             if norm <= tolerance:
+                self._easy = taken <= _EASY
                 return
             self.history.newton_iterations += 1
             if fresh and norm > _DESCENT * last and share > _SMALLEST_SHARE:
@@ -185,18 +191,17 @@ class Integration:
             state.hub += by[-3:]
 
     def _guess(self, step: float) -> Array:
-        """Change of all unknowns over a step: mean rates of the last two steps, extrapolated."""
+        """Change of all unknowns over a step, from two steps or, where the last was easy, three."""
         if not self._moves:
             return 0.5 * step**2 * self._model.first
-        last, rate = self._moves[-1]
-        # From rest the mean of the first step is half the rate at its end.
-        before, earlier = self._moves[-2] if len(self._moves) > 1 else (last, -rate)
-        return step * (rate + (rate - earlier) * (step + last) / (last + before))
+        return extrapolated(self._moves[-3 if self._easy else -2 :], step)
 
     def _accept(self, step: float, after: State, found: Instant) -> None:
         """Go on from a state."""
         model, control, before = self._model, self._control, self._now
-        self._moves = [*self._moves[-1:], (step, self._between(before, after) / step)]
+        moved = self._between(before, after) / step
+        # Before rest it came as it leaves: the even motion through the first state.
+        self._moves = [*(self._moves[-2:] or [(step, -moved)]), (step, moved)]
         self._steps = [(step, before.strains)]
         straighten(after.pose)
         self._now = after

@@ -1,7 +1,6 @@
 """What the base carries, and how it turns."""
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
 
@@ -66,6 +65,8 @@ class BaseRotation(Output):
 
     def read(self, now: Reading) -> Array | None:
         """Shape (3,), rad."""
+        from scipy.spatial.transform import Rotation  # here: most runs have no such base
+
         turn = None if now.carried is None else now.carried.turn
         return None if turn is None else np.asarray(Rotation.from_matrix(turn).as_rotvec())
 

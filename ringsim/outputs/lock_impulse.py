@@ -1,7 +1,6 @@
 """The shock of every lock."""
 
 import numpy as np
-from scipy.integrate import trapezoid
 
 from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
 
@@ -48,5 +47,7 @@ def first_impulse(times: Array, torques: Array, lock: float) -> float:
     # The contact begins at the lock and ends between two steps.
     held = slice(first, last)
     own = np.concatenate([[min(lock, times[first])], times[held], times[last : last + 1]])
+    from scipy.integrate import trapezoid  # here: only scenes that record reactions need it
+
     ends = np.zeros(1 + len(times[last : last + 1]))
     return float(abs(trapezoid(np.concatenate([ends[:1], torques[held], ends[1:]]), own)))

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ringsim.cable.state import ChainState
+from ringsim.hermite import cubic, monotone_slopes
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array, Instant
 
@@ -97,11 +97,9 @@ class Series:
             own = (where >= times[0]) & (where <= times[-1])
             if len(times) == 1:
                 found[own] = known
-            elif rates is not None:
-                curve = CubicHermiteSpline(times, known, rates[begin:end], axis=0)
-                found[own] = curve(where[own])
             else:
-                found[own] = PchipInterpolator(times, known, axis=0)(where[own])
+                slopes = monotone_slopes(times, known) if rates is None else rates[begin:end]
+                found[own] = cubic(times, known, slopes, where[own])
         return found
 
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
+from ringsim.hermite import first_zero
 from ringsim.stepping.instant import Array, Instant
 from ringsim.variables import PLANES
 
@@ -123,7 +123,6 @@ def lock_times(times: Array, angles: Array, rates: Array) -> Array:
         if first == 0:
             continue
         ends = slice(first - 1, first + 1)
-        cubic = CubicHermiteSpline(times[ends], past[ends], rates[(ends, *place)])
-        # Round-off may put a crossing at the very end of the step outside it.
-        found[place] = cubic.roots(extrapolate=False).min(initial=times[first])
+        before, after = times[ends]
+        found[place] = before + first_zero(after - before, past[ends], rates[(ends, *place)])
     return found

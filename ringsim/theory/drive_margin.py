@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from ringsim.choice import kind_of
 from ringsim.layout.pose import Array
@@ -93,6 +92,8 @@ class DriveMargin:
         if not math.isfinite(course[k].margin):
             return course[k]
         bounds = course[max(k - 1, 0)].angle, course[min(k + 1, len(course) - 1)].angle
+        from scipy.optimize import minimize_scalar  # here: most runs do not need it
+
         found = minimize_scalar(
             lambda angle: self.at(angle).margin, bounds=bounds, method="bounded",
             options={"xatol": 1e-9},

@@ -17,8 +17,6 @@ from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.drive_margin import with_margin
-from ringsim.theory.ideal_course import Course
-from ringsim.theory.ideal_outcome import to_outcome
 from ringsim.threads import one_thread
 from ringsim.variables import PLANES, Cause, Outcome, Status
 
@@ -96,6 +94,10 @@ def run_ideal(scene: Scene) -> Outcome:
         If the ideal ring cannot represent the scene.
     """
     refuse_if_not_ideal(scene)
+    # Here: only this fidelity needs scipy's integrators and splines, which load in half a second.
+    from ringsim.theory.ideal_course import Course
+    from ringsim.theory.ideal_outcome import to_outcome
+
     wall, cpu = time.perf_counter(), time.process_time()
     with np.errstate(all="ignore"):
         try:
