@@ -7,29 +7,33 @@ from pathlib import Path
 import pytest
 
 from ringsim.scene import Scene
-from ringsim.simulation import run
+from ringsim.simulation import FIDELITIES
 from ringsim.variables import Fate, Outcome, Status
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from fault_matrix import cells, faulty, sound_scene
 
-CELLS = [(sections, *cell) for sections in (2, 6) for cell in cells() if cell[0] != "sound"]
+CELLS = [cell for cell in cells() if cell[0] != "sound"]
 
 
 @functools.cache
-def sound(sections: int) -> tuple[Scene, Outcome]:
+def sound(fidelity: str, sections: int) -> tuple[Scene, Outcome]:
     scene = sound_scene(sections)
-    return scene, run(scene)
+    return scene, FIDELITIES[fidelity](scene)
 
 
-@pytest.mark.parametrize(("sections", "motor", "damage", "plane"), CELLS)
+@pytest.mark.parametrize(
+    ("fidelity", "sections"),
+    [("full", 2), ("frame", 6), pytest.param("full", 6, marks=pytest.mark.slow)],
+)
+@pytest.mark.parametrize(("motor", "damage", "plane"), CELLS)
 def test_every_pair_of_faults_is_an_outcome_and_no_failure(
-    sections: int, motor: str, damage: str, plane: str
+    fidelity: str, sections: int, motor: str, damage: str, plane: str
 ) -> None:
-    scene, whole = sound(sections)
+    scene, whole = sound(fidelity, sections)
     assert whole.fate is Fate.DEPLOYED
     length, peak = (float(whole.values[n]) for n in ("deployment_time", "peak_tension"))
-    found = run(faulty(scene, motor, damage, plane, length, peak))
+    found = FIDELITIES[fidelity](faulty(scene, motor, damage, plane, length, peak))
     assert found.status == Status.OK, found.reason
     assert int(found.values["restarts"]) == 0
     assert found.values["energy_error"] < 1e-3
