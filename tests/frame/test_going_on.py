@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from click.testing import CliRunner
 
+from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
@@ -189,3 +191,30 @@ def test_states_leave_a_run_as_it_is_but_for_its_steps(tmp_path: Path) -> None:
     assert not [name for name in plain.variables if "state" in str(name)]
     apart = float(np.nanmax(np.abs(run["opening_angle"] - plain["opening_angle"])))
     assert apart < 1e-3 * float(plain["opening_angle"].max())
+
+
+def test_the_command_goes_on(tmp_path: Path) -> None:
+    first, again = str(tmp_path / "first.nc"), str(tmp_path / "again.nc")
+    short = ["--set", "solver.end_time=0.4", "--set", "record.state_interval=0.2"]
+
+    def called(*words: str, code: int = 0) -> str:
+        done = CliRunner().invoke(cli, ["run", "truss2", *words])
+        assert done.exit_code == code, done.output
+        return done.output
+
+    called("--fidelity", "frame", *short, "--out", first)
+    stop = "cables.upper.winch.stop_time=0.3"
+    printed = called("--from", first, "--at", "0.2", *short, "--set", stop, "--out", again)
+    assert f"went on from the state of {first} at 0.2 s with {stop.replace('=', ' = ')}" in printed
+    with xr.open_dataset(again) as data:
+        assert data.attrs["fidelity"] == "frame"
+        assert float(data["final_time"]) == pytest.approx(0.4)
+    for words, told in (
+        (["--at", "0.2"], "--at 0.2: says nothing without --from"),
+        (["--from", first, "--at", "0.25"], "it has 0.2, 0.4 s"),
+        (["--from", first, "--fidelity", "both"], 'choose fidelity = "frame"'),
+        (["--from", first, "--fidelity", "ideal"], 'choose fidelity = "frame"'),
+    ):
+        lines = called(*words, *short[:2], "--out", again, code=2).strip().splitlines()
+        assert len(lines) == 1
+        assert told in lines[0]
