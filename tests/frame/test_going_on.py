@@ -23,8 +23,13 @@ COUNTED = ("total_steps", "total_newton_iterations", "total_jacobians", *TIMINGS
 
 
 def truss(**values: Any) -> Scene:
-    """The truss for 1.2 s with a state at 0.4 and 0.8 s; two underscores stand for a dot."""
-    plain = {"solver.end_time": 1.2, "record.state_interval": 0.4, "record.interval": 0.02}
+    """The truss for 30 ms with a state every 10 ms; two underscores stand for a dot."""
+    plain = {
+        "solver.end_time": 0.03,
+        "solver.step": 0.03,
+        "record.state_interval": 0.01,
+        "record.interval": 0.002,
+    }
     chosen = {name.replace("__", "."): value for name, value in values.items()}
     return load_scene("truss2").with_values(plain | chosen)
 
@@ -59,95 +64,95 @@ MOTOR = {
         {
             "cables__upper__winch__winding": MOTOR,
             "faults": [
-                {"kind": "jammed-pulley", "cable": 2, "pulley": 2, "time": 0.2},
-                {"kind": "stuck-vjoint", "plane": "lower", "section": 2, "time": 0.3},
-                {"kind": "cut-cable", "cable": 2, "span": 1, "time": 0.9},
+                {"kind": "jammed-pulley", "cable": 2, "pulley": 2, "time": 0.012},
+                {"kind": "stuck-vjoint", "plane": "lower", "section": 2, "time": 0.015},
+                {"kind": "cut-cable", "cable": 2, "span": 1, "time": 0.025},
             ],
         },
-        {"solver__step_control": "constant", "solver__step": 0.02},
+        {"solver__step_control": "constant", "solver__step": 0.002},
     ],
     ids=["recorded", "broken", "constant"],
 )
 def test_an_unchanged_scene_goes_on_bit_by_bit(values: dict[str, Any], tmp_path: Path) -> None:
     scene = truss(**values)
     whole, file = stored(scene, tmp_path)
-    assert whole["state_time"].values == pytest.approx([0.4, 0.8, 1.2], abs=1e-8)
-    again = simulate(scene, start=read_state(file, 0.8))
+    assert whole["state_time"].values == pytest.approx([0.01, 0.02, 0.03], abs=1e-8)
+    again = simulate(scene, start=read_state(file, 0.02))
     # What the first run has stored before is not in the file of the second.
-    assert again["state_time"].values == pytest.approx([1.2], abs=1e-8)
+    assert again["state_time"].values == pytest.approx([0.03], abs=1e-8)
     own = [name for name in whole.variables if str(name).startswith("state")]
     assert different(whole.drop_vars(own), again.drop_vars(own)) == []
     assert again.attrs["reason"] == whole.attrs["reason"]
-    assert again.attrs["began"].endswith(f"the state of {file} at 0.8 s, unchanged")
+    assert again.attrs["began"].endswith(f"the state of {file} at 0.02 s, unchanged")
     save(again, tmp_path / "again.nc")
     # The second file holds all of the first run: it can be gone on from, too.
     last = read_state(tmp_path / "again.nc")
-    longer = scene.with_values({"solver.end_time": 1.3})
-    assert simulate(longer, start=last)["final_time"].item() == pytest.approx(1.3)
+    longer = scene.with_values({"solver.end_time": 0.031})
+    assert simulate(longer, start=last)["final_time"].item() == pytest.approx(0.031)
 
 
 def test_a_change_is_as_a_scene_that_foresaw_it(tmp_path: Path) -> None:
     """A winch that is stopped, and a rope that is cut later, where the state was stored before."""
     file = stored(truss(), tmp_path)[1]
     late = {
-        "cables.upper.winch.stop_time": 0.4,
-        "faults": [{"kind": "cut-cable", "cable": 2, "span": 2, "time": 0.7}],
+        "cables.upper.winch.stop_time": 0.01,
+        "faults": [{"kind": "cut-cable", "cable": 2, "span": 2, "time": 0.02}],
     }
     foreseen = simulate(truss().with_values(late), "frame")
-    changed = simulate(truss().with_values(late), start=read_state(file, 0.4))
+    changed = simulate(truss().with_values(late), start=read_state(file, 0.01))
     for name in ("opening_angle", "cable_tension", "wound_length", "kinetic_energy"):
         largest = float(np.nanmax(np.abs(foreseen[name])))
         # Step control sees the change from the state on: what is left is the error of its steps.
         apart = float(np.nanmax(np.abs(changed[name] - foreseen[name])))
-        assert apart <= 2e-4 * largest, name
-    assert "cables.upper.winch.stop_time = 0.4" in changed.attrs["began"]
+        assert apart <= 5e-4 * largest, name
+    assert "cables.upper.winch.stop_time = 0.01" in changed.attrs["began"]
 
 
 def test_a_winch_that_is_switched_on_again_goes_on_with_the_rope_on_its_drum(
     tmp_path: Path,
 ) -> None:
-    """0.01 m/s until 0.3 s, then again from 0.8 s on: 3 mm, and 7 mm at 1.2 s."""
-    ends = {f"cables.{plane}.winch.stop_time": 0.3 for plane in ("upper", "lower")}
+    """0.01 m/s until 6 ms, then again from 20 ms on: 60 um, and 160 um at 30 ms."""
+    ends = {f"cables.{plane}.winch.stop_time": 0.006 for plane in ("upper", "lower")}
     scene = truss()
     file = stored(scene.with_values(ends), tmp_path)[1]
-    run = simulate(scene, start=read_state(file, 0.8))
-    wound = run["wound_length"].sel(plane="upper").interp(time=[0.2, 0.6, 0.8, 1.0, 1.2])
-    assert wound.values == pytest.approx([0.002, 0.003, 0.003, 0.005, 0.007], abs=1e-12)
-    assert run["energy_error"].item() < 2e-2
+    run = simulate(scene, start=read_state(file, 0.02))
+    wound = run["wound_length"].sel(plane="upper").values[[2, 8, 10, 12, 15]]
+    assert wound == pytest.approx([4e-5, 6e-5, 6e-5, 1e-4, 16e-5], abs=1e-12)
+    assert run["energy_error"].item() < 1e-3
 
 
 def test_a_cleared_fault_lets_go(tmp_path: Path) -> None:
     """What a stuck V-joint and a jammed pulley held is lost, and the truss opens on."""
     faults = [
-        {"kind": "stuck-vjoint", "plane": "upper", "section": 1, "time": 0.2},
-        {"kind": "jammed-pulley", "cable": 1, "pulley": 2, "time": 0.2},
+        {"kind": "stuck-vjoint", "plane": "upper", "section": 1, "time": 0.004},
+        {"kind": "jammed-pulley", "cable": 1, "pulley": 2, "time": 0.004},
     ]
     held, file = stored(truss(faults=faults), tmp_path)
-    freed = simulate(truss(), start=read_state(file, 0.4))
-
-    def opened(run: xr.Dataset) -> float:
-        angle = run["opening_angle"].sel(plane="upper", section=1)
-        return float(angle.sel(time=1.2, method="nearest") - angle.sel(time=0.4, method="nearest"))
-
-    assert abs(opened(held)) < 0.1
-    assert opened(freed) > 1.0
-    assert freed["energy_error"].item() < 0.05
-    assert freed["dissipation"].diff("time").sel(time=slice(0.38, 0.44)).max() > 0.0
+    freed = simulate(truss(), start=read_state(file, 0.01))
+    angles = [run["opening_angle"].sel(plane="upper", section=1).values for run in (held, freed)]
+    assert angles[0][5] == angles[1][5]
+    opened = [one[15] - one[5] for one in angles]
+    assert opened[1] > 5.0 * opened[0]
+    lost = [run["dissipation"].values for run in (held, freed)]
+    # At the state's time its reading is that of the changed scene.
+    assert (lost[0][:5] == lost[1][:5]).all()
+    assert lost[1][5] > 2.0 * lost[0][5]
+    assert freed["energy_error"].item() < 1e-3
 
 
 def test_what_cannot_go_on_is_refused_with_the_cure(tmp_path: Path) -> None:
-    scene = truss(faults=[{"kind": "cut-cable", "cable": 1, "span": 2, "time": 0.1}])
+    scene = truss(faults=[{"kind": "cut-cable", "cable": 1, "span": 2, "time": 0.002}])
     file = stored(scene, tmp_path)[1]
-    start = read_state(file, 0.4)
-    early = {"kind": "cut-cable", "cable": 2, "span": 2, "time": 0.3}
+    start = read_state(file, 0.01)
+    early = {"kind": "cut-cable", "cable": 2, "span": 2, "time": 0.003}
     own = scene.to_table()["faults"]
     for values, words in (
         ({"structure.half_bar": 0.29}, r"structure.half_bar = 0.29: .* layout .*0.2889.*without"),
         ({"rods.elements": 3}, r"rods.elements = 3: .*layout"),
         ({"cables.upper": "none", "faults": []}, "cables.upper.* left out: .*layout"),
         ({"faults": []}, "cannot be made whole: keep that fault"),
-        ({"faults": [*own, early]}, r"faults\[1\].time = 0.3 s: has not struck .* after"),
-        ({"solver.end_time": 0.3, "record.state_interval": "none"}, "end_time = 0.3 s: must be af"),
+        ({"faults": [*own, early]}, r"faults\[1\].time = 0.003 s: has not struck .* after"),
+        ({"solver.end_time": 0.008, "solver.step": 0.008}, "end_time = 0.008 s: must be after"),
         ({"solver.error_bars": True}, "error_bars = true: .* set it to false"),
         ({"cables.upper.initial_slack": 0.001}, "initial_slack = 0.001: says how a run begins"),
         ({"record.positions": True}, "record: .* no readings of position: leave out"),
@@ -156,8 +161,8 @@ def test_what_cannot_go_on_is_refused_with_the_cure(tmp_path: Path) -> None:
             simulate(scene.with_values(values), start=start)
     with pytest.raises(InputError, match=r'"full": .* of the engine "frame".*"frame"'):
         simulate(scene, "full", start=start)
-    with pytest.raises(InputError, match=r"--at 0.5: .* it has 0.4, 0.8, 1.2 s"):
-        read_state(file, 0.5)
+    with pytest.raises(InputError, match=r"--at 0.015: .* it has 0.01, 0.02, 0.03 s"):
+        read_state(file, 0.015)
     with pytest.raises(InputError, match="same: take an earlier state"):
         simulate(scene.with_values({"record.state_interval": "none"}), start=_ended(tmp_path))
     for fidelity in ("full", "ideal"):
@@ -176,8 +181,8 @@ def _ended(folder: Path) -> Any:
 
 
 def test_a_file_without_states_is_refused(tmp_path: Path) -> None:
-    save(simulate(truss(solver__end_time=0.1, record__state_interval="none"), "frame"),
-         tmp_path / "run.nc")  # fmt: skip
+    short = truss(solver__end_time=0.01, solver__step=0.01, record__state_interval="none")
+    save(simulate(short, "frame"), tmp_path / "run.nc")
     with pytest.raises(InputError, match=r"holds no states: .*record.state_interval=1"):
         read_state(tmp_path / "run.nc")
     with pytest.raises(InputError, match="no such file"):
@@ -195,7 +200,8 @@ def test_states_leave_a_run_as_it_is_but_for_its_steps(tmp_path: Path) -> None:
 
 def test_the_command_goes_on(tmp_path: Path) -> None:
     first, again = str(tmp_path / "first.nc"), str(tmp_path / "again.nc")
-    short = ["--set", "solver.end_time=0.4", "--set", "record.state_interval=0.2"]
+    short = ["--set", "solver.end_time=0.02", "--set", "solver.step=0.02"]
+    short += ["--set", "record.interval=0.01", "--set", "record.state_interval=0.01"]
 
     def called(*words: str, code: int = 0) -> str:
         done = CliRunner().invoke(cli, ["run", "truss2", *words])
@@ -203,18 +209,18 @@ def test_the_command_goes_on(tmp_path: Path) -> None:
         return done.output
 
     called("--fidelity", "frame", *short, "--out", first)
-    stop = "cables.upper.winch.stop_time=0.3"
-    printed = called("--from", first, "--at", "0.2", *short, "--set", stop, "--out", again)
-    assert f"went on from the state of {first} at 0.2 s with {stop.replace('=', ' = ')}" in printed
+    stop = "cables.upper.winch.stop_time=0.015"
+    printed = called("--from", first, "--at", "0.01", *short, "--set", stop, "--out", again)
+    assert f"went on from the state of {first} at 0.01 s with {stop.replace('=', ' = ')}" in printed
     with xr.open_dataset(again) as data:
         assert data.attrs["fidelity"] == "frame"
-        assert float(data["final_time"]) == pytest.approx(0.4)
+        assert float(data["final_time"]) == pytest.approx(0.02)
     for words, told in (
-        (["--at", "0.2"], "--at 0.2: says nothing without --from"),
-        (["--from", first, "--at", "0.25"], "it has 0.2, 0.4 s"),
+        (["--at", "0.01"], "--at 0.01: says nothing without --from"),
+        (["--from", first, "--at", "0.015"], "it has 0.01, 0.02 s"),
         (["--from", first, "--fidelity", "both"], 'choose fidelity = "frame"'),
         (["--from", first, "--fidelity", "ideal"], 'choose fidelity = "frame"'),
     ):
-        lines = called(*words, *short[:2], "--out", again, code=2).strip().splitlines()
+        lines = called(*words, *short[:6], "--out", again, code=2).strip().splitlines()
         assert len(lines) == 1
         assert told in lines[0]
