@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 from ringsim.cli import cli
 from ringsim.dataset import save
+from ringsim.outputs.stored import StoredState
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
@@ -160,17 +161,18 @@ def test_what_cannot_go_on_is_refused_with_the_cure(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=words):
             simulate(scene.with_values(values), start=start)
     with pytest.raises(InputError, match=r'"full": .* of the engine "frame".*"frame"'):
-        simulate(scene, "full", start=start)
+        simulate(scene.with_values({"record.state_interval": "none"}), "full", start=start)
     with pytest.raises(InputError, match=r"--at 0.015: .* it has 0.01, 0.02, 0.03 s"):
         read_state(file, 0.015)
+    ended = _ended(tmp_path)
     with pytest.raises(InputError, match="same: take an earlier state"):
-        simulate(scene.with_values({"record.state_interval": "none"}), start=_ended(tmp_path))
+        simulate(ended.scene, start=ended)
     for fidelity in ("full", "ideal"):
         with pytest.raises(InputError, match=f'"{fidelity}" stores no states'):
             simulate(truss(), fidelity)
 
 
-def _ended(folder: Path) -> Any:
+def _ended(folder: Path) -> StoredState:
     """The last state of a run that came to rest: winches that never turn."""
     still = {f"cables.{plane}.winch.start_time": 0.0 for plane in ("upper", "lower")}
     still |= {f"cables.{plane}.winch.stop_time": 0.0 for plane in ("upper", "lower")}
