@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from ringsim.refusal import InputError
     from ringsim.scene import Scene, load_scene
     from ringsim.simulation import simulate
+    from ringsim.stored_state import read_state
 
 __all__ = [
     "Campaign", "CampaignError", "InputError", "Scene", "analyse", "compare", "load_scene",
-    "open_campaign", "simulate",
+    "open_campaign", "read_state", "simulate",
 ]  # fmt: skip
 
 _HOMES = {
@@ -34,6 +35,7 @@ _HOMES = {
     "Campaign": "campaign.python", "CampaignError": "campaign.python",
     "open_campaign": "campaign.python", "InputError": "refusal",
     "Scene": "scene", "load_scene": "scene", "simulate": "simulation",
+    "read_state": "stored_state",
 }  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME, axes, holds, span_names
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.stored_state import layout_fingerprint
 from ringsim.variables import Fidelity, Outcome, Variable, flags_of
 
 
@@ -47,10 +48,37 @@ def to_dataset(outcome: Outcome, scene: Scene) -> xr.Dataset:
             arrays[name] = _array(variable, np.full(shape, missing))
     used = {dim for array in arrays.values() for dim in array.dims}
     coordinates = {n: _array(v, known[n]) for n, v in COORDINATES.items() if n in used & set(known)}
+    _add_states(arrays, coordinates, outcome, scene)
     names = span_names(scene)
     if [coordinates[dim].size for dim in SPAN_NAME.dims if dim in coordinates] == [*names.shape]:
         coordinates[SPAN_NAME.name] = _array(SPAN_NAME, names)
     return xr.Dataset(arrays, coords=coordinates, attrs=_attributes(outcome, scene))
+
+
+def _add_states(
+    arrays: dict[str, xr.DataArray], coordinates: dict[str, xr.DataArray],
+    outcome: Outcome, scene: Scene,
+) -> None:  # fmt: skip
+    """Add the states that a run has stored."""
+    if not (found := outcome.states):
+        return
+    told = {
+        "long_name": "everything that a run needs to go on, see ringsim.stored_state",
+        "engine": str(found["state_engine"]),
+        "format": int(found["state_format"]),
+        "layout": layout_fingerprint(scene),
+        "history": str(found["history_form"]),
+    }
+    arrays["state"] = xr.DataArray(found["state"], dims="state_entry", attrs=told)
+    for name, words in (
+        ("state_form", "where the numbers of a state lie, JSON"),
+        ("state_begin", "first number of a state"),
+    ):
+        attributes = {"long_name": words}
+        arrays[name] = xr.DataArray(found[name], dims="state_time", attrs=attributes)
+    attributes = {"long_name": "time of a stored state", "units": "s"}
+    times = xr.DataArray(found["state_time"], dims="state_time", attrs=attributes)
+    coordinates["state_time"] = times
 
 
 def require_file(path: Path) -> None:
@@ -117,6 +145,7 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
         **{f"{name}_version": version(name) for name in ("ringsim", "exudyn", "numba", "numpy")},
         "python_version": platform.python_version(),
         "scene": scene.to_toml(),
+        **({"began": outcome.began} if outcome.began else {}),
     }
 
 

@@ -7,6 +7,7 @@ import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,11 +18,13 @@ from ringsim.choice import kind_of
 from ringsim.compile_cache import choose_folder, compile_once
 from ringsim.outputs.error_bars import error_bars
 from ringsim.outputs.family import holds
+from ringsim.outputs.stored import StoredState
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene, load_scene
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.restarts import run_with_restarts
+from ringsim.stored_state import require_fit
 from ringsim.theory.drive_margin import with_margin
 from ringsim.theory.ideal_fidelity import run_ideal, with_remark
 from ringsim.threads import one_thread
@@ -42,7 +45,9 @@ _COMPILING_STEPS = 5
 
 
 @one_thread()
-def run(scene: Scene, watch: Watch | None = None) -> Outcome:
+def run(
+    scene: Scene, watch: Watch | None = None, start: StoredState | None = None
+) -> Outcome:  # fmt: skip
     """Build and integrate a scene; one that fails or diverges starts anew with smaller steps.
 
     The outcome has arrays on the scene's output grid, of the last start, and what
@@ -50,7 +55,13 @@ def run(scene: Scene, watch: Watch | None = None) -> Outcome:
     of them and of the second run for error bars.  A solve that fails or does not reach its goal
     has a status other than OK and the reason; it never raises.  ``watch`` is called with every
     accepted state.
+
+    Raises
+    ------
+    InputError
+        If the scene asks for stored states, or is to go on from one: only the frame engine can.
     """
+    require_fit(start, scene, "full")
     prepare_run(scene)
     from ringsim.engine.integrate import solve
 
@@ -62,18 +73,27 @@ def prepare_run(scene: Scene) -> None:
     import ringsim.engine.integrate  # noqa: F401
 
 
-def run_frame(scene: Scene, watch: Watch | None = None) -> Outcome:
-    """As :func:`run`, by the frame engine.
+def run_frame(
+    scene: Scene, watch: Watch | None = None, start: StoredState | None = None
+) -> Outcome:  # fmt: skip
+    """As :func:`run`, by the frame engine, which can go on from a stored state.
 
     Raises
     ------
     InputError
-        If it cannot represent the scene.
+        If it cannot represent the scene, or the state is none of such a scene.
     """
+    require_fit(start, scene, "frame")
     prepare_run_frame(scene)
     from ringsim.frame.integrate import solve
 
-    return _run(solve, Fidelity.FRAME, scene, watch, refusal=(InputError,))
+    if start is None and scene.record.state_interval is None:
+        return _run(solve, Fidelity.FRAME, scene, watch, refusal=(InputError,))
+    from ringsim.frame.storing import solve as solve_storing
+
+    storing = partial(solve_storing, start=start)
+    outcome = _run(storing, Fidelity.FRAME, scene, watch, refusal=(InputError,))
+    return outcome if start is None else replace(outcome, began=start.told(scene))
 
 
 def prepare_run_frame(scene: Scene) -> None:
@@ -164,12 +184,18 @@ coordinates, several times as fast; or the ideal ring of rigid rods, which knows
 nor stress and costs a fraction."""
 
 
-def simulate(scene: Scene | str | Path, fidelity: str = "full") -> "xr.Dataset":
+def simulate(
+    scene: Scene | str | Path, fidelity: str | None = None, *, start: StoredState | None = None
+) -> "xr.Dataset":  # fmt: skip
     """Run a scene and return its dataset (see ``ringsim.dataset.to_dataset``).
 
     ``scene`` is a scene, or what ``load_scene`` reads: the name of a built-in one or a file.
-    InputError if that, or ``fidelity`` ("full", "frame", "ideal"), is refused, or if the frame
-    engine or the ideal ring cannot represent the scene.
+    ``fidelity`` is "full", which it is if left out, "frame" or "ideal".  From a stored state
+    ``start``, see :func:`ringsim.read_state`, the run goes on to the end with the engine of that
+    state, and its dataset tells of all from the very beginning.
+
+    InputError if one of them is refused, or if the frame engine or the ideal ring cannot represent
+    the scene.
 
     >>> from ringsim.scene import load_scene
     >>> scene = load_scene("truss2").with_values({"solver.end_time": 0.5})
@@ -181,8 +207,12 @@ def simulate(scene: Scene | str | Path, fidelity: str = "full") -> "xr.Dataset":
     """
     from ringsim.dataset import to_dataset
 
+    fidelity = fidelity or ("full" if start is None else start.engine)
     if fidelity not in FIDELITIES:
         hint = known_or_nearest(fidelity, FIDELITIES)
         raise InputError(f"fidelity = {show(fidelity)}: there is no such model ({hint})")
     chosen = load_scene(scene) if isinstance(scene, (str, Path)) else scene
-    return to_dataset(FIDELITIES[fidelity](chosen), chosen)
+    require_fit(start, chosen, fidelity)
+    if start is None:
+        return to_dataset(FIDELITIES[fidelity](chosen), chosen)
+    return to_dataset(run_frame(chosen, start=start), chosen)

@@ -177,6 +177,10 @@ class Outcome:
     """Arrays by name; shapes follow ``ringsim.outputs.VARIABLES`` and ``coordinates``.  A failed
     run has what was recorded until then, NaN elsewhere."""
     cause: Cause = Cause.NONE
+    states: dict[str, np.ndarray[Any, Any]] = field(default_factory=dict)
+    """States from which a run can go on, as arrays of a file: ``state_time``, ..."""
+    began: str = ""
+    """The stored state that it went on from and what has changed since; empty of a whole run."""
 
     @property
     def fate(self) -> Fate:

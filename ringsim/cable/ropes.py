@@ -129,6 +129,20 @@ class Ropes:
         content[k : k + 2] = held[k : k + 2]
         return split
 
+    def unjam(self, cable: int, pulley: int) -> "Ropes":
+        """The ropes after a pulley that had seized the rope lets it slip again: the opposite of
+        ``jam``.
+        """
+        start = self._span(cable, pulley, 2, "pulley") + 1
+        if start not in self.starts:
+            return self
+        k = int(np.searchsorted(self.starts, start))
+        content, alive = self.content.copy(), self.alive.copy()
+        content[k - 1] += content[k]
+        alive[k - 1] &= alive[k]
+        gone = [np.delete(each, k) for each in (self.starts, content, alive)]
+        return Ropes(self.points_per_cable, *gone)
+
     def cut(self, cable: int, span: int) -> "Ropes":
         """The ropes after a span parts; both count from 0.  ValueError if there is no such span."""
         alive = self.alive.copy()

@@ -16,6 +16,7 @@ follows the structure uses the path taken up so far in the step, S_0 - S, not th
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -98,6 +99,7 @@ class Winches:
             for end, winch in enumerate(cable.winches)
         }
         self._start, self._held = 0.0, np.zeros((len(cables), 2))
+        self._ahead: dict[tuple[int, int], float] = {}
         self._ropes: dict[int, _Rope] = {}
 
     @property
@@ -115,6 +117,8 @@ class Winches:
         wound, speed = self._held.copy(), np.zeros_like(self._held)
         for place, winch in self._winches.items():
             wound[place], speed[place] = winch.at(time, float(self._held[place]))
+        for place, more in self._ahead.items():
+            wound[place] += more
         if not self._ropes or paths is None or rates is None:
             return wound, speed
         elapsed = time - self._start
@@ -127,6 +131,33 @@ class Winches:
                 speed[place] = found
                 wound[place] += found * elapsed
         return wound, speed
+
+    def memory(self) -> list[Any]:
+        """Every winch as it is by now: cable, end, table, and what it has wound beyond its law."""
+        return [
+            [*place, winch.model_dump(mode="json"), self._ahead.get(place, 0.0)]
+            for place, winch in self._winches.items()
+        ]
+
+    def go_on(
+        self, memory: list[Any], before: Sequence[Cable], time: float, wound: Array, rate: Array
+    ) -> None:
+        """Go on at a time (s) from a memory of winches that were those of the cables ``before``.
+
+        Rope wound (m) and its rate (m/s) are of shape (cables, 2).  A winch that is another one now
+        begins with the rope that is on its drum; its rate is entered.
+        """
+        for number, end, table, ahead in memory:
+            place = number, end
+            if self._winches[place] == before[number].winches[end]:
+                self._winches[place] = Winch.model_validate(table)
+            elif isinstance(self._winches[place].winding, FeedbackWinding):
+                continue
+            else:
+                by_law, rate[place] = self._winches[place].at(time)
+                ahead = float(wound[place]) - by_law
+            if ahead and not isinstance(self._winches[place].winding, FeedbackWinding):
+                self._ahead[place] = ahead
 
     def lock(self, number: int, time: float, state: ChainState) -> None:
         """The plane of a cable has locked at a time (s): its winches do what they do then."""

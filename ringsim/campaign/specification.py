@@ -250,6 +250,11 @@ def campaign_of(
         varied = base.with_values(specification.set)
     except InputError as error:
         raise InputError(f"{path.name}: {key}: {error}") from None
+    if (interval := varied.record.state_interval) is not None:
+        raise InputError(
+            f"{path.name}: record.state_interval = {interval:g} s: campaigns store no states: "
+            "leave it out, and run the sample of interest alone (ringsim replay tells its scene)"
+        )
     wanted = {f"requirements.{name}": name for name in specification.requirements}
     wanted |= {f"stop_when.of = {each.of}": each.of for each in specification.stop_when if each.of}
     for where, name in wanted.items():

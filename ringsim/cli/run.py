@@ -1,7 +1,8 @@
 """``ringsim run SCENE``."""
 
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -21,6 +22,9 @@ from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
+
+if TYPE_CHECKING:
+    from ringsim.outputs.stored import StoredState
 
 
 @click.command()
@@ -46,20 +50,30 @@ from ringsim.scene import Scene, load_scene
     "--evidence", metavar="FILE", type=PATH,
     help="settings.toml of ringsim accuracy (default: that of the built-in scene most alike).",
 )  # fmt: skip
+@click.option(
+    "--from", "origin", metavar="FILE", type=PATH,
+    help="Go on from a state that a run has stored (record.state_interval) in its netCDF file.",
+)  # fmt: skip
+@click.option(
+    "--at", metavar="TIME", type=click.FloatRange(min=0.0),
+    help="Time of that state, s.  [default: the last one]",
+)  # fmt: skip
 @click.option("--plot", is_flag=True, help="Draw figures beside the netCDF file.")
 @PLOT_FORMAT
 @ANIMATE
 @COLOUR
 def command(
     scene: str, settings: dict[str, Any], out: Path | None, fidelity: str | None,
-    accuracy: float | None, of: str | None, evidence: Path | None, *, plot: bool,
-    formats: tuple[str, ...] | None, animate: bool, colour: str | None,
+    accuracy: float | None, of: str | None, evidence: Path | None, origin: Path | None,
+    at: float | None, *, plot: bool, formats: tuple[str, ...] | None, animate: bool,
+    colour: str | None,
 ) -> int:  # fmt: skip
     """Run SCENE (a built-in name or a TOML file) and write SCENE.nc."""
     chosen = load_scene(scene)
     if accuracy is not None:
         chosen, fidelity = _with_accuracy(chosen, accuracy, of, evidence, settings, fidelity)
-    fidelity = fidelity or "full"
+    start = _start(origin, at)
+    fidelity = fidelity or ("full" if start is None else start.engine)
     for name, value in (("--of", of), ("--evidence", evidence)):
         if value is not None and accuracy is None:
             raise InputError(f"{name} {value}: says nothing without --accuracy; give both")
@@ -84,12 +98,17 @@ def command(
     from ringsim.outputs import VARIABLES
     from ringsim.outputs.summary import summary
     from ringsim.simulation import run, run_frame, run_ideal
+    from ringsim.stored_state import require_fit
 
     require_file(target)
+    for engine in ("frame", "full") if fidelity == "both" else (fidelity,):
+        require_fit(start, chosen, engine)
+    if start is not None:
+        click.echo(start.told(chosen))
     # The frame engine first: it refuses what it cannot represent.
     engines = {"frame": run_frame, "full": run}
     outcomes = {
-        name: watched(engine, chosen)
+        name: watched(partial(engine, start=start), chosen)
         for name, engine in engines.items() if fidelity in (name, "both")
     }  # fmt: skip
     # Solved in seconds, the ideal ring needs no bar.
@@ -136,6 +155,15 @@ def command(
             click.echo("it shows computed positions with --set record.positions=true")
     failed = any(outcome.status.failed for outcome in outcomes.values())
     return EXIT_FAILED if failed else EXIT_DONE
+
+
+def _start(origin: Path | None, at: float | None) -> "StoredState | None":
+    """The state to go on from."""
+    from ringsim.stored_state import read_state
+
+    if origin is None and at is not None:
+        raise InputError(f"--at {at:g}: says nothing without --from; give both")
+    return None if origin is None else read_state(origin, at)
 
 
 def _restarted(values: dict[str, Any], asked: Solver) -> str:

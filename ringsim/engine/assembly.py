@@ -35,7 +35,9 @@ class Assembly:
     starts
         Accelerations (m/s^2, 1/s^2) at which coordinates start, by node, in the nodes' order.
     bodies
-        Objects with kinetic energy and, where elastic, potential energy.
+        Objects with kinetic energy.
+    beams
+        Elements with potential energy that are no rods'.
     rigid_nodes, dampers
         Nodes with Euler parameters, and dampers of the rods.
     """
@@ -45,6 +47,7 @@ class Assembly:
         self.system = self.container.AddSystem()
         self.starts: dict[int, Array] = {}
         self.bodies: list[Any] = []
+        self.beams: list[Any] = []
         self.rigid_nodes: list[Any] = []
         self.dampers = RodDampers(self.system)
         self._laws: dict[Hashable, Any] = {}

@@ -105,6 +105,7 @@ def _add_boom(model: Multibody, beam: BoomBeam, weight: Weight | None) -> None:
         for k in range(boom.elements)
     ]
     assembly.bodies += cables
+    assembly.beams += cables
     if weight is not None:
         weight.add_beam(cables, nodes, boom.mass / boom.elements, length)
     # The elements' nodes have a slope but no orientation: a second spherical joint holds the

@@ -12,6 +12,7 @@ import numpy as np
 
 from ringsim.cable.ropes import Flags
 from ringsim.cable.state import ChainState
+from ringsim.engine.accelerations import AccelerationMeter
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.base import BaseMeter
 from ringsim.engine.build import Built, build
@@ -60,12 +61,13 @@ class Integration:
         self._energy = EnergyMeter(built)
         self._stress = StressMeter(model) if scene.record.stress else None
         self._base = BaseMeter(built) if scene.record.reactions else None
+        self._shock = AccelerationMeter(model) if scene.record.accelerations else None
         gauge = scene.structure.gauge
         self._bending = BendingMeter(model, gauge) if gauge else None
         self._position = PositionMeter(model) if scene.record.positions else None
         coordinates = {"rod": np.array(list(model.layout.halves()))}
-        if self._position is not None:
-            coordinates |= self._position.coordinates
+        for meter in (self._position, self._shock):
+            coordinates |= {} if meter is None else meter.coordinates
         if self._bending is not None:
             coordinates["station"] = self._bending.stations
         self._gaps = joint_groups(model)
@@ -208,6 +210,7 @@ class Integration:
                 places=None if self._position is None else self._position.read(self._state),
                 strain=None if self._bending is None else self._bending.read(),
                 carried=None if self._base is None else self._base.read(now),
+                accelerations=None if self._shock is None else self._shock.read(),
             )
         )
         return now

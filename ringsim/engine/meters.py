@@ -33,6 +33,7 @@ class EnergyMeter:
         self._assembly, self._connectors = model.assembly, built.connectors
         self._output = model.assembly.system.GetObjectOutputBody
         self._elements = [element for rod in model.rods for element in rod.elements]
+        self._elements += model.assembly.beams
         nodes = [model.joints[joint].nodes[0] for joint, _ in model.layout.forces]
         found = [model.assembly.coordinates_of(node)[:3] for node in nodes]
         self._loaded = np.array(found, dtype=np.int64)

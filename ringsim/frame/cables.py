@@ -13,7 +13,7 @@ import numpy as np
 from ringsim.cable.chain import Chain
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.records import Cables
-from ringsim.cable.ropes import SHORTEST
+from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.turning import Turning
 from ringsim.cable.winches import Winches
@@ -71,6 +71,16 @@ class FrameCables:
             path, path_rate = self.ropes.along(lengths), self.ropes.along(moving)
         wound, wound_rate = self.winches.at(time, self.ropes, path, path_rate)
         return self._chain.state(self.ropes, places, rates, wound, wound_rate)
+
+    def go_on(
+        self, ropes: Ropes, places: Array, rates: Array, wound: Array, speed: Array
+    ) -> ChainState:
+        """Go on with these ropes; the chain at places and rates of all points, from what the
+        winches have wound (m) and how fast they turn (m/s), shape (cables, 2).
+        """
+        self.ropes = ropes
+        self._retable()
+        return self._chain.state(ropes, places, rates, wound, speed)
 
     def strike(self, fault: CableFault, state: ChainState) -> None:
         """Let a fault change the ropes."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ringsim.cable.faults.family import CableFault
+from ringsim.frame.accelerations import AccelerationMeter
 from ringsim.frame.base import BaseMeter
 from ringsim.frame.extrapolation import extrapolated
 from ringsim.frame.kernels import Strains, move, moved_between, straighten
@@ -75,13 +76,16 @@ class Integration:
         self._stress = StressMeter(model.mesh, model.layout) if scene.record.stress else None
         self._position = PositionMeter(model) if scene.record.positions else None
         self._base = BaseMeter(model) if scene.record.reactions else None
+        self._shock = AccelerationMeter(model) if scene.record.accelerations else None
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
         first = self._measure(0.0, self._now)
         self._locks = (
             Locks(first.angles, stowed, scene.structure.planes) if scene.structure.locks else None
         )
-        own = {} if self._position is None else self._position.coordinates
-        self.history = Recorder(scene, own | {"rod": np.array(list(model.layout.halves()))})
+        own = {"rod": np.array(list(model.layout.halves()))}
+        for meter in (self._position, self._shock):
+            own |= {} if meter is None else meter.coordinates
+        self.history = Recorder(scene, own)
         ropes = None if model.cables is None else model.cables.ropes.content
         self._control = RunControl(
             scene.solver,
@@ -96,7 +100,7 @@ class Integration:
         """Integrate until all V-joints have locked and settled, or to the end time."""
         control, history = self._control, self.history
         while control.goes_on:
-            step = control.next_step(self._faults[0].time if self._faults else math.inf)
+            step = control.next_step(self._next_event())
             self._begin()
             while True:
                 try:
@@ -115,6 +119,10 @@ class Integration:
         history.status, history.fate = control.status, control.fate
         history.reason, history.repeats = control.reason, control.repeats
         return history
+
+    def _next_event(self) -> float:
+        """Time that no step may pass, s."""
+        return self._faults[0].time if self._faults else math.inf
 
     def _begin(self) -> None:
         """Let the winches begin a step."""
@@ -198,7 +206,7 @@ class Integration:
 
     def _accept(self, step: float, after: State, found: Instant) -> None:
         """Go on from a state."""
-        model, control, before = self._model, self._control, self._now
+        control, before = self._control, self._now
         moved = self._between(before, after) / step
         # Before rest it came as it leaves: the even motion through the first state.
         self._moves = [*(self._moves[-2:] or [(step, -moved)]), (step, moved)]
@@ -208,13 +216,19 @@ class Integration:
         control.accept(found, self._read(found))
         if self._watch is not None:
             self._watch(control.now)
-        if self._locks is not None:
-            deployed = self._locks.deployed
-            model.laws.latch(deployed)
-            if model.cables is not None and after.chain is not None:
-                for number, (plane, _) in enumerate(model.cables.present):
-                    if deployed[plane].all():
-                        model.cables.winches.lock(number, found.time, after.chain)
+        self._latch(found.time)
+
+    def _latch(self, time: float) -> None:
+        """Latch V-joints that have locked, and let winches know whose plane has."""
+        model, chain = self._model, self._now.chain
+        if self._locks is None:
+            return
+        deployed = self._locks.deployed
+        model.laws.latch(deployed)
+        if model.cables is not None and chain is not None:
+            for number, (plane, _) in enumerate(model.cables.present):
+                if deployed[plane].all():
+                    model.cables.winches.lock(number, time, chain)
 
     def _between(self, before: State, after: State) -> Array:
         """Changes of all unknowns."""
@@ -242,6 +256,7 @@ class Integration:
                 stress=None if self._stress is None else self._stress.read(self._strains),
                 places=None if self._position is None else self._position.read(self._now),
                 carried=None if self._base is None else self._base.read(self._now),
+                accelerations=None if self._shock is None else self._shock.read(self._now),
             )
         )
         return now
@@ -265,11 +280,17 @@ class Integration:
 
     def _measure(self, time: float, state: State) -> Instant:
         """A state, with its cables, and what has passed since the one that was kept last."""
-        model = self._model
+        cables = self._model.cables
+        if cables is not None:
+            state.chain = cables.state(time, state.place.lines, state.rate.lines)
+        return self._told(time, state)
+
+    def _told(self, time: float, state: State) -> Instant:
+        """A state whose chain is known."""
+        model, chain = self._model, state.chain
         tensions, stretch, driven = None, 0.0, bool(self._faults)
-        if model.cables is not None:
-            chain = model.cables.state(time, state.place.lines, state.rate.lines)
-            state.chain, tensions = chain, chain.tensions
+        if model.cables is not None and chain is not None:
+            tensions = chain.tensions
             stretch = float(np.max(chain.strains, where=chain.ropes.alive, initial=0.0))
             driven = driven or model.cables.winches.driving(time, chain)
         angles, rates = model.openings.read(state.pose.angle, state.rate.angles)

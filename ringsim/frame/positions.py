@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ringsim.frame.mesh import Mesh
 from ringsim.frame.model import FrameModel
 from ringsim.frame.state import State
 from ringsim.layout.bodies import OnBody, OnRod
@@ -46,12 +47,26 @@ class PositionMeter:
             element = min(first + where.station, last - 1)
             row[mesh.point[element, first + where.station - element]] = 1.0
         elif isinstance(where, OnBody):
-            own = np.flatnonzero(mesh.point_frame == where.body)
-            known = np.vstack([mesh.point_arm[own].T, np.ones(len(own))])
-            wanted = np.append(where.arm, 1.0)
-            row[own] = np.linalg.lstsq(known, wanted, rcond=None)[0]
-            if np.abs(known @ row[own] - wanted).max() > _CLOSE:
-                raise InputError(
-                    f"record.positions = true: body {where.body + 1} has no mass around its origin "
-                    'that tells where that is: give it an inertia, or choose fidelity = "full"'
-                )
+            row[:] = weights_of(mesh, where)
+
+
+def weights_of(mesh: Mesh, where: OnBody) -> Array:
+    """Shares of all points with mass in a point of a body, shape (points,).
+
+    Raises
+    ------
+    InputError
+        If the body has no mass around that point.
+    """
+    row = np.zeros(len(mesh.point_mass))
+    own = np.flatnonzero(mesh.point_frame == where.body)
+    known = np.vstack([mesh.point_arm[own].T, np.ones(len(own))])
+    wanted = np.append(where.arm, 1.0)
+    row[own] = np.linalg.lstsq(known, wanted, rcond=None)[0]
+    if np.abs(known @ row[own] - wanted).max() > _CLOSE:
+        raise InputError(
+            f"record: body {where.body + 1} has no mass around its origin that tells where that is "
+            "(positions and accelerations need it): give it an inertia, or choose fidelity = "
+            '"full"'
+        )
+    return row

@@ -120,6 +120,7 @@ def holds(scene: Scene) -> set[str]:
         kind_of(scene.structure): True,
         "stress": scene.record.stress,
         "positions": scene.record.positions,
+        "accelerations": scene.record.accelerations,
         "error bars": scene.solver.error_bars,
         "gauge": bool(scene.structure.gauge),
         "motors": any(

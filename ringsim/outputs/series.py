@@ -51,6 +51,8 @@ class Reading(Instant):
 
     carried: Carried | None = None
     """What base and stops carry; None unless recorded."""
+    accelerations: Array | None = None
+    """Of the corners, shape (corners, 3), m/s^2; None unless recorded."""
 
     def by_plane(self, of_cables: NDArray[Any]) -> Array:
         """A number for each plane, from one for each cable; NaN where a plane has no cable."""

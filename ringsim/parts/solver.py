@@ -104,5 +104,10 @@ class Record(Model):
     positions: bool = False
     """Record where corners, pins, joints and the hub are, so that drawings show what was computed;
     of 18 sections 4 kB an output time."""
+    accelerations: bool = False
+    """Record the largest acceleration of every corner."""
+    state_interval: Second | None = None
+    """Store the whole state at multiples of this and at the end, from which ``ringsim run --from``
+    goes on; a step ends at each.  Left out, none is stored."""
     reactions: bool = False
     """Record force and torque at the base, how it turns, and the impulse of every lock."""

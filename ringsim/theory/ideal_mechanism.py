@@ -188,6 +188,31 @@ class Mechanism:
 
         ``spin`` is W (rad/s), ``torque`` that on the whole structure, ``forces`` those on p (N m).
         """
+        rigid = 0 if self.fixed else 6
+        load, reach, rest = self._equations(now, spin, torque, forces)
+        matrix = now.matrix
+        found = np.linalg.solve(reach.T @ matrix @ reach, reach.T @ (load - matrix @ rest))
+        return np.asarray(found[rigid:]), np.asarray(found[3:6] if rigid else np.zeros(3))
+
+    def reaction(
+        self, now: Configuration, spin: Array, torque: Array, forces: Array, moving: Array
+    ) -> Array:
+        """Force (N) and torque (N m) of what holds the held body, in the axes of space and about
+        the body's origin, shape (2, 3): the rate of momentum that nothing else gives.
+
+        Arguments as of ``accelerations``, and the accelerations of the free coordinates.
+        """
+        load, reach, rest = self._equations(now, spin, torque, forces)
+        force, about = (now.matrix @ (reach @ moving + rest) - load)[:6].reshape(2, 3)
+        origin, axes = (self._held @ now.values)[0], (self._held @ now.values)[1:]
+        return np.asarray([axes @ force, axes @ (about - np.cross(origin, force))])
+
+    def _equations(
+        self, now: Configuration, spin: Array, torque: Array, forces: Array
+    ) -> tuple[Array, Array, Array]:
+        """What acts on (V, W, p); how their rates follow from the unknown accelerations, and from
+        the state alone.
+        """
         first, second, matrix, turn = now.first, now.second, now.matrix, skew(spin)
         whirl, rigid = turn @ turn, 0 if self.fixed else 6
         # Accelerations of the masses at zero (V' + W x V, W', p'') are linear in s, s' and s''.
@@ -205,8 +230,7 @@ class Mechanism:
             reach[:6] = holding[:, :-2] @ now.slopes
             rest[:6] = holding[:, :-2] @ now.bias + holding[:, -1]
             rest[:3] -= whirl @ origin[:, 0] + 2.0 * turn @ origin[:, -2]
-        found = np.linalg.solve(reach.T @ matrix @ reach, reach.T @ (load - matrix @ rest))
-        return np.asarray(found[rigid:]), np.asarray(found[3:6] if rigid else np.zeros(3))
+        return load, reach, rest
 
     def _holding(self, now: Configuration) -> Array:
         """(V, W) that stop the held body while it moves with each column of s, shape (6, n + 2)."""

@@ -40,6 +40,8 @@ class IdealState(NamedTuple):
     kinetic: float
     acting: Acting
     pull: Pull | None
+    reaction: Array | None = None
+    """Force (N) and torque (N m) of a fixed base, shape (2, 3); None unless recorded."""
 
     @property
     def stretch(self) -> float:
@@ -69,6 +71,7 @@ class IdealMotion:
         self.latched, self.until, self.refusal = False, math.inf, ""
         self._initial = scene.structure.coordinate
         n = self.mechanism.freedom
+        self._reacts = self.mechanism.fixed and scene.record.reactions
         self._tilts = not self.mechanism.fixed and self.forces.loaded
         tilt = 3 if self._tilts else 0
         motors = 0 if self.cables is None else 2 * len(self.cables.answering)
@@ -100,7 +103,10 @@ class IdealMotion:
         moving, turning = mechanism.accelerations(now, rigid[3:], acting.couple, force)
         rates = np.concatenate([rigid, now.rate])
         kinetic = 0.5 * float(rates @ now.matrix @ rates)
-        return IdealState(moving, turning, rigid[3:], kinetic, acting, pull)
+        held = None
+        if self._reacts:
+            held = mechanism.reaction(now, rigid[3:], acting.couple, force, moving)
+        return IdealState(moving, turning, rigid[3:], kinetic, acting, pull, held)
 
     def rates(self, time: float, state: Array) -> Array:
         """Derivative of the state; NaN where the cables have no answer."""

@@ -12,7 +12,7 @@ from ringsim.outputs.asynchrony import Asynchrony
 from ringsim.outputs.cable_tension import PEAK, CableTension
 from ringsim.outputs.family import Output, Values, axes
 from ringsim.outputs.recorder import ended, outputs_of, overloads, reduced, spanned
-from ringsim.outputs.series import Reading, Run, Series, output_times
+from ringsim.outputs.series import Carried, Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
 from ringsim.theory.ideal_course import Course, Piece
@@ -151,6 +151,7 @@ class _IdealRun:
             Energies(now.kinetic, now.elastic, work, state[-2]),
             chain=None if now.pull is None else now.pull.chain,
             planes=() if motion.cables is None else tuple(motion.cables.planes),
+            carried=None if now.reaction is None else Carried(now.reaction, np.eye(3), None),
         )
 
 

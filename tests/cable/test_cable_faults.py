@@ -63,6 +63,22 @@ def test_jams_between_two_winches_leave_each_its_own_rope():
     assert list(now.wound_rates) == [0.1, 0.0, 0.1]
 
 
+def test_a_pulley_that_is_free_again_makes_one_rope():
+    case = still(PATH, 0.001, (0.1, 0.1), axial_stiffness=1e4)
+    case.wound = np.array([[0.001, 0.0005]])
+    ropes = case.ropes
+    for pulley in (3, 1):
+        ropes = JammedPulley(pulley=pulley, time=1.0).strike(ropes, case.state(ropes=ropes))
+    one = ropes.unjam(0, 0)
+    assert list(one.starts) == [0, 3]
+    assert one.unjam(0, 0) is one
+    free = one.unjam(0, 2)
+    assert list(free.starts) == [0]
+    assert free.content == pytest.approx(case.ropes.content, rel=1e-15)
+    cut = CutCable(cable=1, span=1, time=1.0).strike(ropes, case.state(ropes=ropes))
+    assert list(cut.unjam(0, 0).alive) == [False, True]
+
+
 def test_the_energy_identity_holds_for_split_ropes():
     case = random_case(
         9, wound=0.01, winding=0.2, far_winding=0.1, friction=LAWS["bearing"], damping_time=0.01

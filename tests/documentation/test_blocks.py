@@ -25,6 +25,7 @@ SCRIPTS = [
     ROOT / "README.md",
     ROOT / "docs" / "guide" / "commands.md",
     ROOT / "docs" / "howto" / "own_structure.md",
+    ROOT / "docs" / "howto" / "go_on.md",
 ]
 
 

@@ -7,7 +7,10 @@ import pytest
 from ring_runs import Array, ring, run
 from ringsim.engine.build import Built, build
 from ringsim.engine.integrate import Integration
+from ringsim.engine.meters import EnergyMeter
+from ringsim.engine.readings import Openings, State
 from ringsim.engine.rotations import turn_rates
+from ringsim.parts.boom.flexible import FlexibleBoom
 
 
 @pytest.mark.parametrize("base", ["free", "fixed"])
@@ -76,3 +79,48 @@ def test_a_free_ring_keeps_its_momenta_at_zero(kind: str) -> None:
     assert np.abs(momentum).max() < 1e-6 * scale
     assert np.abs(angular[[0, 2]]).max() < 1e-6 * scale
     assert abs(angular[1]) < (1e-6 if kind == "none" else 5e-3) * scale
+
+
+def test_the_energy_of_a_flexible_boom_is_counted() -> None:
+    """A beam that is clamped at its top and pulled aside at its tip stores F^2 L^3 / 6 E I, one
+    that is stretched by e stores E A e^2 L / 2, and one that swings about its top m L^2 w^2 / 6.
+    """
+    scene = ring(3, boom__kind="flexible", boom__elements=3)
+    built = build(scene)
+    boom, system = scene.boom, built.model.assembly.system
+    assert isinstance(boom, FlexibleBoom)
+    data, start, meter = system.systemData, State(built.model), EnergyMeter(built)
+    places = start.position
+    along = np.linspace(0.0, boom.length, boom.elements + 1)
+    nodes = [node for node in built.model.assembly.starts if _is_of(built, node)]
+    where = np.array([built.model.assembly.coordinates_of(node) for node in nodes])
+    assert where.shape == (4, 6)
+
+    def energies(shift: Array, slope: Array, *, moving: bool = False) -> tuple[float, float]:
+        """Kinetic and elastic ones of nodes that are moved, or move, so; (n, 3) each."""
+        moved = np.zeros_like(places)
+        moved[where] = np.hstack([shift, slope])
+        data.SetODE2Coordinates(np.zeros_like(moved) if moving else moved)
+        data.SetODE2Coordinates_t(moved if moving else np.zeros_like(moved))
+        state = State(built.model)
+        found = meter.read(0.0, state, *Openings(built.model).read(state), None)
+        return found.kinetic, found.elastic
+
+    length, young = boom.length, boom.young_modulus
+    rest = energies(np.zeros((4, 3)), np.zeros((4, 3)))[1]
+    bending, force, x = young * boom.tube.second_moment, 0.01, np.array([1.0, 0.0, 0.0])
+    aside = force * along**2 * (3.0 * length - along) / (6.0 * bending)
+    turned = force * along * (2.0 * length - along) / (2.0 * bending)
+    _, bent = energies(np.outer(aside, x), np.outer(turned, x))
+    assert bent - rest == pytest.approx(force**2 * length**3 / (6.0 * bending), rel=1e-4)
+    strain, down = 1e-5, np.array([0.0, 0.0, -1.0])
+    _, pulled = energies(strain * np.outer(along, down), strain * np.tile(down, (4, 1)))
+    stretched = 0.5 * young * boom.tube.area * strain**2 * length
+    assert pulled - rest == pytest.approx(stretched, rel=1e-6)
+    swung, _ = energies(np.outer(along, x), np.tile(x, (4, 1)), moving=True)
+    assert swung == pytest.approx(boom.mass * length**2 / 6.0, rel=1e-6)
+
+
+def _is_of(built: Built, node: int) -> bool:
+    """Whether a node is of a boom: a place with one slope."""
+    return built.model.assembly.system.GetNode(node)["nodeType"] == "PointSlope1"

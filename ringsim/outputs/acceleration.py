@@ -1,0 +1,31 @@
+"""How hard corners are accelerated."""
+
+import numpy as np
+
+from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+
+
+class PeakAcceleration(Output):
+    """Largest acceleration of every corner's hinge assembly, at the origin of its body.
+
+    It is that of its motion, without the pull of gravity.  Locks give it: each stop sends a shock
+    through the rods, whose height depends on how stiff the stop is.
+    """
+
+    rank = 49
+    needs = ("accelerations",)
+    coordinates = (Variable("corner", ("corner",), "1", "hinge assembly of the structure", "str"),)
+    variables = (
+        Variable(
+            "peak_acceleration", ("corner",), "m/s^2",
+            "largest acceleration of the corner at any step",
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> Array | None:
+        """Shape (corners, 3), m/s^2."""
+        return now.accelerations
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Of all steps."""
+        return {"peak_acceleration": np.linalg.norm(series.values, axis=2).max(axis=0)}
