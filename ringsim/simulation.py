@@ -20,6 +20,7 @@ from ringsim.outputs.family import holds
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene, load_scene
+from ringsim.scene.substituted import substituted
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.restarts import run_with_restarts
 from ringsim.theory.drive_margin import with_margin
@@ -135,6 +136,7 @@ def _run(
 ) -> Outcome:  # fmt: skip
     """Run a scene with an engine, which may raise what is a ``refusal``."""
     begin = (time.perf_counter(), time.process_time())
+    scene = substituted(scene)
 
     def start(solver: Solver) -> Outcome:
         """One start; times count from the first."""

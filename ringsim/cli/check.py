@@ -11,9 +11,10 @@ from ringsim.layout.layout import Layout, layout_of
 from ringsim.layout.mobility import internal_mobility
 from ringsim.refusal import show
 from ringsim.scene import Scene, load_scene
+from ringsim.scene.substituted import substituted
 from ringsim.units import Model
 
-_ASKED = ("margin", "hinge_spring")
+_ASKED = ("margin", "hinge_spring", "temperature")
 """What few scenes name: not told of as left out."""
 MOST_SECTIONS_FOR_MOBILITY = 72
 """Larger rings take seconds, and their answer is the same."""
@@ -47,7 +48,7 @@ def command(scene: str, settings: dict[str, Any], time: float | None, margin: bo
     if margin:
         from ringsim.cli.margin_table import margin_lines
 
-        for text in margin_lines(loaded):
+        for text in margin_lines(substituted(loaded)):
             click.echo(text)
         return
     for label, text in _summary(loaded).items():

@@ -20,6 +20,7 @@ from ringsim.engine.positions import PositionMeter
 from ringsim.engine.readings import Openings, State, joint_groups
 from ringsim.engine.rotations import Array
 from ringsim.engine.settings import newton_norm, solver_settings
+from ringsim.engine.shape import ShapeMeter
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
 from ringsim.scene import Scene
@@ -63,7 +64,11 @@ class Integration:
         gauge = scene.structure.gauge
         self._bending = BendingMeter(model, gauge) if gauge else None
         self._position = PositionMeter(model) if scene.record.positions else None
+        shaped = scene.record.shape or scene.rods.length_error is not None
+        self._shape = ShapeMeter(model) if shaped else None
         coordinates = {"rod": np.array(list(model.layout.halves()))}
+        if self._shape is not None:
+            coordinates |= self._shape.coordinates
         if self._position is not None:
             coordinates |= self._position.coordinates
         if self._bending is not None:
@@ -208,6 +213,7 @@ class Integration:
                 places=None if self._position is None else self._position.read(self._state),
                 strain=None if self._bending is None else self._bending.read(),
                 carried=None if self._base is None else self._base.read(now),
+                put=None if self._shape is None else self._shape.read(self._state),
             )
         )
         return now

@@ -13,6 +13,7 @@ from ringsim.frame.meter import EnergyMeter
 from ringsim.frame.model import FrameModel
 from ringsim.frame.positions import PositionMeter
 from ringsim.frame.secants import Secants
+from ringsim.frame.shape import ShapeMeter
 from ringsim.frame.state import State
 from ringsim.frame.stresses import StressMeter
 from ringsim.layout.pose import Array
@@ -75,7 +76,10 @@ class Integration:
         self._locks = (
             Locks(first.angles, stowed, scene.structure.planes) if scene.structure.locks else None
         )
-        own = {} if self._position is None else self._position.coordinates
+        shaped = scene.record.shape or scene.rods.length_error is not None
+        self._shape = ShapeMeter(model) if shaped else None
+        meters = (self._position, self._shape)
+        own = {k: v for meter in meters if meter is not None for k, v in meter.coordinates.items()}
         self.history = Recorder(scene, own | {"rod": np.array(list(model.layout.halves()))})
         ropes = None if model.cables is None else model.cables.ropes.content
         self._control = RunControl(
@@ -237,6 +241,7 @@ class Integration:
                 stress=None if self._stress is None else self._stress.read(self._strains),
                 places=None if self._position is None else self._position.read(self._now),
                 carried=None if self._base is None else self._base.read(self._now),
+                put=None if self._shape is None else self._shape.read(self._now),
             )
         )
         return now

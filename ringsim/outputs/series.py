@@ -31,6 +31,13 @@ class Carried(NamedTuple):
     stops: Array | None
 
 
+class Put(NamedTuple):
+    """Places of the corners, shape (planes, corners, 3), m, and elastic energy of the rods, J."""
+
+    corners: Array
+    rods: float
+
+
 @dataclass(frozen=True)
 class Reading(Instant):
     """An instant with all that outputs read; to them its energies tell ``work`` with what the
@@ -51,6 +58,9 @@ class Reading(Instant):
 
     carried: Carried | None = None
     """What base and stops carry; None unless recorded."""
+
+    put: Put | None = None
+    """Where corners are and what the rods store; None unless recorded."""
 
     def by_plane(self, of_cables: NDArray[Any]) -> Array:
         """A number for each plane, from one for each cable; NaN where a plane has no cable."""

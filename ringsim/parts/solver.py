@@ -106,3 +106,5 @@ class Record(Model):
     of 18 sections 4 kB an output time."""
     reactions: bool = False
     """Record force and torque at the base, how it turns, and the impulse of every lock."""
+    shape: bool = False
+    """Record how far corners are at the end from the deployed design."""

@@ -16,6 +16,7 @@ from ringsim.layout.layout import layout_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.scene.substituted import substituted
 from ringsim.theory.drive_margin import with_margin
 from ringsim.theory.ideal_course import Course
 from ringsim.theory.ideal_outcome import to_outcome
@@ -36,7 +37,7 @@ def refuse_if_not_ideal(scene: Scene) -> None:
     InputError
         One line with the field, the reason and the cure.
     """
-    cure = "(leave it out, or use the full fidelity)"
+    scene, cure = substituted(scene), "(leave it out, or use the full fidelity)"
     kind = kind_of(scene.structure)
     if kind != "pantograph-ring":
         raise InputError(
@@ -59,6 +60,17 @@ def refuse_if_not_ideal(scene: Scene) -> None:
             "record.positions = true: the ideal ring's shape follows from its one opening angle, "
             "and what it floats along is not integrated (set it to false: drawings need none, or "
             "use the full fidelity)"
+        )
+    if scene.record.shape:
+        raise InputError(
+            "record.shape = true: the ideal ring opens to its drawing (set it to false, or use the "
+            "full fidelity)"
+        )
+    if scene.rods.length_error is not None:
+        raise InputError(
+            "rods.length_error: rods that are not as long as drawn strain each other, or let sections "
+            "open differently, and the ideal ring's do neither (thermal expansion counts as one) "
+            + cure
         )
     if scene.offload is not None:
         raise InputError(
@@ -95,6 +107,7 @@ def run_ideal(scene: Scene) -> Outcome:
     InputError
         If the ideal ring cannot represent the scene.
     """
+    scene = substituted(scene)
     refuse_if_not_ideal(scene)
     wall, cpu = time.perf_counter(), time.process_time()
     with np.errstate(all="ignore"):
