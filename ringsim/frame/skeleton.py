@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod, Rod
+from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod
 from ringsim.layout.joints import Joint
 from ringsim.layout.layout import BoomBeam, Layout
 from ringsim.layout.pose import Array, Pose

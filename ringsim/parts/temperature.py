@@ -108,8 +108,8 @@ class Temperature(Model):
             self.joint.friction.require_covers("joint", self.joint.value)
             if not scene.joints.present():
                 raise ValueError(
-                    "temperature.joint: no joint has friction: add one, as [joints.hinge], or leave "
-                    "it out"
+                    "temperature.joint: no joint has friction: add one, as [joints.hinge], or "
+                    "leave it out"
                 )
         if self.pulley is not None:
             self.pulley.friction.require_covers("pulley", self.pulley.value)

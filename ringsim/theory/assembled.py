@@ -1,7 +1,7 @@
 """A structure put together from rods that are not as long as drawn.
 
-Where all parts of a structure are, places x and axes R of bodies and of the rods' nodes, is what has
-the least elastic energy of the rods,
+Where all parts are, places x and axes R of bodies and of the rods' nodes, is what has the least
+elastic energy of the rods,
 
     sum_e (u . K_u u + psi . K_psi psi) / 2,   with joints closed and the mean opening angle held,
 
@@ -52,8 +52,10 @@ class Assembled(NamedTuple):
     energy: float
 
 
-def assembled(layout: Layout, rods: Rods) -> Assembled:
+def assembled(layout: Layout, rods: Rods, *, locked: bool = False) -> Assembled:
     """The structure as it is put together; the layout itself if its rods are as long as drawn.
+
+    Where it is ``locked`` every opening angle is held, not only their mean.
 
     Raises
     ------
@@ -62,14 +64,14 @@ def assembled(layout: Layout, rods: Rods) -> Assembled:
     """
     if not any(rod.strain for rod in layout.rods):
         return Assembled(layout, 0.0)
-    frames = _Frames(layout, rods)
+    frames = _Frames(layout, rods, locked=locked)
     return Assembled(frames.relax(), frames.energy)
 
 
 class _Frames:
     """Places and axes of all bodies and nodes, and of space, which is last."""
 
-    def __init__(self, layout: Layout, rods: Rods) -> None:
+    def __init__(self, layout: Layout, rods: Rods, *, locked: bool) -> None:
         self._layout = layout
         nodes = [rod.node(k) for rod in layout.rods for k in range(len(rod.stations))]
         poses = [*(body.pose for body in layout.bodies), *nodes]
@@ -98,7 +100,9 @@ class _Frames:
         opening = [layout.joints[number] for number, _ in found]
         self._senses = np.array([sense for _, sense in found])
         self._openings = self._sides([[j.first for j in opening], [j.second for j in opening]])
-        self._folded = self._mean_folded()[0]
+        count = len(found)
+        self._held = np.eye(count) if locked else np.full((min(count, 1), count), 1.0 / count)
+        self._folded = self._angles()[0]
         self.energy = 0.0
 
     def relax(self) -> Layout:
@@ -153,35 +157,41 @@ class _Frames:
             columns.append(np.broadcast_to(self._spots(pairs)[:, None, :], shape).ravel())
             slopes.append(by.ravel())
             count += found.size
-        mean, by_turn = self._mean_folded()
-        gaps.append(np.array([mean - self._folded]))
-        columns.append(self._spots(self._openings[0]).ravel())
-        rows.append(np.full(columns[-1].size, count))
-        slopes.append(by_turn.ravel())
+        angles, by_turn = self._angles()
+        gaps.append(self._held @ (angles - self._folded))
+        shape = (*self._held.shape, 12)
+        numbers = np.arange(len(self._held)) + count
+        rows.append(np.broadcast_to(numbers[:, None, None], shape).ravel())
+        columns.append(np.broadcast_to(self._spots(self._openings[0]), shape).ravel())
+        slopes.append((self._held[:, :, None] * by_turn).ravel())
         entries = np.concatenate(slopes), (np.concatenate(rows), np.concatenate(columns))
-        matrix = csc_array(coo_array(entries, shape=(count + 1, self._size + 6)))
+        size = count + len(self._held), self._size + 6
+        matrix = csc_array(coo_array(entries, shape=size))
         return np.concatenate(gaps), matrix[:, : self._size]
 
-    def _mean_folded(self) -> tuple[float, Array]:
-        """Mean angle (rad) by which V-joints are folded, and derivatives, shape (openings, 12)."""
+    def _angles(self) -> tuple[Array, Array]:
+        """Angles (rad) by which V-joints are folded, and derivatives, shape (openings, 12)."""
         _, turned = self._mounted(*self._openings)
         first, second = turned[:, 0], turned[:, 1]
         y, z, other = first[:, :, 1], first[:, :, 2], second[:, :, 1]
         sine = np.sum(np.cross(y, other) * z, axis=1)
         folded = self._senses * np.arctan2(sine, np.sum(y * other, axis=1))
         folded += 2.0 * np.pi * (folded < -0.5 * np.pi)
-        slopes, share = np.zeros((len(z), 12)), self._senses[:, None] * z / len(z)
+        slopes, share = np.zeros((len(z), 12)), self._senses[:, None] * z
         slopes[:, 3:6], slopes[:, 9:] = -share, share
-        return float(folded.mean()), slopes
+        return folded, slopes
 
     def _sides(self, sides: list[list[Mount]]) -> tuple[Array, Array, Array]:
         """Numbers of the frames of mounts by side, shape (n, 2), with arms and axes there."""
         found = [[self._mount(mount) for mount in side] for side in sides]
+        shapes = ((-1, 2), (-1, 2, 3), (-1, 2, 3, 3))
         number, arms, axes = (
-            np.array([[mount[k] for mount in side] for side in found]).swapaxes(0, 1)
+            np.array([[mount[k] for mount in pair] for pair in zip(*found, strict=True)])
             for k in range(3)
         )
-        return number, arms, axes
+        return (
+            number.astype(int).reshape(shapes[0]), arms.reshape(shapes[1]), axes.reshape(shapes[2])
+        )  # fmt: skip
 
     def _mount(self, mount: Mount) -> tuple[int, Array, Array]:
         if isinstance(mount, InSpace):

@@ -68,9 +68,9 @@ def refuse_if_not_ideal(scene: Scene) -> None:
         )
     if scene.rods.length_error is not None:
         raise InputError(
-            "rods.length_error: rods that are not as long as drawn strain each other, or let sections "
-            "open differently, and the ideal ring's do neither (thermal expansion counts as one) "
-            + cure
+            "rods.length_error: rods that are not as long as drawn strain each other, or let "
+            "sections open differently: those of the ideal ring do neither, and thermal expansion "
+            "counts as one " + cure
         )
     if scene.offload is not None:
         raise InputError(
