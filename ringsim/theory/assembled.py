@@ -101,7 +101,9 @@ class _Frames:
         self._senses = np.array([sense for _, sense in found])
         self._openings = self._sides([[j.first for j in opening], [j.second for j in opening]])
         count = len(found)
-        self._held = np.eye(count) if locked else np.full((min(count, 1), count), 1.0 / count)
+        self._held = (
+            np.eye(count) if locked else np.full((min(count, 1), count), 1.0 / max(count, 1))
+        )
         self._folded = self._angles()[0]
         self.energy = 0.0
 

@@ -33,7 +33,8 @@ def written() -> dict[str, Any]:
     return {
         "rods.length_error": {
             "diagonal_rising": 1e-4, "diagonal_falling": 1e-4,
-            **{f"bar_{side}_{end}": bars for side in ("upper", "lower") for end in ("left", "right")},
+"bar_upper_left": bars, "bar_upper_right": bars,
+            "bar_lower_left": bars, "bar_lower_right": bars,
         },
         "rods.bar_young_modulus": [1.1 * 120e9, 120e9, 0.9 * 120e9, 0.8 * 120e9],
         "joints.vjoint.viscous": 0.004, "joints.vjoint.coulomb": 0.002,
@@ -68,7 +69,7 @@ def test_a_run_at_a_temperature_equals_that_of_the_substituted_scene_bit_by_bit(
     assert one.keys() == two.keys()
     assert float(one["prestress_energy"]) > 0.0
     for name in one.keys() - {"wall_time", "cpu_time"}:
-        assert np.array_equal(one[name], two[name], equal_nan=True), name
+        assert str(one[name].tolist()) == str(two[name].tolist()), name
 
 
 def test_expansion_adds_to_length_errors() -> None:
@@ -104,8 +105,8 @@ def test_a_warm_ring_is_a_larger_one() -> None:
 
 
 @pytest.mark.parametrize(("heat", "words"), [
-    ({"bar": {"value": 500.0, "stiffness": {"temperatures": [100.0, 300.0], "factors": [1.0, 2.0]}}},
-     r"temperature\.bar\.value must lie within 100 \.\. 300 K"),
+    ({"bar": {"value": 500.0, "stiffness": {"temperatures": [1.0, 300.0], "factors": [1.0, 2.0]}}},
+     r"temperature\.bar\.value must lie within 1 \.\. 300 K"),
     ({"bar": {"stiffness": {"temperatures": [300.0, 100.0], "factors": [1.0, 2.0]}}},
      r"temperatures = \.\.\. 100 K must be above"),
     ({"bar": {"stiffness": {"temperatures": [100.0, 300.0], "factors": [1.0]}}},
