@@ -24,6 +24,7 @@ from ringsim.engine.shape import ShapeMeter
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
 from ringsim.scene import Scene
+from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
@@ -64,7 +65,7 @@ class Integration:
         gauge = scene.structure.gauge
         self._bending = BendingMeter(model, gauge) if gauge else None
         self._position = PositionMeter(model) if scene.record.positions else None
-        shaped = scene.record.shape or scene.rods.length_error is not None
+        shaped = scene.record.shape or strained(scene)
         self._shape = ShapeMeter(model) if shaped else None
         coordinates = {"rod": np.array(list(model.layout.halves()))}
         if self._shape is not None:

@@ -23,6 +23,7 @@ from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.scene import Scene
+from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
@@ -76,7 +77,7 @@ class Integration:
         self._locks = (
             Locks(first.angles, stowed, scene.structure.planes) if scene.structure.locks else None
         )
-        shaped = scene.record.shape or scene.rods.length_error is not None
+        shaped = scene.record.shape or strained(scene)
         self._shape = ShapeMeter(model) if shaped else None
         meters = (self._position, self._shape)
         own = {k: v for meter in meters if meter is not None for k, v in meter.coordinates.items()}

@@ -130,7 +130,7 @@ def holds(scene: Scene) -> set[str]:
         ),
         "reactions": scene.record.reactions,
         "shape": scene.record.shape,
-        "length errors": strained(scene),
+        "prestress": bool(strained(scene)),
         "base": scene.boom is not None or scene.structure.supported,
         "held base": scene.held or scene.spacecraft is not None,
     }

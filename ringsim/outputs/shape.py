@@ -61,7 +61,7 @@ class Prestress(Output):
     """Elastic energy of the rods, from what assembling them has left on."""
 
     rank = 59
-    needs = ("length errors",)
+    needs = ("prestress",)
     variables = (
         Variable("rod_energy", ("time",), "J", "elastic energy of the rods"),
         Variable(

@@ -33,9 +33,9 @@ def check_rods(scene: "Scene") -> None:
             'record.shape = true needs structure.kind = "pantograph-ring", not '
             f'"{kind_of(scene.structure)}": only that has corners (leave it out)'
         )
-    if not strained(scene):
+    what = strained(scene)
+    if not what:
         return
-    what = "temperature" if scene.rods.length_error is None else "rods.length_error"
     if (kind := kind_of(scene.structure)) != "pantograph-ring":
         raise ValueError(
             f'{what} needs structure.kind = "pantograph-ring", not "{kind}" (leave it out)'

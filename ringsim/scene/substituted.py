@@ -50,10 +50,14 @@ def substituted(scene: "Scene") -> "Scene":
     return scene.with_values(values | {"temperature": "none"})
 
 
-def strained(scene: "Scene") -> bool:
-    """Whether some rods are said to be longer or shorter than drawn."""
+def strained(scene: "Scene") -> str:
+    """What a scene names that strains its rods before they move; empty if nothing."""
+    if scene.rods.length_error is not None:
+        return "rods.length_error"
+    if scene.structure.held_angles() is not None:
+        return "structure.angle_error"
     warm = [] if scene.temperature is None else scene.temperature.rods()
-    return scene.rods.length_error is not None or any(g.expansion != 0.0 for _, g in warm)
+    return "temperature" if any(group.expansion != 0.0 for _, group in warm) else ""
 
 
 def _longer(error: Values, warm: RodTemperature, reference: float) -> Values:

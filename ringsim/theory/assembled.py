@@ -5,11 +5,11 @@ elastic energy of the rods,
 
     sum_e (u . K_u u + psi . K_psi psi) / 2,   with joints closed and the mean opening angle held,
 
-u and psi strains against the natural lengths (``ringsim.theory.screws``): loads, net and springs do
-not act yet, and nothing else that friction might hold in place is held.  Stationary points are
-found by Gauss and Newton's method with Lagrange's multipliers for joints and angle.  How a free
-structure lies in space, and what else its joints leave free, stays as near to the drawing as a weak
-spring on every frame in each iteration keeps it.
+or every opening angle, where sections are held at their own; u and psi are strains against the
+natural lengths (``ringsim.theory.screws``).  Loads, net and springs do not act yet.  Stationary
+points are found by Gauss and Newton's method with Lagrange's multipliers for joints and angles.
+How a free structure lies in space, and what else its joints leave free, stays as near to the drawing
+as a weak spring on every frame in each iteration keeps it.
 """
 
 from dataclasses import replace
@@ -53,7 +53,7 @@ class Assembled(NamedTuple):
 
 
 def assembled(layout: Layout, rods: Rods, *, locked: bool = False) -> Assembled:
-    """The structure as it is put together; the layout itself if its rods are as long as drawn.
+    """The structure as it is put together; the layout itself if that is as drawn.
 
     Where it is ``locked`` every opening angle is held, not only their mean.
 
@@ -62,7 +62,7 @@ def assembled(layout: Layout, rods: Rods, *, locked: bool = False) -> Assembled:
     ValueError
         If nothing balances near the drawing.
     """
-    if not any(rod.strain for rod in layout.rods):
+    if not any(rod.strain for rod in layout.rods) and (locked or layout.held is None):
         return Assembled(layout, 0.0)
     frames = _Frames(layout, rods, locked=locked)
     return Assembled(frames.relax(), frames.energy)
@@ -101,10 +101,10 @@ class _Frames:
         self._senses = np.array([sense for _, sense in found])
         self._openings = self._sides([[j.first for j in opening], [j.second for j in opening]])
         count = len(found)
-        self._held = (
-            np.eye(count) if locked else np.full((min(count, 1), count), 1.0 / max(count, 1))
-        )
-        self._folded = self._angles()[0]
+        mean = np.full((min(count, 1), count), 1.0 / max(count, 1))
+        held = None if locked else layout.held
+        self._held = np.eye(count) if locked or held is not None else mean
+        self._folded = self._angles()[0] - (0.0 if held is None else held.ravel())
         self.energy = 0.0
 
     def relax(self) -> Layout:
@@ -126,7 +126,7 @@ class _Frames:
             multipliers = self._step(self._summed(blocks, spots), rows, pushed, gaps)
         raise ValueError(
             "the structure cannot be put together: with these rods nothing balances near the "
-            "drawing (reduce rods.length_error)"
+            "drawing (reduce rods.length_error, or structure.angle_error)"
         )
 
     def _step(self, stiffness: csc_array, rows: csc_array, pushed: Array, gaps: Array) -> Array:

@@ -16,7 +16,7 @@ from ringsim.layout.layout import layout_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.scene.substituted import substituted
+from ringsim.scene.substituted import strained, substituted
 from ringsim.theory.drive_margin import with_margin
 from ringsim.theory.ideal_course import Course
 from ringsim.theory.ideal_outcome import to_outcome
@@ -66,11 +66,11 @@ def refuse_if_not_ideal(scene: Scene) -> None:
             "record.shape = true: the ideal ring opens to its drawing (set it to false, or use the "
             "full fidelity)"
         )
-    if scene.rods.length_error is not None:
+    if what := strained(scene):
         raise InputError(
-            "rods.length_error: rods that are not as long as drawn strain each other, or let "
-            "sections open differently: those of the ideal ring do neither, and thermal expansion "
-            "counts as one " + cure
+            f"{what}: rods that are not as long as drawn, or held at other angles, strain each "
+            "other, or let sections open differently: those of the ideal ring do neither (thermal "
+            "expansion makes rods longer, too) " + cure
         )
     if scene.offload is not None:
         raise InputError(

@@ -182,6 +182,27 @@ def test_both_engines_start_where_they_balance() -> None:
     assert np.nanmax(values["kinetic_energy"]) < 1e-3 * prestress
 
 
+def test_sections_are_held_at_their_own_angles_until_they_are_released() -> None:
+    """The energy goes with the square of how far angles differ; held alike they strain nothing."""
+    apart = np.array([0.02, -0.01, 0.03, -0.04])
+    found = {}
+    for size in (1.0, 2.0):
+        scene = ring(structure__angle_error=(size * apart).tolist())
+        drawn = layout_of(scene)
+        made = assembled(drawn, scene.rods)
+        more = np.degrees(made.layout.opening_angles()[0] - drawn.opening_angles()[0])
+        assert np.abs(more - size * apart).max() < 1e-9
+        found[size] = made.energy
+    assert found[2.0] == pytest.approx(4.0 * found[1.0], rel=2e-2)
+    alike = ring(structure__angle_error=0.5)
+    assert assembled(layout_of(alike), alike.rods).energy < 1e-16
+    shared = {"solver__end_time": 0.1, "record__interval": 0.05}
+    held = by_frames(ring(structure__angle_error=apart.tolist(), **shared)).values
+    assert held["prestress_energy"] == pytest.approx(found[1.0], rel=1e-6)
+    at_start = held["opening_angle"][..., 0]
+    assert np.abs(at_start - 46.0 - apart).max() < 1e-9
+
+
 def test_a_scene_without_errors_is_as_it_was() -> None:
     scene = ring()
     layout = layout_of(scene)
@@ -199,6 +220,8 @@ def test_a_scene_without_errors_is_as_it_was() -> None:
     ("ring18", {"rods.length_error": {"bar_upper_left": 0.1}}, "bar_upper_left = 0.1"),
     ("ring18", {"rods.length_error": {"bar_upper_left": [1e-4, 0.0]}}, "has 2 values"),
     ("ring18", {"rods.length_error": {}, "rods.kind": "ancf"}, "rods.length_error needs rods.kind"),
+    ("ring18", {"structure.angle_error": -20.0, "structure.opening_angle": 12.0}, "must leave"),
+    ("ring18", {"structure.angle_error": 0.1, "rods.kind": "ancf"}, "angle_error needs rods.kind"),
     ("planar-truss", {"rods.length_error": {}}, "rods.length_error needs structure.kind"),
     ("planar-truss", {"record.shape": True}, "record.shape = true needs structure.kind"),
 ])  # fmt: skip
