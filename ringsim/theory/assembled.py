@@ -8,8 +8,8 @@ elastic energy of the rods,
 or every opening angle, where sections are held at their own; u and psi are strains against the
 natural lengths (``ringsim.theory.screws``).  Loads, net and springs do not act yet.  Stationary
 points are found by Gauss and Newton's method with Lagrange's multipliers for joints and angles.
-How a free structure lies in space, and what else its joints leave free, stays as near to the drawing
-as a weak spring on every frame in each iteration keeps it.
+How a free structure lies in space, and what else its joints leave free, stays as near to the
+drawing as a weak spring on every frame in each iteration keeps it.
 """
 
 from dataclasses import replace
