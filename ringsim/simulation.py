@@ -22,6 +22,7 @@ from ringsim.outputs.stored import StoredState
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene, load_scene
+from ringsim.scene.substituted import substituted
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.restarts import run_with_restarts
 from ringsim.stored_state import require_fit
@@ -155,6 +156,7 @@ def _run(
 ) -> Outcome:  # fmt: skip
     """Run a scene with an engine, which may raise what is a ``refusal``."""
     begin = (time.perf_counter(), time.process_time())
+    scene = substituted(scene)
 
     def start(solver: Solver) -> Outcome:
         """One start; times count from the first."""

@@ -9,11 +9,14 @@ from ringsim.choice import kind_of
 from ringsim.cli.options import SETTINGS
 from ringsim.layout.layout import Layout, layout_of
 from ringsim.layout.mobility import internal_mobility
-from ringsim.refusal import show
+from ringsim.refusal import InputError, show
 from ringsim.scene import Scene, load_scene
+from ringsim.scene.substituted import strained, substituted
+from ringsim.theory.assembled import assembled
+from ringsim.theory.deployed import deployed
 from ringsim.units import Model
 
-_ASKED = ("margin", "hinge_spring")
+_ASKED = ("margin", "hinge_spring", "temperature")
 """What few scenes name: not told of as left out."""
 MOST_SECTIONS_FOR_MOBILITY = 72
 """Larger rings take seconds, and their answer is the same."""
@@ -47,7 +50,7 @@ def command(scene: str, settings: dict[str, Any], time: float | None, margin: bo
     if margin:
         from ringsim.cli.margin_table import margin_lines
 
-        for text in margin_lines(loaded):
+        for text in margin_lines(substituted(loaded)):
             click.echo(text)
         return
     for label, text in _summary(loaded).items():
@@ -65,6 +68,7 @@ def _summary(scene: Scene) -> dict[str, str]:
         "scene": f"{scene.name}: {scene.title}" if scene.title else scene.name,
         **scene.structure.describe(),
         **_layout(scene),
+        "assembly": _assembly(scene),
         **{name: _fields(part) for name, part in parts.items() if part is not None},
         "faults": "; ".join(map(_fields, scene.faults)),
         "friction": ", ".join(friction),
@@ -92,6 +96,21 @@ def _layout(scene: Scene) -> dict[str, str]:
         "mobility": _mobility(layout),
         "mass": f"{sum(masses.values()):.4g} kg: {parts}",
     }
+
+
+def _assembly(scene: Scene) -> str:
+    """What lengths of rods do without a run; empty if these are as drawn."""
+    if not strained(scene):
+        return ""
+    made = substituted(scene)
+    try:
+        start, end = assembled(layout_of(made), made.rods), deployed(made)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    return (
+        f"prestress {start.energy:.3g} J at the start, {end.energy:.3g} J deployed at rest, "
+        f"corners {end.rms:.3g} m (rms) from the design"
+    )
 
 
 _JOINTS = {

@@ -66,14 +66,25 @@ class Assembly:
         """Indices of a node's coordinates in the system vector: exudyn keeps the nodes' order."""
         return self._places[int(node)]
 
-    def add_rigid_node(self, pose: Pose) -> Any:
-        """A node with Euler parameters, of a body at rest: the pose's rates are accelerations."""
+    def add_rigid_node(self, pose: Pose, natural: Pose | None = None) -> Any:
+        """A node with Euler parameters, of a body at rest: the pose's rates are accelerations.
+
+        Elements are free of strain where their nodes are at their ``natural`` poses.
+        """
         turn = turn_of(pose.axes)
         turning = turn_rates(turn[None], pose.turn[None])[0]
-        node = self.add_node(
-            item.NodeRigidBodyEP(referenceCoordinates=[*pose.place, *turn]),
-            np.concatenate([pose.rate, turning]),
-        )
+        made = item.NodeRigidBodyEP(referenceCoordinates=[*pose.place, *turn])
+        if natural is not None:
+            reference = np.concatenate([natural.place, turn_of(natural.axes)])
+            # Of the two quaternions of a rotation the one that is near the reference.
+            same = np.copysign(1.0, turn @ reference[3:])
+            turning = same * turning
+            made.referenceCoordinates = reference.tolist()
+            made.initialCoordinates = [
+                *(pose.place - reference[:3]),
+                *(same * turn - reference[3:]),
+            ]
+        node = self.add_node(made, np.concatenate([pose.rate, turning]))
         self.rigid_nodes.append(node)
         return node
 

@@ -38,7 +38,7 @@ class Hanging:
 
     def reaction(self, state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
         """See ``ringsim.engine.connectors.Reacting``."""
-        moved = (state.position - state.reference)[self._where]
+        moved = (state.position - state.begun)[self._where]
         rates = state.velocity[self._where]
         found = self._hung.law.hold(self._hung.up, self._hung.lifts, moved, rates)
         return Reaction(0.0, -found.friction, found.stored), rates

@@ -21,9 +21,11 @@ from ringsim.engine.positions import PositionMeter
 from ringsim.engine.readings import Openings, State, joint_groups
 from ringsim.engine.rotations import Array
 from ringsim.engine.settings import newton_norm, solver_settings
+from ringsim.engine.shape import ShapeMeter
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
 from ringsim.scene import Scene
+from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
@@ -65,8 +67,10 @@ class Integration:
         gauge = scene.structure.gauge
         self._bending = BendingMeter(model, gauge) if gauge else None
         self._position = PositionMeter(model) if scene.record.positions else None
+        shaped = scene.record.shape or strained(scene)
+        self._shape = ShapeMeter(model) if shaped else None
         coordinates = {"rod": np.array(list(model.layout.halves()))}
-        for meter in (self._position, self._shock):
+        for meter in (self._position, self._shock, self._shape):
             coordinates |= {} if meter is None else meter.coordinates
         if self._bending is not None:
             coordinates["station"] = self._bending.stations
@@ -211,6 +215,7 @@ class Integration:
                 strain=None if self._bending is None else self._bending.read(),
                 carried=None if self._base is None else self._base.read(now),
                 accelerations=None if self._shock is None else self._shock.read(),
+                put=None if self._shape is None else self._shape.read(self._state),
             )
         )
         return now

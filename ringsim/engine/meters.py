@@ -73,7 +73,7 @@ class EnergyMeter:
             if chain is not None and old_chain is not None:
                 driven, lost_in_cables = work_between(old_chain, chain)
                 lost += lost_in_cables
-        work = float(np.sum(self._forces * (state.position - state.reference)[self._loaded]))
+        work = float(np.sum(self._forces * (state.position - state.begun)[self._loaded]))
         if self._weight is not None:
             done = self._weight.work(state)
             self._lifted = done if self._lifted is None else self._lifted

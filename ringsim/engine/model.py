@@ -15,6 +15,7 @@ from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod
 from ringsim.layout.layout import layout_of
 from ringsim.layout.pose import Pose
 from ringsim.scene import Scene
+from ringsim.theory.assembled import assembled
 from ringsim.theory.first_reaction import Acceleration, first_acceleration
 from ringsim.theory.one_coordinate import OneCoordinate
 
@@ -45,10 +46,11 @@ class Multibody:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.scene, self.layout = scene, layout_of(scene)
+        drawn = layout_of(scene)
+        self.scene, self.layout = scene, assembled(drawn, scene.rods).layout
         self.formulation = formulation = FORMULATIONS[type(scene.rods)]
         self.assembly = assembly = Assembly()
-        self.ideal = OneCoordinate(scene, self.layout)
+        self.ideal = OneCoordinate(scene, drawn)
         self.moving = first_acceleration(self.layout, self.ideal, scene.structure.coordinate)
         started = _started(self.moving)
         self.bodies: list[tuple[Any, Any]] = []
@@ -60,7 +62,7 @@ class Multibody:
         self.rods: list[BuiltRod] = []
         self.loose: dict[str, Any] = {}
         for part in self.layout.rods:
-            poses = [started(part.station(share)) for share in part.stations]
+            poses = [started(part.node(station)) for station in range(len(part.stations))]
             rod = add_rod(assembly, formulation, part, poses, scene.rods)
             self.rods.append(rod)
             for station, mass, _ in part.masses:

@@ -14,12 +14,15 @@ from ringsim.layout.joints import ChordOpening
 
 
 class State:
-    """Total coordinates and rates of a model, copied from exudyn by ``refresh``."""
+    """Total coordinates and rates of a model, copied from exudyn by ``refresh``; ``begun`` are
+    those from which a run starts.
+    """
 
     def __init__(self, model: Multibody) -> None:
         self._data = model.assembly.system.systemData
         self.reference = np.array(self._data.GetODE2Coordinates(exu.ConfigurationType.Reference))
         self.refresh()
+        self.begun = self.position.copy()
 
     def refresh(self) -> None:
         """Copy exudyn's current state."""

@@ -1,6 +1,7 @@
 """Rods as chains of beam elements, in the formulation of the scene's kind of rods."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import exudyn as exu
@@ -38,9 +39,9 @@ class GeometricallyExact:
     """Whether exudyn reports strains, forces and moments of the elements."""
     constant_curvature = True
 
-    def add_node(self, assembly: Assembly, pose: Pose) -> Any:
+    def add_node(self, assembly: Assembly, pose: Pose, natural: Pose | None) -> Any:
         """A node at a pose; as for ``Assembly.add_rigid_node``."""
-        return assembly.add_rigid_node(pose)
+        return assembly.add_rigid_node(pose, natural)
 
     def add_element(self, assembly: Assembly, nodes: list[Any], length: float, section: Any) -> Any:
         """Exudyn's ObjectBeamGeometricallyExact, and a damper if the section is damped.
@@ -80,8 +81,9 @@ class Ancf:
     has_strains = False
     constant_curvature = False
 
-    def add_node(self, assembly: Assembly, pose: Pose) -> Any:
+    def add_node(self, assembly: Assembly, pose: Pose, natural: Pose | None) -> Any:
         """A node with position and the slope vectors along y and z."""
+        assert natural is None, "rods of this kind are as long as drawn"
         y, z = pose.axes[:, 1], pose.axes[:, 2]
         return assembly.add_node(
             item.NodePointSlope23(referenceCoordinates=[*pose.place, *y, *z]),
@@ -132,8 +134,9 @@ def beam_section(rods: Rods, part: parts.Rod, constant_over: float) -> Any:
     across = 1.0 / (1.0 / direct + constant_over**2 / (12.0 * young * second))
     stiffness = np.diag([young * area, across, across, shear * 2.0 * second, bending, bending])
     section = exu.BeamSection()
-    section.massPerLength = rods.density * area
-    section.inertia = rods.density * np.diag([2.0 * second, second, second])
+    density = rods.density / (1.0 + part.strain)  # its mass is that of the length that is drawn
+    section.massPerLength = density * area
+    section.inertia = density * np.diag([2.0 * second, second, second])
     section.stiffnessMatrix = stiffness
     section.dampingMatrix = rods.damping * stiffness
     return section
@@ -143,10 +146,21 @@ def add_rod(
     assembly: Assembly, formulation: Formulation, part: parts.Rod, poses: Sequence[Pose], rods: Rods
 ) -> BuiltRod:
     """A rod of the layout with the poses of its nodes; as for ``Assembly.add_rigid_node``."""
-    nodes = [formulation.add_node(assembly, pose) for pose in poses]
+    naturals = _natural(part) if part.nodes else [None] * len(poses)
+    nodes = [
+        formulation.add_node(assembly, pose, natural)
+        for pose, natural in zip(poses, naturals, strict=True)
+    ]
     elements = []
-    for k, length in enumerate(part.lengths.tolist()):
+    for k, length in enumerate(part.natural_lengths.tolist()):
         section = beam_section(rods, part, length if formulation.constant_curvature else 0.0)
         elements.append(formulation.add_element(assembly, nodes[k : k + 2], length, section))
     assembly.bodies += elements
     return BuiltRod(nodes, elements)
+
+
+def _natural(part: parts.Rod) -> list[Pose]:
+    """Poses of a rod's nodes where nothing strains it."""
+    start, along = part.start, part.start.axes[:, 0]
+    stations = np.concatenate([[0.0], np.cumsum(part.natural_lengths)])
+    return [replace(start, place=start.place + station * along) for station in stations]

@@ -15,6 +15,7 @@ from ringsim.frame.meter import EnergyMeter
 from ringsim.frame.model import FrameModel
 from ringsim.frame.positions import PositionMeter
 from ringsim.frame.secants import Secants
+from ringsim.frame.shape import ShapeMeter
 from ringsim.frame.state import State
 from ringsim.frame.stresses import StressMeter
 from ringsim.layout.pose import Array
@@ -24,6 +25,7 @@ from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.scene import Scene
+from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
@@ -82,8 +84,10 @@ class Integration:
         self._locks = (
             Locks(first.angles, stowed, scene.structure.planes) if scene.structure.locks else None
         )
+        shaped = scene.record.shape or strained(scene)
+        self._shape = ShapeMeter(model) if shaped else None
         own = {"rod": np.array(list(model.layout.halves()))}
-        for meter in (self._position, self._shock):
+        for meter in (self._position, self._shock, self._shape):
             own |= {} if meter is None else meter.coordinates
         self.history = Recorder(scene, own)
         ropes = None if model.cables is None else model.cables.ropes.content
@@ -257,6 +261,7 @@ class Integration:
                 places=None if self._position is None else self._position.read(self._now),
                 carried=None if self._base is None else self._base.read(self._now),
                 accelerations=None if self._shock is None else self._shock.read(self._now),
+                put=None if self._shape is None else self._shape.read(self._now),
             )
         )
         return now

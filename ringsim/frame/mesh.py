@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ringsim.frame.parts import Indices, Parts
-from ringsim.frame.skeleton import Element, Skeleton, inertia_of, stiffness_of
+from ringsim.frame.skeleton import Element, Skeleton, inertia_of
 from ringsim.layout.layout import SPACECRAFT
 from ringsim.layout.pose import Array
+from ringsim.layout.stiffness import stiffness_of
 from ringsim.parts.rods.family import Rods
 
 
@@ -65,10 +66,11 @@ def mesh_of(
     """
     layout, elements = skeleton.layout, []
     for number, rod in enumerate(layout.rods):
-        for k, length in enumerate(rod.lengths.tolist()):
+        for k, (drawn, length) in enumerate(zip(rod.lengths, rod.natural_lengths, strict=True)):
             ends = skeleton.end(number, k), skeleton.end(number, k + 1)
-            mass = inertia_of(rod.density, rod.tube, length)
-            elements.append(Element(*ends, length, stiffness_of(rod, rods, length), mass))
+            mass = inertia_of(rod.density, rod.tube, float(drawn))
+            stiffness = stiffness_of(rod, rods, float(length))
+            elements.append(Element(*ends, float(length), stiffness, mass))
     elements += boom
     parts, points = Parts(skeleton, elements, touching), _Points()
     pairs = [(element.first, element.second) for element in elements]

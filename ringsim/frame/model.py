@@ -10,7 +10,7 @@ from ringsim.frame.cables import FrameCables
 from ringsim.frame.factored import Border, Factored
 from ringsim.frame.following import Coefficients, Followed
 from ringsim.frame.hanging import Hanging
-from ringsim.frame.kernels import Pose, Strains, begin_tangent, move
+from ringsim.frame.kernels import Pose, Strains, add_forces, begin_tangent, move
 from ringsim.frame.laws import JointLaws, Openings
 from ringsim.frame.lines import Arms, no_lines
 from ringsim.frame.mesh import mesh_of
@@ -23,6 +23,7 @@ from ringsim.layout.pose import Array
 from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.theory.assembled import assembled
 from ringsim.theory.first_reaction import first_acceleration
 from ringsim.theory.one_coordinate import OneCoordinate
 from ringsim.theory.scales import residual_tolerance
@@ -46,8 +47,9 @@ class FrameModel:
     def __init__(self, scene: Scene) -> None:
         if not isinstance(scene.rods, GeometricallyExactRods):
             raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
-        self.scene, self.layout = scene, layout_of(scene)
-        self.ideal = OneCoordinate(scene, self.layout)
+        drawn = layout_of(scene)
+        self.scene, self.layout = scene, assembled(drawn, scene.rods).layout
+        self.ideal = OneCoordinate(scene, drawn)
         self.gravity = np.zeros(3) if self.layout.gravity is None else self.layout.gravity
         self.moving = first_acceleration(self.layout, self.ideal, scene.structure.coordinate)
         self.skeleton = skeleton = Skeleton(self.layout)
@@ -242,6 +244,10 @@ class FrameModel:
             self._held,
         )  # fmt: skip
         self._place(state)
+        if any(rod.nodes for rod in self.layout.rods):
+            held = Strains(state.strains, np.zeros_like(state.strains), 0.0)
+            points, unloaded = state.place.points, np.zeros(self.mesh.unknowns)
+            add_forces(self.mesh, pose, points, np.zeros_like(points), held, unloaded)
         # Accelerations of the points: differences of places along the motion.
         ahead, behind = state.copy(), state.copy()
         small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)

@@ -10,11 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod, Rod
+from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod
 from ringsim.layout.joints import Joint
 from ringsim.layout.layout import BoomBeam, Layout
 from ringsim.layout.pose import Array, Pose
-from ringsim.parts.rods.family import Rods
 from ringsim.parts.tube import Tube
 from ringsim.refusal import InputError
 
@@ -84,7 +83,7 @@ class Skeleton:
         key = rod, station
         if key not in self._ends:
             part = self.layout.rods[rod]
-            pose = part.station(part.stations[station])
+            pose = part.node(station)
             self._frame(pose)
             self._ends[key] = End(len(self.places) - 1, np.zeros(3), np.eye(3), -1)
         return self._ends[key]
@@ -171,15 +170,6 @@ class Skeleton:
         self.angle_rates.append(rate)
         self.angle_of[joint] = len(self.angles) - 1
         return len(self.angles) - 1
-
-
-def stiffness_of(rod: Rod, rods: Rods, length: float) -> Array:
-    """Stiffness of u and psi, shape (6,), N/m and N m; see ``ringsim.frame.element``."""
-    young, area, second = rod.young_modulus, rod.tube.area, rod.tube.second_moment
-    shear, bending = young * rods.shear_modulus_ratio, young * second
-    direct = rod.tube.shear_factor(rods.poisson_ratio) * shear * area
-    across = 1.0 / (1.0 / direct + length**2 / (12.0 * bending))
-    return np.array([young * area, across, across, 2.0 * shear * second, bending, bending]) / length
 
 
 def inertia_of(density: float, tube: Tube, length: float) -> Array:

@@ -53,6 +53,8 @@ class Rod:
     they are called where masses are listed and lines are drawn.  ``stations`` are the shares of the
     length, from 0 to 1, at which nodes are, with elements between; ``masses`` are point masses on
     nodes: station, kg, and what they are called.  ``young_modulus`` in Pa, ``density`` in kg/m^3.
+    It is made longer than it is drawn by the share ``strain``; an assembled structure
+    (``ringsim.theory.assembled``) tells where its ``nodes`` then are, one a station.
     """
 
     name: str
@@ -65,6 +67,8 @@ class Rod:
     density: float
     stations: tuple[float, ...]
     masses: tuple[tuple[int, float, str], ...] = ()
+    strain: float = 0.0
+    nodes: tuple[Pose, ...] = ()
 
     @cached_property
     def length(self) -> float:
@@ -80,6 +84,15 @@ class Rod:
     def lengths(self) -> Array:
         """Of its elements, m."""
         return np.diff(self.stations) * self.length
+
+    @property
+    def natural_lengths(self) -> Array:
+        """Of its elements where nothing strains them, m."""
+        return self.lengths * (1.0 + self.strain)
+
+    def node(self, station: int) -> Pose:
+        """The pose of a station by its number."""
+        return self.nodes[station] if self.nodes else self.station(self.stations[station])
 
     def station(self, share: float) -> Pose:
         """The pose at a share of the length."""
@@ -125,5 +138,4 @@ def pose_of(mount: Mount, bodies: Sequence[Body], rods: Sequence[Rod]) -> Pose:
         body = bodies[mount.body].pose
         place, rate = body.at(mount.arm)
         return Pose(place, body.axes @ mount.axes, rate, body.turn)
-    rod = rods[mount.rod]
-    return rod.station(rod.stations[mount.station])
+    return rods[mount.rod].node(mount.station)

@@ -87,6 +87,7 @@ class Draft:
         stations: Sequence[float],
         young_modulus: float,
         masses: tuple[tuple[int, float, str], ...] = (),
+        strain: float = 0.0,
     ) -> RodRef:
         """A straight rod whose joints turn about ``normal``; see ``Rod`` for what it is made of.
 
@@ -98,7 +99,7 @@ class Draft:
         start = Pose.of(ends[0], axes_along(ends[0], ends[1], normal))
         end = replace(start, place=real_of(ends[1]), rate=rate_of(ends[1]))
         rod = Rod(name, section, group, start, end, tube, young_modulus, self.scene.rods.density,
-                  tuple(float(share) for share in stations), masses)  # fmt: skip
+                  tuple(float(share) for share in stations), masses, strain)  # fmt: skip
         stretch = abs(float((end.rate - start.rate) @ start.axes[:, 0]))
         if stretch > _CLOSE * rod.length:
             raise ValueError(

@@ -101,7 +101,8 @@ class Layout:
     numbers of bodies; ``paths`` sheaves of each cable of the scene in order, from its first winch
     to its far end; ``forces`` constant ones: number of the joint whose first mount they act on,
     and vector, N; ``base`` the body that is held, or that a boom's upper end is fixed to;
-    ``gravity`` the weight of a kilogram, m/s^2; ``hung`` the lines of a ground test.
+    ``gravity`` the weight of a kilogram, m/s^2; ``hung`` the lines of a ground test;
+    ``held`` how much further open V-joints are held before a run, shape (planes, sections), rad.
     """
 
     bodies: tuple[Body, ...]
@@ -118,6 +119,7 @@ class Layout:
     base: int | None = None
     gravity: Array | None = None
     hung: Hung | None = None
+    held: Array | None = None
 
     def pose(self, mount: Mount) -> Pose:
         """The frame of a mount, with its own axes."""

@@ -12,6 +12,7 @@ from ringsim.choice import kind_of
 from ringsim.outputs.peaks import Peak, SpanNames, Values
 from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
+from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Array
 from ringsim.variables import ErrorBar, Variable
 
@@ -129,6 +130,8 @@ def holds(scene: Scene) -> set[str]:
             for winch in cable.winches
         ),
         "reactions": scene.record.reactions,
+        "shape": scene.record.shape,
+        "prestress": bool(strained(scene)),
         "base": scene.boom is not None or scene.structure.supported,
         "held base": scene.held or scene.spacecraft is not None,
     }

@@ -31,6 +31,13 @@ class Carried(NamedTuple):
     stops: Array | None
 
 
+class Put(NamedTuple):
+    """Places of the corners, shape (planes, corners, 3), m, and elastic energy of the rods, J."""
+
+    corners: Array
+    rods: float
+
+
 @dataclass(frozen=True)
 class Reading(Instant):
     """An instant with all that outputs read; to them its energies tell ``work`` with what the
@@ -53,6 +60,9 @@ class Reading(Instant):
     """What base and stops carry; None unless recorded."""
     accelerations: Array | None = None
     """Of the corners, shape (corners, 3), m/s^2; None unless recorded."""
+
+    put: Put | None = None
+    """Where corners are and what the rods store; None unless recorded."""
 
     def by_plane(self, of_cables: NDArray[Any]) -> Array:
         """A number for each plane, from one for each cable; NaN where a plane has no cable."""

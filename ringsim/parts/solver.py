@@ -111,3 +111,5 @@ class Record(Model):
     goes on; a step ends at each.  Left out, none is stored."""
     reactions: bool = False
     """Record force and torque at the base, how it turns, and the impulse of every lock."""
+    shape: bool = False
+    """Record how far corners are at the end from the deployed design."""

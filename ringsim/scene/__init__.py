@@ -32,8 +32,9 @@ from ringsim.parts.solver import Record, Solver
 from ringsim.parts.spacecraft import Spacecraft
 from ringsim.parts.stop.family import Stop
 from ringsim.parts.stop.spring_damper import SpringDamperStop
+from ringsim.parts.temperature import Temperature
 from ringsim.refusal import InputError, explain, known_or_nearest, models_in, show
-from ringsim.scene.checks import check_faults, check_margin
+from ringsim.scene.checks import check_faults, check_margin, check_rods
 from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import ListIn, Model
@@ -67,6 +68,8 @@ class Scene(Model):
     """Springs from the upper corners to a hub; left out, there is none."""
     loads: Loads | None = None
     """Forces on the V-joints; left out, there are none."""
+    temperature: Temperature | None = None
+    """Temperatures of parts; left out, everything is as the scene says."""
     gravity: Gravity | None = None
     """Weight of everything; left out, there is none."""
     offload: Offload | None = None
@@ -94,8 +97,9 @@ class Scene(Model):
                     "one value for all, or a list of that length"
                 )
         check_faults(self)
+        check_rods(self)
         self.structure.check(self)
-        for part in (self.spacecraft, self.gravity, self.offload):
+        for part in (self.spacecraft, self.gravity, self.offload, self.temperature):
             if part is not None:
                 part.check(self)
         if self.record.stress and isinstance(self.rods, AncfRods):
@@ -113,8 +117,7 @@ class Scene(Model):
                 f"limits.tension = {self.limits.tension:g} N needs a cable: add [cables.upper], or "
                 "leave the limit out"
             )
-        if self.margin is not None:
-            check_margin(self)
+        check_margin(self)
         if self.record.interval > self.solver.end_time:
             raise ValueError(
                 f"record.interval = {self.record.interval} s must not exceed solver.end_time = "

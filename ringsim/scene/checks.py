@@ -6,6 +6,7 @@ from ringsim.cable.faults.family import CableFault
 from ringsim.cable.limited import why_unlimited
 from ringsim.choice import kind_of
 from ringsim.parts.faults.failed_spring import FailedSpring
+from ringsim.scene.substituted import strained
 
 if TYPE_CHECKING:
     from ringsim.scene import Scene
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
 def check_margin(scene: "Scene") -> None:
     """Refuse (ValueError) a margin of what has none."""
+    if scene.margin is None:
+        return
     if (kind := kind_of(scene.structure)) != "pantograph-ring":
         raise ValueError(
             f'margin needs structure.kind = "pantograph-ring", not "{kind}" (leave it out)'
@@ -21,6 +24,27 @@ def check_margin(scene: "Scene") -> None:
         raise ValueError("margin: nothing drives the ring (add [cables.upper], or leave it out)")
     if reason := why_unlimited(scene.cables, scene.structure.planes):
         raise ValueError(reason)
+
+
+def check_rods(scene: "Scene") -> None:
+    """Refuse (ValueError) rods of other lengths where nothing can strain them."""
+    if scene.record.shape and kind_of(scene.structure) != "pantograph-ring":
+        raise ValueError(
+            'record.shape = true needs structure.kind = "pantograph-ring", not '
+            f'"{kind_of(scene.structure)}": only that has corners (leave it out)'
+        )
+    what = strained(scene)
+    if not what:
+        return
+    if (kind := kind_of(scene.structure)) != "pantograph-ring":
+        raise ValueError(
+            f'{what} needs structure.kind = "pantograph-ring", not "{kind}" (leave it out)'
+        )
+    if kind_of(scene.rods) == "ancf":
+        raise ValueError(
+            f'{what} needs rods.kind = "geometrically-exact", not "ancf": choose that, or leave '
+            f"{what} out"
+        )
 
 
 def check_faults(scene: "Scene") -> None:

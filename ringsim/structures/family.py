@@ -67,6 +67,12 @@ class Structure(Model):
         """
         raise NotImplementedError
 
+    def held_angles(self) -> NDArray[np.float64] | None:
+        """How much further than drawn each V-joint is held open before a run, shape (planes,
+        sections), rad; None if they are as drawn.
+        """
+        return None
+
     def basis(self, coordinate: float) -> NDArray[np.float64]:
         """Functions s of the coordinate in which all places are linear, if a kind has some, so
         that theory need not build a layout at each coordinate: every place is P s with constant P.

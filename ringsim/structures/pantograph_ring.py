@@ -1,6 +1,7 @@
 """The pantograph ring: closed, or an open arc of the same polygon (two sections: the truss)."""
 
 import math
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -11,11 +12,13 @@ from ringsim.choice import kind_of
 from ringsim.layout.bodies import Lump
 from ringsim.layout.draft import Draft
 from ringsim.layout.layout import Layout
+from ringsim.parts.persection import PerSection, spread
 from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_sections import add_sections
 from ringsim.structures.ring_geometry import RingGeometry
 from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
 
+AngleError = Annotated[float, Field(ge=-20.0, le=20.0), Unit("deg")]
 LEAST_OPENING = 1.0
 """Degree; below it stand angles meant in radians, and hardly a fold: two bar halves of 0.3 m end
 5 mm apart there, less than a bar is thick."""
@@ -53,6 +56,10 @@ class PantographRing(Structure):
     """Edge of the cube whose inertia a hinge assembly has (its density is 13 975 kg/m^3)."""
     opening_angle: Degree = 46.0
     """Initial angle between the bar halves: near 0 stowed, 180 deployed."""
+    angle_error: PerSection[AngleError] | None = None
+    """How much further open, upper and lower V-joints alike, a section is held before it is
+    released; left out, all are at ``opening_angle``, or as errors of their rods' lengths leave
+    them."""
 
     @model_validator(mode="after")
     def _possible(self) -> "PantographRing":
@@ -83,6 +90,12 @@ class PantographRing(Structure):
                 f"opening_angle = {self.opening_angle} deg must be at most 179.9: there is "
                 "nothing left to deploy"
             )
+        for error in np.ravel(0.0 if self.angle_error is None else self.angle_error):
+            if not LEAST_OPENING <= self.opening_angle + error <= 179.9:
+                raise ValueError(
+                    f"angle_error = {error:g} deg must leave opening_angle = {self.opening_angle} "
+                    f"deg between {LEAST_OPENING:g} and 179.9 deg: lower it"
+                )
         if self.corner_mass == 0.0:
             raise ValueError(
                 "corner_mass = 0.0 kg must be positive: a hinge assembly is a rigid body"
@@ -130,6 +143,12 @@ class PantographRing(Structure):
     def reach(self) -> float:
         """See ``Structure``."""
         return self.half_bar
+
+    def held_angles(self) -> NDArray[np.float64] | None:
+        """See ``Structure``."""
+        if self.angle_error is None:
+            return None
+        return np.radians(np.tile(spread(self.angle_error, self.sections), (2, 1)))
 
     def geometry(self) -> RingGeometry:
         """The ideal ring."""
@@ -185,7 +204,7 @@ class PantographRing(Structure):
         hinge = Lump("hinges", self.corner_mass, np.zeros(3), cube)
         draft.corners = [[draft.body(at, [hinge]) for at in plane] for plane in fold.corners]
         add_sections(draft, geometry, fold, draft.corners, self.vjoint_mass)
-        return draft.finish()
+        return replace(draft.finish(), held=self.held_angles())
 
 
 def _size(geometry: RingGeometry, phi: float) -> str:

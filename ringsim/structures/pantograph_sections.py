@@ -6,6 +6,7 @@ import numpy as np
 
 from ringsim.layout.draft import BodyRef, Draft, Track
 from ringsim.parts.persection import spread
+from ringsim.parts.rods.length_error import errors_of
 from ringsim.structures.ring_geometry import Fold, RingGeometry
 
 
@@ -27,7 +28,10 @@ def add_sections(
     the rods' names.
     """
     rods = draft.scene.rods
-    young = spread(rods.young_modulus, geometry.sections).tolist()
+    young, young_bar = (
+        spread(rods.young_of(group), geometry.sections).tolist() for group in ("diagonal", "bar")
+    )
+    strains = errors_of(rods, geometry.sections)
     whole, half = (np.arange(n + 1) / n for n in (2 * rods.elements, rods.elements))
     middle = ((rods.elements, vjoint_mass, "V-joints"),) if vjoint_mass > 0.0 else ()
     tracks: tuple[list[Any], list[Any]] = ([], [])
@@ -39,7 +43,8 @@ def add_sections(
             ends = [pins[end][side] for end, side in enumerate(sides)]
             diagonals.append(
                 draft.rod(f"{prefix}diagonal_{name}", section, "diagonals", ends, normal,
-                          rods.diagonal, whole, young[section])
+                          rods.diagonal, whole, young[section],
+                          strain=strains[f"diagonal_{name}"][section])
             )  # fmt: skip
             for end, side in enumerate(sides):
                 parts = diagonals[-1], held[end][side]
@@ -52,7 +57,8 @@ def add_sections(
                 bars.append(
                     draft.rod(f"{prefix}bar_{name}_{name_of_half}", section, "bars",
                               (at, pin) if end else (pin, at), normal, rods.bar, half,
-                              young[section], () if end else middle)
+                              young_bar[section], () if end else middle,
+                              strains[f"bar_{name}_{name_of_half}"][section])
                 )  # fmt: skip
                 draft.joint("revolute", "hinge", section, (bars[end], body), pin)
                 track.append(draft.on(body, pin))

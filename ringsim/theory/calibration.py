@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 from ringsim.cable.bracket.bar_half import BarHalfBracket
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.scene.substituted import substituted
 from ringsim.structures.pantograph_ring import LEAST_OPENING, PantographRing
 from ringsim.theory.ideal_course import Course
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
@@ -37,7 +38,7 @@ def opening_angle_for(scene: Scene, time: float) -> float:
     if not (math.isfinite(time) and time > 0.0):
         raise InputError(f"a deployment time of {time:g} s must be finite and above 0 s")
     end = min(max(_PATIENCE * time, scene.solver.step), _LONGEST)
-    plain = scene.with_values({"record.stress": False, "solver.end_time": end})
+    plain = substituted(scene).with_values({"record.stress": False, "solver.end_time": end})
     refuse_if_not_ideal(plain)
     cables = [] if scene.cables is None else [cable for _, cable in scene.cables.present()]
     # From these angles on every cable's bracket opens the ring, and no stop is in contact.

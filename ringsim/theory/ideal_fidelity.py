@@ -16,6 +16,7 @@ from ringsim.layout.layout import layout_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.scene.substituted import strained, substituted
 from ringsim.theory.drive_margin import with_margin
 from ringsim.threads import one_thread
 from ringsim.variables import PLANES, Cause, Outcome, Status
@@ -34,7 +35,7 @@ def refuse_if_not_ideal(scene: Scene) -> None:
     InputError
         One line with the field, the reason and the cure.
     """
-    cure = "(leave it out, or use the full fidelity)"
+    scene, cure = substituted(scene), "(leave it out, or use the full fidelity)"
     kind = kind_of(scene.structure)
     if kind != "pantograph-ring":
         raise InputError(
@@ -57,6 +58,17 @@ def refuse_if_not_ideal(scene: Scene) -> None:
             "record.positions = true: the ideal ring's shape follows from its one opening angle, "
             "and what it floats along is not integrated (set it to false: drawings need none, or "
             "use the full fidelity)"
+        )
+    if scene.record.shape:
+        raise InputError(
+            "record.shape = true: the ideal ring opens to its drawing (set it to false, or use the "
+            "full fidelity)"
+        )
+    if what := strained(scene):
+        raise InputError(
+            f"{what}: rods that are not as long as drawn, or held at other angles, strain each "
+            "other, or let sections open differently: those of the ideal ring do neither (thermal "
+            "expansion makes rods longer, too) " + cure
         )
     if scene.offload is not None:
         raise InputError(
@@ -93,6 +105,7 @@ def run_ideal(scene: Scene) -> Outcome:
     InputError
         If the ideal ring cannot represent the scene.
     """
+    scene = substituted(scene)
     refuse_if_not_ideal(scene)
     # Here: only this fidelity needs scipy's integrators and splines, which load in half a second.
     from ringsim.theory.ideal_course import Course

@@ -1,7 +1,7 @@
 """The family of friction laws of joints."""
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -13,6 +13,9 @@ class JointFriction(Model):
 
     Fields of a kind may be ``PerSection``; its methods are called on ``at_section`` of it.
     """
+
+    proportional: ClassVar[tuple[str, ...]] = ()
+    """Fields that the torque is proportional to, all together."""
 
     def torque(self, rate: Any, xp: Any = np) -> Any:
         """Torque in N m against a rate in rad/s, of the rate's sign; ``xp``: see ``springs``."""

@@ -1,7 +1,7 @@
 """Viscous and dry friction."""
 
 import math
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from ringsim.units import AngularRate, Torque, TorsionDamping
 
 class ViscousCoulombFriction(JointFriction):
     """Torque against the relative rate w: viscous * w + coulomb * tanh(w / rate)."""
+
+    proportional: ClassVar[tuple[str, ...]] = ("viscous", "coulomb")
 
     kind: Literal["viscous-coulomb"] = "viscous-coulomb"
     viscous: PerSection[TorsionDamping] = 0.0

@@ -1,0 +1,79 @@
+"""How far the structure that has opened is from its drawing."""
+
+import math
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ringsim.layout.layout import layout_at_opening
+from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+
+
+class Shape(Output):
+    """Distances of all corners from where the drawing has them when deployed, at the run's end.
+
+    The drawing is moved as a rigid body to where the sum of the squares of these distances is the
+    least (Kabsch, Acta Crystallographica A 32, 1976).
+    """
+
+    rank = 49
+    needs = ("shape",)
+    coordinates = (Variable("corner", ("corner",), "1", "corner of the structure, from 1", "i4"),)
+    variables = (
+        Variable(
+            "corner_deviation", ("plane", "corner"), "m",
+            "distance of a corner at the end from the deployed design, after the best fit",
+        ),
+        Variable(
+            "best_fit_rms", (), "m", "root of the mean square of all corners' deviations",
+            summary=("best-fit rms", "10.3e"),
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> Array | None:
+        """Places of the corners, shape (planes, corners, 3), m."""
+        return None if now.put is None else now.put.corners
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Of the last state."""
+        drawn = layout_at_opening(run.scene, math.pi)
+        places = [[drawn.bodies[number].pose.place for number in p] for p in drawn.corners]
+        found = deviations(series.values[-1], np.array(places))
+        return {"corner_deviation": found, "best_fit_rms": np.sqrt(np.mean(found**2))}
+
+
+def deviations(places: Array, drawn: Array) -> Array:
+    """Distances (m) of places from a drawing that is moved to fit best, shape (...), from (..., 3).
+
+    >>> square = np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+    >>> deviations(square[:, [1, 0, 2]] + 5.0, square).round(12).tolist()
+    [0.0, 0.0, 0.0, 0.0]
+    """
+    from_centre = [
+        each.reshape(-1, 3) - each.reshape(-1, 3).mean(axis=0) for each in (places, drawn)
+    ]
+    turn, _ = Rotation.align_vectors(*from_centre)
+    apart = from_centre[0] - turn.apply(from_centre[1])
+    return np.asarray(np.linalg.norm(apart, axis=1).reshape(places.shape[:-1]))
+
+
+class Prestress(Output):
+    """Elastic energy of the rods, from what assembling them has left on."""
+
+    rank = 59
+    needs = ("prestress",)
+    variables = (
+        Variable("rod_energy", ("time",), "J", "elastic energy of the rods"),
+        Variable(
+            "prestress_energy", (), "J", "elastic energy of the rods at the start",
+            summary=("prestress", "10.3e"),
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> float | None:
+        """In J."""
+        return None if now.put is None else now.put.rods
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """On the output grid, and the first."""
+        return {"rod_energy": series.on_grid(), "prestress_energy": series.values[0]}

@@ -1,0 +1,124 @@
+"""Temperatures of parts, and what they change."""
+
+from itertools import pairwise
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ringsim.parts.persection import PerSection
+from ringsim.units import ListIn, Model, Unit
+
+Kelvin = Annotated[float, Field(ge=1.0, le=2000.0), Unit("K")]
+Expansion = Annotated[float, Field(ge=-1e-3, le=1e-3), Unit("1/K")]
+PartFactor = Annotated[float, Field(gt=0.0, le=1e4), Unit("1")]
+Values = float | tuple[float, ...]
+
+
+class FactorTable(Model):
+    """Factors on a property at temperatures, joined by lines."""
+
+    temperatures: Annotated[tuple[Kelvin, ...], ListIn, Field(min_length=2, max_length=50)]
+    """Temperatures, increasing; one outside of them is refused."""
+    factors: Annotated[tuple[PartFactor, ...], ListIn]
+    """What the property that the scene names is multiplied by there."""
+
+    @model_validator(mode="after")
+    def _usable(self) -> Self:
+        if len(self.factors) != len(self.temperatures):
+            raise ValueError(
+                f"factors has {len(self.factors)} values, but temperatures has "
+                f"{len(self.temperatures)}: give one factor for each temperature"
+            )
+        late = [b for a, b in pairwise(self.temperatures) if b <= a]
+        if late:
+            raise ValueError(f"temperatures = ... {late[0]:g} K must be above the one before it")
+        return self
+
+    def require_covers(self, name: str, value: Values) -> None:
+        """Raise a ValueError if a temperature (K) of the part ``name`` lies outside."""
+        first, last = self.temperatures[0], self.temperatures[-1]
+        if min(np.ravel(value)) < first or max(np.ravel(value)) > last:
+            raise ValueError(
+                f"temperature.{name}.value must lie within {first:g} .. {last:g} K, for which its "
+                "table has factors: extend the table"
+            )
+
+    def at(self, value: Values) -> Values:
+        """Factors at temperatures (K), one or one a section."""
+        found = np.interp(value, self.temperatures, self.factors)
+        return tuple(found.tolist()) if found.ndim else float(found)
+
+
+class RodTemperature(Model):
+    """The temperature of a group of rods."""
+
+    value: PerSection[Kelvin] = 293.15
+    """Temperature of the rods, or of those of each section."""
+    expansion: Expansion = 0.0
+    """Thermal expansion: rods become longer by this times their temperature less ``reference``."""
+    stiffness: FactorTable | None = None
+    """Factors on ``rods.young_modulus``; left out, it is the same at all temperatures."""
+
+
+class JointTemperature(Model):
+    """The temperature of all joints."""
+
+    value: PerSection[Kelvin] = 293.15
+    """Temperature of the joints, or of those of each section."""
+    friction: FactorTable
+    """Factors on viscous and dry friction of all joints."""
+
+
+class PulleyTemperature(Model):
+    """The temperature of all pulleys."""
+
+    value: Kelvin = 293.15
+    """Temperature of the pulleys."""
+    friction: FactorTable
+    """Factors on ``friction.coefficient`` of all cables."""
+
+
+class Temperature(Model):
+    """Temperatures of groups of parts, uniform in each and constant in time.
+
+    A run is that of the scene with other lengths, stiffnesses and friction in place of this part:
+    see ``ringsim.scene.substituted``.  Length errors e become (1 + e) (1 + a (T - reference)) - 1;
+    hinge assemblies, ropes and the boom keep their sizes.
+    """
+
+    reference: Kelvin = 293.15
+    """Temperature at which rods are as long as the scene says."""
+    diagonal: RodTemperature | None = None
+    """Of the diagonals; left out, they are at ``reference``."""
+    bar: RodTemperature | None = None
+    """Of the folding bars; left out, they are at ``reference``."""
+    joint: JointTemperature | None = None
+    """Of the joints; left out, their friction is as given."""
+    pulley: PulleyTemperature | None = None
+    """Of the pulleys; left out, their friction is as given."""
+
+    def check(self, scene: Any) -> None:
+        """Raise a ValueError where a table does not reach, or has nothing to act on."""
+        tables = [(name, group, group.stiffness) for name, group in self.rods()]
+        for name, group, table in tables:
+            if table is not None:
+                table.require_covers(name, group.value)
+        if self.joint is not None:
+            self.joint.friction.require_covers("joint", self.joint.value)
+            if not scene.joints.present():
+                raise ValueError(
+                    "temperature.joint: no joint has friction: add one, as [joints.hinge], or "
+                    "leave it out"
+                )
+        if self.pulley is not None:
+            self.pulley.friction.require_covers("pulley", self.pulley.value)
+            if scene.cables is None:
+                raise ValueError(
+                    "temperature.pulley: there is no cable: add [cables.upper], or leave it out"
+                )
+
+    def rods(self) -> list[tuple[str, RodTemperature]]:
+        """Groups of rods that have a temperature of their own, by name."""
+        groups = ("diagonal", self.diagonal), ("bar", self.bar)
+        return [(name, group) for name, group in groups if group is not None]

@@ -1,0 +1,237 @@
+"""Rods that are not as long as drawn: what they strain, and where the structure then is."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ringsim.engine.integrate import solve as by_exudyn
+from ringsim.frame.integrate import solve as by_frames
+from ringsim.layout.bodies import Lump, Rod
+from ringsim.layout.draft import Draft
+from ringsim.layout.layout import Layout, layout_at_opening, layout_of
+from ringsim.layout.pose import STEP
+from ringsim.parts.rods.length_error import LengthError
+from ringsim.refusal import InputError
+from ringsim.scene import Scene, load_scene
+from ringsim.theory.assembled import assembled
+from ringsim.theory.deployed import deployed
+from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
+from ringsim.theory.screws import strains
+
+NAMES = tuple(LengthError.model_fields)
+
+
+def ring(sections: int = 4, **values: Any) -> Scene:
+    """A free ring of sections and loads alone; of its values a double underscore is a dot."""
+    plain = {"structure.sections": sections, "net": "none", "boom": "none"}
+    given = {name.replace("__", "."): value for name, value in values.items()}
+    return load_scene("ring18").with_values(plain | given)
+
+
+def scattered(size: float, sections: int = 4, seed: int = 1) -> dict[str, list[float]]:
+    draw = np.random.default_rng(seed)
+    return {name: (size * draw.standard_normal(sections)).tolist() for name in NAMES}
+
+
+def length(rod: Rod) -> float:
+    """Distance of the ends as assembled."""
+    return float(np.linalg.norm(rod.nodes[-1].place - rod.nodes[0].place))
+
+
+def axial_force(rod: Rod) -> float:
+    """By the strain of a straight rod."""
+    natural = rod.length * (1.0 + rod.strain)
+    return rod.young_modulus * rod.tube.area * (length(rod) / natural - 1.0)
+
+
+def square(errors: list[float]) -> Layout:
+    """A square of 1 m with both diagonals, six rods on pins: once statically indeterminate."""
+    scene = load_scene("truss2").with_values(dict.fromkeys(("boom", "net", "cables"), "none"))
+    draft = Draft(scene.with_values({"loads": "none"}))
+    still = 0j * STEP
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) + still
+    lump = Lump("hinges", 0.01, np.zeros(3), 1e-6 * np.eye(3))
+    bodies = [draft.body(at, [lump]) for at in corners]
+    normal = np.array([0.0, 0.0, 1.0]) + still
+    pairs = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2), (1, 3)]
+    for number, (pair, error) in enumerate(zip(pairs, errors, strict=True)):
+        ends = [corners[k] for k in pair]
+        rod = draft.rod(
+            f"rod_{number}", 0, "rods", ends, normal, scene.rods.bar, (0.0, 1.0), 1e11, strain=error
+        )
+        for k in pair:
+            draft.joint("revolute", "hinge", 0, (rod, bodies[k]), corners[k])
+    return draft.finish()
+
+
+def test_forces_of_an_indeterminate_truss_are_those_of_linear_statics() -> None:
+    """Its state of self-stress is s = 1 in the sides and -sqrt(2) in the diagonals: the forces are
+    s X with sum s (e L + s X L / EA) = 0.  What is left out is quadratic in the errors.
+    """
+    errors = [2e-6, -1e-6, 0.5e-6, 3e-6, -2e-6, 1e-6]
+    layout = square(errors)
+    found = assembled(layout, load_scene("truss2").rods)
+    s = np.array([1.0, 1.0, 1.0, 1.0, -math.sqrt(2.0), -math.sqrt(2.0)])
+    lengths = np.array([rod.length for rod in layout.rods])
+    rigidity = 1e11 * layout.rods[0].tube.area
+    free = float(np.sum(s * errors * lengths))
+    x = -free / float(np.sum(s * s * lengths)) * rigidity
+    forces = np.array([axial_force(rod) for rod in found.layout.rods])
+    assert np.abs(forces / (s * x) - 1.0).max() < 1e-4
+    energy = 0.5 * float(np.sum((s * x) ** 2 * lengths)) / rigidity
+    assert found.energy == pytest.approx(energy, rel=1e-4)
+
+
+def test_corners_of_a_deployed_ring_of_three_are_those_of_a_pin_jointed_truss() -> None:
+    """12 bars hold its 6 corners: B u = e L, with u the displacements less those of a rigid body.
+    Rods bend where diagonals do not cross in their middles, with 1e-3 of the stiffness.
+    """
+    errors = scattered(1e-5, 3)
+    scene = ring(3, structure__hinge_offset=0.0, rods__length_error=errors)
+    drawn = layout_at_opening(scene, math.pi)
+    at = np.array([[drawn.bodies[k].pose.place for k in plane] for plane in drawn.corners])
+    bars: list[tuple[tuple[int, int], tuple[int, int], float]] = []
+    for k in range(3):
+        following = (k + 1) % 3
+        for plane, name in enumerate(("upper", "lower")):
+            halves = errors[f"bar_{name}_left"][k] + errors[f"bar_{name}_right"][k]
+            bars.append(((plane, k), (plane, following), 0.5 * halves))
+        bars.append(((1, k), (0, following), errors["diagonal_rising"][k]))
+        bars.append(((0, k), (1, following), errors["diagonal_falling"][k]))
+    places = at.reshape(-1, 3)
+    rows, longer = [], []
+    for one, other, error in bars:
+        first, second = 3 * one[0] + one[1], 3 * other[0] + other[1]
+        along = places[second] - places[first]
+        row = np.zeros((6, 3))
+        row[first], row[second] = -along, along
+        rows.append(row.ravel() / np.linalg.norm(along))
+        longer.append(error * np.linalg.norm(along))
+    matrix = np.array(rows)
+    assert np.linalg.matrix_rank(matrix) == 12
+    moved = np.linalg.lstsq(matrix, np.array(longer), rcond=None)[0].reshape(-1, 3)
+    # The least displacements are free of rigid motion, as is the best fit.
+    expected = np.linalg.norm(moved, axis=1)
+    found = deployed(scene).deviations.ravel()
+    assert np.abs(found - expected).max() < 5e-3 * expected.max()
+
+
+def test_errors_that_fit_strain_nothing() -> None:
+    """Two sections give way by their angles, and a ring of equal errors is a larger one."""
+    open_arc = load_scene("truss2").with_values({"rods.length_error": scattered(1e-4, 2)})
+    found = assembled(layout_of(open_arc), open_arc.rods)
+    assert found.energy < 1e-18
+    for rod in found.layout.rods:
+        assert length(rod) == pytest.approx((1.0 + rod.strain) * rod.length, abs=1e-13)
+    larger = ring(rods__length_error=dict.fromkeys(NAMES, 1e-3))
+    assert assembled(layout_of(larger), larger.rods).energy < 1e-15
+    assert deployed(larger).energy < 1e-15
+
+
+def test_forces_are_what_the_energy_changes_by() -> None:
+    """d E / d e = -N L at the least energy (Castigliano, Engesser), at the same mean angle."""
+    errors, step = scattered(1e-4), 1e-7
+
+    def at(change: float) -> Any:
+        moved = errors | {"diagonal_rising": list(errors["diagonal_rising"])}
+        moved["diagonal_rising"][2] += change
+        scene = ring(rods__length_error=moved)
+        return assembled(layout_of(scene), scene.rods)
+
+    layout = at(0.0).layout
+    rod = next(r for r in layout.rods if (r.name, r.section) == ("diagonal_rising", 2))
+    natural = rod.natural_lengths
+    place, axes = (np.array([getattr(node, k) for node in rod.nodes]) for k in ("place", "axes"))
+    # Along the arc: bending brings the ends as near to each other as the force does.
+    stretch = strains(natural)(place[:-1], axes[:-1], place[1:], axes[1:])[:, 0]
+    forces = rod.young_modulus * rod.tube.area * stretch / natural
+    slope = (at(step).energy - at(-step).energy) / (2.0 * step)
+    assert slope == pytest.approx(-float(np.sum(forces * rod.lengths)), rel=2e-3)
+
+
+def test_the_mean_angle_stays_and_joints_stay_closed() -> None:
+    scene = ring(rods__length_error=scattered(1e-3))
+    drawn, found = layout_of(scene), assembled(layout_of(scene), scene.rods).layout
+    angles, before = found.opening_angles()[0], drawn.opening_angles()[0]
+    assert abs(angles.mean() - before.mean()) < 1e-12
+    assert np.ptp(angles) > math.radians(0.1)
+    for joint in found.joints:
+        first, second = found.pose(joint.first), found.pose(joint.second)
+        assert np.abs(first.place - second.place).max() < 1e-12
+        assert first.axes[:, 2] @ second.axes[:, 2] > 1.0 - 1e-12
+
+
+def test_both_engines_start_where_they_balance() -> None:
+    """The prestress is theirs, and what accelerates them is the loads: without any they rest, but
+    for what the prestress changes by as the ring opens.
+    """
+    loaded = ring(rods__length_error=scattered(1e-4), solver__end_time=0.4, record__interval=0.1,
+                  solver__step_control="constant", solver__step=0.02)  # fmt: skip
+    one, two = by_exudyn(loaded).values, by_frames(loaded).values
+    prestress = assembled(layout_of(loaded), loaded.rods).energy
+    for values in (one, two):
+        assert values["prestress_energy"] == pytest.approx(prestress, rel=1e-6)
+    assert np.abs(one["opening_angle"] - two["opening_angle"]).max() < 1e-6
+    assert one["rod_energy"] == pytest.approx(two["rod_energy"], rel=1e-5)
+    free = loaded.with_values({"loads": "none", "solver.end_time": 0.1})
+    values = by_frames(free).values
+    assert np.nanmax(values["kinetic_energy"]) < 1e-3 * prestress
+
+
+def test_sections_are_held_at_their_own_angles_until_they_are_released() -> None:
+    """The energy goes with the square of how far angles differ; held alike they strain nothing."""
+    apart = np.array([0.02, -0.01, 0.03, -0.04])
+    found = {}
+    for size in (1.0, 2.0):
+        scene = ring(structure__angle_error=(size * apart).tolist())
+        drawn = layout_of(scene)
+        made = assembled(drawn, scene.rods)
+        more = np.degrees(made.layout.opening_angles()[0] - drawn.opening_angles()[0])
+        assert np.abs(more - size * apart).max() < 1e-9
+        found[size] = made.energy
+    assert found[2.0] == pytest.approx(4.0 * found[1.0], rel=2e-2)
+    alike = ring(structure__angle_error=0.5)
+    assert assembled(layout_of(alike), alike.rods).energy < 1e-16
+    shared = {"solver__end_time": 0.1, "record__interval": 0.05}
+    held = by_frames(ring(structure__angle_error=apart.tolist(), **shared)).values
+    assert held["prestress_energy"] == pytest.approx(found[1.0], rel=1e-6)
+    at_start = held["opening_angle"][..., 0]
+    assert np.abs(at_start - 46.0 - apart).max() < 1e-9
+
+
+def test_a_scene_without_errors_is_as_it_was() -> None:
+    scene = ring()
+    layout = layout_of(scene)
+    assert assembled(layout, scene.rods).layout is layout
+    assert "length_error" not in scene.to_toml()
+    assert "temperature" not in scene.to_toml()
+    zero = ring(rods__length_error={}, solver__end_time=0.3)
+    plain = ring(solver__end_time=0.3)
+    one, two = by_frames(plain).values, by_frames(zero).values
+    for name in one.keys() - {"wall_time", "cpu_time"}:
+        assert str(one[name].tolist()) == str(two[name].tolist()), name
+
+
+@pytest.mark.parametrize(("scene", "values", "words"), [
+    ("ring18", {"rods.length_error": {"bar_upper_left": 0.1}}, "bar_upper_left = 0.1"),
+    ("ring18", {"rods.length_error": {"bar_upper_left": [1e-4, 0.0]}}, "has 2 values"),
+    ("ring18", {"rods.length_error": {}, "rods.kind": "ancf"}, "rods.length_error needs rods.kind"),
+    ("ring18", {"structure.angle_error": -20.0, "structure.opening_angle": 12.0}, "must leave"),
+    ("ring18", {"structure.angle_error": 0.1, "rods.kind": "ancf"}, "angle_error needs rods.kind"),
+    ("planar-truss", {"rods.length_error": {}}, "rods.length_error needs structure.kind"),
+    ("planar-truss", {"record.shape": True}, "record.shape = true needs structure.kind"),
+])  # fmt: skip
+def test_bad_input_is_refused(scene: str, values: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        load_scene(scene).with_values(values)
+
+
+def test_the_ideal_ring_refuses_what_strains_it() -> None:
+    with pytest.raises(InputError, match=r"rods\.length_error: rods"):
+        refuse_if_not_ideal(ring(rods__length_error=scattered(1e-4)))
+    with pytest.raises(InputError, match=r"record\.shape = true"):
+        refuse_if_not_ideal(ring(record__shape=True))
