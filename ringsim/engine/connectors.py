@@ -23,7 +23,7 @@ from ringsim.layout.points import HUB
 from ringsim.layout.pose import turned_about_z
 from ringsim.parts.hinge_spring.family import HingeSpring
 from ringsim.parts.joint_friction.family import JointFriction
-from ringsim.parts.net import Net
+from ringsim.parts.net.hub import SpringNet
 from ringsim.parts.persection import at_section
 from ringsim.parts.springs import Reaction
 from ringsim.parts.stop.family import Stop
@@ -185,7 +185,7 @@ def _net(model: Multibody, held: HubNet, weight: Weight | None) -> Reacting:
     if weight is not None:
         weight.add_point(hub, net.hub_mass)
 
-    def settings(law: Net) -> dict[str, Any]:
+    def settings(law: SpringNet) -> dict[str, Any]:
         if law.two_sided:
             return {"stiffness": law.stiffness, "damping": law.damping}
         return assembly.symbolic_law(

@@ -198,7 +198,7 @@ class Integration:
             energies = after.energies._replace(lost=lost, driven=now.energies.driven)
             now = replace(after, energies=energies)
         self._energy.keep()
-        cables = self._built.cables
+        cables, edge = self._built.cables, self._built.edge
         self.history.note(
             Reading(
                 **vars(now),
@@ -208,6 +208,7 @@ class Integration:
                 places=None if self._position is None else self._position.read(self._state),
                 strain=None if self._bending is None else self._bending.read(),
                 carried=None if self._base is None else self._base.read(now),
+                edge=None if edge is None else edge.tensions(self._state),
             )
         )
         return now

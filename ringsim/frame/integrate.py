@@ -228,7 +228,7 @@ class Integration:
             energies = after.energies._replace(lost=lost, driven=now.energies.driven)
             now = replace(after, energies=energies)
         self._energy.keep()
-        cables = self._model.cables
+        cables, edge = self._model.cables, self._model.edge
         self.history.note(
             Reading(
                 **vars(now),
@@ -237,6 +237,7 @@ class Integration:
                 stress=None if self._stress is None else self._stress.read(self._strains),
                 places=None if self._position is None else self._position.read(self._now),
                 carried=None if self._base is None else self._base.read(self._now),
+                edge=None if edge is None else edge.tensions(self._now.pose.place),
             )
         )
         return now

@@ -11,6 +11,7 @@ from ringsim.cable.winding.motor import MotorWinding
 from ringsim.choice import kind_of
 from ringsim.outputs.peaks import Peak, SpanNames, Values
 from ringsim.outputs.series import Reading, Run, Series, output_times
+from ringsim.parts.net.boundary import BoundaryNet
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array
 from ringsim.variables import ErrorBar, Variable
@@ -129,6 +130,7 @@ def holds(scene: Scene) -> set[str]:
         ),
         "reactions": scene.record.reactions,
         "base": scene.boom is not None or scene.structure.supported,
+        "boundary net": isinstance(scene.net, BoundaryNet),
         "held base": scene.held or scene.spacecraft is not None,
     }
     return {name for name, present in held.items() if present}

@@ -23,7 +23,7 @@ from ringsim.parts.joints import Joints
 from ringsim.parts.limits import Limits
 from ringsim.parts.loads import Loads
 from ringsim.parts.margin.family import MarginStandard
-from ringsim.parts.net import Net
+from ringsim.parts.net.family import Net
 from ringsim.parts.offload import Offload
 from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
@@ -63,8 +63,8 @@ class Scene(Model):
     """Tube at the first corner along which the ring slides; left out, there is none."""
     spacecraft: Spacecraft | None = None
     """Rigid body that holds the boom; left out, there is none."""
-    net: Net | None = None
-    """Springs from the upper corners to a hub; left out, there is none."""
+    net: Annotated[Net, OneOf(default="hub")] | None = None
+    """Springs to a hub, or cables along the edge; left out, there is none."""
     loads: Loads | None = None
     """Forces on the V-joints; left out, there are none."""
     gravity: Gravity | None = None

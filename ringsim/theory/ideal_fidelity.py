@@ -14,6 +14,7 @@ from ringsim.choice import kind_of
 from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.layout import layout_of
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
+from ringsim.parts.net.hub import SpringNet
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.drive_margin import with_margin
@@ -64,7 +65,7 @@ def refuse_if_not_ideal(scene: Scene) -> None:
         raise InputError(
             "offload: lines, trolleys and their friction are no part of the ideal fidelity " + cure
         )
-    if scene.net is None:
+    if not isinstance(scene.net, SpringNet):
         return
     net, layout = scene.net, layout_of(scene)
     corners = np.array([layout.bodies[number].pose.place for number in layout.corners[0]])

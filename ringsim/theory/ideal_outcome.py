@@ -151,6 +151,7 @@ class _IdealRun:
             Energies(now.kinetic, now.elastic, work, state[-2]),
             chain=None if now.pull is None else now.pull.chain,
             planes=() if motion.cables is None else tuple(motion.cables.planes),
+            edge=motion.edge_tensions(state),
         )
 
 
