@@ -55,8 +55,10 @@ def build(scene: Scene) -> Built:
         stops = Stops(model, scene.stop)
         connectors.append(stops.reaction)
     if scene.hinge_spring is not None:
-        springs = Springs(model, scene.hinge_spring)
+        springs = Springs(model, "hinge_spring", scene.hinge_spring)
         connectors.append(springs.reaction)
+    if scene.latch is not None and scene.latch.pushes:
+        connectors.append(Springs(model, "latch", scene.latch).reaction)
     if scene.cables is not None:
         paths = [[_on_nodes(model, sheave) for sheave in path] for path in model.layout.paths]
         path = CablePath(paths, slopes=isinstance(model.formulation, Ancf))

@@ -23,6 +23,7 @@ from ringsim.layout.points import HUB
 from ringsim.layout.pose import turned_about_z
 from ringsim.parts.hinge_spring.family import HingeSpring
 from ringsim.parts.joint_friction.family import JointFriction
+from ringsim.parts.latch import Latch
 from ringsim.parts.net.hub import SpringNet
 from ringsim.parts.persection import at_section
 from ringsim.parts.springs import Reaction
@@ -87,11 +88,11 @@ class Stops:
 
 
 class Springs:
-    """A spring in every V-joint; the angle is measured as that of ``Stops``."""
+    """A spring, or the ramp of a latch, in every V-joint; the angle is measured as in ``Stops``."""
 
-    def __init__(self, model: Multibody, spring: HingeSpring) -> None:
+    def __init__(self, model: Multibody, part: str, spring: HingeSpring | Latch) -> None:
         self._system = model.assembly.system
-        planes = opening_joints(model, "hinge_spring", 'hinge_spring = "none"')
+        planes = opening_joints(model, part, f'{part} = "none"')
         self._objects = [
             [self._add(model, *one, spring.at(k)) for k, one in enumerate(plane)]
             for plane in planes
@@ -99,7 +100,9 @@ class Springs:
         self._law = spring.at(np.arange(len(planes[0])))
         self._alive = np.ones((len(planes), len(planes[0])))
 
-    def _add(self, model: Multibody, joint: BuiltJoint, sense: float, law: HingeSpring) -> Any:
+    def _add(
+        self, model: Multibody, joint: BuiltJoint, sense: float, law: HingeSpring | Latch
+    ) -> Any:
         def torque(angle: Any, rate: Any, _: Any) -> Any:
             return sense * law.torque(sense * angle + 0.5 * math.pi, SYMBOLIC).elastic
 

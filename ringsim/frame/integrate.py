@@ -23,6 +23,7 @@ from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Instant
+from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
 from ringsim.theory.scales import scales_of
@@ -75,6 +76,7 @@ class Integration:
         self._locks = (
             Locks(first.angles, stowed, scene.structure.planes) if scene.structure.locks else None
         )
+        self._latches = Latches(scene)
         own = {} if self._position is None else self._position.coordinates
         self.history = Recorder(scene, own | {"rod": np.array(list(model.layout.halves()))})
         ropes = None if model.cables is None else model.cables.ropes.content
@@ -196,6 +198,7 @@ class Integration:
     def _accept(self, step: float, after: State, found: Instant) -> None:
         """Go on from a state."""
         model, control, before = self._model, self._control, self._now
+        last = control.now
         self._moves = [*self._moves[-1:], (step, self._between(before, after) / step)]
         self._steps = [(step, before.strains)]
         straighten(after.pose)
@@ -205,7 +208,8 @@ class Integration:
             self._watch(control.now)
         if self._locks is not None:
             deployed = self._locks.deployed
-            model.laws.latch(deployed)
+            self._latches.note(deployed, last, found)
+            model.laws.latch(self._latches.caught)
             if model.cables is not None and after.chain is not None:
                 for number, (plane, _) in enumerate(model.cables.present):
                     if deployed[plane].all():

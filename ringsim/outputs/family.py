@@ -130,6 +130,7 @@ def holds(scene: Scene) -> set[str]:
         ),
         "reactions": scene.record.reactions,
         "base": scene.boom is not None or scene.structure.supported,
+        "latches": scene.stop is not None and scene.stop.latch and scene.structure.locks,
         "boundary net": isinstance(scene.net, BoundaryNet),
         "held base": scene.held or scene.spacecraft is not None,
     }

@@ -123,7 +123,12 @@ def lock_times(times: Array, angles: Array, rates: Array) -> Array:
         if first == 0:
             continue
         ends = slice(first - 1, first + 1)
-        cubic = CubicHermiteSpline(times[ends], past[ends], rates[(ends, *place)])
-        # Round-off may put a crossing at the very end of the step outside it.
-        found[place] = cubic.roots(extrapolate=False).min(initial=times[first])
+        found[place] = crossing(times[ends], past[ends], rates[(ends, *place)])
     return found
+
+
+def crossing(times: Array, past: Array, rates: Array) -> float:
+    """Time (s) at which an angle past 180 deg (rad) passes zero in a step."""
+    cubic = CubicHermiteSpline(times, past, rates)
+    # Round-off may put a crossing at the very end of the step outside it.
+    return float(cubic.roots(extrapolate=False).min(initial=times[1]))

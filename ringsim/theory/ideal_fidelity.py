@@ -13,6 +13,7 @@ from ringsim.cable import regularisation
 from ringsim.choice import kind_of
 from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.layout import layout_of
+from ringsim.parts.faults.failed_latch import FailedLatch
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.net.hub import SpringNet
 from ringsim.refusal import InputError
@@ -50,6 +51,16 @@ def refuse_if_not_ideal(scene: Scene) -> None:
                 f'faults[{number}].kind = "{fault.kind}": with rigid rods one stuck V-joint stops '
                 f"the whole ring, so the ideal fidelity does not support it {cure}"
             )
+        if isinstance(fault, FailedLatch):
+            raise InputError(
+                f'faults[{number}].kind = "{fault.kind}": with rigid rods the other latches hold '
+                f"that joint, too, so the ideal fidelity does not support it {cure}"
+            )
+    if scene.latch is not None and np.ptp(scene.latch.min_rate) > 0.0:
+        raise InputError(
+            "latch.min_rate: latches of the ideal fidelity catch all together: give one value for "
+            "all, or use the full fidelity"
+        )
     if scene.record.stress:
         raise InputError(
             "record.stress = true: rigid rods carry no stress in the ideal fidelity (set it to "
