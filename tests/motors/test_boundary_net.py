@@ -32,8 +32,9 @@ def sprung(**values: object) -> Scene:
     """Three sections from 150 deg on that springs open, without cables of a drive."""
     plain = {
         "cables": "none", "structure.sections": 3, "structure.opening_angle": 150.0, "joints": {},
-        "hinge_spring": SPRING, "net": NET, "solver.tolerance": 1e-4, "solver.end_time": 1.0, "solver.step": 0.02,
-        "solver.newton_tolerance": 1e-6, "record.interval": 2e-3, "stop.latch": True,
+        "hinge_spring": SPRING, "net": NET, "solver.tolerance": 1e-4, "solver.end_time": 1.0,
+        "solver.step": 0.02, "solver.newton_tolerance": 1e-6, "record.interval": 2e-3,
+        "stop.latch": True,
     }  # fmt: skip
     return ring().with_values(plain | {k.replace("__", "."): v for k, v in values.items()})
 

@@ -16,6 +16,8 @@ from ringsim.choice import kinds_of
 from ringsim.engine.assembly import SYMBOLIC, TORSION, Assembly
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.joint_friction.family import JointFriction
+from ringsim.parts.latch import Latch
+from ringsim.parts.net.boundary import pull
 from ringsim.parts.net.hub import SpringNet
 from ringsim.parts.persection import at_section
 from ringsim.parts.stop.family import Stop
@@ -45,6 +47,14 @@ def stop_law(stop: Stop, latched: bool) -> Any:
     return law
 
 
+def ramp_law(latch: Latch) -> Any:
+    def law(place: Any, rate: Any, xp: Any = np) -> Any:
+        return latch.torque(place, xp)
+
+    law.corners = (0.0, math.radians(latch.reach))  # type: ignore[attr-defined]
+    return law
+
+
 def without_xp(law: Any) -> Any:
     return lambda place, rate, xp=np: law(place, rate)
 
@@ -53,6 +63,8 @@ LAWS = {
     "stop": st.builds(stop_law, STOP, st.just(False)),
     "latch": st.builds(stop_law, STOP, st.just(True)),
     "net": records(SpringNet).map(lambda net: net.tension),
+    "edge": st.floats(1.0, 1e5).map(lambda k: lambda x, rate, xp=np: pull(x, k, xp)),
+    "ramp": records(Latch).map(ramp_law),
     "rest": records(Rest).map(lambda rest: rest.push),
     "strut": records(DeployingSpring).map(lambda spring: without_xp(spring.tension)),
     "stuck": st.just(without_xp(StuckVJoint(time=0.0, section=1).torque)),
