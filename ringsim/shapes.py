@@ -2,14 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from ringsim.layout.edge import natural_lengths
 from ringsim.layout.layout import Layout, layout_at_opening, layout_of
 from ringsim.layout.points import Points, points_of
 from ringsim.layout.pose import Array
+from ringsim.parts.net.boundary import BoundaryNet
+from ringsim.parts.net.hub import SpringNet
 from ringsim.scene import Scene
 
 COMPUTED = "positions as computed"
@@ -70,9 +74,15 @@ class Shape:
 
     def lines(self, places: Array) -> dict[str, Array]:
         """Ends of all lines by what they are part of; see ``Points.drawn``."""
+        return self.points.drawn(places, self._taut_beyond)
+
+    @cached_property
+    def _taut_beyond(self) -> float | Array:
+        """Length beyond which a string of the net pulls, m, of all or of each."""
         net = self.scene.net
-        beyond = 0.0 if net is None or net.two_sided else net.neutral_length
-        return self.points.drawn(places, beyond)
+        if isinstance(net, BoundaryNet) and (edge := layout_of(self.scene).edge) is not None:
+            return natural_lengths(self.scene, edge)[edge.present]
+        return net.neutral_length if isinstance(net, SpringNet) and not net.two_sided else 0.0
 
     def lags(self, run: xr.Dataset) -> ByLine:
         """Deviation (degree) from the mean opening angle of the joint that a line ends at, NaN for

@@ -171,7 +171,7 @@ def _needed(file: Path) -> xr.Dataset:
 
 def _quadrature(scene: Scene) -> list[Truth]:
     """Deployment time of a ring that only position-dependent loads drive, without losses."""
-    conservative = not scene.joints.present() and (scene.net is None or scene.net.damping == 0.0)
+    conservative = not scene.joints.present() and (scene.net is None or scene.net.lossless)
     if kind_of(scene.structure) != "pantograph-ring" or not scene.structure.closed:
         return []  # the quadrature keeps an arc's end assemblies upright, but they swing
     if not conservative or scene.cables is not None or scene.faults or scene.loads is None:

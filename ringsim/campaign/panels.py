@@ -22,7 +22,7 @@ from ringsim.variables import PLANES
 _DECADE = 10.0
 """HIGH over LOW from which on values are spaced geometrically."""
 _DEFAULTS = (
-    (("cables.*.axial_stiffness", "net.stiffness"),
+    (("cables.*.axial_stiffness", "net.stiffness", "net.axial_stiffness"),
      ("cables.*.friction.coefficient", "joints.vjoint.viscous", "structure.spring.damping")),
     (("rods.damping",), ("solver.step",)),
     (("cables.*.winch.winding.speed", "loads.force"),

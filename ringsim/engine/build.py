@@ -10,6 +10,7 @@ from ringsim.choice import kind_of
 from ringsim.engine.cable_path import CablePath
 from ringsim.engine.cables import CableDrive
 from ringsim.engine.connectors import Reacting, Springs, Stops, connect
+from ringsim.engine.edge import EdgeCables
 from ringsim.engine.faults import Faults
 from ringsim.engine.model import Multibody
 from ringsim.engine.rods import Ancf
@@ -30,6 +31,7 @@ class Built(NamedTuple):
     cables: CableDrive | None
     faults: Faults
     weight: Weight | None
+    edge: EdgeCables | None
 
 
 def build(scene: Scene) -> Built:
@@ -46,12 +48,17 @@ def build(scene: Scene) -> Built:
     if model.layout.boom is not None:
         _add_boom(model, model.layout.boom, weight)
     connectors = connect(model, weight)
+    edge = None if model.layout.edge is None else EdgeCables(model, model.layout.edge)
+    if edge is not None:
+        connectors.append(edge.reaction)
     if scene.stop is not None:
         stops = Stops(model, scene.stop)
         connectors.append(stops.reaction)
     if scene.hinge_spring is not None:
-        springs = Springs(model, scene.hinge_spring)
+        springs = Springs(model, "hinge_spring", scene.hinge_spring)
         connectors.append(springs.reaction)
+    if scene.latch is not None and scene.latch.pushes:
+        connectors.append(Springs(model, "latch", scene.latch).reaction)
     if scene.cables is not None:
         paths = [[_on_nodes(model, sheave) for sheave in path] for path in model.layout.paths]
         path = CablePath(paths, slopes=isinstance(model.formulation, Ancf))
@@ -59,7 +66,7 @@ def build(scene: Scene) -> Built:
     faults = Faults(model, cables, springs)
     connectors += [joint.reaction for joint in faults.joints]
     model.assembly.finish()
-    return Built(model, connectors, stops, cables, faults, weight)
+    return Built(model, connectors, stops, cables, faults, weight, edge)
 
 
 def _on_nodes(model: Multibody, sheave: Sheave) -> Sheave:

@@ -23,7 +23,8 @@ from ringsim.layout.points import HUB
 from ringsim.layout.pose import turned_about_z
 from ringsim.parts.hinge_spring.family import HingeSpring
 from ringsim.parts.joint_friction.family import JointFriction
-from ringsim.parts.net import Net
+from ringsim.parts.latch import Latch
+from ringsim.parts.net.hub import SpringNet
 from ringsim.parts.persection import at_section
 from ringsim.parts.springs import Reaction
 from ringsim.parts.stop.family import Stop
@@ -87,11 +88,11 @@ class Stops:
 
 
 class Springs:
-    """A spring in every V-joint; the angle is measured as that of ``Stops``."""
+    """A spring, or the ramp of a latch, in every V-joint; the angle is measured as in ``Stops``."""
 
-    def __init__(self, model: Multibody, spring: HingeSpring) -> None:
+    def __init__(self, model: Multibody, part: str, spring: HingeSpring | Latch) -> None:
         self._system = model.assembly.system
-        planes = opening_joints(model, "hinge_spring", 'hinge_spring = "none"')
+        planes = opening_joints(model, part, f'{part} = "none"')
         self._objects = [
             [self._add(model, *one, spring.at(k)) for k, one in enumerate(plane)]
             for plane in planes
@@ -99,7 +100,9 @@ class Springs:
         self._law = spring.at(np.arange(len(planes[0])))
         self._alive = np.ones((len(planes), len(planes[0])))
 
-    def _add(self, model: Multibody, joint: BuiltJoint, sense: float, law: HingeSpring) -> Any:
+    def _add(
+        self, model: Multibody, joint: BuiltJoint, sense: float, law: HingeSpring | Latch
+    ) -> Any:
         def torque(angle: Any, rate: Any, _: Any) -> Any:
             return sense * law.torque(sense * angle + 0.5 * math.pi, SYMBOLIC).elastic
 
@@ -185,7 +188,7 @@ def _net(model: Multibody, held: HubNet, weight: Weight | None) -> Reacting:
     if weight is not None:
         weight.add_point(hub, net.hub_mass)
 
-    def settings(law: Net) -> dict[str, Any]:
+    def settings(law: SpringNet) -> dict[str, Any]:
         if law.two_sided:
             return {"stiffness": law.stiffness, "damping": law.damping}
         return assembly.symbolic_law(

@@ -27,6 +27,7 @@ from ringsim.outputs.series import Reading
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Instant
+from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
 from ringsim.theory.scales import scales_of
@@ -80,6 +81,7 @@ class Integration:
         self._locks = (
             Locks(angles, stowed, scene.structure.planes) if scene.structure.locks else None
         )
+        self._latches = Latches(scene)
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
@@ -175,17 +177,19 @@ class Integration:
             self._control.diverge(Reason(Cause.NOT_FINITE, text))
             return False
         found = self._weighed or self._measure(time)
+        before = self._control.now
         goes_on = self._control.accept(found, self._read(found))
         if self._watch is not None:
             self._watch(self._control.now)
         if self._locks is not None:
+            self._latches.note(self._locks.deployed, before, found)
             self._lock(self._locks.deployed, time)
         return goes_on
 
     def _lock(self, deployed: Flags, time: float) -> None:
         """Latch the V-joints that have locked, and let winches know whose plane has."""
         if self._built.stops is not None:
-            self._built.stops.latch(deployed)
+            self._built.stops.latch(self._latches.caught)
         cables = self._built.cables
         if cables is not None and self._chain is not None:
             for number, (plane, _) in enumerate(cables.present):
@@ -204,7 +208,7 @@ class Integration:
             energies = after.energies._replace(lost=lost, driven=now.energies.driven)
             now = replace(after, energies=energies)
         self._energy.keep()
-        cables = self._built.cables
+        cables, edge = self._built.cables, self._built.edge
         self.history.note(
             Reading(
                 **vars(now),
@@ -216,6 +220,7 @@ class Integration:
                 carried=None if self._base is None else self._base.read(now),
                 accelerations=None if self._shock is None else self._shock.read(),
                 put=None if self._shape is None else self._shape.read(self._state),
+                edge=None if edge is None else edge.tensions(self._state),
             )
         )
         return now

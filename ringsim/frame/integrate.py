@@ -27,6 +27,7 @@ from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Instant
+from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
 from ringsim.theory.scales import scales_of
@@ -84,6 +85,7 @@ class Integration:
         self._locks = (
             Locks(first.angles, stowed, scene.structure.planes) if scene.structure.locks else None
         )
+        self._latches = Latches(scene)
         shaped = scene.record.shape or strained(scene)
         self._shape = ShapeMeter(model) if shaped else None
         own = {"rod": np.array(list(model.layout.halves()))}
@@ -211,6 +213,7 @@ class Integration:
     def _accept(self, step: float, after: State, found: Instant) -> None:
         """Go on from a state."""
         control, before = self._control, self._now
+        last = control.now
         moved = self._between(before, after) / step
         # Before rest it came as it leaves: the even motion through the first state.
         self._moves = [*(self._moves[-2:] or [(step, -moved)]), (step, moved)]
@@ -220,6 +223,8 @@ class Integration:
         control.accept(found, self._read(found))
         if self._watch is not None:
             self._watch(control.now)
+        if self._locks is not None:
+            self._latches.note(self._locks.deployed, last, found)
         self._latch(found.time)
 
     def _latch(self, time: float) -> None:
@@ -228,7 +233,7 @@ class Integration:
         if self._locks is None:
             return
         deployed = self._locks.deployed
-        model.laws.latch(deployed)
+        model.laws.latch(self._latches.caught)
         if model.cables is not None and chain is not None:
             for number, (plane, _) in enumerate(model.cables.present):
                 if deployed[plane].all():
@@ -251,7 +256,7 @@ class Integration:
             energies = after.energies._replace(lost=lost, driven=now.energies.driven)
             now = replace(after, energies=energies)
         self._energy.keep()
-        cables = self._model.cables
+        cables, edge = self._model.cables, self._model.edge
         self.history.note(
             Reading(
                 **vars(now),
@@ -262,6 +267,7 @@ class Integration:
                 carried=None if self._base is None else self._base.read(self._now),
                 accelerations=None if self._shock is None else self._shock.read(self._now),
                 put=None if self._shape is None else self._shape.read(self._now),
+                edge=None if edge is None else edge.tensions(self._now.pose.place),
             )
         )
         return now

@@ -100,6 +100,8 @@ class JointLaws:
         spring, sections = scene.hinge_spring, openings.angle.shape[1]
         self._spring = None if spring is None else spring.at(np.arange(sections))
         self._sprung = np.ones(openings.angle.shape)
+        latch = scene.latch
+        self._pawl = latch.at(np.arange(sections)) if latch is not None and latch.pushes else None
         self.latched = np.zeros(openings.angle.shape, dtype=bool)
         self._latches = False
         self._stuck: list[tuple[StuckVJoint, tuple[int, int], float]] = []
@@ -168,6 +170,13 @@ class JointLaws:
                 return Reaction(*(alive * part for part in spring.torque(x)))
 
             found.append((own, sense, sense * angles[own], sense * rates[own], drive))
+        if self._pawl is not None:
+            pawl = self._pawl
+
+            def lift(x: Array, _: Array) -> Reaction:
+                return pawl.torque(x)
+
+            found.append((own, sense, sense * angles[own], sense * rates[own], lift))
         for fault, place, opening in self._stuck:
             where = np.array([own[place]])
             turned = np.pi - sense[place] * angles[where] - opening

@@ -37,6 +37,8 @@ class EnergyMeter:
             elastic += stored
             forces.append(resisting)
             places.append(lengths)
+        if model.edge is not None:
+            elastic += model.edge.stored(pose.place)
         if model.hanging is not None:
             hold = model.hanging.hold(state)
             kinetic += model.hanging.kinetic(state)

@@ -7,6 +7,7 @@ import numpy as np
 from ringsim.choice import kind_of
 from ringsim.frame.balance import Held, add_slides, balance, put_in_place
 from ringsim.frame.cables import FrameCables
+from ringsim.frame.edge import EdgeCables
 from ringsim.frame.factored import Border, Factored
 from ringsim.frame.following import Coefficients, Followed
 from ringsim.frame.hanging import Hanging
@@ -61,6 +62,8 @@ class FrameModel:
         self.openings = Openings.of(skeleton)
         self.laws = JointLaws(scene, skeleton, self.openings)
         self.strings = None if self.layout.net is None else Strings(self.layout.net)
+        edge = self.layout.edge
+        self.edge = None if edge is None else EdgeCables(scene, edge, mesh)
         self.coefficients = Coefficients.of(scene.solver.spectral_radius)
         angle = np.array([one.start for one in skeleton.angles])
         self.openings.unwrapped(angle)
@@ -173,6 +176,8 @@ class FrameModel:
             if pulls is not None:
                 inner[self._string_spots] += pulls
                 g[-3:] -= pulls.sum(axis=0)
+        if self.edge is not None:
+            self.edge.push(now.pose.place, inner)
         if self.hanging is not None:
             self.hanging.push(now, inner)
         if self.cables is not None:
@@ -198,6 +203,8 @@ class FrameModel:
         fronts[front, spot, spot] += slopes
         for slide in self._beam_slides:
             slide.add_tangent(now.pose, fronts)
+        if self.edge is not None:
+            self.edge.add_tangent(now.pose.place, fronts)
         if self.hanging is not None:
             self.hanging.add_tangent(now, by_rate, by_place, fronts)
         blocks, inertia = None, math.nan

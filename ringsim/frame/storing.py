@@ -25,7 +25,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.stepping.going_on import begin_anew, go_on
 from ringsim.stepping.instant import Instant
-from ringsim.stepping.memory import Memory
+from ringsim.stepping.memory import Memory, instant, kept
 from ringsim.variables import Outcome
 
 Watch = Callable[[Instant], None]
@@ -85,7 +85,7 @@ class Storing(Integration):
         memory: Memory = {
             "pose": list(now.pose), "hub": now.hub, "strains": now.strains,
             "followed": list(now.followed), "moves": self._moves, "easy": self._easy,
-            "steps": self._steps,
+            "steps": self._steps, "latches": kept(self._latches, ("caught", "_earlier")),
             "straining": [self._strains.before, self._strains.lead],
             "reaction": getattr(self._model, "reaction", None),
             "stuck": [opening for _, opening in self._held],
@@ -106,7 +106,10 @@ class Storing(Integration):
         for own, value in zip(arrays, stored, strict=True):
             own[...] = value
         self._now, self._moves, self._steps = state, memory["moves"], memory["steps"]
-        self._easy = memory["easy"]
+        self._easy, latches = memory["easy"], memory["latches"]
+        self._latches.caught = latches["caught"]
+        if latches["_earlier"] is not None:
+            self._latches._earlier = instant(latches["_earlier"])
         self._strains = Strains(state.strains, *memory["straining"])
         if memory["reaction"] is not None:
             model.reaction = memory["reaction"]
@@ -147,7 +150,7 @@ class Storing(Integration):
         left = len(struck_by(self._scene.faults, start.time))
         self._faults = sorted(self._scene.faults, key=lambda fault: fault.time)[left:]
         if self._locks is not None:
-            model.laws.latch(self._locks.deployed)
+            model.laws.latch(self._latches.caught)
 
     def _chain_of(self, start: StoredState, gone: list[Fault]) -> ChainState:
         """The cables."""

@@ -15,11 +15,13 @@ from ringsim.cable.records import Cable
 from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
 from ringsim.layout.base import add_boom, base_of
 from ringsim.layout.bodies import SPACE, Body, InSpace, Lump, Mount, OnBody, OnRod, Rod, pose_of
+from ringsim.layout.edge import along_edges
 from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.hung import hang
 from ringsim.layout.joints import ChordOpening, Joint, JointOpening, Opening
 from ringsim.layout.layout import Contact, HubNet, Layout, Spring
 from ringsim.layout.pose import Array, Pose, axes_along, rate_of, real_of
+from ringsim.parts.net.hub import SpringNet
 from ringsim.parts.persection import spread
 from ringsim.parts.tube import Tube
 
@@ -175,6 +177,7 @@ class Draft:
             base=base_of(self),
             gravity=gravity,
             hung=None if gravity is None else hang(self, gravity, base_of(self)),
+            edge=along_edges(self),
         )
 
     def _mount(self, part: Part | None, at: Any, axes: Array, what: str) -> Mount:
@@ -210,7 +213,7 @@ class Draft:
 
     def _net(self) -> HubNet | None:
         net = self.scene.net
-        if net is None:
+        if not isinstance(net, SpringNet):
             return None
         self.require_corners("net", 1)
         held = tuple(ref.number for ref in self.corners[0])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.layout.pose import Array
-from ringsim.parts.net import Net
+from ringsim.parts.net.hub import SpringNet
 from ringsim.parts.persection import at_section, spread
 from ringsim.parts.springs import Reaction
 
@@ -32,7 +32,7 @@ class NetForces(NamedTuple):
 class FreeHub:
     """Springs from so many corners to a free hub; ``corners`` have the shape (corners, 3), m."""
 
-    def __init__(self, net: Net, corners: int) -> None:
+    def __init__(self, net: SpringNet, corners: int) -> None:
         self._net = at_section(net, np.arange(corners))
         self._stiffness = spread(net.stiffness, corners)
 

@@ -26,7 +26,7 @@ def hang(draft: "Draft", gravity: np.ndarray, base: int | None) -> Hung | None:
     whole = sum(body.mass for body in draft.bodies) + sum(
         rod.mass + sum(mass for _, mass, _ in rod.masses) for rod in draft.rods
     )
-    whole += 0.0 if net is None else net.hub_mass
+    whole += 0.0 if net is None else net.point_mass
     flexible = boom is not None and not any(
         lump.group == "boom" for lump in draft.bodies[draft.corners[0][0].number].lumps
     )

@@ -12,7 +12,8 @@ from ringsim.cable.sheaves import BlockSheave, Sheave
 from ringsim.layout.bodies import Body, InSpace, Lump, Mount, OnBody, OnRod, Rod, pose_of
 from ringsim.layout.joints import Joint, JointOpening, Opening
 from ringsim.layout.pose import STEP, Array, Pose, cross
-from ringsim.parts.net import Net
+from ringsim.parts.net.boundary import BoundaryNet
+from ringsim.parts.net.hub import SpringNet
 from ringsim.parts.offload import Offload
 
 SPACECRAFT = "spacecraft"
@@ -46,9 +47,28 @@ class Contact(NamedTuple):
 class HubNet(NamedTuple):
     """Springs from the origins of bodies to a free ``hub``, where they balance, shape (3,), m."""
 
-    law: Net
+    law: SpringNet
     hub: Array
     bodies: tuple[int, ...]
+
+
+class EdgeNet(NamedTuple):
+    """Cables between the origins of bodies, numbers of them by plane and section, -1 in planes
+    without: shape (planes, sections, 2).
+    """
+
+    law: BoundaryNet
+    bodies: NDArray[np.int64]
+
+    @property
+    def pairs(self) -> NDArray[np.int64]:
+        """Those that there are, shape (n, 2)."""
+        return self.bodies[self.present]
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Whether there is a cable, shape (planes, sections)."""
+        return self.bodies[..., 0] >= 0
 
 
 class Hung(NamedTuple):
@@ -102,7 +122,8 @@ class Layout:
     to its far end; ``forces`` constant ones: number of the joint whose first mount they act on,
     and vector, N; ``base`` the body that is held, or that a boom's upper end is fixed to;
     ``gravity`` the weight of a kilogram, m/s^2; ``hung`` the lines of a ground test;
-    ``held`` how much further open V-joints are held before a run, shape (planes, sections), rad.
+    ``held`` how much further open V-joints are held before a run, shape (planes, sections), rad;
+    ``edge`` the cables along the edge of a net.
     """
 
     bodies: tuple[Body, ...]
@@ -120,6 +141,7 @@ class Layout:
     gravity: Array | None = None
     hung: Hung | None = None
     held: Array | None = None
+    edge: EdgeNet | None = None
 
     def pose(self, mount: Mount) -> Pose:
         """The frame of a mount, with its own axes."""

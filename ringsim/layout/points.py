@@ -39,11 +39,11 @@ class Points:
         """Of the dimensions of ``ringsim.outputs.position``."""
         return {"point": np.array(self.names), "axis": np.array(["x", "y", "z"])}
 
-    def drawn(self, places: Array, taut_beyond: float = 0.0) -> dict[str, Array]:
+    def drawn(self, places: Array, taut_beyond: float | Array = 0.0) -> dict[str, Array]:
         """Ends of lines, shape (lines, 2, 3), m, for points at some places, shape (points, 3), m.
 
-        The net's strings are "net, taut" where longer than ``taut_beyond`` (m), or "net, slack";
-        joints that open are points, lines without a length, "V-joints".
+        The net's strings are "net, taut" where longer than ``taut_beyond`` (m, of all or of each),
+        or "net, slack"; joints that open are points, lines without a length, "V-joints".
         """
         found = {name: places[pairs] for name, pairs in self.lines.items()}
         if (net := found.pop("net", None)) is not None:
@@ -165,6 +165,9 @@ def _lines(layout: Layout) -> Iterator[tuple[str, Where, Where]]:
     if layout.net is not None:
         for number in layout.net.bodies:
             yield "net", OnBody(number), HUB
+    if layout.edge is not None:
+        for first, second in layout.edge.pairs.tolist():
+            yield "net", OnBody(first), OnBody(second)
 
 
 def _group(layout: Layout, body: int) -> str:

@@ -11,6 +11,7 @@ from ringsim.cable.winding.motor import MotorWinding
 from ringsim.choice import kind_of
 from ringsim.outputs.peaks import Peak, SpanNames, Values
 from ringsim.outputs.series import Reading, Run, Series, output_times
+from ringsim.parts.net.boundary import BoundaryNet
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Array
@@ -133,6 +134,8 @@ def holds(scene: Scene) -> set[str]:
         "shape": scene.record.shape,
         "prestress": bool(strained(scene)),
         "base": scene.boom is not None or scene.structure.supported,
+        "latches": scene.stop is not None and scene.stop.latch and scene.structure.locks,
+        "boundary net": isinstance(scene.net, BoundaryNet),
         "held base": scene.held or scene.spacecraft is not None,
     }
     return {name for name, present in held.items() if present}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.outputs.family import COORDINATES, OUTPUTS, VARIABLES, Array, Output, axes, holds
+from ringsim.outputs.latching import missed
 from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
@@ -108,6 +109,7 @@ def ended(
 ) -> Outcome:  # fmt: skip
     """The outcome of a run that ended so; ``passed`` are the limits that it went over."""
     fate = Fate.OVERLOADED if passed and not status.failed else fate
+    passed += missed(values)
     values["outcome"] = np.array(int(fate))
     return Outcome(status, str(reason) + passed, coordinates, values, reason.cause)
 

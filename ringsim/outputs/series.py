@@ -63,6 +63,8 @@ class Reading(Instant):
 
     put: Put | None = None
     """Where corners are and what the rods store; None unless recorded."""
+    edge: Array | None = None
+    """Tension of the cables along a net's edge, shape (planes, sections), N; None without."""
 
     def by_plane(self, of_cables: NDArray[Any]) -> Array:
         """A number for each plane, from one for each cable; NaN where a plane has no cable."""

@@ -20,10 +20,11 @@ from ringsim.parts.faults.family import Fault
 from ringsim.parts.gravity import Gravity
 from ringsim.parts.hinge_spring.family import HingeSpring
 from ringsim.parts.joints import Joints
+from ringsim.parts.latch import Latch
 from ringsim.parts.limits import Limits
 from ringsim.parts.loads import Loads
 from ringsim.parts.margin.family import MarginStandard
-from ringsim.parts.net import Net
+from ringsim.parts.net.family import Net
 from ringsim.parts.offload import Offload
 from ringsim.parts.rods.ancf import AncfRods
 from ringsim.parts.rods.family import Rods
@@ -34,7 +35,13 @@ from ringsim.parts.stop.family import Stop
 from ringsim.parts.stop.spring_damper import SpringDamperStop
 from ringsim.parts.temperature import Temperature
 from ringsim.refusal import InputError, explain, known_or_nearest, models_in, show
-from ringsim.scene.checks import check_faults, check_margin, check_rods
+from ringsim.scene.checks import (
+    check_faults,
+    check_latch,
+    check_limits,
+    check_margin,
+    check_rods,
+)
 from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import ListIn, Model
@@ -60,12 +67,14 @@ class Scene(Model):
     """A spring in every V-joint."""
     stop: Annotated[Stop, OneOf(default="spring-damper")] | None = SpringDamperStop()
     """What ends the travel of every V-joint; built unless it is "none"."""
+    latch: Latch | None = None
+    """What the latches of the stops ask for; left out, they take nothing and always catch."""
     boom: Annotated[Boom, OneOf()] | None = None
     """Tube at the first corner along which the ring slides; left out, there is none."""
     spacecraft: Spacecraft | None = None
     """Rigid body that holds the boom; left out, there is none."""
-    net: Net | None = None
-    """Springs from the upper corners to a hub; left out, there is none."""
+    net: Annotated[Net, OneOf(default="hub")] | None = None
+    """Springs to a hub, or cables along the edge; left out, there is none."""
     loads: Loads | None = None
     """Forces on the V-joints; left out, there are none."""
     temperature: Temperature | None = None
@@ -98,6 +107,8 @@ class Scene(Model):
                 )
         check_faults(self)
         check_rods(self)
+        check_limits(self)
+        check_latch(self)
         self.structure.check(self)
         for part in (self.spacecraft, self.gravity, self.offload, self.temperature):
             if part is not None:
@@ -106,16 +117,6 @@ class Scene(Model):
             raise ValueError(
                 'record.stress = true is not possible with rods.kind = "ancf", whose elements '
                 'report no forces: choose "geometrically-exact", or leave record.stress out'
-            )
-        if self.limits.rod_stress is not None and not self.record.stress:
-            raise ValueError(
-                f"limits.rod_stress = {self.limits.rod_stress:g} Pa needs the stress of the rods: "
-                "set record.stress = true, or leave the limit out"
-            )
-        if self.limits.tension is not None and self.cables is None:
-            raise ValueError(
-                f"limits.tension = {self.limits.tension:g} N needs a cable: add [cables.upper], or "
-                "leave the limit out"
             )
         check_margin(self)
         if self.record.interval > self.solver.end_time:

@@ -5,11 +5,34 @@ from typing import TYPE_CHECKING
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.limited import why_unlimited
 from ringsim.choice import kind_of
+from ringsim.parts.faults.failed_latch import FailedLatch
 from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.scene.substituted import strained
 
 if TYPE_CHECKING:
     from ringsim.scene import Scene
+
+
+def check_limits(scene: "Scene") -> None:
+    """Refuse (ValueError) limits of what a run does not tell."""
+    if scene.limits.rod_stress is not None and not scene.record.stress:
+        raise ValueError(
+            f"limits.rod_stress = {scene.limits.rod_stress:g} Pa needs the stress of the rods: "
+            "set record.stress = true, or leave the limit out"
+        )
+    if scene.limits.tension is not None and scene.cables is None:
+        raise ValueError(
+            f"limits.tension = {scene.limits.tension:g} N needs a cable: add [cables.upper], or "
+            "leave the limit out"
+        )
+
+
+def check_latch(scene: "Scene") -> None:
+    """Refuse (ValueError) a latch of stops that have none."""
+    if scene.latch is not None and (scene.stop is None or not scene.stop.latch):
+        raise ValueError(
+            "latch: the stops of this scene do not hold: set stop.latch = true, or leave latch out"
+        )
 
 
 def check_margin(scene: "Scene") -> None:
@@ -56,6 +79,11 @@ def check_faults(scene: "Scene") -> None:
             raise ValueError(
                 f"faults[{number}] is a fault of a spring, but the scene has none: add "
                 "[hinge_spring], or leave the fault out"
+            )
+        if isinstance(fault, FailedLatch) and (scene.stop is None or not scene.stop.latch):
+            raise ValueError(
+                f"faults[{number}] is a fault of a latch, but the stops have none: set stop.latch "
+                "= true, or leave the fault out"
             )
         if isinstance(fault, CableFault):
             if not cables:

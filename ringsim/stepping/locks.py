@@ -123,6 +123,10 @@ def lock_times(times: Array, angles: Array, rates: Array) -> Array:
         if first == 0:
             continue
         ends = slice(first - 1, first + 1)
-        before, after = times[ends]
-        found[place] = before + first_zero(after - before, past[ends], rates[(ends, *place)])
+        found[place] = crossing(times[ends], past[ends], rates[(ends, *place)])
     return found
+
+
+def crossing(times: Array, past: Array, rates: Array) -> float:
+    """Time (s) at which an angle past 180 deg (rad) passes zero in a step."""
+    return float(times[0]) + first_zero(float(times[1] - times[0]), past, rates)

@@ -14,6 +14,7 @@ import numpy as np
 from ringsim.choice import kind_of
 from ringsim.layout.pose import Array
 from ringsim.parts.margin.family import MarginStandard
+from ringsim.parts.net.boundary import BoundaryNet
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.drive import Drive
@@ -23,6 +24,10 @@ from ringsim.variables import Outcome
 
 PULLEYS = "pulley friction"
 """Name of what is lost between the winches and the ring at the tension that they have."""
+
+
+LATE = np.radians([168.0, 170.0, 172.0, 174.0, 176.0, 177.0, 178.0, 179.0])
+"""Opening angles (rad) at which latches, and cables along a net's edge, are looked at besides."""
 
 
 class Margin(NamedTuple):
@@ -55,6 +60,7 @@ class DriveMargin:
         self._standard = standard
         self._drive = Drive(scene, self._mechanism, at_speed=standard.keep_speed)
         self._resistances = resistances(scene, self._mechanism)
+        self._ends_steeply = scene.latch is not None or isinstance(scene.net, BoundaryNet)
         self.kinds = [PULLEYS, *(one.kind for one in self._resistances)]
         self.start = math.pi - 2.0 * scene.structure.coordinate
         """Opening angle at which the scene begins, rad."""
@@ -83,8 +89,11 @@ class DriveMargin:
         return Margin(angle, ideal, resisting, margin)
 
     def course(self, count: int = 33) -> list[Margin]:
-        """At so many angles from the start to 180 deg."""
-        return [self.at(float(angle)) for angle in np.linspace(self.start, math.pi, count)]
+        """At so many angles from the start to 180 deg, and more where parts resist at the end."""
+        angles = np.linspace(self.start, math.pi, count)
+        if self._ends_steeply:
+            angles = np.union1d(angles, LATE[self.start < LATE])
+        return [self.at(float(angle)) for angle in angles]
 
     def least(self, course: list[Margin]) -> Margin:
         """The smallest margin of all angles between those of a course."""

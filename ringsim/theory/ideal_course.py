@@ -228,20 +228,29 @@ class Course:
             self.fate, self.reason, self._end = Fate.OVERLOADED, Reason(text=words), self._time
             return
         phi, rate = float(self._state[0]), float(self._state[self.motion.mechanism.freedom])
-        stop = self._scene.stop
         if math.isnan(self.lock_time) and phi <= 0.0 and rate < 0.0:
             self.lock_time = self._time - phi / rate
             self.fate = Fate.DEPLOYED
             self.reason = Reason(text="all V-joints have reached 180 deg")
             self._settle(self.lock_time)
-            self.motion.latched = stop is not None and stop.latch
+            self.motion.latched = self._catches(-2.0 * rate)
             if self.motion.cables is not None:
                 self.motion.cables.lock(self._time)
+            self._begin()
+        elif phi <= 0.0 and not self.motion.latched and self._catches(-2.0 * rate):
+            self.motion.latched = True
             self._begin()
         elif not self.reason and phi >= self._stowed:
             self.fate = Fate.FOLDED
             self.reason = Reason(text="all V-joints have reached the stowed stop")
             self._settle(self._time)
+
+    def _catches(self, rate: float) -> bool:
+        """Whether latches catch that joints meet at an opening rate (rad/s)."""
+        stop, latch = self._scene.stop, self._scene.latch
+        if stop is None or not stop.latch or rate <= 0.0:
+            return False
+        return latch is None or rate >= np.max(latch.min_rate)
 
     def _settle(self, time: float) -> None:
         settling = 0.0 if self._scene.stop is None else self._scene.solver.settling_time

@@ -13,7 +13,9 @@ from ringsim.cable import regularisation
 from ringsim.choice import kind_of
 from ringsim.layout.free_hub import FreeHub
 from ringsim.layout.layout import layout_of
+from ringsim.parts.faults.failed_latch import FailedLatch
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
+from ringsim.parts.net.hub import SpringNet
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained, substituted
@@ -48,6 +50,16 @@ def refuse_if_not_ideal(scene: Scene) -> None:
                 f'faults[{number}].kind = "{fault.kind}": with rigid rods one stuck V-joint stops '
                 f"the whole ring, so the ideal fidelity does not support it {cure}"
             )
+        if isinstance(fault, FailedLatch):
+            raise InputError(
+                f'faults[{number}].kind = "{fault.kind}": with rigid rods the other latches hold '
+                f"that joint, too, so the ideal fidelity does not support it {cure}"
+            )
+    if scene.latch is not None and np.ptp(scene.latch.min_rate) > 0.0:
+        raise InputError(
+            "latch.min_rate: latches of the ideal fidelity catch all together: give one value for "
+            "all, or use the full fidelity"
+        )
     if scene.record.stress:
         raise InputError(
             "record.stress = true: rigid rods carry no stress in the ideal fidelity (set it to "
@@ -74,7 +86,7 @@ def refuse_if_not_ideal(scene: Scene) -> None:
         raise InputError(
             "offload: lines, trolleys and their friction are no part of the ideal fidelity " + cure
         )
-    if scene.net is None:
+    if not isinstance(scene.net, SpringNet):
         return
     net, layout = scene.net, layout_of(scene)
     corners = np.array([layout.bodies[number].pose.place for number in layout.corners[0]])

@@ -24,7 +24,9 @@ from ringsim.layout.bodies import OnBody
 from ringsim.layout.free_hub import FreeHub, NetForces
 from ringsim.layout.layout import Layout
 from ringsim.layout.pose import Array, skew
+from ringsim.parts.net.hub import SpringNet
 from ringsim.scene import Scene
+from ringsim.theory.ideal_edge import IdealEdge
 from ringsim.theory.ideal_points import UP, Points, body_of
 
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3))
@@ -90,9 +92,15 @@ class Mechanism:
         self._mass, self._first = float(masses.sum()), np.tensordot(masses, places, 1)
         second = ((flat.T * masses) @ flat).reshape(3, count, 3, count)
         self._second = second.transpose(1, 3, 0, 2).reshape(count, -1)
-        corners = points.layout.corners
+        corners, edge = points.layout.corners, points.layout.edge
         self._corners = points.places([OnBody(body) for body in corners[0]] if corners else [])
-        self._net = None if scene.net is None else FreeHub(scene.net, len(self._corners))
+        self._net: FreeHub | IdealEdge | None = None
+        self._ends = self._corners
+        if isinstance(scene.net, SpringNet):
+            self._net = FreeHub(scene.net, len(self._corners))
+        elif edge is not None:
+            self._net = IdealEdge(scene, edge)
+            self._ends = points.places([OnBody(int(body)) for body in edge.pairs.ravel()])
         held = [body_of(support.second) for support in points.layout.supports]
         self.fixed = bool(held)
         self._held = points.frame(held[0]) if held else np.zeros(0)
@@ -137,8 +145,16 @@ class Mechanism:
         """What the net does while p changes at a rate (rad/s)."""
         if self._net is None:
             return NetForces(np.zeros(len(rate)), 0.0, 0.0)
-        places, slopes, _ = now.moved(self._corners)
+        places, slopes, _ = now.moved(self._ends)
         return self._net.forces(places, slopes, rate)
+
+    def net_tensions(self, now: Configuration) -> Array | None:
+        """Of cables along a net's edge, N, shape (planes, sections), NaN in planes without; None
+        of other nets.
+        """
+        if not isinstance(self._net, IdealEdge):
+            return None
+        return self._net.tensions(now.moved(self._ends)[0])
 
     def vertical(self, now: Configuration) -> Array:
         """Unit vector that points up in space, in the structure's axes, if it cannot pitch."""

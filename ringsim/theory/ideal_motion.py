@@ -108,6 +108,13 @@ class IdealMotion:
             held = mechanism.reaction(now, rigid[3:], acting.couple, force, moving)
         return IdealState(moving, turning, rigid[3:], kinetic, acting, pull, held)
 
+    def edge_tensions(self, state: Array) -> Array | None:
+        """Of cables along a net's edge, N, shape (planes, sections); None without."""
+        if self.mechanism.points.layout.edge is None:
+            return None
+        now = self.mechanism.configuration(state[self._place], state[self._rate])
+        return self.mechanism.net_tensions(now)
+
     def rates(self, time: float, state: Array) -> Array:
         """Derivative of the state; NaN where the cables have no answer."""
         if not np.isfinite(state).all():

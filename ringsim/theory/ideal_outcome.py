@@ -152,6 +152,7 @@ class _IdealRun:
             chain=None if now.pull is None else now.pull.chain,
             planes=() if motion.cables is None else tuple(motion.cables.planes),
             carried=None if now.reaction is None else Carried(now.reaction, np.eye(3), None),
+            edge=motion.edge_tensions(state),
         )
 
 

@@ -1,4 +1,4 @@
-"""The springs of all V-joints of a ring of rigid rods, whose joints open alike."""
+"""Springs and latches of all V-joints of a ring of rigid rods, whose joints open alike."""
 
 import numpy as np
 
@@ -6,7 +6,9 @@ from ringsim.scene import Scene
 
 
 class SpringEnergy:
-    """Springs of a scene; ``alive`` are those that have not failed, shape (planes, sections)."""
+    """Springs and latches of a scene; ``alive`` are springs that have not failed, shape (planes,
+    sections).
+    """
 
     def __init__(self, scene: Scene) -> None:
         sections = scene.structure.sections
@@ -14,9 +16,26 @@ class SpringEnergy:
         self.alive = np.ones((len(self._planes), sections))
         spring = scene.hinge_spring
         self._law = None if spring is None else spring.at(np.arange(sections))
+        latch = scene.latch
+        self._pawl = None if latch is None else latch.at(np.arange(sections))
 
     def at(self, folded: float) -> tuple[float, float]:
-        """Sum of the torques that open (N m) and energy (J) at the folded angle (rad) of all."""
+        """Sum of all torques that open (N m) and energy (J) at the folded angle (rad) of all."""
+        torque, stored = self.springs(folded)
+        if self._pawl is None:
+            return torque, stored
+        more, lifted = self.pawls(folded)
+        return torque + more, stored + lifted
+
+    def pawls(self, folded: float) -> tuple[float, float]:
+        """Those of the latches alone."""
+        if self._pawl is None:
+            return 0.0, 0.0
+        reaction = self._pawl.torque(np.full(self.alive.shape, folded))
+        return float(np.sum(reaction.elastic)), float(np.sum(reaction.stored))
+
+    def springs(self, folded: float) -> tuple[float, float]:
+        """Those of the springs alone."""
         if self._law is None:
             return 0.0, 0.0
         reaction = self._law.torque(np.full(self.alive.shape, folded))

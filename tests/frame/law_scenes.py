@@ -31,6 +31,9 @@ FLEXIBLE: Values = {"boom.kind": "flexible", "boom.length": 0.9, "boom.elements"
 ARC: Values = {"structure.closed": False, "structure.polygon_sections": 18,
                "structure.aspect_ratio": 1.0, "joints.hinge.viscous": 2e-3}  # fmt: skip
 NET: Values = {"net.stiffness": 0.05, "net.neutral_length": 0.1}
+EDGE: Values = STOPS | {
+    "net": {"kind": "boundary", "axial_stiffness": 200.0, "strain": [0.02, 0.01, 0.03]}
+}
 SUDDEN: Values = {"solver.step": 1e-3, "solver.end_time": 0.25, "record.interval": 5e-3}
 """Resolves ropes that winches jerk."""
 STALLING = SUDDEN | {"solver.step": 2.5e-4, "solver.end_time": 0.1}
@@ -74,6 +77,8 @@ FORCES: dict[str, Values] = {
     | {"net.two_sided": True, "net.stiffness": 0.01, "net.neutral_length": 0.3},
     "damped-net": NET | {"net.damping": 0.05},
     "net-sections": NET | {"net.stiffness": [0.05, 0.04, 0.06]} | RIGID,
+    "edge-net": RIGID | EDGE,
+    "ramps": STOPS | {"stop.latch": True, "latch": {"peak_torque": [0.05, 0.1, 0.08]}},
     "rigid-free": RIGID | {"boom.base": "free"},
     "rigid-fixed": RIGID | {"boom.base": "fixed"},
     "flexible-free": FLEXIBLE | {"boom.base": "free"},

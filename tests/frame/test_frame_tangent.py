@@ -18,6 +18,7 @@ from ringsim.scene import Scene, load_scene
 DIFFERENCES = 1e-6
 """Central differences of 1e-7 leave this much: round-off of stiff rods over soft angles."""
 NET = {"stiffness": 0.05, "neutral_length": 0.3, "damping": 0.01, "hub_mass": 0.02}
+EDGE = {"kind": "boundary", "axial_stiffness": 50.0, "strain": [0.1, 0.06, 0.08]}
 OPEN = {"structure.closed": False, "structure.polygon_sections": 18, "boom.base": "fixed"}
 FLEXIBLE = {"boom.kind": "flexible", "boom.elements": 3}
 
@@ -37,12 +38,15 @@ def scene(name: str = "ring18", **values: Any) -> Scene:
         {"boom": "none", "structure.sections": 9},
         {"boom": "none", "rods.elements": 3},
         {"boom": "none", "structure.sections": 6, "net": NET},
+        {"boom": "none", "structure.sections": 3, "structure.opening_angle": 150.0, "net": EDGE},
+        OPEN | {"structure.sections": 3, "structure.opening_angle": 150.0, "net": EDGE},
         OPEN | {"structure.sections": 1},
         OPEN | {"structure.sections": 2},
         OPEN | {"structure.sections": 5, "rods.elements": 2},
     ],
     ids=[
-        "free-4", "free-3", "free-9", "three-elements", "net", "arc-1", "arc-2", "arc-5",
+        "free-4", "free-3", "free-9", "three-elements", "net", "edge", "arc-edge",
+        "arc-1", "arc-2", "arc-5",
     ],
 )  # fmt: skip
 def test_tangent_of_rings(values: dict[str, Any]) -> None:

@@ -16,7 +16,9 @@ from ringsim.choice import kinds_of
 from ringsim.engine.assembly import SYMBOLIC, TORSION, Assembly
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.parts.joint_friction.family import JointFriction
-from ringsim.parts.net import Net
+from ringsim.parts.latch import Latch
+from ringsim.parts.net.boundary import pull
+from ringsim.parts.net.hub import SpringNet
 from ringsim.parts.persection import at_section
 from ringsim.parts.stop.family import Stop
 from ringsim.parts.stop.spring_damper import SpringDamperStop
@@ -45,6 +47,14 @@ def stop_law(stop: Stop, latched: bool) -> Any:
     return law
 
 
+def ramp_law(latch: Latch) -> Any:
+    def law(place: Any, rate: Any, xp: Any = np) -> Any:
+        return latch.torque(place, xp)
+
+    law.corners = (0.0, math.radians(latch.reach))  # type: ignore[attr-defined]
+    return law
+
+
 def without_xp(law: Any) -> Any:
     return lambda place, rate, xp=np: law(place, rate)
 
@@ -52,7 +62,9 @@ def without_xp(law: Any) -> Any:
 LAWS = {
     "stop": st.builds(stop_law, STOP, st.just(False)),
     "latch": st.builds(stop_law, STOP, st.just(True)),
-    "net": records(Net).map(lambda net: net.tension),
+    "net": records(SpringNet).map(lambda net: net.tension),
+    "edge": st.floats(1.0, 1e5).map(lambda k: lambda x, rate, xp=np: pull(x, k, xp)),
+    "ramp": records(Latch).map(ramp_law),
     "rest": records(Rest).map(lambda rest: rest.push),
     "strut": records(DeployingSpring).map(lambda spring: without_xp(spring.tension)),
     "stuck": st.just(without_xp(StuckVJoint(time=0.0, section=1).torque)),
@@ -146,7 +158,7 @@ def test_a_stop_only_pushes_into_the_range(stop, folded, rate):
         assert torque == 0.0
 
 
-@given(records(Rest), records(Net), PLACE, RATE)
+@given(records(Rest), records(SpringNet), PLACE, RATE)
 def test_rest_and_one_sided_strings_never_turn_round(rest, net, stretch, rate):
     assert float(rest.push(stretch, rate).total) >= 0.0
     tension = float(net.tension(stretch, rate).total)
@@ -156,7 +168,7 @@ def test_rest_and_one_sided_strings_never_turn_round(rest, net, stretch, rate):
 
 
 def test_values_of_each_section_reach_the_law():
-    net = Net(stiffness=(1.0, 2.0, 4.0))
+    net = SpringNet(stiffness=(1.0, 2.0, 4.0))
     assert type(at_section(net, 2).stiffness) is float
     stretch = np.array([0.1, 0.2, 0.3])
     each = [at_section(net, k).tension(stretch[k], 0.0).total for k in range(3)]

@@ -4,7 +4,7 @@ from ringsim.theory.resistances.family import Opening, Resistance
 
 
 class NetResistance(Resistance):
-    """Tension of the net's strings; their dampers are left out."""
+    """Tension of the net's strings or cables; dampers are left out."""
 
     kind = "net"
     category = "spring"

@@ -21,4 +21,4 @@ class SpringResistance(Resistance):
         """See ``Resistance``."""
         springs = SpringEnergy(self.scene)
         # One radian of every joint's angle for one of the opening angle.
-        return -springs.at(math.pi - opening.angle)[0]
+        return -springs.springs(math.pi - opening.angle)[0]

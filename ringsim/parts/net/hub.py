@@ -1,18 +1,19 @@
 """The net, reduced to springs."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from ringsim.parts.net.family import Net
 from ringsim.parts.persection import PerSection
 from ringsim.parts.springs import Reaction, one_sided, two_sided
-from ringsim.units import DampingRate, Kilogram, Metre, Model, SpringRate
+from ringsim.units import DampingRate, Kilogram, Metre, SpringRate
 
 ONSET = 1e-4
 """Stretch over which the damper of a string comes in, m: a ten-thousandth of its length."""
 
 
-class Net(Model):
+class SpringNet(Net):
     """A spring from every upper corner, all alike or not, to one free hub point in the middle.
 
     Force = stiffness * (distance - neutral_length) + damping * rate, only while longer than
@@ -20,6 +21,7 @@ class Net(Model):
     inferred from the published deployment times.
     """
 
+    kind: Literal["hub"] = "hub"
     stiffness: PerSection[SpringRate] = 0.001
     """Force over stretch of the spring of a corner."""
     damping: DampingRate = 0.0
@@ -30,6 +32,16 @@ class Net(Model):
     """Whether springs push, too, where they are shorter than neutral."""
     hub_mass: Kilogram = 1e-5
     """Mass of the hub, next to nothing: 1 g changes the time of a clamped ring by 5e-4."""
+
+    @property
+    def point_mass(self) -> float:
+        """See ``Net``."""
+        return self.hub_mass
+
+    @property
+    def lossless(self) -> bool:
+        """See ``Net``."""
+        return self.damping == 0.0
 
     def tension(self, stretch: Any, rate: Any, xp: Any = np) -> Reaction:
         """Of strings longer than neutral by ``stretch`` (m), at its rate (m/s).

@@ -1,0 +1,48 @@
+"""How fast V-joints met their latches, and which of these caught."""
+
+import numpy as np
+
+from ringsim.outputs.family import Output, Run, Series, Values, Variable
+from ringsim.stepping.latches import Latches, meetings
+from ringsim.variables import PLANES
+
+
+class Latching(Output):
+    """The opening rate at which every V-joint first reached 180 deg, and whether its latch holds.
+
+    ECSS-E-ST-33-01C, 4.7.5.4.3, wants latching shown over temperature and tolerances.
+    """
+
+    rank = 5
+    needs = ("latches",)
+    variables = (
+        Variable(
+            "latch_rate", ("plane", "section"), "rad/s",
+            "opening rate at which the V-joint first met its latch; missing if it did not",
+        ),
+        Variable("latched", ("plane", "section"), "1", "1 if the latch of the V-joint holds", "i4"),
+        Variable("latched_joints", (), "1", "V-joints that are held by their latches", "i4"),
+    )  # fmt: skip
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """From the steps, as the engines do while they run."""
+        found, latches = np.full(run.locks.shape, np.nan), Latches(run.scene)
+        met = list(meetings(run.angles.times, run.angles.values, run.rates.values))
+        for one in reversed(met):
+            found[one.place] = one.rate
+        latches.meet(met)
+        caught = latches.caught.astype(np.int32)
+        return {"latch_rate": found, "latched": caught, "latched_joints": caught.sum()}
+
+
+def missed(values: Values) -> str:
+    """Which latches did not catch though their joints came to them, in words; empty if none."""
+    if "latched" not in values:
+        return ""
+    open_ = np.argwhere(np.isfinite(values["lock_time"]) & (values["latched"] == 0)).tolist()
+    if not open_:
+        return ""
+    names = [f"{PLANES[plane]} {section + 1}" for plane, section in open_]
+    more = f" and {len(names) - 6} more" if len(names) > 6 else ""
+    count = f"{len(names)} of {values['latched'].size} latches did not catch"
+    return f"; {count}: {', '.join(names[:6])}{more}"

@@ -1,0 +1,1 @@
+"""Kinds of nets, one file each."""

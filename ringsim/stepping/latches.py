@@ -1,0 +1,81 @@
+"""Which V-joints their latches hold, and how fast they met them."""
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.parts.faults.failed_latch import FailedLatch
+from ringsim.parts.persection import spread
+from ringsim.stepping.instant import Array, Instant
+from ringsim.stepping.locks import crossing
+
+ON_STOP = 1e-9
+"""Angle past 180 deg at which a stop has hardly begun to push, rad."""
+
+
+class Meeting(NamedTuple):
+    """A V-joint, (plane, section), comes to 180 deg at a time (s) and an opening rate (rad/s)."""
+
+    place: tuple[int, int]
+    time: float
+    rate: float
+
+
+class Latches:
+    """The latches of a scene; ``caught`` is whether each holds, shape (planes, sections)."""
+
+    def __init__(self, scene: Any) -> None:
+        shape = len(scene.structure.planes), scene.structure.sections
+        self.caught = np.zeros(shape, dtype=bool)
+        self._present = scene.stop is not None and scene.stop.latch
+        least = spread(0.0 if scene.latch is None else scene.latch.min_rate, shape[1])
+        self._least = np.broadcast_to(np.where(least > 0.0, least, -math.inf), shape)
+        self._fails = np.full(shape, math.inf)
+        for fault in (one for one in scene.faults if isinstance(one, FailedLatch)):
+            place = scene.structure.planes.index(fault.plane), fault.section - 1
+            self._fails[place] = min(self._fails[place], fault.time)
+        self._earlier: Instant | None = None
+        self._sure = not (np.isfinite(self._least).any() or np.isfinite(self._fails).any())
+
+    def note(self, deployed: NDArray[np.bool_], before: Instant, now: Instant) -> None:
+        """Go on by a step; ``deployed`` are the V-joints that have reached 180 deg by its end."""
+        if not self._present:
+            return
+        if self._sure:
+            self.caught = deployed.copy()
+            return
+        known = [before, now] if self._earlier is None else [self._earlier, before, now]
+        self._earlier = before
+        times = np.array([each.time for each in known])
+        angles, rates = (np.array([getattr(one, k) for one in known]) for k in ("angles", "rates"))
+        self.meet(one for one in meetings(times, angles, rates) if one.time > before.time)
+
+    def meet(self, met: Iterable[Meeting]) -> None:
+        """Let those catch that can, of meetings in the order of their times."""
+        for place, time, rate in met:
+            if self._present and rate >= self._least[place] and time < self._fails[place]:
+                self.caught[place] = True
+
+
+def meetings(times: Array, angles: Array, rates: Array) -> Iterator[Meeting]:
+    """Every arrival at 180 deg, of angles (rad) and rates (rad/s) of shape (n, planes, sections) at
+    times (s).
+
+    The step that meets a stop brakes, so that the rate is that of its begin, with the acceleration
+    of the step before; unless it ends on the stop, whose rate is then that of its end.
+    """
+    past = angles - math.pi
+    for step, plane, section in np.argwhere((past[:-1] < 0.0) & (past[1:] >= 0.0)).tolist():
+        ends, place = slice(step, step + 2), (plane, section)
+        own, speed = past[:, plane, section], rates[:, plane, section]
+        time = crossing(times[ends], own[ends], speed[ends])
+        met = float(speed[step])
+        if own[step + 1] < ON_STOP:
+            met = float(speed[step + 1])
+        elif step > 0 and own[step - 1] < 0.0:
+            bend = (speed[step] - speed[step - 1]) / (times[step] - times[step - 1])
+            met += float(bend) * (time - float(times[step]))
+        yield Meeting(place, time, met)

@@ -1,0 +1,150 @@
+"""Latches: their torque, the rate at which joints meet them, and those that do not catch."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.integrate import quad
+
+from motor_rings import ring
+from ringsim.parts.latch import Latch
+from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.refusal import InputError
+from ringsim.scene import Scene, load_scene
+from ringsim.simulation import simulate
+from ringsim.theory.drive_margin import DriveMargin
+from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+
+LATCH = {"peak_torque": 0.3, "reach": 8.0}
+REACH = math.radians(8.0)
+
+
+def latched(**values: object) -> Scene:
+    """Three sections from 160 deg on that springs open against their latches."""
+    plain = {
+        "cables": "none", "structure.sections": 3, "structure.opening_angle": 160.0, "joints": {},
+        "hinge_spring": {"kind": "linear", "stiffness": 0.02, "preload": 0.3}, "latch": LATCH,
+        "solver.tolerance": 1e-4, "solver.newton_tolerance": 1e-6, "solver.end_time": 1.0,
+        "record.interval": 1e-3, "stop.latch": True, "solver.settling_time": 0.01,
+    }  # fmt: skip
+    return ring().with_values(plain | {k.replace("__", "."): v for k, v in values.items()})
+
+
+def test_the_energy_of_the_ramp_is_the_integral_of_its_torque() -> None:
+    law = Latch(**LATCH)
+    work, _ = quad(lambda x: law.torque(x).elastic, REACH, 0.0)
+    assert work == pytest.approx(2.0 / 3.0 * 0.3 * REACH, rel=1e-12)
+    for begin, end in ((0.3, 0.1), (0.3, 0.05), (0.1, -0.01)):
+        work, _ = quad(lambda x: law.torque(x).elastic, begin, end, points=[0.0, REACH])
+        assert law.torque(end).stored - law.torque(begin).stored == pytest.approx(work, rel=1e-9)
+    assert law.torque(0.5 * REACH).elastic == pytest.approx(-0.3, rel=1e-12)
+    np.testing.assert_array_equal(law.torque(np.array([-0.1, 0.0, REACH, 1.0])).elastic, 0.0)
+
+
+def test_resistance_is_that_of_all_ramps() -> None:
+    found = DriveMargin(latched(latch__peak_torque=[0.1, 0.2, 0.6]), EcssMechanisms())
+    for share in (0.1, 0.5, 0.9, 1.5):
+        resisting = found.at(math.pi - share * REACH).resisting
+        expected = 2 * 0.9 * 4.0 * share * max(1.0 - share, 0.0)
+        assert resisting["latches"] == pytest.approx(expected, rel=1e-9, abs=1e-15)
+        springs = 6 * (0.3 + 0.02 * share * REACH)
+        assert resisting["springs"] == pytest.approx(-springs, rel=1e-12)
+
+
+def test_the_ideal_ring_meets_its_latches_as_the_quadrature_says() -> None:
+    scene = latched()
+    ring, found = OneCoordinate(scene), simulate(scene, "ideal")
+    start = scene.structure.coordinate
+    time = opening_time(ring, start, panels=200).time
+    assert float(found.deployment_time) == pytest.approx(time, rel=1e-6)
+    folding = math.sqrt(2.0 * (ring.work(0.0) - ring.work(start)) / ring.motion(0.0).inertia)
+    # What the springs give over 20 deg, less what the ramps take.
+    gained = 6 * (0.3 * math.radians(20.0) + 0.01 * math.radians(20.0) ** 2 - 0.2 * REACH)
+    assert ring.work(0.0) - ring.work(start) == pytest.approx(gained, rel=1e-9)
+    np.testing.assert_allclose(found.latch_rate, 2.0 * folding, rtol=1e-6)
+    assert found.latched.values.tolist() == [[1] * 3] * 2
+    assert int(found.latched_joints) == 6
+
+
+@pytest.mark.parametrize("fidelity", ["frame", "full"])
+def test_engines_agree_with_the_ideal_ring(fidelity: str) -> None:
+    scene = latched()
+    truth, found = simulate(scene, "ideal"), simulate(scene, fidelity)
+    np.testing.assert_allclose(found.deployment_time, truth.deployment_time, rtol=2e-3)
+    np.testing.assert_allclose(found.latch_rate, truth.latch_rate, rtol=5e-3)
+    assert found.latched.values.tolist() == truth.latched.values.tolist()
+    assert float(found.energy_error) < 1e-3
+
+
+@pytest.mark.parametrize("fidelity", ["ideal", "frame", "full"])
+def test_joints_that_come_too_slowly_leave_again(fidelity: str) -> None:
+    """Springs hold the joints at their stops; here they fold again, as they have come."""
+    scene = latched(
+        latch={"min_rate": 100.0}, solver__settling_time=0.05, stop__damping=0.0,
+        hinge_spring={"kind": "linear", "stiffness": 0.02, "preload": 0.3},
+    )  # fmt: skip
+    found = simulate(scene, fidelity)
+    assert float(found.latch_rate.max()) < 100.0
+    assert int(found.latched_joints) == 0
+    assert int(found.locked_joints) == 6
+    assert "6 of 6 latches did not catch: upper 1, upper 2, upper 3" in found.attrs["reason"]
+    after = found.opening_angle.where(found.time > float(found.deployment_time)).min()
+    caught = simulate(scene.with_values({"latch.min_rate": 0.0}), fidelity)
+    held = caught.opening_angle.where(caught.time > float(caught.deployment_time)).min()
+    assert float(after) < float(held) < 180.0
+
+
+@pytest.mark.parametrize("fidelity", ["frame", "full"])
+def test_a_latch_that_has_failed_does_not_catch(fidelity: str) -> None:
+    """That of upper 2 from the start, those of lower 1 and 3 by their rates; one that has caught
+    holds on."""
+    faults = [
+        {"kind": "failed-latch", "section": 2, "time": 0.0},
+        {"kind": "failed-latch", "plane": "lower", "section": 2, "time": 0.9},
+    ]
+    found = simulate(latched(faults=faults, latch={"min_rate": [0.0, 0.0, 100.0]}), fidelity)
+    assert found.latched.values.tolist() == [[1, 0, 0], [1, 1, 0]]
+    assert "3 of 6 latches did not catch: upper 2, upper 3, lower 3" in found.attrs["reason"]
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"stop.latch": False}, "set stop.latch = true"),
+        ({"stop": "none"}, "set stop.latch = true"),
+        ({"latch": "none", "stop.latch": False,
+          "faults": [{"kind": "failed-latch", "section": 1, "time": 0.0}]}, "fault of a latch"),
+        ({"faults": [{"kind": "failed-latch", "section": 4, "time": 0.0}]}, "at most 3"),
+        ({"latch.peak_torque": -1.0}, "latch.peak_torque = -1.0"),
+        ({"latch.reach": 90.0}, "latch.reach = 90.0"),
+        ({"latch.min_rate": [1.0]}, "needs 3"),
+    ],
+)  # fmt: skip
+def test_latches_that_cannot_be_are_refused(values: dict[str, object], text: str) -> None:
+    with pytest.raises((InputError, ValidationError), match=text):
+        latched().with_values(values)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"faults": [{"kind": "failed-latch", "section": 1, "time": 0.0}]},
+        {"latch.min_rate": [1.0, 2.0, 3.0]},
+    ],
+)
+def test_the_ideal_ring_refuses_latches_that_differ(values: dict[str, object]) -> None:
+    with pytest.raises(InputError, match="ideal fidelity"):
+        simulate(latched().with_values(values), "ideal")
+
+
+def test_rings_without_latches_tell_no_rate() -> None:
+    short = {
+        "solver.end_time": 0.05,
+        "solver.step": 0.01,
+        "record.interval": 0.01,
+        "structure.sections": 3,
+    }
+    assert "latch_rate" not in simulate(load_scene("ring18").with_values(short), "ideal")
