@@ -140,8 +140,8 @@ class Ropes:
         content, alive = self.content.copy(), self.alive.copy()
         content[k - 1] += content[k]
         alive[k - 1] &= alive[k]
-        gone = [np.delete(each, k) for each in (self.starts, content, alive)]
-        return Ropes(self.points_per_cable, *gone)
+        starts = np.delete(self.starts, k)
+        return Ropes(self.points_per_cable, starts, np.delete(content, k), np.delete(alive, k))
 
     def cut(self, cable: int, span: int) -> "Ropes":
         """The ropes after a span parts; both count from 0.  ValueError if there is no such span."""

@@ -24,4 +24,4 @@ class AccelerationMeter:
         """Shape (corners, 3), m/s^2, at the current state."""
         found = self._data.GetODE2Coordinates_tt(self._next)
         self._next = exu.ConfigurationType.Current
-        return np.asarray(found)[self._where]
+        return np.asarray(np.asarray(found, dtype=float)[self._where])

@@ -7,25 +7,19 @@ from dataclasses import replace
 import numpy as np
 
 from ringsim.cable.faults.family import CableFault
-from ringsim.frame.accelerations import AccelerationMeter
-from ringsim.frame.base import BaseMeter
 from ringsim.frame.extrapolation import extrapolated
 from ringsim.frame.kernels import Strains, move, moved_between, straighten
 from ringsim.frame.meter import EnergyMeter
 from ringsim.frame.model import FrameModel
-from ringsim.frame.positions import PositionMeter
+from ringsim.frame.readings import Readings
 from ringsim.frame.secants import Secants
-from ringsim.frame.shape import ShapeMeter
 from ringsim.frame.state import State
-from ringsim.frame.stresses import StressMeter
 from ringsim.layout.pose import Array
 from ringsim.outputs.recorder import Recorder
-from ringsim.outputs.series import Reading
 from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.scene import Scene
-from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks
@@ -76,22 +70,14 @@ class Integration:
         self._steps: list[tuple[float, Array]] = []
         self._faults = sorted(scene.faults, key=lambda fault: fault.time)
         self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
-        self._stress = StressMeter(model.mesh, model.layout) if scene.record.stress else None
-        self._position = PositionMeter(model) if scene.record.positions else None
-        self._base = BaseMeter(model) if scene.record.reactions else None
-        self._shock = AccelerationMeter(model) if scene.record.accelerations else None
+        self._readings = Readings(model)
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
         first = self._measure(0.0, self._now)
         self._locks = (
             Locks(first.angles, stowed, scene.structure.planes) if scene.structure.locks else None
         )
         self._latches = Latches(scene)
-        shaped = scene.record.shape or strained(scene)
-        self._shape = ShapeMeter(model) if shaped else None
-        own = {"rod": np.array(list(model.layout.halves()))}
-        for meter in (self._position, self._shock, self._shape):
-            own |= {} if meter is None else meter.coordinates
-        self.history = Recorder(scene, own)
+        self.history = Recorder(scene, self._readings.coordinates)
         ropes = None if model.cables is None else model.cables.ropes.content
         self._control = RunControl(
             scene.solver,
@@ -256,20 +242,7 @@ class Integration:
             energies = after.energies._replace(lost=lost, driven=now.energies.driven)
             now = replace(after, energies=energies)
         self._energy.keep()
-        cables, edge = self._model.cables, self._model.edge
-        self.history.note(
-            Reading(
-                **vars(now),
-                chain=self._now.chain,
-                planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
-                stress=None if self._stress is None else self._stress.read(self._strains),
-                places=None if self._position is None else self._position.read(self._now),
-                carried=None if self._base is None else self._base.read(self._now),
-                accelerations=None if self._shock is None else self._shock.read(self._now),
-                put=None if self._shape is None else self._shape.read(self._now),
-                edge=None if edge is None else edge.tensions(self._now.pose.place),
-            )
-        )
+        self.history.note(self._readings.read(now, self._now, self._strains))
         return now
 
     def _strike(self, now: Instant) -> bool:

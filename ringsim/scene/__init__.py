@@ -35,13 +35,7 @@ from ringsim.parts.stop.family import Stop
 from ringsim.parts.stop.spring_damper import SpringDamperStop
 from ringsim.parts.temperature import Temperature
 from ringsim.refusal import InputError, explain, known_or_nearest, models_in, show
-from ringsim.scene.checks import (
-    check_faults,
-    check_latch,
-    check_limits,
-    check_margin,
-    check_rods,
-)
+from ringsim.scene.checks import check_parts
 from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import ListIn, Model
@@ -105,10 +99,7 @@ class Scene(Model):
                     f"{path} has {len(value)} values, but the structure needs {wanted}: give "
                     "one value for all, or a list of that length"
                 )
-        check_faults(self)
-        check_rods(self)
-        check_limits(self)
-        check_latch(self)
+        check_parts(self)
         self.structure.check(self)
         for part in (self.spacecraft, self.gravity, self.offload, self.temperature):
             if part is not None:
@@ -118,7 +109,6 @@ class Scene(Model):
                 'record.stress = true is not possible with rods.kind = "ancf", whose elements '
                 'report no forces: choose "geometrically-exact", or leave record.stress out'
             )
-        check_margin(self)
         if self.record.interval > self.solver.end_time:
             raise ValueError(
                 f"record.interval = {self.record.interval} s must not exceed solver.end_time = "

@@ -13,7 +13,13 @@ if TYPE_CHECKING:
     from ringsim.scene import Scene
 
 
-def check_limits(scene: "Scene") -> None:
+def check_parts(scene: "Scene") -> None:
+    """Refuse (ValueError) parts that lack what they need of each other."""
+    for check in (_check_faults, _check_rods, _check_limits, _check_latch, _check_margin):
+        check(scene)
+
+
+def _check_limits(scene: "Scene") -> None:
     """Refuse (ValueError) limits of what a run does not tell."""
     if scene.limits.rod_stress is not None and not scene.record.stress:
         raise ValueError(
@@ -27,7 +33,7 @@ def check_limits(scene: "Scene") -> None:
         )
 
 
-def check_latch(scene: "Scene") -> None:
+def _check_latch(scene: "Scene") -> None:
     """Refuse (ValueError) a latch of stops that have none."""
     if scene.latch is not None and (scene.stop is None or not scene.stop.latch):
         raise ValueError(
@@ -35,7 +41,7 @@ def check_latch(scene: "Scene") -> None:
         )
 
 
-def check_margin(scene: "Scene") -> None:
+def _check_margin(scene: "Scene") -> None:
     """Refuse (ValueError) a margin of what has none."""
     if scene.margin is None:
         return
@@ -49,7 +55,7 @@ def check_margin(scene: "Scene") -> None:
         raise ValueError(reason)
 
 
-def check_rods(scene: "Scene") -> None:
+def _check_rods(scene: "Scene") -> None:
     """Refuse (ValueError) rods of other lengths where nothing can strain them."""
     if scene.record.shape and kind_of(scene.structure) != "pantograph-ring":
         raise ValueError(
@@ -70,7 +76,7 @@ def check_rods(scene: "Scene") -> None:
         )
 
 
-def check_faults(scene: "Scene") -> None:
+def _check_faults(scene: "Scene") -> None:
     """Refuse (ValueError) faults of what is not there."""
     cables = [] if scene.cables is None else scene.cables.present()
     for number, fault in enumerate(scene.faults, 1):
