@@ -96,4 +96,4 @@ def _turned(phi: Of) -> Of:
     x, y, z = phi.T
     zero = 0 * x
     spun = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    return np.eye(3) + sine * spun + cosine * (spun @ spun)
+    return np.asarray(np.eye(3) + sine * spun + cosine * (spun @ spun))
