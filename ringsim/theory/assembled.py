@@ -116,7 +116,8 @@ class _Frames:
             self.energy = 0.5 * float(np.sum(self._stiffness * values**2))
             spots = self._spots(self._elements)
             force = np.einsum("nm,nmk->nk", self._stiffness * values, slopes)
-            pushed: Array = np.bincount(spots.ravel(), force.ravel(), self._size + 6)[: self._size]
+            summed = np.bincount(spots.ravel(), force.ravel(), self._size + 6)
+            pushed = np.asarray(summed[: self._size], dtype=float)
             gaps, rows = self._closing()
             if multipliers is not None:
                 left = np.abs(pushed + self._scale * (rows.T @ multipliers)).max()
