@@ -46,8 +46,8 @@ class FactorTable(Model):
 
     def at(self, value: Values) -> Values:
         """Factors at temperatures (K), one or one a section."""
-        found = np.asarray(np.interp(value, self.temperatures, self.factors))
-        return tuple(float(each) for each in found) if found.ndim else float(found)
+        found = np.interp(np.ravel(value), self.temperatures, self.factors).tolist()
+        return tuple(found) if isinstance(value, tuple) else float(found[0])
 
 
 class RodTemperature(Model):

@@ -62,6 +62,10 @@ def _check_rods(scene: "Scene") -> None:
             'record.shape = true needs structure.kind = "pantograph-ring", not '
             f'"{kind_of(scene.structure)}": only that has corners (leave it out)'
         )
+    if scene.rods.bar_young_modulus is not None and kind_of(scene.structure) != "pantograph-ring":
+        raise ValueError(
+            "rods.bar_young_modulus: only the pantograph ring has folding bars (leave it out)"
+        )
     what = strained(scene)
     if not what:
         return
