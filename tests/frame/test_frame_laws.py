@@ -17,7 +17,7 @@ from ringsim.simulation import simulate
 FLOOR = 1e-4
 SLOW = {
     "forces": {"viscous-sections", "force-sections", "net", "rigid-free", "arc-2-free",
-               "damped-net", "free-stop"},
+               "damped-net", "free-stop", "edge-net", "ramps"},
     "cables": {"last", "capstan-pulleys", "frictionless", "stall", "two-winches", "feedback",
                "locked", "constant", "arc-2-flexible", "boom-and-net", "late-lower", "taut"},
 }  # fmt: skip

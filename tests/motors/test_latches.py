@@ -69,17 +69,26 @@ def test_the_ideal_ring_meets_its_latches_as_the_quadrature_says() -> None:
     assert int(found.latched_joints) == 6
 
 
-@pytest.mark.parametrize("fidelity", ["frame", "full"])
-def test_engines_agree_with_the_ideal_ring(fidelity: str) -> None:
-    scene = latched()
-    truth, found = simulate(scene, "ideal"), simulate(scene, fidelity)
-    np.testing.assert_allclose(found.deployment_time, truth.deployment_time, rtol=2e-3)
+def test_a_ring_of_stiff_rods_meets_its_latches_as_the_ideal_one_does() -> None:
+    """Usual rods swing in the last degrees, which makes the rates 4 % larger."""
+    scene = latched(rods__young_modulus=1.2e13)
+    truth, found = simulate(scene, "ideal"), simulate(scene, "frame")
+    np.testing.assert_allclose(found.deployment_time, truth.deployment_time, rtol=1e-3)
     np.testing.assert_allclose(found.latch_rate, truth.latch_rate, rtol=5e-3)
     assert found.latched.values.tolist() == truth.latched.values.tolist()
     assert float(found.energy_error) < 1e-3
 
 
-@pytest.mark.parametrize("fidelity", ["ideal", "frame", "full"])
+@pytest.mark.slow
+def test_both_engines_meet_latches_alike() -> None:
+    frame, full = (simulate(latched(), fidelity) for fidelity in ("frame", "full"))
+    np.testing.assert_allclose(frame.deployment_time, full.deployment_time, rtol=1e-4)
+    np.testing.assert_allclose(frame.latch_rate, full.latch_rate, rtol=2e-3)
+
+
+@pytest.mark.parametrize(
+    "fidelity", ["ideal", "frame", pytest.param("full", marks=pytest.mark.slow)]
+)
 def test_joints_that_come_too_slowly_leave_again(fidelity: str) -> None:
     """Springs hold the joints at their stops; here they fold again, as they have come."""
     scene = latched(
