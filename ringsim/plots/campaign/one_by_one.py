@@ -1,5 +1,7 @@
 """What every single change of a one-at-a-time design does to the main numbers."""
 
+import itertools
+import re
 import textwrap
 
 import numpy as np
@@ -30,9 +32,12 @@ def is_one_by_one(campaign: xr.Dataset) -> bool:
     return kind == "one-at-a-time" and bool(scalars(campaign)) and bool(inputs(campaign))
 
 
-def moves(campaign: xr.Dataset) -> list[str]:
-    """Of each sample what it has other than the first one, in words; "base" of that."""
-    found, seen = [["base"], *([] for _ in range(campaign.sizes["sample"] - 1))], set[str]()
+def moves(campaign: xr.Dataset) -> tuple[list[str], list[str]]:
+    """Of each sample what it has other than the first one, in words, and the input that moved;
+    "base" and "" of the first.
+    """
+    count = campaign.sizes["sample"]
+    found, moved, seen = [list[str]() for _ in range(count)], [""] * count, set[str]()
     for name in inputs(campaign):
         # Paths that share one drawn value move together.
         shared = distribution_of(campaign[name]).get("shared")
@@ -42,13 +47,15 @@ def moves(campaign: xr.Dataset) -> list[str]:
         values = campaign[name].to_numpy()
         rows = values.reshape(len(values), -1)
         for sample, place in zip(*np.nonzero(rows != rows[0]), strict=True):
-            found[sample].append(_word(campaign[name], rows[sample, place], int(place)))
-    return [", ".join(words) for words in found]
+            one, base = rows[sample, place], rows[0, place]
+            found[sample].append(_word(campaign[name], one, base, int(place)))
+            moved[sample] = name
+    return [", ".join(words) or "base" for words in found], moved
 
 
-def _word(variable: xr.DataArray, value: object, place: int) -> str:
-    """The place of an input of many, or the value of a single one, with the last part of its
-    path.
+def _word(variable: xr.DataArray, value: object, base: object, place: int) -> str:
+    """The place of an input of many; of a single one the last part of its path with the value, of
+    a table with what in it is new.
     """
     if variable.ndim > 1:
         dim = str(variable.dims[1])
@@ -57,8 +64,11 @@ def _word(variable: xr.DataArray, value: object, place: int) -> str:
             return str(variable[named].values[place])
         return f"{dim} {place + 1}"
     last = str(variable.attrs.get("path") or variable.name).rpartition(".")[2]
-    shown = f"{value:.4g}" if isinstance(value, float) else str(value)
-    return f"{last} {shown}"
+    if isinstance(value, float):
+        return f"{last} {value:.4g}"
+    old = set(re.split(r"[(),]+ ?", str(base)))
+    new = [word for word in re.split(r"[(),]+ ?", str(value)) if word and word not in old]
+    return f"{last} {', '.join(new) or value}"
 
 
 @style.styled
@@ -67,7 +77,8 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
 
     Colour and marker say how the sample ended.
     """
-    names, words, ends = scalars(campaign), moves(campaign), endings(campaign)
+    names, ends = scalars(campaign), endings(campaign)
+    words, moved = moves(campaign)
     samples = campaign["sample"].to_numpy()
     figure = Figure(figsize=(9.6, 1.75 * len(names) + 2.4))
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
@@ -78,7 +89,9 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
         at = np.searchsorted(samples, known)
         if 0 in at:
             axes.axhline(values[0], color=style.GREY, linewidth=0.9)
-        axes.plot(at, values, color=style.PALE, linewidth=1.0, zorder=1)
+        for _, run in itertools.groupby(range(len(at)), key=lambda k: moved[at[k]]):
+            line = list(run)
+            axes.plot(at[line], values[line], color=style.PALE, linewidth=1.0, zorder=1)
         for word in dict.fromkeys(ends.tolist()):
             own = ends[at] == word
             colour, marker = looks.get(word, FAILED[0])

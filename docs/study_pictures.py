@@ -1,0 +1,102 @@
+"""Draws the pictures of docs/studies that are not figures of one campaign alone.
+
+    python docs/study_pictures.py runs
+
+``sections.png`` from runs/sections-N; ``stalling_motor.png`` from runs/stalling-motor: the margin
+of the rigid ring without a standard's factors, against what the flexible one did.
+"""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from pictures import save
+
+import ringsim
+from ringsim.analysis.campaign_samples import endings
+from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.plots import style
+from ringsim.plots.campaign.frame import LOOKS
+from ringsim.theory.drive_margin import DriveMargin
+
+COUNTS = (6, 9, 12, 18, 27, 36)
+NUMBERS = {
+    "asynchrony_max": "Largest asynchrony (degree)",
+    "deployment_time": "Deployment time (s)",
+    "peak_tension": "Largest tension (N)",
+}
+PLAIN = EcssMechanisms(
+    inertia=1.0, spring=1.0, friction=1.0, gravity=1.0, latch=1.0, driving_spring=1.0,
+    motorisation=1.0,
+)  # fmt: skip
+"""What drives over what resists, as it is."""
+
+
+@style.styled
+def sections(runs: Path) -> Figure:
+    """A panel a number: all samples over the number of sections."""
+    figure = Figure(figsize=(10.2, 3.4))
+    panels = figure.subplots(1, len(NUMBERS))
+    means: dict[str, list[float]] = {name: [] for name in NUMBERS}
+    for count in COUNTS:
+        with xr.open_dataset(runs / f"sections-{count}" / "campaign.nc") as campaign:
+            for axes, name in zip(panels, NUMBERS, strict=True):
+                values = campaign[name].to_numpy()
+                axes.plot([count] * len(values), values, "o", color=style.BLUE, markersize=3.5)
+                means[name].append(float(values.mean()))
+    for axes, (name, words) in zip(panels, NUMBERS.items(), strict=True):
+        axes.plot(COUNTS, means[name], color=style.BLUE, linewidth=1.0)
+        axes.set(xlabel="Sections", ylabel=words, ylim=(0.0, None), xlim=(0, 38), xticks=COUNTS)
+    return figure
+
+
+def static_margins(campaign: xr.Dataset) -> np.ndarray:
+    """Of the rigid ring of every sample at its start, without factors; negative: it cannot open."""
+    scene = ringsim.load_scene("ring18-motor")
+    names = {
+        "cables.upper.friction.coefficient": "cables_upper_friction_coefficient",
+        "cables.lower.friction.coefficient": "cables_lower_friction_coefficient",
+        "joints.vjoint.coulomb": "joints_vjoint_coulomb",
+        "cables.upper.winch.winding.derating": "cables_upper_winch_winding_derating",
+        "cables.lower.winch.winding.derating": "cables_lower_winch_winding_derating",
+    }
+    found = []
+    for sample in campaign["sample"].values:
+        values = {path: float(campaign[name].sel(sample=sample)) for path, name in names.items()}
+        found.append(DriveMargin(scene.with_values(values), PLAIN).at(math.radians(20.0)).margin)
+    return np.array(found)
+
+
+@style.styled
+def stalling_motor(runs: Path) -> Figure:
+    """Deployment time over the static margin; samples that never deploy at the top."""
+    with xr.open_dataset(runs / "stalling-motor" / "campaign.nc") as campaign:
+        margins, words = static_margins(campaign), endings(campaign)
+        times = campaign["deployment_time"].to_numpy()
+    figure = Figure(figsize=(8.0, 4.0))
+    axes = figure.subplots()
+    top = 1.12 * np.nanmax(times)
+    for word in sorted(set(words.tolist())):
+        own = words == word
+        colour, marker = LOOKS[word]
+        axes.plot(margins[own], np.nan_to_num(times[own], nan=top), marker, color=colour,
+                  markersize=5, alpha=0.8, label=f"{word} ({own.sum()})")  # fmt: skip
+    axes.axvline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+    axes.set_xlabel("Margin of the rigid ring at 20 deg, without factors")
+    axes.set_ylabel("Deployment time (s); at the top: none")
+    figure.legend(loc="outside lower center", ncols=4)
+    return figure
+
+
+def main() -> None:
+    """Draw all of them."""
+    runs = Path(sys.argv[1])
+    for draw in (sections, stalling_motor):
+        save(draw(runs), f"{draw.__name__}.png")
+
+
+if __name__ == "__main__":
+    main()
