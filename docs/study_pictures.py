@@ -2,8 +2,9 @@
 
     python docs/study_pictures.py runs
 
-``sections.png`` from runs/sections-N; ``stalling_motor.png`` from runs/stalling-motor: the margin
-of the rigid ring without a standard's factors, against what the flexible one did.
+``winding_laws.png`` from runs/winding-laws, ``sections.png`` from runs/sections-N;
+``stalling_motor.png`` from runs/stalling-motor: the margin of the rigid ring without a standard's
+factors, against what the flexible one did.
 """
 
 import math
@@ -53,6 +54,40 @@ def sections(runs: Path) -> Figure:
     return figure
 
 
+LAWS = (
+    "constant speed", "ramp of 0.2 s", "ramp of 1 s", "ramp of 5 s", "table, slow start",
+    "tension feedback, 5 N", "stall at 10 N",
+)  # fmt: skip
+"""As the campaign lists them."""
+
+
+@style.styled
+def winding_laws(runs: Path) -> Figure:
+    """Largest tension and slack of every law, a marker a friction of the joints."""
+    with xr.open_dataset(runs / "winding-laws" / "campaign.nc") as campaign:
+        grid = {
+            "Largest tension (N)": campaign["peak_tension"].to_numpy(),
+            "Slack at the winch, worse cable (s)": campaign["slack_duration"].max("plane"),
+            "Largest asynchrony (degree)": campaign["asynchrony_max"].to_numpy(),
+        }
+        joints = campaign["joints_vjoint_viscous"].to_numpy().reshape(-1, len(LAWS))[:, 0]
+    figure = Figure(figsize=(10.4, 3.9))
+    panels = figure.subplots(1, len(grid), sharey=True)
+    looks = ((style.BLUE, "o"), (style.ORANGE, "s"), (style.VERMILLION, "^"))
+    for axes, (words, values) in zip(panels, grid.items(), strict=True):
+        rows = np.asarray(values).reshape(-1, len(LAWS))
+        for row, friction, (colour, marker) in zip(rows, joints, looks, strict=True):
+            axes.plot(row, range(len(LAWS)), marker, color=colour, markersize=6, alpha=0.85,
+                      label=f"joints of {friction:g} N m s/rad")  # fmt: skip
+        axes.set_xlabel(words)
+    panels[0].set_xscale("log")
+    style.plain_numbers(panels[0].xaxis)
+    panels[0].set_yticks(range(len(LAWS)), LAWS)
+    panels[0].set_ylim(len(LAWS) - 0.5, -0.5)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
 def static_margins(campaign: xr.Dataset) -> np.ndarray:
     """Of the rigid ring of every sample at its start, without factors; negative: it cannot open."""
     scene = ringsim.load_scene("ring18-motor")
@@ -94,7 +129,7 @@ def stalling_motor(runs: Path) -> Figure:
 def main() -> None:
     """Draw all of them."""
     runs = Path(sys.argv[1])
-    for draw in (sections, stalling_motor):
+    for draw in (winding_laws, sections, stalling_motor):
         save(draw(runs), f"{draw.__name__}.png")
 
 
