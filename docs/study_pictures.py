@@ -18,10 +18,12 @@ from pictures import save
 
 import ringsim
 from ringsim.analysis.campaign_samples import endings
-from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import LOOKS
-from ringsim.theory.drive_margin import DriveMargin
+from ringsim.theory.drive import Drive
+from ringsim.theory.ideal_mechanism import Mechanism
+from ringsim.theory.resistances.family import Opening, folding, resistances
+from ringsim.variables import PLANES
 
 COUNTS = (6, 9, 12, 18, 27, 36)
 NUMBERS = {
@@ -29,11 +31,6 @@ NUMBERS = {
     "deployment_time": "Deployment time (s)",
     "peak_tension": "Largest tension (N)",
 }
-PLAIN = EcssMechanisms(
-    inertia=1.0, spring=1.0, friction=1.0, gravity=1.0, latch=1.0, driving_spring=1.0,
-    motorisation=1.0,
-)  # fmt: skip
-"""What drives over what resists, as it is."""
 
 
 @style.styled
@@ -89,20 +86,34 @@ def winding_laws(runs: Path) -> Figure:
 
 
 def static_margins(campaign: xr.Dataset) -> np.ndarray:
-    """Of the rigid ring of every sample at its start, without factors; negative: it cannot open."""
+    """Of the rigid ring of every sample at its start, without factors; negative: it cannot open.
+
+    What drives over what resists, less one.  Friction of joints is linear in its coefficient, what
+    a cable drives in its winch's tension.
+    """
     scene = ringsim.load_scene("ring18-motor")
-    names = {
-        "cables.upper.friction.coefficient": "cables_upper_friction_coefficient",
-        "cables.lower.friction.coefficient": "cables_lower_friction_coefficient",
-        "joints.vjoint.coulomb": "joints_vjoint_coulomb",
-        "cables.upper.winch.winding.derating": "cables_upper_winch_winding_derating",
-        "cables.lower.winch.winding.derating": "cables_lower_winch_winding_derating",
-    }
-    found = []
-    for sample in campaign["sample"].values:
-        values = {path: float(campaign[name].sel(sample=sample)) for path, name in names.items()}
-        found.append(DriveMargin(scene.with_values(values), PLAIN).at(math.radians(20.0)).margin)
-    return np.array(found)
+    mechanism = Mechanism(scene)
+    drive, start = Drive(scene, mechanism), math.pi - 2.0 * scene.structure.coordinate
+    now = folding(mechanism, scene.structure.coordinate)
+    friction = campaign["cables_upper_friction_coefficient"].to_numpy()
+    driving = np.zeros(len(friction))
+    for plane, cable, reeved in zip(PLANES, drive.cables, drive.reeved(now), strict=True):
+        for sample, own in enumerate(friction):
+            law = cable.friction.factored(own / cable.friction.coefficient)
+            decay = law.bound_decay(reeved.angles, cable.pulley_radius)
+            shares = np.exp(np.append(0.0, np.cumsum(decay)))
+            weak = float(campaign[f"cables_{plane}_winch_winding_derating"][sample])
+            pull = weak * cable.winch.winding.available_tension()
+            driving[sample] += pull * float(shares @ reeved.shortening)
+    dry = campaign["joints_vjoint_coulomb"].to_numpy()
+
+    def resisting(coulomb: float) -> float:
+        own = scene.with_values({"joints.vjoint.coulomb": coulomb})
+        kinds = resistances(own, Mechanism(own))
+        return sum(one.force(Opening(start, 0.0, 0.0, now)) for one in kinds)
+
+    low, high = resisting(0.01), resisting(0.02)
+    return driving / (low + (high - low) * (dry - 0.01) / 0.01) - 1.0
 
 
 @style.styled

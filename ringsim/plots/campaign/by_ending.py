@@ -1,6 +1,7 @@
 """Courses of some samples of every ending: bands that tell what those have in common that stall."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -60,9 +61,10 @@ def bands_by_ending(axes: Axes, x: Array, values: Array, words: NDArray[np.str_]
 
 def legend(figure: Figure, panels: Sequence[Axes]) -> None:
     """One legend of all panels below the figure."""
-    found = {}
+    found = dict[str, Any]()
     for axes in panels:
-        found |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+        handles, labels = axes.get_legend_handles_labels()
+        found |= dict(zip(labels, handles, strict=True))
     figure.legend(
         [*found.values()], [*found], loc="outside lower center", ncols=max(1, min(4, len(found)))
     )
