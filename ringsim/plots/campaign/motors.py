@@ -14,7 +14,7 @@ def motors(campaign: xr.Dataset) -> Figure:
     """A row a motor, from ``motor_torque`` and ``motor_speed`` (sample, plane, winch, time)."""
     read, words = chosen(campaign, ["motor_torque", "motor_speed"])
     read = read.transpose("sample", "plane", "winch", "time")
-    there = np.isfinite(read["motor_torque"]).any(("sample", "time")).to_numpy()
+    there = np.isfinite(read["motor_torque"].to_numpy()).any(axis=(0, 3))
     places = np.argwhere(there).tolist()
     figure = Figure(figsize=(9.2, 2.2 * len(places) + 1.3))
     grid = figure.subplots(len(places), 2, sharex=True, sharey="col", squeeze=False)
