@@ -162,6 +162,8 @@ class Variable:
     error_bar: ErrorBar | None = None
     summary: tuple[str, str] | None = None
     """Label and number format in what ``ringsim run`` prints, if it stands there."""
+    until: str = "final_time"
+    """Number up to which all output times have a value; the run's end where that is missing."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.dataset import to_dataset
-from ringsim.outputs.family import span_names
+from ringsim.outputs.family import VARIABLES, span_names
 from ringsim.scene import Scene, load_scene
 from ringsim.shapes import shape_of
 from ringsim.variables import PLANES, Cause, Fate, Outcome, Status
@@ -127,3 +127,30 @@ def with_positions(campaign: xr.Dataset, shift: float = 0.5) -> xr.Dataset:
     told = {"long_name": "position of a point of the structure", "units": "m"}
     more = campaign.assign_coords(names)
     return more.assign(position=(("sample", "point", "axis", "time"), np.array(rows), told))
+
+
+def with_motors(campaign: xr.Dataset) -> xr.Dataset:
+    """The same with motors, margins and a base: sample k has its least margin of -0.5 + 0.1 k at
+    the first record, its motors the torque (1 + k) mN m, its base a force of 3 + k N.
+    """
+    known = np.isfinite(campaign["asynchrony"].transpose("sample", "time").to_numpy())
+    k, gone = np.arange(campaign.sizes["sample"]), np.where(known, 0.0, np.nan)
+    held = gone[:, None, None, :]
+    dims, share = ("sample", "plane", "winch", "time"), TIMES / TIMES[-1]
+    size = 1e-3 * (1.0 + k)[:, None, None, None]
+    torque = np.broadcast_to(size + held, (len(k), 2, 1, len(share)))
+    vector = np.array([0.0, 0.6, 0.8])[:, None] * (3.0 + k)[:, None, None] + gone[:, None, :]
+    least = np.where(known.any(axis=1), -0.5 + 0.1 * k, np.nan)
+    values = {
+        "motor_torque": (dims, torque), "motor_speed": (dims, 300.0 + 0.0 * torque),
+        "base_force": (("sample", "axis", "time"), vector),
+        "base_torque": (("sample", "axis", "time"), 0.5 * vector),
+        "drive_margin": (("sample", "time"), least[:, None] + share + gone),
+        "least_drive_margin": ("sample", least),
+    }  # fmt: skip
+    says = {
+        name: {"units": VARIABLES[name].units, "long_name": VARIABLES[name].long_name}
+        for name in values
+    }
+    more = campaign.assign_coords(winch=[1], axis=["x", "y", "z"])
+    return more.assign({name: (*each, says[name]) for name, each in values.items()})

@@ -49,7 +49,8 @@ def _check(requirements: dict[str, Requirement]) -> dict[str, Requirement]:
         if name not in known:
             why = f"is no output that can be required ({known_or_nearest(name, known)})"
             if name in VARIABLES and (dims := VARIABLES[name].dims):
-                near = [n for n in quantities() if n.startswith(f"{name}_") or n == f"peak_{name}"]
+                ends = (f"least_{name}", f"peak_{name}")
+                near = [n for n in quantities() if n in ends or n.startswith(f"{name}_")]
                 hint = near[0] if near else known_or_nearest(name, known)
                 why = f"has a value for each {' and '.join(dims)}: require a number, like {hint}"
             raise ValueError(f"{name} {why}")

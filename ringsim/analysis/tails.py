@@ -8,10 +8,40 @@ import xarray as xr
 from scipy.stats import norm
 
 from ringsim.analysis.binomial import share_interval
-from ringsim.analysis.intervals import LEVEL, student
+from ringsim.analysis.intervals import LEVEL, Array, student
 from ringsim.analysis.quantities import CHECKED, good, lost
 from ringsim.sampling.designs.subset_simulation import SubsetSimulation
 from ringsim.variables import Status
+
+
+def subset_simulation(campaign: xr.Dataset) -> SubsetSimulation | None:
+    """The design of a campaign if it is subset simulation, else None."""
+    table = json.loads(campaign.attrs.get("design", "{}"))
+    if table.get("kind") != "subset-simulation":
+        return None
+    return SubsetSimulation.model_validate(table)
+
+
+def _responses(campaign: xr.Dataset, design: SubsetSimulation) -> Array:
+    values = campaign[design.of].to_numpy().astype(float)
+    return design.responses(values, ~good(campaign))
+
+
+def approach(campaign: xr.Dataset) -> list[tuple[Array, Array]]:
+    """Of each replicate the values of the output that its levels reached, the event's last, with
+    the probability to be at or beyond each; what has no probability yet is left out.
+    """
+    if (design := subset_simulation(campaign)) is None:
+        return []
+    found = []
+    for one in design.levels(_responses(campaign, design)).repetitions:
+        places, shares = [*one.thresholds], [*one.beyond]
+        if one.probability > 0.0:
+            places, shares = [*places, design.target], [*shares, one.probability]
+        # Runs without a value are beyond all: a threshold among them has no place on an axis.
+        known = np.isfinite(places)
+        found.append((design.sign * np.array(places)[known], np.array(shares)[known]))
+    return found
 
 
 def tail(campaign: xr.Dataset) -> dict[str, Any]:
@@ -20,12 +50,9 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
     The interval is that of the logarithm: of independent replicates Student's t from their
     scatter; of a single one the normal limit from the correlation of its chains.
     """
-    table = json.loads(campaign.attrs.get("design", "{}"))
-    if table.get("kind") != "subset-simulation":
+    if (design := subset_simulation(campaign)) is None:
         return {}
-    design = SubsetSimulation.model_validate(table)
-    values = campaign[design.of].to_numpy().astype(float)
-    known = design.responses(values, ~good(campaign))
+    known = _responses(campaign, design)
     found = design.levels(known)
     each = np.array([one.probability for one in found.repetitions])
     chains = np.array([one.variation for one in found.repetitions])

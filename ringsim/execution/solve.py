@@ -73,7 +73,7 @@ def _not_finite(outcome: Outcome) -> str:
     that are not there.
     """
     axis = outcome.coordinates.get("time")
-    end = outcome.values.get("final_time")
+    final = outcome.values.get("final_time")
     for name, values in outcome.values.items():
         array = np.asarray(values)
         if array.dtype.kind != "f" or name not in VARIABLES:
@@ -81,8 +81,9 @@ def _not_finite(outcome: Outcome) -> str:
         if np.isinf(array).any():
             return f"{name} is infinite: try a smaller solver.step"
         dims = VARIABLES[name].dims
-        if "time" in dims and axis is not None and end is not None:
+        if "time" in dims and axis is not None and final is not None:
             along = dims.index("time")
+            end = np.fmin(outcome.values.get(VARIABLES[name].until, np.nan), final)
             gaps = np.isnan(np.compress(np.asarray(axis) <= float(end), array, axis=along))
             broken = bool((gaps.any(axis=along) & ~gaps.all(axis=along)).any())
         else:

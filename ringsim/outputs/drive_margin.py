@@ -2,6 +2,9 @@
 
 from ringsim.outputs.family import Output, Run, Series, Values, Variable
 
+LAST_LOCK = "deployment_time"
+"""What is open needs no drive any more."""
+
 
 class DriveMargins(Output):
     """Generalised forces on the mean opening angle of the ideal ring at that of the run.
@@ -18,12 +21,15 @@ class DriveMargins(Output):
         Variable(
             "drive_available", ("time",), "N m",
             "what winches and loads could drive without friction in the pulleys",
+            until=LAST_LOCK,
         ),
         Variable(
-            "drive_resistance", ("resistance", "time"), "N m", "resistance to opening by its kind"
+            "drive_resistance", ("resistance", "time"), "N m", "resistance to opening by its kind",
+            until=LAST_LOCK,
         ),
         Variable(
-            "drive_margin", ("time",), "1", "margin of the drive with the factors of the standard"
+            "drive_margin", ("time",), "1", "margin of the drive with the factors of the standard",
+            until=LAST_LOCK,
         ),
         Variable(
             "least_drive_margin", (), "1", "smallest margin of the drive at any output time",

@@ -17,6 +17,7 @@ from ringsim.plots.inline import inline
 from ringsim.report import model, tables
 from ringsim.report.player import player
 from ringsim.report.sensitivity import what_matters
+from ringsim.report.tail import rare_event
 
 LARGEST = 2_000_000
 """Bytes of a page: it is to go by mail."""
@@ -45,12 +46,14 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     failures, more = tables.failures(campaign, folder)
     values, head = model.values(campaign)
     figures = [(p.name, p.words, inline(f, p.name, p.words)) for p, f in figures_of(campaign)]
-    stopping = stopping_lines(campaign, placement(campaign))
     notes = [*restart_lines(campaign), *override_lines(campaign), *budget_lines(campaign)]
     shell = jinja2.Environment(
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
+    placed = placement(campaign)
+    stopping = stopping_lines(campaign, placed)
+    head_of_statistics, statistics = tables.statistics(campaign)
     design = dict(wanted.get("design", {}))
     design.pop("samples", None)  # a call with --samples changes it
     context: dict[str, Any] = {
@@ -60,7 +63,9 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "not_run": int((endings(campaign) == "not run").sum()),
         "design": design.pop("kind", "unknown"), "design_more": design,
         "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),
-        "outcomes": tables.outcomes(campaign), "statistics": tables.statistics(campaign),
+        "outcomes": tables.outcomes(campaign), "tail": rare_event(campaign),
+        "statistics": statistics, "statistics_head": head_of_statistics,
+        "no_population": "" if placed.population or not placed.kind else placed.told,
         "requirements": tables.requirements(campaign), "verdicts": tables.verdicts(analysis),
         "matters": what_matters(analysis), "peaks": peak_lines(campaign), "stopping": stopping,
         "figures": figures, "player": player(campaign), "failures": failures, "more": more,

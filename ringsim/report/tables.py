@@ -17,6 +17,7 @@ from ringsim.analysis.campaign_samples import (
     scalars,
     values_of,
 )
+from ringsim.analysis.design import placement
 from ringsim.analysis.quantities import CHECKED, good
 from ringsim.refusal import show
 from ringsim.variables import GOALS, Cause
@@ -38,20 +39,30 @@ def outcomes(campaign: xr.Dataset) -> Rows:
     return [[word, str(n), f"{n / len(words):.1%}"] for word, n in Counter(words).most_common()]
 
 
-def statistics(campaign: xr.Dataset) -> Rows:
-    """A row a main number: what, unit, n, lost, mean, deviation, quantiles, extremes."""
-    rows = []
+_HEAD = ["Number", "Unit", "n used", "n left out"]
+_MOMENTS = ["Mean", "Std. dev.", "5 %", "Median", "95 %"]
+_EXTREMES = ["Least (sample)", "Largest (sample)"]
+
+
+def statistics(campaign: xr.Dataset) -> tuple[list[str], Rows]:
+    """Heads, and a row a main number: what, unit, n, lost, mean, deviation, quantiles, extremes.
+
+    Extremes alone where samples stand for no population: their mean would be that of the design.
+    """
+    rows, placed = [], placement(campaign)
+    moments = placed.population or not placed.kind
     for name in scalars(campaign):
         samples, values = values_of(campaign, name)
         says, deviation = campaign[name].attrs, values.std(ddof=1) if len(values) > 1 else np.nan
         low, high = int(values.argmin()), int(values.argmax())
+        told = [values.mean(), deviation, *np.quantile(values, (0.05, 0.5, 0.95))]
         rows.append([
             str(says.get("long_name", name)), str(says.get("units", "1")), str(len(values)),
-            str(campaign.sizes["sample"] - len(values)), number(values.mean()), number(deviation),
-            *(number(q) for q in np.quantile(values, (0.05, 0.5, 0.95))),
+            str(campaign.sizes["sample"] - len(values)),
+            *(number(float(each)) for each in told if moments),
             f"{number(values[low])} ({samples[low]})", f"{number(values[high])} ({samples[high]})",
         ])  # fmt: skip
-    return rows
+    return [*_HEAD, *(_MOMENTS if moments else []), *_EXTREMES], rows
 
 
 def requirements(campaign: xr.Dataset) -> Rows:

@@ -50,6 +50,8 @@ class Repetition:
     """Coefficient of variation by the correlation within chains; too small if levels depend."""
     thresholds: list[float] = field(default_factory=list)
     """Of the levels passed."""
+    beyond: list[float] = field(default_factory=list)
+    """Probability of a response at or above each of them."""
 
 
 @dataclass
@@ -131,6 +133,7 @@ def _simulation(
             found.probability, found.variation = probability, float(np.sqrt(squares))
             return
         found.thresholds.append(bound)
+        found.beyond.append(probability)
         states, values = here[seeds], response[seeds]
         course, heights = [states], [values]
         for step in range(1, length):

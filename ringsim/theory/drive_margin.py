@@ -22,6 +22,8 @@ from ringsim.theory.ideal_mechanism import Mechanism
 from ringsim.theory.resistances.family import Opening, folding, resistances
 from ringsim.variables import Outcome
 
+MOST = 1e6
+"""Margin told along a run where next to nothing resists: files hold no infinite numbers."""
 PULLEYS = "pulley friction"
 """Name of what is lost between the winches and the ring at the tension that they have."""
 
@@ -130,7 +132,7 @@ def with_margin(outcome: Outcome, scene: Scene) -> Outcome:
         rates = np.gradient(angles[moving], times[moving])
         found = _along(drive, times[moving], angles[moving], rates)
         available[moving] = [each.available for each in found]
-        margin[moving] = [each.margin for each in found]
+        margin[moving] = [min(each.margin, MOST) for each in found]
         resisting[:, moving] = np.array([[*each.resisting.values()] for each in found]).T
     values = {"drive_available": available, "drive_resistance": resisting, "drive_margin": margin}
     if np.isfinite(margin).any():

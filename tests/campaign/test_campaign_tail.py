@@ -11,6 +11,8 @@ from scipy.stats import norm
 
 from campaign_bench import Bench, assert_same, finished
 from ringsim.analysis.study import analyse
+from ringsim.analysis.tails import approach
+from ringsim.report.page import page
 
 DESIGN = """
 [design]
@@ -63,6 +65,24 @@ def test_the_probability_is_that_of_the_closed_form(tail):
     words = r"probability of deployment_time > [\d.]+ s: [\d.]+ \(95 % "
     assert re.search(words, tail.printed)
     assert re.search(words, tail.run("analyse", "out"))
+
+
+def test_the_report_shows_the_tail_and_no_means_of_its_samples(tail):
+    campaign = tail.result("out")
+    found, text = analyse(campaign), page(campaign, "runs/tail")
+    low, high = found.tail_probability_interval.values
+    assert f"<td>{found.tail_probability.item():.3g}</td>" in text
+    assert f"<td>{low:.2g} to {high:.2g}</td>" in text
+    assert 'id="figure-rare_event"' in text
+    assert "No means: a design of kind subset-simulation" in text
+    assert 'id="figure-convergence"' not in text
+    for (places, shares), each in zip(
+        approach(campaign), found.tail_replicate_probability.values, strict=True
+    ):
+        assert shares[-1] == each
+        assert (np.diff(places) > 0).all()
+        assert (np.diff(shares) < 0).all()
+        np.testing.assert_allclose(shares[:-1], 0.5 ** np.arange(1, len(shares)))
 
 
 @pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from made_campaign import SECTIONS, TIMES, lags, made_campaign
+from made_campaign import SECTIONS, TIMES, lags, made_campaign, with_motors
 from matplotlib.figure import Figure
 
 from ringsim.analysis import courses as courses_module
@@ -17,6 +17,8 @@ from ringsim.analysis.campaign_samples import median_and_worst
 from ringsim.analysis.courses import course, courses
 from ringsim.cli import cli
 from ringsim.dataset import save
+from ringsim.plots.campaign import by_ending
+from ringsim.plots.campaign.base import base_load
 from ringsim.plots.campaign.by_input import by_input, drawn
 from ringsim.plots.campaign.convergence import convergence
 from ringsim.plots.campaign.distributions import distributions
@@ -24,6 +26,9 @@ from ringsim.plots.campaign.fan import fan
 from ringsim.plots.campaign.figures import PICTURES, draw_campaign, figures_of
 from ringsim.plots.campaign.lag_map import lag_map
 from ringsim.plots.campaign.lock_order import lock_order, shares
+from ringsim.plots.campaign.margin import margin
+from ringsim.plots.campaign.motors import motors
+from ringsim.plots.campaign.one_by_one import moves, one_by_one
 from ringsim.plots.campaign.tension import tension
 
 GOOD = [0, 1, 3, 4, 6]
@@ -32,6 +37,12 @@ GOOD = [0, 1, 3, 4, 6]
 @pytest.fixture(scope="module")
 def mixed() -> xr.Dataset:
     return made_campaign(8, failed=(2, 5), not_run=(7,))
+
+
+def names_for(campaign: xr.Dataset) -> set[str]:
+    """Figures of what campaigns of the kind hold."""
+    absent = {each.name for each in PICTURES if not set(each.needs) <= set(campaign)}
+    return {each.name for each in PICTURES} - absent - {"rare_event", "one_by_one"}
 
 
 def words(figure: Figure) -> str:
@@ -171,7 +182,7 @@ def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
 
 
 def test_no_figure_drops_a_sample_in_silence(mixed: xr.Dataset) -> None:
-    for picture, figure in figures_of(mixed):
+    for picture, figure in figures_of(with_motors(mixed)):
         told = words(figure)
         if picture.name == "by_input":
             assert "All 8 samples; 3 without" in told
@@ -192,7 +203,7 @@ def test_all_figures_of_a_file(tmp_path: Path, mixed: xr.Dataset) -> None:
     assert done.exit_code == 0, done.output
     names = {path.name for path in tmp_path.glob("*.svg")}
     # Five samples are too few for a correlation.
-    expected = {picture.name for picture in PICTURES} - {"tornado"}
+    expected = names_for(mixed) - {"tornado"}
     assert names == {f"campaign-fig-{name}.svg" for name in expected}
 
 
@@ -210,4 +221,71 @@ def test_the_ideal_ring_has_no_fan() -> None:
     campaign = made_campaign(2)
     campaign["asynchrony"][:] = np.nan
     names = {picture.name for picture, _ in figures_of(campaign)}
-    assert names == {picture.name for picture in PICTURES} - {"fan", "lag_map", "tornado"}
+    assert names == names_for(campaign) - {"fan", "lag_map", "tornado"}
+
+
+def test_the_margin_by_ending_and_over_the_angle() -> None:
+    campaign = with_motors(made_campaign(8, stalled=(4, 6), failed=(2,)))
+    upper, lower = margin(campaign).axes
+    strips = dict(
+        zip([t.get_text() for t in upper.get_yticklabels()], upper.collections, strict=True)
+    )
+    assert {name: len(at.get_offsets()) for name, at in strips.items()} == {
+        "deployed (5)": 5, "stalled (2)": 2,
+    }  # fmt: skip
+    np.testing.assert_allclose(strips["stalled (2)"].get_offsets()[:, 0], [-0.1, 0.1], atol=1e-12)
+    (stalled,) = (line for line in lower.lines if line.get_label() == "stalled (2)")
+    # The margin grows by one over the way, from 20 to 180 deg.
+    angle = stalled.get_xdata()
+    np.testing.assert_allclose(stalled.get_ydata(), (angle - 20.0) / 160.0, atol=1e-9)
+    band = lower.collections[1].get_paths()[0].vertices
+    assert band[:, 1].min() == pytest.approx(-0.1)
+    campaign.attrs["requirements"] = '{"least_drive_margin": {"min": -0.3, "probability": 0.9}}'
+    assert [t.get_text() for t in margin(campaign).axes[0].texts] == ["required -0.3"]
+
+
+def test_motors_and_base_are_drawn_by_ending() -> None:
+    campaign = with_motors(made_campaign(8, stalled=(4, 6), failed=(2,)))
+    torques = motors(campaign).axes[::2]
+    assert [a.get_title(loc="left") for a in torques] == ["upper cable", "lower cable"]
+    for axes in torques:
+        lines = {line.get_label(): line.get_ydata() for line in axes.lines}
+        np.testing.assert_allclose(lines["stalled (2)"], 6e-3)
+        np.testing.assert_allclose(lines["deployed (5)"], 4e-3)
+    force, torque = base_load(campaign).axes
+    for axes, scale in ((force, 1.0), (torque, 0.5)):
+        np.testing.assert_allclose(axes.lines[0].get_ydata(), 6.0 * scale)
+        assert axes.collections[0].get_paths()[0].vertices[:, 1].max() == pytest.approx(
+            10.0 * scale
+        )
+
+
+def test_of_many_samples_some_of_every_ending_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(by_ending, "MOST", 3)
+    monkeypatch.setattr(blocks_module, "BLOCK_BYTES", 1)
+    campaign = with_motors(made_campaign(9, stalled=(8,)))
+    read, ends = by_ending.chosen(campaign, ["motor_torque"])
+    assert read["sample"].values.tolist() == [0, 3, 6, 8]
+    assert ends.tolist() == ["deployed"] * 3 + ["stalled"]
+    assert "4 of them are drawn" in words(motors(campaign))
+
+
+def test_one_at_a_time_names_every_change() -> None:
+    campaign = made_campaign(6, stalled=(5,))
+    campaign.attrs["design"] = '{"kind": "one-at-a-time"}'
+    campaign["rods_young_modulus"][:] = [1e11, 2e11, 1e11, 1e11, 1e11, 1e11]
+    friction = np.ones((6, 3))
+    friction[[2, 3, 4], [0, 1, 2]] = 2.0
+    campaign["cables_upper_friction_coefficient"][:] = friction
+    campaign["cables_lower_winch_stop_time"][:] = ["none"] * 5 + ["3.0"]
+    changes = ["base", "young_modulus 2e+11", "pulley 1", "pulley 2", "pulley 3"]
+    changes += ["lower_winch_stop_time 3.0"]
+    assert moves(campaign)[0] == changes
+    figure = one_by_one(campaign)
+    assert [t.get_text() for t in figure.axes[-1].get_xticklabels()] == changes
+    (panel,) = (a for a in figure.axes if a.get_title(loc="left").startswith("largest tension"))
+    points = np.concatenate([c.get_offsets() for c in panel.collections])
+    np.testing.assert_allclose(points, np.stack([np.arange(6), 20.0 + np.arange(6)], axis=1))
+    names = {picture.name for picture, _ in figures_of(campaign)}
+    assert "one_by_one" in names
+    assert not {"distributions", "convergence"} & names

@@ -47,7 +47,7 @@ def values(table, path):
 
 
 def test_every_kind_is_tested():
-    own = {"grid", "list", "saltelli", "morris", "subset-simulation"}  # tests of their own
+    own = {"grid", "list", "one-at-a-time", "saltelli", "morris", "subset-simulation"}
     assert set(kinds_of(Design)) == {*PROBABILISTIC, *own}
 
 
@@ -118,6 +118,34 @@ def test_grid_crosses_all_levels(base):
     assert len(combinations) == table.samples
     np.testing.assert_allclose(np.unique(values(table, "loads.force")), np.linspace(0.01, 0.02, 5))
     assert values(table, "rods.elements")[:4].tolist() == [1, 2, 4, 1]
+
+
+def test_one_input_at_a_time_leaves_the_base_case(base):
+    inputs = {
+        "rods.young_modulus": {"kind": "uniform", "low": 1e11, "high": 2e11, "each_section": True},
+        "rods.elements": {"kind": "discrete", "values": [2, 1, 4]},
+    }
+    design = {"kind": "one-at-a-time"}
+    modulus, elements = (column.values for column in drawn(base, design, inputs).columns)
+    expected = np.full((6 + 3, 6), 1e11)
+    expected[range(1, 7), range(6)] = 2e11
+    np.testing.assert_array_equal(modulus, expected)
+    assert elements.tolist() == [2] * 7 + [1, 4]
+    design |= {"levels": 3, "base": {"rods.young_modulus": 2}}
+    modulus, elements = (column.values for column in drawn(base, design, inputs).columns)
+    assert modulus.shape == (1 + 6 * 2 + 2, 6)
+    assert (modulus == 1.5e11).sum() == modulus.size - 12
+    assert modulus[1:3, 0].tolist() == [1e11, 2e11]
+    assert (elements == 2).sum() == len(elements) - 2
+
+
+@pytest.mark.parametrize(
+    ("base_level", "words"),
+    [(3, "has 2 levels"), ({"loads.forse": 1}, "did you mean loads.force")],
+)
+def test_base_levels_that_are_not_there_are_refused(base, base_level, words):
+    with pytest.raises(InputError, match=words):
+        drawn(base, {"kind": "one-at-a-time", "base": base_level})
 
 
 def test_csv_list_is_taken_as_it_is(base, tmp_path):

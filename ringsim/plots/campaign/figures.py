@@ -9,17 +9,33 @@ from matplotlib.figure import Figure
 
 from ringsim.analysis.campaign_samples import inputs, judged_by, scalars
 from ringsim.analysis.courses import courses
+from ringsim.analysis.design import placement
 from ringsim.analysis.reading import any_finite
 from ringsim.files import writing
 from ringsim.plots import style
+from ringsim.plots.campaign.base import base_load
 from ringsim.plots.campaign.by_input import by_input
 from ringsim.plots.campaign.convergence import convergence
 from ringsim.plots.campaign.distributions import distributions
 from ringsim.plots.campaign.fan import fan
 from ringsim.plots.campaign.lag_map import lag_map
 from ringsim.plots.campaign.lock_order import lock_order
+from ringsim.plots.campaign.margin import margin
+from ringsim.plots.campaign.motors import motors
+from ringsim.plots.campaign.one_by_one import is_one_by_one, one_by_one
+from ringsim.plots.campaign.tail import rare_event, reached
 from ringsim.plots.campaign.tension import tension
 from ringsim.plots.campaign.tornado import explained, tornado
+
+
+def _spread(campaign: xr.Dataset) -> bool:
+    """Whether main numbers are of samples that no other figure tells better."""
+    return bool(scalars(campaign)) and not reached(campaign) and not is_one_by_one(campaign)
+
+
+def _converges(campaign: xr.Dataset) -> bool:
+    """Whether more samples make means and quantiles more certain."""
+    return bool(scalars(campaign)) and placement(campaign).population
 
 
 class Picture(NamedTuple):
@@ -41,8 +57,19 @@ _COURSES = ("asynchrony", "opening_angle", "final_time", "deployment_time")
 """Asynchrony first: the ideal ring has none, and its angles are equal by assumption."""
 PICTURES = (
     Picture(
+        "rare_event", rare_event, "Probability of what levels reached, up to the rare event",
+        of=reached,
+    ),
+    Picture(
+        "one_by_one", one_by_one, "Main numbers after each single change", of=is_one_by_one,
+    ),
+    Picture(
         "distributions", distributions,
-        "Cumulative distribution of each main number, with its limits", of=scalars,
+        "Cumulative distribution of each main number, with its limits", of=_spread,
+    ),
+    Picture(
+        "margin", margin, "Smallest margin of the drive by ending, and its course",
+        ("drive_margin", "least_drive_margin", "opening_angle"),
     ),
     Picture(
         "fan", fan, "Deviation of each section from the mean opening angle, over all samples",
@@ -62,7 +89,15 @@ PICTURES = (
         of=explained,
     ),
     Picture(
-        "convergence", convergence, "Mean and 95 % quantile as samples come in", of=scalars,
+        "convergence", convergence, "Mean and 95 % quantile as samples come in", of=_converges,
+    ),
+    Picture(
+        "motors", motors, "Torque and speed of the motors over time, by ending",
+        ("motor_torque", "motor_speed"),
+    ),
+    Picture(
+        "base", base_load, "Force and torque at the base over time, by ending",
+        ("base_force", "base_torque"),
     ),
     Picture(
         "tension", tension, "Largest tension of each span along the cables",

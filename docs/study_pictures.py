@@ -1,0 +1,148 @@
+"""Draws the pictures of docs/studies that are not figures of one campaign alone.
+
+    python docs/study_pictures.py runs
+
+``winding_laws.png`` from runs/winding-laws, ``sections.png`` from runs/sections-N;
+``stalling_motor.png`` from runs/stalling-motor: the margin of the rigid ring without a standard's
+factors, against what the flexible one did.
+"""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from pictures import save
+
+import ringsim
+from ringsim.analysis.campaign_samples import endings
+from ringsim.plots import style
+from ringsim.plots.campaign.frame import LOOKS
+from ringsim.theory.drive import Drive
+from ringsim.theory.ideal_mechanism import Mechanism
+from ringsim.theory.resistances.family import Opening, folding, resistances
+from ringsim.variables import PLANES
+
+COUNTS = (6, 9, 12, 18, 27, 36)
+NUMBERS = {
+    "asynchrony_max": "Largest asynchrony (degree)",
+    "deployment_time": "Deployment time (s)",
+    "peak_tension": "Largest tension (N)",
+}
+
+
+@style.styled
+def sections(runs: Path) -> Figure:
+    """A panel a number: all samples over the number of sections."""
+    figure = Figure(figsize=(10.2, 3.4))
+    panels = figure.subplots(1, len(NUMBERS))
+    means: dict[str, list[float]] = {name: [] for name in NUMBERS}
+    for count in COUNTS:
+        with xr.open_dataset(runs / f"sections-{count}" / "campaign.nc") as campaign:
+            for axes, name in zip(panels, NUMBERS, strict=True):
+                values = campaign[name].to_numpy()
+                axes.plot([count] * len(values), values, "o", color=style.BLUE, markersize=3.5)
+                means[name].append(float(values.mean()))
+    for axes, (name, words) in zip(panels, NUMBERS.items(), strict=True):
+        axes.plot(COUNTS, means[name], color=style.BLUE, linewidth=1.0)
+        axes.set(xlabel="Sections", ylabel=words, ylim=(0.0, None), xlim=(0, 38), xticks=COUNTS)
+    return figure
+
+
+LAWS = (
+    "constant speed", "ramp of 0.2 s", "ramp of 1 s", "ramp of 5 s", "table, slow start",
+    "tension feedback, 5 N", "stall at 10 N",
+)  # fmt: skip
+"""As the campaign lists them."""
+
+
+@style.styled
+def winding_laws(runs: Path) -> Figure:
+    """Largest tension and slack of every law, a marker a friction of the joints."""
+    with xr.open_dataset(runs / "winding-laws" / "campaign.nc") as campaign:
+        grid = {
+            "Largest tension (N)": campaign["peak_tension"].to_numpy(),
+            "Slack at the winch, worse cable (s)": campaign["slack_duration"].max("plane"),
+            "Largest asynchrony (degree)": campaign["asynchrony_max"].to_numpy(),
+        }
+        joints = campaign["joints_vjoint_viscous"].to_numpy().reshape(-1, len(LAWS))[:, 0]
+    figure = Figure(figsize=(10.4, 3.9))
+    panels = figure.subplots(1, len(grid), sharey=True)
+    looks = ((style.BLUE, "o"), (style.ORANGE, "s"), (style.VERMILLION, "^"))
+    for axes, (words, values) in zip(panels, grid.items(), strict=True):
+        rows = np.asarray(values).reshape(-1, len(LAWS))
+        for row, friction, (colour, marker) in zip(rows, joints, looks, strict=True):
+            axes.plot(row, range(len(LAWS)), marker, color=colour, markersize=6, alpha=0.85,
+                      label=f"joints of {friction:g} N m s/rad")  # fmt: skip
+        axes.set_xlabel(words)
+    panels[0].set_xscale("log")
+    style.plain_numbers(panels[0].xaxis)
+    panels[0].set_yticks(range(len(LAWS)), LAWS)
+    panels[0].set_ylim(len(LAWS) - 0.5, -0.5)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def static_margins(campaign: xr.Dataset) -> np.ndarray:
+    """Of the rigid ring of every sample at its start, without factors; negative: it cannot open.
+
+    What drives over what resists, less one.  Friction of joints is linear in its coefficient, what
+    a cable drives in its winch's tension.
+    """
+    scene = ringsim.load_scene("ring18-motor")
+    mechanism = Mechanism(scene)
+    drive, start = Drive(scene, mechanism), math.pi - 2.0 * scene.structure.coordinate
+    now = folding(mechanism, scene.structure.coordinate)
+    friction = campaign["cables_upper_friction_coefficient"].to_numpy()
+    driving = np.zeros(len(friction))
+    for plane, cable, reeved in zip(PLANES, drive.cables, drive.reeved(now), strict=True):
+        for sample, own in enumerate(friction):
+            law = cable.friction.factored(own / cable.friction.coefficient)
+            decay = law.bound_decay(reeved.angles, cable.pulley_radius)
+            shares = np.exp(np.append(0.0, np.cumsum(decay)))
+            weak = float(campaign[f"cables_{plane}_winch_winding_derating"][sample])
+            pull = weak * cable.winch.winding.available_tension()
+            driving[sample] += pull * float(shares @ reeved.shortening)
+    dry = campaign["joints_vjoint_coulomb"].to_numpy()
+
+    def resisting(coulomb: float) -> float:
+        own = scene.with_values({"joints.vjoint.coulomb": coulomb})
+        kinds = resistances(own, Mechanism(own))
+        return sum(one.force(Opening(start, 0.0, 0.0, now)) for one in kinds)
+
+    low, high = resisting(0.01), resisting(0.02)
+    return driving / (low + (high - low) * (dry - 0.01) / 0.01) - 1.0
+
+
+@style.styled
+def stalling_motor(runs: Path) -> Figure:
+    """Deployment time over the static margin; samples that never deploy at the top."""
+    with xr.open_dataset(runs / "stalling-motor" / "campaign.nc") as campaign:
+        margins, words = static_margins(campaign), endings(campaign)
+        times = campaign["deployment_time"].to_numpy()
+    figure = Figure(figsize=(8.0, 4.0))
+    axes = figure.subplots()
+    top = 1.12 * np.nanmax(times)
+    for word in sorted(set(words.tolist())):
+        own = words == word
+        colour, marker = LOOKS[word]
+        axes.plot(margins[own], np.nan_to_num(times[own], nan=top), marker, color=colour,
+                  markersize=5, alpha=0.8, label=f"{word} ({own.sum()})")  # fmt: skip
+    axes.axvline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+    axes.set_xlabel("Margin of the rigid ring at 20 deg, without factors")
+    axes.set_ylabel("Deployment time (s); at the top: none")
+    figure.legend(loc="outside lower center", ncols=4)
+    return figure
+
+
+def main() -> None:
+    """Draw all of them."""
+    runs = Path(sys.argv[1])
+    for draw in (winding_laws, sections, stalling_motor):
+        save(draw(runs), f"{draw.__name__}.png")
+
+
+if __name__ == "__main__":
+    main()

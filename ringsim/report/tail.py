@@ -1,0 +1,53 @@
+"""The rare event of a campaign of subset simulation, for a report."""
+
+from typing import NamedTuple
+
+import xarray as xr
+
+from ringsim.analysis.binomial import share_interval
+from ringsim.analysis.tails import tail
+from ringsim.report.tables import Rows
+
+
+class RareEvent(NamedTuple):
+    """A table of what was found, and what it leaves out."""
+
+    rows: Rows
+    notes: list[str]
+
+
+def rare_event(campaign: xr.Dataset) -> RareEvent | None:
+    """Probability with its interval, how sure it is and why; None for any other design."""
+    if not (found := xr.Dataset(tail(campaign))):
+        return None
+    event = str(found["tail_probability"].attrs["event"])
+    runs, lost = campaign.sizes["sample"], int(found["tail_lost"])
+    replicates, levels = found.sizes["tail_replicate"], int(found["tail_levels"].max())
+    rows = [["event", event]]
+    if not int(found["tail_ended"]):
+        rows += [["runs so far", str(runs)]]
+        return RareEvent(rows, ["Not all levels have run: there is no probability yet"])
+    low, high = found["tail_probability_interval"].to_numpy()
+    each = ", ".join(f"{p:.2g}" for p in found["tail_replicate_probability"].to_numpy())
+    rows += [
+        ["probability", f"{float(found['tail_probability']):.3g}"],
+        ["95 % interval", f"{low:.2g} to {high:.2g}"],
+        [
+            "coefficient of variation",
+            f"{float(found['tail_variation']):.2g} by the replicates, "
+            f"{float(found['tail_variation_of_chains']):.2g} by the chains alone",
+        ],
+        ["by each replicate", each],
+        ["levels", f"{levels} at most, in {replicates} replicates"],
+        ["runs", f"{runs}, {lost} lost and taken as no event"],
+    ]
+    notes = []
+    if checked := int(found["tail_checked"]):
+        confirmed = int(found["tail_confirmed"])
+        low, high = share_interval(confirmed, checked)
+        rows.append([
+            "in the event by the full engine, too",
+            f"{confirmed} of {checked} repeated runs (95 %: {low:.2g} to {high:.2g} of all)",
+        ])  # fmt: skip
+        notes.append("Events that only the full engine sees are not looked for")
+    return RareEvent(rows, notes)
