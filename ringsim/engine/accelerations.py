@@ -5,23 +5,21 @@ import numpy as np
 
 from ringsim.engine.model import Multibody
 from ringsim.engine.rotations import Array
-from ringsim.layout.corners import corners_of
 
 
 class AccelerationMeter:
     """Reads the nodes of corners."""
 
     def __init__(self, model: Multibody) -> None:
-        corners = corners_of(model.layout, model.scene.structure.planes)
-        self.coordinates = {"corner": np.array(list(corners))}
-        nodes = [model.bodies[body][1] for body in corners.values()]
-        self._where = np.array([model.assembly.coordinates_of(node)[:3] for node in nodes])
+        corners, size = model.layout.corners, model.assembly.coordinates_of
+        self.coordinates = {"corner": np.arange(1, len(corners[0]) + 1)}
+        self._where = np.array([[size(model.bodies[k][1])[:3] for k in plane] for plane in corners])
         self._data = model.assembly.system.systemData
         # exudyn's solver takes the initial ones over in its first step.
         self._next = exu.ConfigurationType.Initial
 
     def read(self) -> Array:
-        """Shape (corners, 3), m/s^2, at the current state."""
+        """Shape (planes, corners, 3), m/s^2, at the current state."""
         found = self._data.GetODE2Coordinates_tt(self._next)
         self._next = exu.ConfigurationType.Current
         return np.asarray(np.asarray(found, dtype=float)[self._where])

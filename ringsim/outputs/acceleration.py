@@ -14,18 +14,17 @@ class PeakAcceleration(Output):
 
     rank = 49
     needs = ("accelerations",)
-    coordinates = (Variable("corner", ("corner",), "1", "hinge assembly of the structure", "str"),)
     variables = (
         Variable(
-            "peak_acceleration", ("corner",), "m/s^2",
+            "peak_acceleration", ("plane", "corner"), "m/s^2",
             "largest acceleration of the corner at any step",
         ),
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
-        """Shape (corners, 3), m/s^2."""
+        """Shape (planes, corners, 3), m/s^2."""
         return now.accelerations
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Of all steps."""
-        return {"peak_acceleration": np.linalg.norm(series.values, axis=2).max(axis=0)}
+        return {"peak_acceleration": np.linalg.norm(series.values, axis=3).max(axis=0)}

@@ -59,7 +59,7 @@ class Reading(Instant):
     carried: Carried | None = None
     """What base and stops carry; None unless recorded."""
     accelerations: Array | None = None
-    """Of the corners, shape (corners, 3), m/s^2; None unless recorded."""
+    """Of the corners, shape (planes, corners, 3), m/s^2; None unless recorded."""
 
     put: Put | None = None
     """Where corners are and what the rods store; None unless recorded."""
