@@ -55,6 +55,8 @@ def command(
                 "--format pvd: shows runs, and this is a campaign: choose some with --sample"
             )
         chosen = dataset.sel(sample=list(samples)) if samples else dataset
+        # Stored states mean nothing to other programs.
+        chosen = chosen.drop_dims(["state_entry", "state_time"], errors="ignore")
         folder = out or (file if file.is_dir() else file.parent)
         stem = "campaign" if file.is_dir() else file.stem
         with writing(folder):

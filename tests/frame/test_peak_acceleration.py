@@ -22,7 +22,7 @@ RING = load_scene("ring18").with_values(
         "structure.sections": 4, "structure.opening_angle": 60.0, "net": "none",
         "boom.base": "fixed", "loads.force": [0.05, 0.06, 0.04, 0.055],
         "record.accelerations": True, "record.positions": True, "record.interval": 0.1,
-        "solver.step_control": "constant", "solver.step": 0.005, "solver.end_time": 0.4,
+        "solver.step_control": "constant", "solver.step": 0.005, "solver.end_time": 0.15,
     }
 )  # fmt: skip
 ENGINES: dict[str, Callable[[], Recorder]] = {
@@ -53,7 +53,7 @@ def test_they_are_the_rates_of_velocities(engine: str) -> None:
     steps = np.diff(history.times)[:, None, None, None]
     gained = np.cumsum(0.5 * steps * (shocks[1:] + shocks[:-1]), axis=0)
     largest = np.abs(velocities).max()
-    assert largest > 0.04
+    assert largest > 0.01
     assert np.abs(velocities[1:] - velocities[0] - gained).max() < 2e-3 * largest
     peaks = np.linalg.norm(shocks, axis=3).max(axis=0)
     assert found.values["peak_acceleration"] == pytest.approx(peaks, rel=1e-15)
