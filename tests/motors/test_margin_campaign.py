@@ -14,7 +14,9 @@ from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.execution.solve import solve
+from ringsim.plots.campaign.figures import PICTURES
 from ringsim.refusal import InputError
+from ringsim.report import tables
 from ringsim.report.page import page
 from ringsim.theory.drive_margin import MOST, DriveMargin, with_margin
 from ringsim.variables import PLANES, Fate, Outcome, Status
@@ -93,8 +95,13 @@ def test_the_report_shows_them(campaign: xr.Dataset) -> None:
         assert f'id="figure-{name}"' in text
     assert "<td>smallest margin of the drive at any output time</td>" in text
     assert '<th scope="col">Mean</th>' in text
+
+
+def test_a_grid_has_extremes_and_no_means(campaign: xr.Dataset) -> None:
     listed = campaign.assign_attrs(design='{"kind": "grid"}')
-    text = page(listed, "runs/made")
-    assert "No means: a design of kind grid stands for no population" in text
-    assert '<th scope="col">Mean</th>' not in text
-    assert 'id="figure-convergence"' not in text
+    for kind, made in (("random", campaign), ("grid", listed)):
+        heads, rows = tables.statistics(made)
+        assert ("Mean" in heads) == (kind == "random")
+        assert {len(row) for row in rows} == {len(heads)}
+        (convergence,) = (each for each in PICTURES if each.name == "convergence")
+        assert convergence.of(made) == (kind == "random")
