@@ -57,11 +57,12 @@ def _check_margin(scene: "Scene") -> None:
 
 def _check_rods(scene: "Scene") -> None:
     """Refuse (ValueError) rods of other lengths where nothing can strain them."""
-    if scene.record.shape and kind_of(scene.structure) != "pantograph-ring":
-        raise ValueError(
-            'record.shape = true needs structure.kind = "pantograph-ring", not '
-            f'"{kind_of(scene.structure)}": only that has corners (leave it out)'
-        )
+    for name in ("shape", "accelerations"):
+        if getattr(scene.record, name) and kind_of(scene.structure) != "pantograph-ring":
+            raise ValueError(
+                f'record.{name} = true needs structure.kind = "pantograph-ring", not '
+                f'"{kind_of(scene.structure)}", which has no corners: leave it out'
+            )
     if scene.rods.bar_young_modulus is not None and kind_of(scene.structure) != "pantograph-ring":
         raise ValueError(
             "rods.bar_young_modulus: only the pantograph ring has folding bars (leave it out)"
