@@ -19,4 +19,5 @@ class LatchResistance(Resistance):
 
     def force(self, opening: Opening) -> float:
         """See ``Resistance``."""
-        return -SpringEnergy(self.scene).pawls(math.pi - opening.angle)[0]
+        # A difference, not a negative: no resistance is 0, not -0.
+        return 0.0 - SpringEnergy(self.scene).pawls(math.pi - opening.angle)[0]
