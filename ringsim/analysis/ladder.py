@@ -63,6 +63,11 @@ class Rung:
     fidelity: str = "full"
 
 
+def shortened(rungs: Sequence[Rung]) -> list[Rung]:
+    """Those that make the reference, and the settings to choose from."""
+    return [rung for rung in rungs if rung.ladder in (STANDING, *GRADED, "setting")]
+
+
 def by_frames(rungs: Sequence[Rung]) -> list[Rung]:
     """What the frame engine is tried with, of the rungs of the full one.
 

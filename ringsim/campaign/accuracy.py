@@ -18,6 +18,7 @@ from ringsim.analysis.ladder import (
     ladder,
     left_out,
     references,
+    shortened,
     standing,
 )  # fmt: skip
 from ringsim.campaign.cases import run_cases
@@ -38,8 +39,9 @@ class ReferenceRunError(Exception):
 
 
 def run_ladder(
-    folder: Path, scene: Scene, workers: int, timeout: float, most_elements: int = 4
-) -> xr.Dataset:
+    folder: Path, scene: Scene, workers: int, timeout: float, most_elements: int = 4,
+    *, brief: bool = False,
+) -> xr.Dataset:  # fmt: skip
     """Errors and cost of all settings of a scene's ladder (``judge``).
 
     A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
@@ -48,8 +50,9 @@ def run_ladder(
     settings too, where they can represent the scene.  ``folder`` holds the campaigns, and a study
     that was interrupted goes on, also with rungs that took longer than ``timeout``, the longest
     time of one rung, s; ``most_elements`` (4 or 8) is how many times more than the scene's are
-    tried.  What the study had to do without is in the attribute ``remarks``.  InputError if the
-    scene is refused, ReferenceRunError if too few runs for a reference end well.
+    tried; ``brief`` leaves out ladders that only explain (``shortened``).  What the study had to
+    do without is in the attribute ``remarks``.  InputError if the scene is refused,
+    ReferenceRunError if too few runs for a reference end well.
     """
     plain = {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
     scene = scene.with_values(plain)
@@ -57,6 +60,7 @@ def run_ladder(
     late = frozenset({Status.TIMEOUT})
     study = _Study(scene, partial(run_cases, folder, workers=workers, timeout=timeout, again=late))
     rungs = ladder(scene, most_elements)
+    rungs = shortened(rungs) if brief else rungs
     for rung in rungs:
         scene.with_values(dict(rung.values))  # refused before anything has run
     in_time, in_space = references(rungs)

@@ -27,9 +27,14 @@ from ringsim.scene import load_scene
     help="Elements up to so many times the scene's; 8 for peak stresses to 1e-3, at several times "
     "the cost.",
 )  # fmt: skip
+@click.option(
+    "--brief", is_flag=True,
+    help="Only the reference and settings to choose from: no constant steps, other rods, "
+    "dissipation or Newton tolerances, for about two thirds of the cost.",
+)  # fmt: skip
 def command(
     scene: str, settings: dict[str, Any], out: Path | None, workers: int | None, timeout: float,
-    most_elements: str,
+    most_elements: str, brief: bool,
 ) -> int:  # fmt: skip
     """Compare numerical settings of SCENE: error against run time, and which to choose.
 
@@ -50,7 +55,7 @@ def command(
 
     try:
         cores = workers or len(os.sched_getaffinity(0))
-        found = run_ladder(folder, chosen, cores, timeout, int(most_elements))
+        found = run_ladder(folder, chosen, cores, timeout, int(most_elements), brief=brief)
     except ReferenceRunError as error:
         click.echo(f"{chosen.name}: {error}", err=True)
         return EXIT_FAILED

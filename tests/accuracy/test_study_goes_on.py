@@ -36,7 +36,9 @@ def model(scene: Scene) -> float:
 def study(tmp_path, monkeypatch):
     """Runs a study of the made-up model, in which some settings fail."""
 
-    def study(failing: list[Mapping[str, Any]], most: int = 4) -> xr.Dataset:
+    def study(
+        failing: list[Mapping[str, Any]], most: int = 4, *, brief: bool = False
+    ) -> xr.Dataset:
         def run_cases(folder, name, scene, cases, *, fidelity, **_):
             assert ("frame" in name) == (fidelity == "frame")
             rows = []
@@ -60,7 +62,7 @@ def study(tmp_path, monkeypatch):
 
         monkeypatch.setattr(accuracy, "run_cases", run_cases)
         monkeypatch.setattr(accuracy._Study, "ideal", lambda _: None)
-        return run_ladder(tmp_path, SCENE, 1, 60.0, most)
+        return run_ladder(tmp_path, SCENE, 1, 60.0, most, brief=brief)
 
     return study
 
@@ -122,6 +124,14 @@ def test_studies_with_eight_elements_go_on_from_others():
     new = [r for r in eight if r not in four]
     assert [r.label for r in new[1:]] == [r.label for r in eight[-2:]]
     assert references(eight)[1][:-1] == references(four)[1]
+
+
+def test_a_brief_study_has_the_same_reference_and_settings(study):
+    whole, found = study([]), study([], brief=True)
+    assert set(found.ladder.values) == {"as it stands", "steps", "elements", "setting"}
+    xr.testing.assert_identical(found.reference, whole.reference)
+    of_settings = [each.label[each.ladder == "setting"] for each in (found, whole)]
+    assert of_settings[0].values.tolist() == of_settings[1].values.tolist()
 
 
 def test_both_engines_run_the_same_steps_and_elements(study):
