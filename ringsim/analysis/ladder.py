@@ -33,6 +33,9 @@ _HALVINGS = {"x 2": -1, "x 1": 0, "x 1/2": 1, "x 1/4": 2, "x 1/8": 3, "x 1/16": 
 """Rungs of "steps" by the factor on every step, with the exponent of 1/2."""
 _OF_ELEMENTS = 1.0 / 8.0
 """Factor on every step of the rungs of "elements"."""
+_OF_BRIEF = 1.0 / 4.0
+"""The same of a brief study, and of its finest steps."""
+_STEPS = ("solver.step", "solver.tolerance", "solver.deviation_tolerance")
 _LEVELS = 3
 """Levels from which a limit is extrapolated."""
 _TIGHT = 1e-6
@@ -64,8 +67,16 @@ class Rung:
 
 
 def shortened(rungs: Sequence[Rung]) -> list[Rung]:
-    """Those that make the reference, and the settings to choose from."""
-    return [rung for rung in rungs if rung.ladder in (STANDING, *GRADED, "setting")]
+    """The ladder of a brief study: reference and settings to choose from, none with steps shorter
+    than a quarter of the scene's, at which its elements are, too.
+    """
+    finest = next(r for r in rungs if r.ladder == "steps" and r.size == _OF_BRIEF)
+    steps = {path: finest.values[path] for path in _STEPS}
+    brief = [
+        replace(rung, values={**rung.values, **steps}) if rung.ladder == "elements" else rung
+        for rung in rungs if rung.ladder in (STANDING, *GRADED, "setting")
+    ]  # fmt: skip
+    return [r for r in brief if all(r.values[path] >= least for path, least in steps.items())]
 
 
 def by_frames(rungs: Sequence[Rung]) -> list[Rung]:

@@ -50,9 +50,9 @@ def run_ladder(
     settings too, where they can represent the scene.  ``folder`` holds the campaigns, and a study
     that was interrupted goes on, also with rungs that took longer than ``timeout``, the longest
     time of one rung, s; ``most_elements`` (4 or 8) is how many times more than the scene's are
-    tried; ``brief`` leaves out ladders that only explain (``shortened``).  What the study had to
-    do without is in the attribute ``remarks``.  InputError if the scene is refused,
-    ReferenceRunError if too few runs for a reference end well.
+    tried; ``brief`` is for a third of the cost (``shortened``).  What the study had to do without
+    is in the attribute ``remarks``.  InputError if the scene is refused, ReferenceRunError if too
+    few runs for a reference end well.
     """
     plain = {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
     scene = scene.with_values(plain)
@@ -60,7 +60,9 @@ def run_ladder(
     late = frozenset({Status.TIMEOUT})
     study = _Study(scene, partial(run_cases, folder, workers=workers, timeout=timeout, again=late))
     rungs = ladder(scene, most_elements)
-    rungs = shortened(rungs) if brief else rungs
+    if brief:
+        rungs = shortened(rungs)
+        remarks.append("a brief study: no steps shorter than a quarter of the scene's")
     for rung in rungs:
         scene.with_values(dict(rung.values))  # refused before anything has run
     in_time, in_space = references(rungs)
