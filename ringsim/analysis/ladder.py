@@ -67,16 +67,25 @@ class Rung:
 
 
 def shortened(rungs: Sequence[Rung]) -> list[Rung]:
-    """The ladder of a brief study: reference and settings to choose from, none with steps shorter
-    than a quarter of the scene's, at which its elements are, too.
+    """The ladder of a brief study: reference and settings to choose from.
+
+    None has steps shorter than a quarter of the scene's, at which its elements are, or more than
+    twice the elements, and settings are tried at the scene's own kind of Newton's tolerance.
     """
     finest = next(r for r in rungs if r.ladder == "steps" and r.size == _OF_BRIEF)
     steps = {path: finest.values[path] for path in _STEPS}
+
+    def kept(rung: Rung) -> bool:
+        few = rung.values["rods.elements"] <= 2 * finest.values["rods.elements"]
+        long = all(rung.values[path] >= least for path, least in steps.items())
+        same = rung.ladder != "setting" or rung.values["solver.newton_tolerance"] > _TIGHT
+        return few and long and same
+
     brief = [
         replace(rung, values={**rung.values, **steps}) if rung.ladder == "elements" else rung
         for rung in rungs if rung.ladder in (STANDING, *GRADED, "setting")
     ]  # fmt: skip
-    return [r for r in brief if all(r.values[path] >= least for path, least in steps.items())]
+    return list(filter(kept, brief))
 
 
 def by_frames(rungs: Sequence[Rung]) -> list[Rung]:

@@ -50,7 +50,7 @@ def run_ladder(
     settings too, where they can represent the scene.  ``folder`` holds the campaigns, and a study
     that was interrupted goes on, also with rungs that took longer than ``timeout``, the longest
     time of one rung, s; ``most_elements`` (4 or 8) is how many times more than the scene's are
-    tried; ``brief`` is for a third of the cost (``shortened``).  What the study had to do without
+    tried; ``brief`` is for a quarter of the cost (``shortened``).  What the study had to do without
     is in the attribute ``remarks``.  InputError if the scene is refused, ReferenceRunError if too
     few runs for a reference end well.
     """
@@ -62,7 +62,7 @@ def run_ladder(
     rungs = ladder(scene, most_elements)
     if brief:
         rungs = shortened(rungs)
-        remarks.append("a brief study: no steps shorter than a quarter of the scene's")
+        remarks.append("a brief study: steps down to a quarter, elements up to twice the scene's")
     for rung in rungs:
         scene.with_values(dict(rung.values))  # refused before anything has run
     in_time, in_space = references(rungs)

@@ -29,8 +29,9 @@ from ringsim.scene import load_scene
 )  # fmt: skip
 @click.option(
     "--brief", is_flag=True,
-    help="A third of the cost: steps down to a quarter of the scene's instead of a sixteenth, no "
-    "constant steps, other rods, dissipation or Newton tolerances.",
+    help="A quarter of the cost: steps down to a quarter of the scene's instead of a sixteenth, "
+    "elements up to twice the scene's, no constant steps, other rods, dissipation or Newton "
+    "tolerances.",
 )  # fmt: skip
 def command(
     scene: str, settings: dict[str, Any], out: Path | None, workers: int | None, timeout: float,
