@@ -88,6 +88,12 @@ def shortened(rungs: Sequence[Rung]) -> list[Rung]:
     return list(filter(kept, brief))
 
 
+def frames_alone(rungs: Sequence[Rung]) -> list[Rung]:
+    """The ladder of the frame engine by itself: its reference, and settings to choose from."""
+    own = (STANDING, *GRADED, "setting")
+    return [replace(rung, fidelity=FRAME) for rung in rungs if rung.ladder in own]
+
+
 def by_frames(rungs: Sequence[Rung]) -> list[Rung]:
     """What the frame engine is tried with, of the rungs of the full one.
 

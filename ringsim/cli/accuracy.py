@@ -33,9 +33,14 @@ from ringsim.scene import load_scene
     "elements up to twice the scene's, no constant steps, other rods, dissipation or Newton "
     "tolerances.",
 )  # fmt: skip
+@click.option(
+    "--fidelity", type=click.Choice(["both", "frame"]), default="both", show_default=True,
+    help="Engines to try; frame: that one alone, at a tenth of the cost, with its own limit as the "
+    "reference.",
+)  # fmt: skip
 def command(
     scene: str, settings: dict[str, Any], out: Path | None, workers: int | None, timeout: float,
-    most_elements: str, brief: bool,
+    most_elements: str, brief: bool, fidelity: str,
 ) -> int:  # fmt: skip
     """Compare numerical settings of SCENE: error against run time, and which to choose.
 
@@ -56,7 +61,10 @@ def command(
 
     try:
         cores = workers or len(os.sched_getaffinity(0))
-        found = run_ladder(folder, chosen, cores, timeout, int(most_elements), brief=brief)
+        engine = "frame" if fidelity == "frame" else "full"
+        found = run_ladder(
+            folder, chosen, cores, timeout, int(most_elements), brief=brief, fidelity=engine
+        )
     except ReferenceRunError as error:
         click.echo(f"{chosen.name}: {error}", err=True)
         return EXIT_FAILED

@@ -36,9 +36,7 @@ def model(scene: Scene) -> float:
 def study(tmp_path, monkeypatch):
     """Runs a study of the made-up model, in which some settings fail."""
 
-    def study(
-        failing: list[Mapping[str, Any]], most: int = 4, *, brief: bool = False
-    ) -> xr.Dataset:
+    def study(failing: list[Mapping[str, Any]], most: int = 4, **how: Any) -> xr.Dataset:
         def run_cases(folder, name, scene, cases, *, fidelity, **_):
             assert ("frame" in name) == (fidelity == "frame")
             rows = []
@@ -62,7 +60,7 @@ def study(tmp_path, monkeypatch):
 
         monkeypatch.setattr(accuracy, "run_cases", run_cases)
         monkeypatch.setattr(accuracy._Study, "ideal", lambda _: None)
-        return run_ladder(tmp_path, SCENE, 1, 60.0, most, brief=brief)
+        return run_ladder(tmp_path, SCENE, 1, 60.0, most, **how)
 
     return study
 
@@ -133,6 +131,15 @@ def test_a_brief_study_finds_the_truth_with_fewer_and_coarser_runs(study):
     assert float(found["solver_tolerance"].min()) == SCENE.solver.tolerance / 16.0
     assert error(found) < 1e-7
     assert found.uncertainty.sel(output="motion") > whole.uncertainty.sel(output="motion")
+
+
+def test_frames_alone_are_their_own_reference(study):
+    found = study([], fidelity="frame")
+    assert set(found.fidelity.values) == {"frame"}
+    assert error(found) < 1e-8
+    assert "the reference is its own limit" in tables(found, "A study")
+    with pytest.raises(ReferenceRunError, match="more time"):
+        study([rung("steps", "x 1/4")], fidelity="frame")
 
 
 def test_both_engines_run_the_same_steps_and_elements(study):
