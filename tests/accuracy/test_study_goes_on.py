@@ -124,13 +124,14 @@ def test_studies_with_eight_elements_go_on_from_others():
     assert references(eight)[1][:-1] == references(four)[1]
 
 
-def test_a_brief_study_finds_the_truth_with_fewer_and_coarser_runs(study):
+def test_a_brief_study_is_less_certain_with_fewer_and_coarser_runs(study):
     whole, found = study([]), study([], brief=True)
     assert set(found.ladder.values) == {"as it stands", "steps", "elements", "setting"}
     assert found.sizes["rung"] < 0.6 * whole.sizes["rung"]
     assert float(found["solver_tolerance"].min()) == SCENE.solver.tolerance / 16.0
-    assert error(found) < 1e-7
-    assert found.uncertainty.sel(output="motion") > whole.uncertainty.sel(output="motion")
+    own, of_whole = (float(each.uncertainty.sel(output="motion")) for each in (found, whole))
+    assert error(found) <= own
+    assert own > of_whole
 
 
 def test_frames_alone_are_their_own_reference(study):
