@@ -1,6 +1,6 @@
-"""Make the accuracy reports of the built-in scenes again, and the settings that come with ringsim.
+"""Make the accuracy reports of scenes that have one again, and the settings that come with ringsim.
 
-Run: python benchmarks/accuracy_reports.py [scene ...]
+Run: python benchmarks/accuracy_reports.py [--brief] [scene ...]
 
 Writes docs/accuracy/SCENE.md and .png, and ringsim/scenes/evidence/SCENE.toml.  A study that was
 interrupted goes on from runs/accuracy-SCENE, and begins anew if the engine has changed since.
@@ -15,9 +15,8 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-from ringsim.scene import builtin_scenes
-
 ROOT = Path(__file__).parents[1]
+EVIDENCE = ROOT / "ringsim" / "scenes" / "evidence"
 READERS = {"analysis", "campaign", "cli", "execution", "plots", "sampling", "scenes", "storage"}
 """Rooms without an effect on the numbers of a run."""
 
@@ -42,18 +41,20 @@ def fresh(folder: Path) -> Path:
     return folder
 
 
-def remake(name: str) -> None:
-    folder = fresh(ROOT / "runs" / f"accuracy-{name}")
-    command = [sys.executable, "-m", "ringsim", "accuracy", name, "--out", str(folder)]
+def remake(name: str, *words: str) -> None:
+    folder = fresh(ROOT / "runs" / "-".join(["accuracy", name, *words]))
+    command = [sys.executable, "-m", "ringsim", "accuracy", name, "--out", str(folder), *words]
     subprocess.run(command, check=True)
-    docs, evidence = ROOT / "docs" / "accuracy", ROOT / "ringsim" / "scenes" / "evidence"
-    for target in (docs, evidence):
+    docs = ROOT / "docs" / "accuracy"
+    for target in (docs, EVIDENCE):
         target.mkdir(parents=True, exist_ok=True)
     for end in ("md", "png"):
         shutil.copyfile(folder / f"accuracy.{end}", docs / f"{name}.{end}")
-    shutil.copyfile(folder / "settings.toml", evidence / f"{name}.toml")
+    shutil.copyfile(folder / "settings.toml", EVIDENCE / f"{name}.toml")
 
 
 if __name__ == "__main__":
-    for each in sys.argv[1:] or builtin_scenes():
-        remake(each)
+    brief = [word for word in sys.argv[1:] if word == "--brief"]
+    names = [word for word in sys.argv[1:] if word != "--brief"]
+    for each in names or sorted(path.stem for path in EVIDENCE.glob("*.toml")):
+        remake(each, *brief)

@@ -46,7 +46,8 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     """Errors, orders, cost and the efficient frontier of a ladder.
 
     ``results`` are ``NEEDED`` variables over ``rung``, one entry for each of the ``rungs``, those
-    of the reference among them.  The reference is the limit of the full engine's runs, for all.
+    of the reference among them.  The reference is the limit of the full engine's runs, for
+    all; without any that of the frame engine's.
 
     Returns
     -------
@@ -63,7 +64,8 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     ValueError
         If too few runs for a reference ended well.
     """
-    errors = Errors(results, rungs)
+    alone = all(rung.fidelity != "full" for rung in rungs)
+    errors = Errors(results, rungs, FRAME if alone else "full")
     error = np.array(list(errors.of.values())).T
     own = np.array(list(errors.uncertainty.values()))
     good = bounds(error, rungs, own)
@@ -76,7 +78,7 @@ def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -
     choice = np.array([ladder not in _OTHER_MODELS for ladder in ladders])
     ranked = np.where(choice[:, None], good, np.nan)
     graded, orders = errors.orders()
-    engines = _engines(errors, results, rungs)
+    engines = None if alone else _engines(errors, results, rungs)
     if engines is not None:
         names, more = engines.orders
         graded, orders = [*graded, *names], np.vstack([orders, more])

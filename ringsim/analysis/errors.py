@@ -89,11 +89,14 @@ def largest(values: xr.DataArray) -> Array:
 
 
 def order(values: xr.DataArray, noise: float) -> float:
-    """Observed order of three levels along ``rung``; NaN unless changes shrink above the noise.
+    """Observed order of three levels along ``rung``; NaN unless changes shrink above the noise,
+    and of fewer levels.
 
     Each level has half the length of elements of the one before; ``noise`` is the largest effect
     of anything else, in the unit of the values.
     """
+    if values.sizes["rung"] < 3:
+        return np.nan
     first, last = largest(values.diff("rung")).tolist()
     return float(np.log2(first / last)) if first > last > noise else np.nan
 

@@ -33,6 +33,9 @@ _HALVINGS = {"x 2": -1, "x 1": 0, "x 1/2": 1, "x 1/4": 2, "x 1/8": 3, "x 1/16": 
 """Rungs of "steps" by the factor on every step, with the exponent of 1/2."""
 _OF_ELEMENTS = 1.0 / 8.0
 """Factor on every step of the rungs of "elements"."""
+_OF_BRIEF = 1.0 / 4.0
+"""The same of a brief study, and of its finest steps."""
+_STEPS = ("solver.step", "solver.tolerance", "solver.deviation_tolerance")
 _LEVELS = 3
 """Levels from which a limit is extrapolated."""
 _TIGHT = 1e-6
@@ -61,6 +64,34 @@ class Rung:
     size: float
     values: Mapping[str, Any]
     fidelity: str = "full"
+
+
+def shortened(rungs: Sequence[Rung]) -> list[Rung]:
+    """The ladder of a brief study: reference and settings to choose from.
+
+    None has steps shorter than a quarter of the scene's, at which its elements are, or more than
+    twice the elements, and settings are tried at the scene's own kind of Newton's tolerance.
+    """
+    finest = next(r for r in rungs if r.ladder == "steps" and r.size == _OF_BRIEF)
+    steps = {path: finest.values[path] for path in _STEPS}
+
+    def kept(rung: Rung) -> bool:
+        few = rung.values["rods.elements"] <= 2 * finest.values["rods.elements"]
+        long = all(rung.values[path] >= least for path, least in steps.items())
+        same = rung.ladder != "setting" or rung.values["solver.newton_tolerance"] > _TIGHT
+        return few and long and same
+
+    brief = [
+        replace(rung, values={**rung.values, **steps}) if rung.ladder == "elements" else rung
+        for rung in rungs if rung.ladder in (STANDING, *GRADED, "setting")
+    ]  # fmt: skip
+    return list(filter(kept, brief))
+
+
+def frames_alone(rungs: Sequence[Rung]) -> list[Rung]:
+    """The ladder of the frame engine by itself: its reference, and settings to choose from."""
+    own = (STANDING, *GRADED, "setting")
+    return [replace(rung, fidelity=FRAME) for rung in rungs if rung.ladder in own]
 
 
 def by_frames(rungs: Sequence[Rung]) -> list[Rung]:

@@ -15,9 +15,11 @@ from ringsim.analysis.ladder import (
     PATHS,
     Rung,
     by_frames,
+    frames_alone,
     ladder,
     left_out,
     references,
+    shortened,
     standing,
 )  # fmt: skip
 from ringsim.campaign.cases import run_cases
@@ -38,8 +40,9 @@ class ReferenceRunError(Exception):
 
 
 def run_ladder(
-    folder: Path, scene: Scene, workers: int, timeout: float, most_elements: int = 4
-) -> xr.Dataset:
+    folder: Path, scene: Scene, workers: int, timeout: float, most_elements: int = 4,
+    *, brief: bool = False, fidelity: str = "full",
+) -> xr.Dataset:  # fmt: skip
     """Errors and cost of all settings of a scene's ladder (``judge``).
 
     A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
@@ -48,32 +51,42 @@ def run_ladder(
     settings too, where they can represent the scene.  ``folder`` holds the campaigns, and a study
     that was interrupted goes on, also with rungs that took longer than ``timeout``, the longest
     time of one rung, s; ``most_elements`` (4 or 8) is how many times more than the scene's are
-    tried.  What the study had to do without is in the attribute ``remarks``.  InputError if the
-    scene is refused, ReferenceRunError if too few runs for a reference end well.
+    tried; ``brief`` is for a quarter of the cost (``shortened``).  ``fidelity`` "frame" tries that
+    engine alone, whose limit is then the reference.  What the study had to do without is in the
+    attribute ``remarks``.  InputError if the scene is refused, ReferenceRunError if too few runs
+    for a reference end well.
     """
     plain = {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
     scene = scene.with_values(plain)
     remarks = left_out(scene)
     late = frozenset({Status.TIMEOUT})
     study = _Study(scene, partial(run_cases, folder, workers=workers, timeout=timeout, again=late))
-    rungs = ladder(scene, most_elements)
+    why, rungs = why_not_frame(scene), ladder(scene, most_elements)
+    if fidelity == FRAME:
+        if why:
+            raise InputError(f"--fidelity {FRAME}: {why}")
+        rungs = frames_alone(rungs)
+        remarks.append("a study of the frame engine alone: the reference is its own limit")
+    if brief:
+        rungs = shortened(rungs)
+        remarks.append("a brief study: steps down to a quarter, elements up to twice the scene's")
     for rung in rungs:
         scene.with_values(dict(rung.values))  # refused before anything has run
-    in_time, in_space = references(rungs)
+    in_time, in_space = references(rungs, fidelity=fidelity)
     failed: dict[int, str] = {}
     for stage, places in (("first", in_time[:1]), ("reference", in_time + in_space)):
         own = [rungs[k] for k in places]
         found = study.run(stage, own)
         failed |= {places[k]: told for k, told in _failures(own, found).items()}
-        _require_references(rungs, failed)
+        _require_references(rungs, failed, fidelity)
     remarks += [f"{told}; the reference is made of other runs" for told in failed.values()]
-    if why := why_not_frame(scene):
+    if why:
         remarks.append(f"the frame engine is left out: {why}")
-    else:
+    elif fidelity != FRAME:
         rungs += by_frames(rungs)
     results = study.run("settings", rungs)
     failed |= _failures(rungs, results)
-    _require_references(rungs, failed)
+    _require_references(rungs, failed, fidelity)
     truths = _quadrature(scene)
     if (ideal := study.ideal()) is not None:
         results = xr.concat([ideal, results], "rung")
@@ -100,10 +113,10 @@ def _failures(rungs: Sequence[Rung], found: xr.Dataset) -> dict[int, str]:
     return told
 
 
-def _require_references(rungs: Sequence[Rung], failed: dict[int, str]) -> None:
+def _require_references(rungs: Sequence[Rung], failed: dict[int, str], fidelity: str) -> None:
     """Raise ReferenceRunError if without the rungs that failed too few are left to compare with."""
     try:
-        references(rungs, [k not in failed for k in range(len(rungs))])
+        references(rungs, [k not in failed for k in range(len(rungs))], fidelity)
     except ValueError:
         raise ReferenceRunError(
             f"{next(iter(failed.values()))}: change the scene so that it ends well with fine "

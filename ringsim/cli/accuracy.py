@@ -27,9 +27,20 @@ from ringsim.scene import load_scene
     help="Elements up to so many times the scene's; 8 for peak stresses to 1e-3, at several times "
     "the cost.",
 )  # fmt: skip
+@click.option(
+    "--brief", is_flag=True,
+    help="A quarter of the cost: steps down to a quarter of the scene's instead of a sixteenth, "
+    "elements up to twice the scene's, no constant steps, other rods, dissipation or Newton "
+    "tolerances.",
+)  # fmt: skip
+@click.option(
+    "--fidelity", type=click.Choice(["both", "frame"]), default="both", show_default=True,
+    help="Engines to try; frame: that one alone, at a tenth of the cost, with its own limit as the "
+    "reference.",
+)  # fmt: skip
 def command(
     scene: str, settings: dict[str, Any], out: Path | None, workers: int | None, timeout: float,
-    most_elements: str,
+    most_elements: str, brief: bool, fidelity: str,
 ) -> int:  # fmt: skip
     """Compare numerical settings of SCENE: error against run time, and which to choose.
 
@@ -50,7 +61,10 @@ def command(
 
     try:
         cores = workers or len(os.sched_getaffinity(0))
-        found = run_ladder(folder, chosen, cores, timeout, int(most_elements))
+        engine = "frame" if fidelity == "frame" else "full"
+        found = run_ladder(
+            folder, chosen, cores, timeout, int(most_elements), brief=brief, fidelity=engine
+        )
     except ReferenceRunError as error:
         click.echo(f"{chosen.name}: {error}", err=True)
         return EXIT_FAILED

@@ -278,6 +278,6 @@ class Integration:
             stretch = float(np.max(chain.strains, where=chain.ropes.alive, initial=0.0))
             driven = driven or model.cables.winches.driving(time, chain)
         angles, rates = model.openings.read(state.pose.angle, state.rate.angles)
-        energies = self._energy.read(state, self._strains)
+        energies = self._energy.read(time, state, self._strains)
         gap = model.gap(state.pose)
         return Instant(time, angles, rates, energies, gap, tensions, stretch, driven)

@@ -1,5 +1,7 @@
 """Energies of a state, and what has passed since the state that was kept last."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ringsim.cable.state import ChainState, work_between
@@ -10,33 +12,51 @@ from ringsim.layout.pose import Array
 from ringsim.stepping.instant import Energies
 
 
+class Passing(NamedTuple):
+    """Time (s), forces that take energy, their places and the rates of these, shape (n,); cables.
+
+    Pairs of forces and places are N and m, or N m and rad.
+    """
+
+    time: float
+    forces: Array
+    places: Array
+    rates: Array
+    chain: ChainState | None
+
+
 class EnergyMeter:
     """Measures the energies of a model.
 
-    What friction, dampers and stops take is their mean force times the displacement.
+    What friction, dampers and stops take is ``lost_between``; of ropes and winches see
+    ``work_between``.
     """
 
     def __init__(self, model: FrameModel) -> None:
         self._model = model
-        self._kept: tuple[Array, Array, ChainState | None] | None = None
-        self._last: tuple[Array, Array, ChainState | None] | None = None
+        self._kept: Passing | None = None
+        self._last: Passing | None = None
 
-    def read(self, state: State, strains: Strains) -> Energies:
-        """Energies of a state with its strains and, if there are cables, its chain."""
+    def read(self, time: float, state: State, strains: Strains) -> Energies:
+        """Energies of a state at a time (s) with its strains and, if there are cables, its chain.
+
+        Losses and what winches put in count from the state that was kept last.
+        """
         model, mesh = self._model, self._model.mesh
         pose = state.pose
         torques = model.laws.passing(pose.angle, state.rate.angles)
         kinetic = kinetic_energy(mesh, state.rate.points)
         elastic = 0.5 * float(np.sum(mesh.stiffness * state.strains**2)) + torques.stored
         elastic += sum(slide.stored(pose) for slide in model.slides)
-        forces, places = [torques.lost], [pose.angle]
+        forces, places, rates = [torques.lost], [pose.angle], [state.rate.angles]
         if model.strings is not None:
-            stored, resisting, lengths = model.strings.passing(*state.net)
+            stored, resisting, lengths, along = model.strings.passing(*state.net)
             moving = state.rate.hub[0]
             kinetic += 0.5 * model.strings.hub_mass * float(moving @ moving)
             elastic += stored
             forces.append(resisting)
             places.append(lengths)
+            rates.append(along)
         if model.edge is not None:
             elastic += model.edge.stored(pose.place)
         if model.hanging is not None:
@@ -45,24 +65,37 @@ class EnergyMeter:
             elastic += hold.stored
             forces.append(-hold.friction.ravel())
             places.append(state.place.hung.ravel())
+            rates.append(state.rate.hung.ravel())
         if mesh.tau.any():
             straining = strains.lead * state.strains + strains.before
             forces.append((mesh.tau[:, None] * mesh.stiffness * straining).ravel())
             places.append(state.strains.ravel())
-        force, place = np.concatenate(forces), np.concatenate(places)
+            rates.append(straining.ravel())
+        if state.chain is not None:
+            elastic += float(state.chain.elastic_energy.sum())
+        passing = np.concatenate(forces), np.concatenate(places), np.concatenate(rates)
+        self._last = Passing(time, *passing, state.chain)
         lost = driven = 0.0
-        chain = state.chain
-        if chain is not None:
-            elastic += float(chain.elastic_energy.sum())
-        if self._kept is not None:
-            before, at, chain_before = self._kept
-            lost = 0.5 * float((force + before) @ (place - at))
-            if chain is not None and chain_before is not None:
-                driven, rubbed = work_between(chain_before, chain)
+        if (before := self._kept) is not None:
+            lost = lost_between(before, self._last)
+            if before.chain is not None and state.chain is not None:
+                driven, rubbed = work_between(before.chain, state.chain)
                 lost += rubbed
-        self._last = force, place, chain
         return Energies(kinetic, elastic, model.work(state), lost, driven)
 
     def keep(self) -> None:
         """Count from the last reading on."""
         self._kept = self._last
+
+
+def lost_between(before: Passing, after: Passing) -> float:
+    """Work in J of forces in a step h in which they and the rates of their places go linearly:
+
+        mean force times displacement + h (F2 - F1) (v2 - v1) / 12.
+
+    Without the second part, never negative where friction grows with the rate, every change of
+    speed would seem to cost energy.
+    """
+    step, rises = after.time - before.time, after.forces - before.forces
+    mean = 0.5 * float((before.forces + after.forces) @ (after.places - before.places))
+    return mean + step / 12.0 * float(rises @ (after.rates - before.rates))

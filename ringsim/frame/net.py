@@ -59,12 +59,14 @@ class Strings:
 
     def passing(
         self, ends: Array, rates: Array, hub: Array, hub_rate: Array
-    ) -> tuple[float, Array, Array]:
-        """Energy stored (J), dissipating forces of the strings (N) and their lengths (m)."""
+    ) -> tuple[float, Array, Array, Array]:
+        """Energy stored (J), dissipating forces of the strings (N), their lengths (m) and rates of
+        these (m/s).
+        """
         lengths, along, _ = stretched(ends, rates, hub, hub_rate)
         reaction = self._law.tension(lengths - self._free, along)
         lost = np.broadcast_to(reaction.damping, lengths.shape)
-        return float(np.sum(reaction.stored)), lost, lengths
+        return float(np.sum(reaction.stored)), lost, lengths, along
 
     def tangents(
         self, ends: Array, rates: Array, hub: Array, hub_rate: Array, rate_by_place: float

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-import tomli_w
 import xarray as xr
 from click.testing import CliRunner, Result
 
@@ -36,7 +35,9 @@ def test_settings_are_picked_and_told(tmp_path: Path) -> None:
     out = tmp_path / "run.nc"
     found = ringsim("run", "ring18", *SMALL, "--accuracy", "0.05", "--out", str(out))
     assert found.exit_code == 0, found.output
-    assert "settings for 0.05: fidelity = full, solver.step = 0.2, solver.tolerance" in found.output
+    assert (
+        "settings for 0.05: fidelity = frame, solver.step = 0.2, solver.tolerance" in found.output
+    )
     assert "measured with ring18 to be good for: deployment time" in found.output
     picked = evidence_for(load_scene("ring18")).pick(0.05)
     with xr.open_dataset(out) as dataset:
@@ -51,14 +52,10 @@ def test_settings_are_picked_and_told(tmp_path: Path) -> None:
 def test_the_cheaper_engine_runs_unless_it_cannot_or_may_not(
     words: list[str], represented: bool, engine: str, tmp_path: Path, monkeypatch
 ) -> None:
-    known = evidence_for(load_scene("ring18"))
-    cheap = known.settings[0].model_copy(update={"fidelity": "frame", "seconds": 0.01})
-    both = known.model_copy(update={"settings": (cheap, *known.settings)})
-    file, out = tmp_path / "settings.toml", tmp_path / "run.nc"
-    file.write_text(tomli_w.dumps(both.model_dump()))
+    out = tmp_path / "run.nc"
     if not represented:
         monkeypatch.setattr(simulation, "why_not_frame", lambda scene: "it cannot")
-    asked = ["--accuracy", "0.05", "--evidence", str(file), "--out", str(out)]
+    asked = ["--accuracy", "0.05", "--out", str(out)]
     found = ringsim("run", "ring18", *SMALL, *asked, *words)
     assert found.exit_code == 0, found.output
     assert f"settings for 0.05: fidelity = {engine}, " in found.output

@@ -36,7 +36,7 @@ def model(scene: Scene) -> float:
 def study(tmp_path, monkeypatch):
     """Runs a study of the made-up model, in which some settings fail."""
 
-    def study(failing: list[Mapping[str, Any]], most: int = 4) -> xr.Dataset:
+    def study(failing: list[Mapping[str, Any]], most: int = 4, **how: Any) -> xr.Dataset:
         def run_cases(folder, name, scene, cases, *, fidelity, **_):
             assert ("frame" in name) == (fidelity == "frame")
             rows = []
@@ -60,7 +60,7 @@ def study(tmp_path, monkeypatch):
 
         monkeypatch.setattr(accuracy, "run_cases", run_cases)
         monkeypatch.setattr(accuracy._Study, "ideal", lambda _: None)
-        return run_ladder(tmp_path, SCENE, 1, 60.0, most)
+        return run_ladder(tmp_path, SCENE, 1, 60.0, most, **how)
 
     return study
 
@@ -122,6 +122,25 @@ def test_studies_with_eight_elements_go_on_from_others():
     new = [r for r in eight if r not in four]
     assert [r.label for r in new[1:]] == [r.label for r in eight[-2:]]
     assert references(eight)[1][:-1] == references(four)[1]
+
+
+def test_a_brief_study_is_less_certain_with_fewer_and_coarser_runs(study):
+    whole, found = study([]), study([], brief=True)
+    assert set(found.ladder.values) == {"as it stands", "steps", "elements", "setting"}
+    assert found.sizes["rung"] < 0.6 * whole.sizes["rung"]
+    assert float(found["solver_tolerance"].min()) == SCENE.solver.tolerance / 16.0
+    own, of_whole = (float(each.uncertainty.sel(output="motion")) for each in (found, whole))
+    assert error(found) <= own
+    assert own > of_whole
+
+
+def test_frames_alone_are_their_own_reference(study):
+    found = study([], fidelity="frame")
+    assert set(found.fidelity.values) == {"frame"}
+    assert error(found) < 1e-8
+    assert "the reference is its own limit" in tables(found, "A study")
+    with pytest.raises(ReferenceRunError, match="more time"):
+        study([rung("steps", "x 1/4")], fidelity="frame")
 
 
 def test_both_engines_run_the_same_steps_and_elements(study):
