@@ -12,7 +12,14 @@ from matplotlib.figure import Figure
 
 from ringsim.analysis.design import placement
 from ringsim.analysis.sensitivity import sensitivity
-from ringsim.plots.campaign.tornado import analysed, bars_of, explained, measure_of, tornado
+from ringsim.plots.campaign.tornado import (
+    _short,
+    analysed,
+    bars_of,
+    explained,
+    measure_of,
+    tornado,
+)
 from ringsim.sampling.designs.morris import Morris
 from ringsim.sampling.designs.random import RandomDesign
 from ringsim.sampling.designs.saltelli import Saltelli
@@ -91,3 +98,9 @@ def test_a_shut_gate_is_told_in_place_of_bars() -> None:
     outputs = dict(bars_of(analysed(campaign), "total_index"))
     assert outputs["lost"].names[0] == "modulus"
     assert "left out: " in figure.legends[0].get_title().get_text()
+
+
+def test_long_paths_are_broken_between_their_parts() -> None:
+    assert _short("cables.upper.winch.winding.derating") == "cables.upper.winch.winding.\nderating"
+    place = "cables.upper.friction.coefficient[section 1 first hinge]"
+    assert _short(place) == place.replace("[", "\n[")

@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from ringsim.analysis.courses import ends
 from ringsim.plots import style
 from ringsim.plots.campaign.by_ending import chosen, counted, over_time
 from ringsim.plots.campaign.frame import head
@@ -12,7 +13,10 @@ from ringsim.plots.campaign.frame import head
 @style.styled
 def motors(campaign: xr.Dataset) -> Figure:
     """A row a motor, from ``motor_torque`` and ``motor_speed`` (sample, plane, winch, time)."""
-    read, words = chosen(campaign, ["motor_torque", "motor_speed"])
+    names = ["motor_torque", "motor_speed", "final_time", "deployment_time"]
+    read, words = chosen(campaign, names)
+    # Motors that have done their work stand still, and would hide those that still wind.
+    read = read.where(read["time"] <= xr.DataArray(ends(read), dims="sample"))
     read = read.transpose("sample", "plane", "winch", "time")
     there = np.isfinite(read["motor_torque"].to_numpy()).any(axis=(0, 3))
     places = np.argwhere(there).tolist()

@@ -189,7 +189,9 @@ def _short(name: str) -> str:
     )
     path, bracket, place = path.partition("[")
     if not mean:
-        return textwrap.fill(path, _WIDE) + ("\n" if bracket else "") + bracket + place
+        # Between the parts of a path rather than within a word.
+        apart = textwrap.fill(path.replace(".", ". "), _WIDE).replace(". ", ".")
+        return (apart if len(path) > _WIDE else path) + ("\n" if bracket else "") + bracket + place
     part = f" {bracket}{place} of" if bracket else ""
     return f"{mean}{part}\n{path}"
 
