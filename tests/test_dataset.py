@@ -34,7 +34,7 @@ def full_outcome(sections: int = 4) -> Outcome:
     """Every variable, filled with random bits of full precision and some NaN."""
     random = np.random.default_rng(7)
     sizes = {"plane": 2, "section": sections, "time": len(TIMES), "rod": len(RODS), "span": 6}
-    sizes |= {"station": 5, "point": 4, "axis": 3, "winch": 2, "resistance": 3}
+    sizes |= {"station": 5, "point": 4, "axis": 3, "winch": 2, "resistance": 3, "corner": 4}
     values = {}
     for name, variable in VARIABLES.items():
         shape = tuple(sizes[dim] for dim in variable.dims)
@@ -58,6 +58,7 @@ def full_outcome(sections: int = 4) -> Outcome:
         "winch": np.array([1, 2]),
         "resistance": np.array(["pulley friction", "joint friction", "net"]),
         "axis": np.array(["x", "y", "z"]),
+        "corner": np.arange(1, 5),
         "point": np.array(["upper corner 1", "hub", "boom tip", "upper V-joint 1"]),
     }
     return Outcome(Status.OK, "all V-joints have locked", coordinates, values)

@@ -12,8 +12,6 @@ from ringsim.layout.mobility import internal_mobility
 from ringsim.refusal import InputError, show
 from ringsim.scene import Scene, load_scene
 from ringsim.scene.substituted import strained, substituted
-from ringsim.theory.assembled import assembled
-from ringsim.theory.deployed import deployed
 from ringsim.units import Model
 
 _ASKED = ("margin", "hinge_spring", "temperature")
@@ -102,6 +100,10 @@ def _assembly(scene: Scene) -> str:
     """What lengths of rods do without a run; empty if these are as drawn."""
     if not strained(scene):
         return ""
+    # Here: few scenes need them, and they load scipy.
+    from ringsim.theory.assembled import assembled
+    from ringsim.theory.deployed import deployed
+
     made = substituted(scene)
     try:
         start, end = assembled(layout_of(made), made.rods), deployed(made)

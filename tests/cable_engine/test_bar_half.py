@@ -81,7 +81,7 @@ def test_brackets_that_cannot_be_are_refused(values: dict[str, Any], text: str) 
     assert text in str(refused.value)
 
 
-@pytest.mark.parametrize("half", ["first", "second"])
+@pytest.mark.parametrize("half", ["first", pytest.param("second", marks=pytest.mark.slow)])
 def test_the_ideal_truss_opens_alike(half: str) -> None:
     full, ideal = outcome(scene(half)), run_ideal(scene(half))
     assert ideal.status == Status.OK

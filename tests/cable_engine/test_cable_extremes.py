@@ -46,12 +46,16 @@ QUICK = [
     {"both__axial_stiffness": 1e3},
     {"both__axial_stiffness": 1e6},
     {"both__friction__coefficient": 0.0},
-    {"start": 2.0},
     {"speed": 0.5},
 ]
+LATE = {"start": 2.0}
 
 
-@pytest.mark.parametrize("case", QUICK, ids=lambda case: "-".join(map(str, case.items())))
+@pytest.mark.parametrize(
+    "case",
+    [*QUICK, pytest.param(LATE, marks=pytest.mark.slow)],
+    ids=lambda case: "-".join(map(str, case.items())),
+)
 def test_one_value_at_its_end(case: dict[str, Any]) -> None:
     values = {"speed": 0.05, "start": 20.0} | case
     found = wound_in(**values)

@@ -159,6 +159,7 @@ def opened(kind: str, **values: Any) -> Outcome:
     return outcome(truss(2, **(fields | values)))
 
 
+@pytest.mark.slow
 def test_both_kinds_of_rods_open_alike_under_equal_cables() -> None:
     slopes, exact = opened("ancf"), opened("geometrically-exact")
     assert slopes.status == exact.status == Status.OK
@@ -181,7 +182,14 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "cut",
+        pytest.param("jam", marks=pytest.mark.slow),
+        pytest.param("stuck", marks=pytest.mark.slow),
+    ],
+)
 def test_faults_strike_rods_with_slopes_as_others(fault: str) -> None:
     struck = [FAULTS[fault] | {"time": 0.7}]
     slopes, exact = (

@@ -213,7 +213,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", "-l", str(disk)], check=True)
 
 
-@pytest.mark.parametrize("ranks", [0, 2])
+@pytest.mark.parametrize("ranks", [pytest.param(0, marks=pytest.mark.slow), 2])
 def test_full_disk_stops_the_campaign_and_loses_no_finished_sample(
     ranks, small_disk, bench, request
 ):

@@ -111,5 +111,5 @@ def test_measured_settings_are_for_one_engine() -> None:
 
 
 def test_settings_of_an_engine_that_was_not_measured_are_refused() -> None:
-    printed = called("run", "ring18", "--accuracy", "0.05", "--fidelity", "frame", code=2)
-    assert "no settings of it were measured with ring18" in printed
+    printed = called("run", "planar-truss", "--accuracy", "0.05", "--fidelity", "frame", code=2)
+    assert "no settings of it were measured with planar-truss" in printed

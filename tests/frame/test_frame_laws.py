@@ -19,7 +19,8 @@ SLOW = {
     "forces": {"viscous-sections", "force-sections", "net", "rigid-free", "arc-2-free",
                "damped-net", "free-stop", "edge-net", "ramps"},
     "cables": {"last", "capstan-pulleys", "frictionless", "stall", "two-winches", "feedback",
-               "locked", "constant", "arc-2-flexible", "boom-and-net", "late-lower", "taut"},
+               "locked", "constant", "arc-2-flexible", "boom-and-net", "late-lower", "taut",
+               "backdrivable"},
 }  # fmt: skip
 """Near kin of what runs by default."""
 
@@ -31,6 +32,10 @@ def named(kind: str, scenes: dict[str, dict[str, object]]) -> list[object]:
 
 def check(scene: Scene) -> None:
     for name, found in apart(scene).items():
+        # What is lost where a joint stops within a step they count by rules of other orders
+        # (docs/frame.md), and twice the step says nothing of that.
+        if name == "dissipation" and scene.faults:
+            continue
         assert found.difference <= sum(found.errors) + FLOOR * found.largest, name
 
 

@@ -114,7 +114,7 @@ def test_springs_that_are_too_weak_stop_where_the_cables_hold_them() -> None:
 
 @pytest.mark.parametrize("fidelity", ["frame", "full"])
 def test_engines_agree_with_the_ideal_ring(fidelity: str) -> None:
-    scene = sprung()
+    scene = sprung(solver__tolerance=5e-5)
     truth, found = simulate(scene, "ideal"), simulate(scene, fidelity)
     np.testing.assert_allclose(found.deployment_time, truth.deployment_time, rtol=2e-3)
     before = truth.time.values < float(truth.deployment_time) - 2e-3

@@ -51,7 +51,7 @@ def test_check_says_what_is_built() -> None:
     assert line(summary, "mobility").startswith("1 internal degree of freedom")
     assert (
         line(summary, "left out")
-        == "cables, gravity, offload, spacecraft, joint friction, stress output"
+        == "cables, gravity, latch, offload, spacecraft, joint friction, stress output"
     )
 
 

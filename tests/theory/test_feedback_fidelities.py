@@ -22,7 +22,7 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", [pytest.param("stall", marks=pytest.mark.slow), *list(LAWS)[1:]])
 def test_both_models_answer_the_law_alike(name: str) -> None:
     law: dict[str, Any] = LAWS[name]
     scene = six(cable__winch__winding=law, solver__end_time=3.0, record__interval=0.1)
