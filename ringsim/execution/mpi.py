@@ -23,6 +23,8 @@ _TO_WORKER, _TO_RANK_0 = 11, 12
 _SHORTEST, _LONGEST = 1e-4, 2e-2
 _AHEAD_SECONDS, _MOST_AHEAD = 0.02, 32
 _POLITE = 5e-3
+_HEARD = 0.2
+"""Time for a launcher to read what a rank has said, s: it polls its ranks' pipes."""
 _T = TypeVar("_T")
 
 _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
@@ -80,8 +82,10 @@ def aborting(communicator: Any) -> Iterator[None]:
     try:
         yield
     except Exception:
-        traceback.print_exc()
+        sys.stderr.write(traceback.format_exc())
         sys.stderr.flush()
+        # mpiexec drops what it has not read yet when a job aborts.
+        time.sleep(_HEARD)
         communicator.Abort(1)
         raise
 
