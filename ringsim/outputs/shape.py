@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ringsim.layout.layout import layout_at_opening
 from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
@@ -52,6 +51,8 @@ def deviations(places: Array, drawn: Array) -> Array:
     from_centre = [
         each.reshape(-1, 3) - each.reshape(-1, 3).mean(axis=0) for each in (places, drawn)
     ]
+    from scipy.spatial.transform import Rotation  # here: few scenes record their shape
+
     turn, _ = Rotation.align_vectors(*from_centre)
     apart = from_centre[0] - turn.apply(from_centre[1])
     return np.asarray(np.linalg.norm(apart, axis=1).reshape(places.shape[:-1]))
