@@ -34,11 +34,12 @@ def six(step: float, end: float) -> Scene:
 
 @pytest.mark.parametrize(
     ("step", "end"),
-    [pytest.param(0.01, 2.0), pytest.param(1e-3, 3.3, marks=pytest.mark.slow)],
+    [pytest.param(0.01, 2.0), pytest.param(1e-3, 3.25, marks=pytest.mark.slow)],
 )
 def test_joints_of_a_ring_of_six_deviate_alike(step: float, end: float) -> None:
     """To 1e-3 of the largest deviation at every time: with the same steps, and the same rods, only
-    Newton's residual is left, 1e-7 of the drive, over a stiffness that carries 1e-3 of it.
+    Newton's residual is left, 1e-7 of the drive, over a stiffness that carries 1e-3 of it.  Up to
+    the stops: twelve impacts within 4 ms, in steps of 1 ms, make 1 % of what was 1e-7.
     """
     scene = six(step, end)
     here, there = (deviations(solve(scene)) for solve in (by_frames, by_exudyn))
