@@ -15,8 +15,12 @@ if TYPE_CHECKING:
 
 def check_parts(scene: "Scene") -> None:
     """Refuse (ValueError) parts that lack what they need of each other."""
-    for check in (_check_faults, _check_rods, _check_limits, _check_latch, _check_margin):
-        check(scene)
+    _check_faults(scene)
+    _check_corners(scene)
+    _check_rods(scene)
+    _check_limits(scene)
+    _check_latch(scene)
+    _check_margin(scene)
 
 
 def _check_limits(scene: "Scene") -> None:
@@ -55,14 +59,18 @@ def _check_margin(scene: "Scene") -> None:
         raise ValueError(reason)
 
 
-def _check_rods(scene: "Scene") -> None:
-    """Refuse (ValueError) rods of other lengths where nothing can strain them."""
+def _check_corners(scene: "Scene") -> None:
+    """Refuse (ValueError) records of corners where there are none."""
     for name in ("shape", "accelerations"):
         if getattr(scene.record, name) and kind_of(scene.structure) != "pantograph-ring":
             raise ValueError(
                 f'record.{name} = true needs structure.kind = "pantograph-ring", not '
                 f'"{kind_of(scene.structure)}", which has no corners: leave it out'
             )
+
+
+def _check_rods(scene: "Scene") -> None:
+    """Refuse (ValueError) rods of other lengths or moduli in structures that have no such rods."""
     if scene.rods.bar_young_modulus is not None and kind_of(scene.structure) != "pantograph-ring":
         raise ValueError(
             "rods.bar_young_modulus: only the pantograph ring has folding bars (leave it out)"

@@ -159,7 +159,6 @@ def opened(kind: str, **values: Any) -> Outcome:
     return outcome(truss(2, **(fields | values)))
 
 
-@pytest.mark.slow
 def test_both_kinds_of_rods_open_alike_under_equal_cables() -> None:
     slopes, exact = opened("ancf"), opened("geometrically-exact")
     assert slopes.status == exact.status == Status.OK

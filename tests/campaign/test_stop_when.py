@@ -73,7 +73,6 @@ def test_it_ends_there_under_mpi(ended, bench, mpi):
     assert_same(bench, ended)
 
 
-@pytest.mark.slow
 def test_it_ends_there_in_parts_and_with_samples_beyond(ended, bench):
     """The last part runs to its end before the first one has begun."""
     write(bench)

@@ -39,7 +39,8 @@ def six(step: float, end: float) -> Scene:
 def test_joints_of_a_ring_of_six_deviate_alike(step: float, end: float) -> None:
     """To 1e-3 of the largest deviation at every time: with the same steps, and the same rods, only
     Newton's residual is left, 1e-7 of the drive, over a stiffness that carries 1e-3 of it.  Up to
-    the stops: twelve impacts within 4 ms, in steps of 1 ms, make 1 % of what was 1e-7.
+    the stops: 40 ms behind twelve impacts within 4 ms they differ by 0.12 deg of 1.0 in steps of
+    1 ms, and by 0.005 deg in steps of 0.25 ms.
     """
     scene = six(step, end)
     here, there = (deviations(solve(scene)) for solve in (by_frames, by_exudyn))
