@@ -151,15 +151,16 @@ class ChainState:
         present = float(self.wound_rate[cable, end])
         inner = ropes.inner(rope)
         part = self.lengths[ropes.starts[rope] : ropes.ends[rope]] / self.paths[rope]
-        share = 1.0 - np.cumsum(part)[:-1] - float(end)
-        speeds, slip, decays = self.speeds[inner], self.slip_speeds[inner], self.log_decays[inner]
-        alive = float(ropes.alive[rope])
+        slip, decays = self.slip_speeds[inner], self.log_decays[inner]
+        share = (1.0 - np.cumsum(part)[:-1] - float(end)) / slip
+        slid = self.speeds[inner] / slip - present * share
+        alive, logs = float(ropes.alive[rope]), np.zeros(len(part))
 
         def ratio(speed: float) -> float:
-            exponents = np.tanh((speeds + (speed - present) * share) / slip)
-            logs = np.append(0.0, np.cumsum(exponents * decays))
-            weights = np.exp(logs - logs.max())
-            return float(alive * weights[-1 if end else 0] / (weights @ part))
+            # A root finder asks some ten thousand times a run: few calls of numpy, in place.
+            np.cumsum(decays * np.tanh(slid + speed * share), out=logs[1:])
+            weights = np.exp(logs - np.maximum.reduce(logs))
+            return alive * float(weights[-1 if end else 0]) / float(weights @ part)
 
         path_rate = float(self.path_rates[rope] + self.wound_rates[rope]) - present
         return WinchReading(tension_ratio=ratio, path_rate=path_rate, path_slope=path_slope)

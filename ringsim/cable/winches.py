@@ -14,7 +14,7 @@ follows the structure uses the path taken up so far in the step, S_0 - S, not th
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,8 +29,14 @@ _NUDGE = 1e-8
 """Change of path in m by which the answer of the winches to the structure is measured: a hundred
 million roundings of a path of 1 m, and still a force of 1e-3 N at EA = 1e5 N."""
 
+_SECANTS = 8
+"""Secants before Brent's method: from the last answer three or four are enough."""
+_SAME, _ALIKE = 1e-15, 1e-11
+"""Speeds (m/s, and relative) that are one: over a step of 0.1 s they wind 1e-14 m more or less, of
+which a rope of EA = 1e5 N takes no notice (1e-10 N)."""
 
-@dataclass(frozen=True)
+
+@dataclass
 class _Rope:
     """A rope that winches with feedback wind in this step, as it was at the beginning."""
 
@@ -39,6 +45,10 @@ class _Rope:
     """EA (N), Kelvin-Voigt time (s) and width of the passage from slack to taut (N)."""
     members: dict[tuple[int, int], tuple[FeedbackWinding, WinchReading]]
     """Laws and readings by cable and end (0 first, 1 far)."""
+    total: float
+    """Speed of all members at which they last balanced the rope, m/s."""
+    gain: float = 1.0
+    """How fast their excess over the commands rose with it there."""
 
     def speeds(
         self, elapsed: float, path: float, rate: float, natural: float, rest: float
@@ -67,17 +77,42 @@ class _Rope:
             ]
 
         low, high = (sum(bounds) for bounds in zip(*(limits for *_, limits in laws), strict=True))
-        if sum(commands(high)) >= high:
-            total = high
-        elif sum(commands(low)) <= low:
-            total = low
-        else:
-            from scipy.optimize import brentq  # here: prescribed laws do not need it
-
-            total = brentq(lambda v: v - sum(commands(v)), low, high, xtol=1e-16, rtol=1e-14)
+        total, self.gain = root_of_rising(
+            lambda v: v - sum(commands(v)), min(max(self.total, low), high), self.gain, low, high
+        )
+        self.total = total
+        if count == 1:
+            return np.array([total])
         found = np.array(commands(total))
         # Steep commands amplify the last bits of the total: share these out.
         return np.asarray(found + (total - found.sum()) / count)
+
+
+def root_of_rising(
+    excess: Callable[[float], float], guess: float, gain: float, low: float, high: float
+) -> tuple[float, float]:
+    """Where a function, that rises by at least its argument, is zero, and how fast it rises there.
+
+    By secants from a guess and a slope: an iteration or a step ago the answer was nearly the same,
+    and Brent's method would search all speeds of the motor each time.  It decides where bends of
+    the function lead secants astray.  ``excess`` is not positive at ``low``, nor negative at
+    ``high``.
+    """
+    at, value = guess, excess(guess)
+    for _ in range(_SECANTS):
+        same = _SAME + _ALIKE * abs(at)
+        low, high = (low, at) if value > 0.0 else (at, high)
+        if abs(value) <= same or high - low <= 2.0 * same:
+            return at, gain
+        # Never a shorter way, so that the root is passed and held from both sides: a step that is
+        # short since the gain was too large proves nothing.
+        way = max(abs(value) / gain, same)
+        to, before = min(max(at - math.copysign(way, value), low), high), value
+        value = excess(to)
+        at, gain = to, max((value - before) / (to - at), 1.0)
+    from scipy.optimize import brentq  # here: it is rarely needed, and slow to load
+
+    return float(brentq(excess, low, high, xtol=_SAME, rtol=_ALIKE)), gain
 
 
 def driving(winches: Mapping[tuple[int, int], Winch], time: float, state: ChainState) -> bool:
@@ -190,6 +225,8 @@ class Winches:
         for place, winch in self._winches.items():
             if isinstance(winch.winding, FeedbackWinding) and winch.turns(time):
                 k = int(state.ropes.of_end[place])
-                begun = _Rope(float(state.paths[k]), state.material[:, k].tolist(), {})
+                begun = _Rope(float(state.paths[k]), state.material[:, k].tolist(), {}, 0.0)
                 reading = state.reading(*place, float(slopes[place[0]]))
-                self._ropes.setdefault(k, begun).members[place] = winch.winding, reading
+                rope = self._ropes.setdefault(k, begun)
+                rope.members[place] = winch.winding, reading
+                rope.total += float(state.wound_rate[place])

@@ -58,7 +58,8 @@ class Peak:
             return ""
         where = dict(zip(self.dims, places, strict=True))
         words = [v if isinstance(v, str) else f"{dim} {v:.0f}" for dim, v in where.items()]
-        if names := span_names.get(where.get("plane", ""), ()):
+        names = span_names.get(where.get("plane", ""), ())
+        if "span" in where and names:
             words[-1] += f" ({names[int(where['span']) - 1]})"
         alike = ties(values, self.series, self.dims, places, time)
         words[0], more = with_ties(tuple(places), alike)

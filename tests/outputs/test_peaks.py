@@ -13,6 +13,7 @@ from ringsim.cli import cli
 from ringsim.outputs.asynchrony import Asynchrony
 from ringsim.outputs.cable_tension import CableTension
 from ringsim.outputs.family import axes
+from ringsim.outputs.net_tension import NetTension
 from ringsim.outputs.rod_stress import RodStress
 from ringsim.outputs.series import Run, Series
 from ringsim.outputs.summary import summary
@@ -256,3 +257,21 @@ def test_results_without_places_tell_none() -> None:
     assert RodStress().told({"peak_stress_time": np.nan}, {}) == ""
     assert Asynchrony().told({"asynchrony_max": 3.0, "asynchrony_leader_plane": ""}, {}) == ""
     assert Asynchrony().told({"asynchrony_max": 3.0}, {}) == ""
+
+
+def test_places_without_a_span_are_told_beside_names_of_spans() -> None:
+    """The net's edge has planes and sections, of a scene whose cables name their spans."""
+    tensions = np.ones((9, 2, 2))
+    tensions[3, 1, 0] = 4.0
+    found = NetTension().reduce(STILL, Series(TIMES, tensions, STILL.angles.grid))
+    names = {"upper": ("winch to block",), "lower": ("winch to block",)}
+    assert NetTension().told(found, names) == "at 0.75 s: lower, section 1"
+
+
+@pytest.mark.parametrize("name", ["ring18-motor", "ring18-ground", "ring18-cable"])
+def test_the_verb_tells_every_peak_of_a_scene(name: str, tmp_path: Path) -> None:
+    """What a run says at its end, of the scenes with most parts; it reaches its time limit."""
+    short = ["--set", "solver.end_time=0.02", "--fidelity", "frame"]
+    done = CliRunner().invoke(cli, ["run", name, *short, "--out", str(tmp_path / "a.nc")])
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.output
+    assert "largest tension" in done.output
