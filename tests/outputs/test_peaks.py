@@ -271,7 +271,7 @@ def test_places_without_a_span_are_told_beside_names_of_spans() -> None:
 @pytest.mark.parametrize("name", ["ring18-motor", "ring18-ground", "ring18-cable"])
 def test_the_verb_tells_every_peak_of_a_scene(name: str, tmp_path: Path) -> None:
     """What a run says at its end, of the scenes with most parts; it reaches its time limit."""
-    short = ["--set", "solver.end_time=0.02", "--fidelity", "frame"]
+    short = ["--set", "solver.end_time=0.2", "--fidelity", "frame"]
     done = CliRunner().invoke(cli, ["run", name, *short, "--out", str(tmp_path / "a.nc")])
     assert done.exception is None or isinstance(done.exception, SystemExit), done.output
     assert "largest tension" in done.output
