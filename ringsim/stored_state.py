@@ -27,7 +27,7 @@ def layout_fingerprint(scene: Scene) -> str:
         [(body.pose.place, body.pose.axes) for body in layout.bodies],
         [(rod.name, rod.section, rod.start.place, rod.end.place, rod.stations)
          for rod in layout.rods],
-        [(joint.kind, joint.first, joint.second) for joint in layout.joints],
+        [(joint.kind, joint.first, joint.second, joint.error) for joint in layout.joints],
         layout.openings, layout.paths, layout.base,
         None if layout.net is None else layout.net.bodies,
         None if layout.hung is None else layout.hung.bodies,

@@ -119,10 +119,12 @@ class Draft:
         parts: Sequence[Part | None],
         at: Any,
         axes: Any = None,
+        error: Array | None = None,
     ) -> int:
         """A joint between two parts at a place; None stands for space.
 
-        Its ``axes`` are those of the first of the parts that is a rod unless given.
+        Its ``axes`` are those of the first of the parts that is a rod unless given; see ``Joint``
+        for its ``error``, here a vector in space.
 
         Raises
         ------
@@ -135,14 +137,17 @@ class Draft:
         if parts[1] is None:  # a place in space comes first, as those who read supports expect
             parts = parts[::-1]
         first, second = (self._mount(part, at, real_of(axes), family or kind) for part in parts)
-        self.joints.append(Joint(kind, family, section, first, second))
+        if error is not None:
+            assert isinstance(second, OnBody)
+            error = self.bodies[second.body].pose.axes.T @ error
+        self.joints.append(Joint(kind, family, section, first, second, error))
         return len(self.joints) - 1
 
     def slide(self, first: BodyRef, second: BodyRef, axes: Any) -> None:
         """Let two bodies slide along the x axis of ``axes``, each held at its own origin."""
         numbers, frame = (first.number, second.number), real_of(axes)
-        mounts = [OnBody(k, axes=self.bodies[k].pose.axes.T @ frame) for k in numbers]
-        self.joints.append(Joint("prismatic", "", 0, *mounts))
+        low, high = (OnBody(k, axes=self.bodies[k].pose.axes.T @ frame) for k in numbers)
+        self.joints.append(Joint("prismatic", "", 0, low, high))
 
     def opening(self, plane: int, joint: int, sense: float, lift: Any) -> None:
         """Let a revolute's angle be the opening angle of the plane's next section."""

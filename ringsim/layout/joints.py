@@ -13,7 +13,9 @@ class Joint:
 
     "revolute" turns about z, "prismatic" slides along x, "sleeve" slides along z and turns freely,
     "weld" holds everything.  By its ``family`` a scene gives it friction: "pivot", "hinge",
-    "vjoint", ...; empty if it cannot have any.  ``section`` counts from 0.
+    "vjoint", ...; empty if it cannot have any.  ``section`` counts from 0.  Where a part is not
+    made as drawn, ``error`` is by how much longer the arm of the second mount, a body's, is (m); in
+    a structure that has been put together the arm has it.
     """
 
     kind: Literal["revolute", "prismatic", "sleeve", "weld"]
@@ -21,6 +23,7 @@ class Joint:
     section: int
     first: Mount
     second: Mount
+    error: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -61,6 +61,16 @@ class RodTemperature(Model):
     """Factors on ``rods.young_modulus``; left out, it is the same at all temperatures."""
 
 
+class HingeTemperature(Model):
+    """The temperature of all hinge assemblies."""
+
+    value: PerSection[Kelvin] = 293.15
+    """Temperature of the hinge assemblies at both ends of all sections, or of each section."""
+    expansion: Expansion = 0.0
+    """Thermal expansion: pins stand off by ``structure.hinge_offset``, with its errors, times this
+    and their temperature less ``reference`` more."""
+
+
 class JointTemperature(Model):
     """The temperature of all joints."""
 
@@ -84,7 +94,7 @@ class Temperature(Model):
 
     A run is that of the scene with other lengths, stiffnesses and friction in place of this part:
     see ``ringsim.scene.substituted``.  Length errors e become (1 + e) (1 + a (T - reference)) - 1;
-    hinge assemblies, ropes and the boom keep their sizes.
+    ropes and the boom keep their sizes.
     """
 
     reference: Kelvin = 293.15
@@ -93,6 +103,8 @@ class Temperature(Model):
     """Of the diagonals; left out, they are at ``reference``."""
     bar: RodTemperature | None = None
     """Of the folding bars; left out, they are at ``reference``."""
+    hinge: HingeTemperature | None = None
+    """Of the hinge assemblies; left out, they are at ``reference``."""
     joint: JointTemperature | None = None
     """Of the joints; left out, their friction is as given."""
     pulley: PulleyTemperature | None = None
@@ -117,6 +129,12 @@ class Temperature(Model):
                 raise ValueError(
                     "temperature.pulley: there is no cable: add [cables.upper], or leave it out"
                 )
+
+    @property
+    def expands(self) -> bool:
+        """Whether any part changes its size."""
+        groups = (self.diagonal, self.bar, self.hinge)
+        return any(group is not None and group.expansion != 0.0 for group in groups)
 
     def rods(self) -> list[tuple[str, RodTemperature]]:
         """Groups of rods that have a temperature of their own, by name."""

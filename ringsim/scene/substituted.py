@@ -10,6 +10,8 @@ import numpy as np
 
 from ringsim.parts.rods.length_error import LengthError
 from ringsim.parts.temperature import RodTemperature
+from ringsim.structures.hinge_error import HingeError
+from ringsim.structures.pantograph_ring import PantographRing
 
 if TYPE_CHECKING:
     from ringsim.scene import Scene
@@ -35,6 +37,12 @@ def substituted(scene: "Scene") -> "Scene":
     if heat.diagonal is not None and heat.diagonal.stiffness is not None:
         # The bars' modulus is that of the diagonals unless it stands there.
         values.setdefault("rods.bar_young_modulus", _plain(scene.rods.young_of("bar")))
+    ring = scene.structure
+    if heat.hinge is not None and heat.hinge.expansion != 0.0 and isinstance(ring, PantographRing):
+        for name, error in ring.hinge_error or HingeError():
+            grown = np.asarray(heat.hinge.value) - heat.reference
+            more = (ring.hinge_offset + np.asarray(error)) * heat.hinge.expansion * grown
+            values[f"structure.hinge_error.{name}"] = _plain(np.asarray(error) + more)
     if heat.joint is not None:
         factors = heat.joint.friction.at(heat.joint.value)
         for family, law in scene.joints.present().items():
@@ -54,10 +62,9 @@ def strained(scene: "Scene") -> str:
     """What a scene names that strains its rods before they move; empty if nothing."""
     if scene.rods.length_error is not None:
         return "rods.length_error"
-    if scene.structure.held_angles() is not None:
-        return "structure.angle_error"
-    warm = [] if scene.temperature is None else scene.temperature.rods()
-    return "temperature" if any(group.expansion != 0.0 for _, group in warm) else ""
+    if field := scene.structure.strained_by():
+        return f"structure.{field}"
+    return "temperature" if scene.temperature is not None and scene.temperature.expands else ""
 
 
 def _longer(error: Values, warm: RodTemperature, reference: float) -> Values:

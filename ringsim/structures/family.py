@@ -67,6 +67,12 @@ class Structure(Model):
         """
         raise NotImplementedError
 
+    def strained_by(self) -> str:
+        """Name of a field that leaves parts beside the drawing, so that rods are strained before a
+        run; empty if there is none.
+        """
+        return ""
+
     def held_angles(self) -> NDArray[np.float64] | None:
         """How much further than drawn each V-joint is held open before a run, shape (planes,
         sections), rad; None if they are as drawn.

@@ -14,6 +14,7 @@ from ringsim.layout.draft import Draft
 from ringsim.layout.layout import Layout
 from ringsim.parts.persection import PerSection, spread
 from ringsim.structures.family import Structure
+from ringsim.structures.hinge_error import HingeError
 from ringsim.structures.pantograph_sections import add_sections
 from ringsim.structures.ring_geometry import RingGeometry
 from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
@@ -48,6 +49,8 @@ class PantographRing(Structure):
     """Half the length of a diagonal, from hinge pin to pivot."""
     hinge_offset: MetreOrZero = 0.006554
     """Distance of the pins from the vertical line of their hinge assembly."""
+    hinge_error: HingeError | None = None
+    """How much further the pins stand; left out, they are where they are drawn."""
     corner_mass: KilogramOrZero = 0.0198
     """Mass of each hinge assembly."""
     vjoint_mass: KilogramOrZero = 0.0198
@@ -144,6 +147,11 @@ class PantographRing(Structure):
         """See ``Structure``."""
         return self.half_bar
 
+    def strained_by(self) -> str:
+        """See ``Structure``."""
+        given = (name for name in ("hinge_error", "angle_error") if getattr(self, name) is not None)
+        return next(given, "")
+
     def held_angles(self) -> NDArray[np.float64] | None:
         """See ``Structure``."""
         if self.angle_error is None:
@@ -203,7 +211,9 @@ class PantographRing(Structure):
         cube = self.corner_mass * self.hinge_size**2 / 6.0 * np.eye(3)
         hinge = Lump("hinges", self.corner_mass, np.zeros(3), cube)
         draft.corners = [[draft.body(at, [hinge]) for at in plane] for plane in fold.corners]
-        add_sections(draft, geometry, fold, draft.corners, self.vjoint_mass)
+        add_sections(
+            draft, geometry, fold, draft.corners, self.vjoint_mass, errors=self.hinge_error
+        )
         return replace(draft.finish(), held=self.held_angles())
 
 

@@ -23,7 +23,10 @@ def assembled(layout: Layout, rods: Rods, *, locked: bool = False) -> Assembled:
     ValueError
         If nothing balances near the drawing.
     """
-    if not any(rod.strain for rod in layout.rods) and (locked or layout.held is None):
+    wrong = any(rod.strain for rod in layout.rods) or any(
+        joint.error is not None for joint in layout.joints
+    )
+    if not wrong and (locked or layout.held is None):
         return Assembled(layout, 0.0)
     from ringsim.theory.assembling import Frames  # here: it loads scipy, and few scenes need it
 

@@ -1,4 +1,4 @@
-"""A structure put together from rods that are not as long as drawn.
+"""A structure put together from parts that are not as drawn.
 
 Where all parts are, places x and axes R of bodies and of the rods' nodes, is what has the least
 elastic energy of the rods,
@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from ringsim.layout.bodies import InSpace, Mount, OnBody
 from ringsim.layout.free_hub import FreeHub
-from ringsim.layout.joints import JointOpening
+from ringsim.layout.joints import Joint, JointOpening
 from ringsim.layout.layout import Layout
 from ringsim.layout.pose import Array, Pose
 from ringsim.layout.stiffness import stiffness_of
@@ -44,10 +44,20 @@ _CLOSES: dict[str, tuple[screws.OfTwo, ...]] = {
 """What must vanish of each kind of joint."""
 
 
+def made(joint: Joint) -> Joint:
+    """A joint with its error in the arm that is not as drawn."""
+    if joint.error is None:
+        return joint
+    assert isinstance(joint.second, OnBody)
+    second = joint.second._replace(arm=joint.second.arm + joint.error)
+    return replace(joint, second=second, error=None)
+
+
 class Frames:
     """Places and axes of all bodies and nodes, and of space, which is last."""
 
     def __init__(self, layout: Layout, rods: Rods, *, locked: bool) -> None:
+        layout = replace(layout, joints=tuple(made(joint) for joint in layout.joints))
         self._layout = layout
         nodes = [rod.node(k) for rod in layout.rods for k in range(len(rod.stations))]
         poses = [*(body.pose for body in layout.bodies), *nodes]
@@ -103,7 +113,7 @@ class Frames:
             multipliers = self._step(self._summed(blocks, spots), rows, pushed, gaps)
         raise ValueError(
             "the structure cannot be put together: with these rods nothing balances near the "
-            "drawing (reduce rods.length_error, or structure.angle_error)"
+            "drawing (reduce rods.length_error, structure.hinge_error or structure.angle_error)"
         )
 
     def _step(self, stiffness: csc_array, rows: csc_array, pushed: Array, gaps: Array) -> Array:

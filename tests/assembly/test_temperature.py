@@ -119,3 +119,28 @@ def test_a_warm_ring_is_a_larger_one() -> None:
 def test_bad_input_is_refused(heat: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         ring(temperature=heat, joints={})
+
+
+def test_a_ring_warm_in_all_parts_is_a_drawing_of_another_scale() -> None:
+    """Rods and hinge assemblies of one expansion: every length grows by e, and nothing strains."""
+    e, warm = 1e-3, {"value": 393.15, "expansion": 1e-5}
+    parts = dict.fromkeys(("diagonal", "bar", "hinge"), warm)
+    scene = ring(temperature={"reference": 293.15} | parts)
+    found = deployed(scene)
+    plain = scene.structure.geometry().fold(0.0).corners.reshape(-1, 3)
+    expected = e * np.linalg.norm(np.real(plain - plain.mean(axis=0)), axis=1)
+    assert found.energy < 1e-15
+    assert np.abs(found.deviations.ravel() - expected).max() < 1e-9
+
+
+def test_expansion_of_hinge_assemblies_adds_to_errors_of_their_pins() -> None:
+    warm = {"value": [300.0, 350.0, 400.0, 450.0], "expansion": 1e-5}
+    scene = ring(
+        temperature={"reference": 300.0, "hinge": warm},
+        structure__hinge_error={"upper_left": 1e-4, "lower_right": [0.0, 1e-5, 0.0, 0.0]},
+    )
+    made = substituted(scene).structure.hinge_error
+    offset, heat = scene.structure.hinge_offset, 1e-5 * np.array([0.0, 50.0, 100.0, 150.0])
+    assert made.upper_left == pytest.approx(1e-4 + (offset + 1e-4) * heat, rel=1e-14)
+    lower = np.array([0.0, 1e-5, 0.0, 0.0])
+    assert made.lower_right == pytest.approx(lower + (offset + lower) * heat, rel=1e-14)
