@@ -1,14 +1,15 @@
 """Do the two engines agree on random scenes to within their error bars?
 
     python benchmarks/two_engines.py run --out FILE.json [--scenes 40 --first 0]
-    python benchmarks/two_engines.py run --out FILE.json --scenes 20 --first 1000
+    python benchmarks/two_engines.py run --out FILE.json --scenes 20 --first 1000   (or 2000)
     python benchmarks/two_engines.py table FILE.json
     python benchmarks/two_engines.py look SEED [--finer 16]
 
 ``run`` solves random scenes of rings and arcs (benchmarks/random_scenes.py: forces and cables, all
 laws of friction and winding, booms, nets, faults; from seed 1000 on
-benchmarks/random_load_scenes.py: motors, springs, weight on lines, spacecraft) by exudyn and in
-joint coordinates, each with the error bars of its own two runs, and keeps what it finds as it
+benchmarks/random_load_scenes.py: motors, springs, weight on lines, spacecraft; from 2000 on
+benchmarks/random_part_scenes.py: edge nets, latches, scatter of parts) by exudyn and in joint
+coordinates, each with the error bars of its own two runs, and keeps what it finds as it
 comes.  Scenes on which exudyn takes more than ``DEAR`` are left out: that says nothing about
 agreement.  ``table`` compares all that has a bar: the difference over the sum of both bars, of
 series where it is largest.  Both engines have the same elements, so that the part of a bar that
@@ -27,7 +28,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from random_load_scenes import FAMILIES, FIRST, random_load_scene
+import random_load_scenes as loads
+import random_part_scenes as parts
 from random_scenes import random_scene
 
 from ringsim.engine.integrate import solve as by_exudyn
@@ -43,7 +45,7 @@ ENGINES = {"exudyn": by_exudyn, "frames": by_frames}
 DEAR = 25.0
 """Processor time of exudyn's run without bars, s."""
 REPRESENTED = ("forces-ring", "forces-arc", "cables-ring", "cables-arc", "cable-faults",
-               "constant-steps", *FAMILIES)  # fmt: skip
+               "constant-steps", *loads.FAMILIES, *parts.FAMILIES)  # fmt: skip
 LEAST = {"asynchrony": 1e-6}
 """Difference that is round-off: at the start of a run deviations and their bars are."""
 ONE_ELEMENT = 10**6
@@ -52,7 +54,12 @@ ONE_ELEMENT = 10**6
 
 def scene_of(seed: int) -> tuple[str, Scene] | None:
     """A seed's name and scene; None if frames do not represent its kind."""
-    drawn = random_scene(seed) if seed < FIRST else random_load_scene(seed)
+    if seed < loads.FIRST:
+        drawn = random_scene(seed)
+    elif seed < parts.FIRST:
+        drawn = loads.random_load_scene(seed)
+    else:
+        drawn = parts.random_part_scene(seed)
     kind = drawn["name"].split("-", 1)[1]
     if kind not in REPRESENTED:
         return None
