@@ -9,7 +9,7 @@ from ringsim.cable.bracket.bisector import BisectorBracket
 from ringsim.cable.bracket.family import Bracket
 from ringsim.cable.friction.family import PulleyFriction
 from ringsim.cable.friction.frictionless import Frictionless
-from ringsim.cable.winding.family import PrescribedWinding, Winding
+from ringsim.cable.winding.family import FeedbackWinding, PrescribedWinding, Winding
 from ringsim.cable.winding.stall import StallWinding
 from ringsim.choice import OneOf
 from ringsim.units import (
@@ -45,7 +45,7 @@ class Winch(Model):
     """The drum stands still from here on."""
     after_lock: Literal["stop", "hold", "pull"] = "stop"
     """What the winch does once all V-joints of its plane have locked: stand still, keep the tension
-    that it has then, or go on with its law."""
+    that it has then (by winding alone where rope cannot turn it back), or go on with its law."""
 
     @model_validator(mode="after")
     def _in_order(self) -> "Winch":
@@ -79,7 +79,9 @@ class Winch(Model):
             return self
         if self.after_lock == "stop" or speed == 0.0 or time < self.start_time:
             return self.model_copy(update={"stop_time": max(time, self.start_time)})
-        hold = StallWinding(speed=speed, max_tension=max(tension, LEAST_HELD), backdrivable=True)
+        # A winch of prescribed speed has a motor for it; a gear that locks itself gives no rope.
+        back = not isinstance(self.winding, FeedbackWinding) or self.winding.limits()[0] < 0.0
+        hold = StallWinding(speed=speed, max_tension=max(tension, LEAST_HELD), backdrivable=back)
         # "pull": this law is what it does after the lock, and stays as it is.
         return self.model_copy(update={"winding": hold, "after_lock": "pull"})
 

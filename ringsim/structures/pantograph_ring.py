@@ -72,6 +72,13 @@ class PantographRing(Structure):
         self.require_below(
             "hinge_offset", "half_bar", "shorten it, a hinge assembly is smaller than a section"
         )
+        for name, error in self.hinge_error or ():
+            if self.hinge_offset + np.min(error) < 0.0:
+                raise ValueError(
+                    f"hinge_error.{name} = {np.min(error):g} m must be at least "
+                    f"{-self.hinge_offset:g}, the negative of hinge_offset: the pin would stand "
+                    "beyond the line of its hinge assembly, in the next section (raise it)"
+                )
         if self.closed and self.sections < 3:
             raise ValueError(
                 f"sections = {self.sections} must be at least 3 for a closed ring "

@@ -130,3 +130,9 @@ def test_both_engines_start_and_move_alike() -> None:
 def test_bad_input_is_refused(name: str, values: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         load_scene(name).with_values(values)
+
+
+def test_a_pin_beyond_the_line_of_its_hinge_assembly_is_refused() -> None:
+    words = r"lower_left = -0\.009 m must be at least -0\.006554.*raise it"
+    with pytest.raises(InputError, match=words):
+        ring(structure__hinge_error={"lower_left": [0.0, -9e-3, 0.0, 0.0]})

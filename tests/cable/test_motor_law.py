@@ -12,6 +12,7 @@ from cable_cases import still
 from ringsim.cable.records import Winch
 from ringsim.cable.winches import Winches
 from ringsim.cable.winding.motor import MotorWinding
+from ringsim.cable.winding.stall import StallWinding
 
 FIELDS = {
     "no_load_speed": 600.0, "stall_torque": 0.002, "gear_ratio": 100.0, "efficiency": 0.6,
@@ -157,3 +158,18 @@ def test_a_rope_that_is_pulled_off_turns_an_open_gear_and_breaks_its_head_on_a_l
 def test_a_motor_that_cannot_be_is_refused(fields, text):
     with pytest.raises(ValidationError, match=text):
         motor(**fields)
+
+
+@pytest.mark.parametrize(("back", "least"), [(None, 0.0), (0.5, -1.0)])
+def test_what_a_motor_holds_after_the_lock_it_holds_by_its_gear(
+    back: float | None, least: float
+) -> None:
+    """A gear that locks itself gives no rope back, however hard the rope pulls."""
+    winding = MotorWinding(
+        no_load_speed=500.0, stall_torque=0.02, gear_ratio=1000.0, drum_radius=0.01,
+        back_efficiency=back,
+    )  # fmt: skip
+    held = Winch(winding=winding, after_lock="hold").locked(1.0, 5.0).winding
+    assert isinstance(held, StallWinding)
+    assert held.limits()[0] == least * winding.usual_speed()
+    assert held.max_tension == 5.0
