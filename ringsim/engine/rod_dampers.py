@@ -44,8 +44,8 @@ STIFFENING = 1.0 + 1.5 / _SHORT
 class RodDampers:
     """The dampers of all elements of all rods of a model, in their order.
 
-    ``latest`` has their forces and the rates of strain when they were read last, shape (dampers, 6):
-    forces and moments in the elements' middles, tension positive, N and N m.
+    ``latest`` are their forces and moments in the elements' middles, tension positive, N and N m,
+    and the rates of strain that they resist, shape (dampers, 6), when they were read last.
     """
 
     def __init__(self, system: Any) -> None:

@@ -72,4 +72,3 @@ class EnergyMeter:
     def keep(self) -> None:
         """Count from the last reading on."""
         self._kept = self._last
-
