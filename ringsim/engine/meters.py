@@ -14,10 +14,9 @@ from ringsim.engine.model import Multibody
 from ringsim.engine.readings import State
 from ringsim.engine.rotations import Array
 from ringsim.stepping.instant import Energies
+from ringsim.stepping.losses import Passing, lost_between
 
 _KIND = exu.OutputVariableType
-_Passing = tuple[float, Array, Array, ChainState | None]
-"""Time (s), damping forces (N, N m) and the rates that they resist (m/s, rad/s), cables."""
 
 
 class EnergyMeter:
@@ -41,8 +40,8 @@ class EnergyMeter:
         self._weight = built.weight
         self._lifted: float | None = None
         self._untold = model.scene.rods.damping > 0.0 and not model.formulation.has_strains
-        self._kept: _Passing | None = None
-        self._last: _Passing | None = None
+        self._kept: tuple[Passing, ChainState | None] | None = None
+        self._last: tuple[Passing, ChainState | None] | None = None
 
     def read(
         self, time: float, state: State, angles: Array, rates: Array, chain: ChainState | None
@@ -61,17 +60,15 @@ class EnergyMeter:
             resisted.append(np.ravel(resisting))
         if chain is not None:
             elastic += chain.elastic_energy.sum()
-        pushing, moving = np.concatenate(forces), np.concatenate(resisted)
-        self._last = time, pushing, moving, chain
-        # Mean force times displacement.  That of a damper is the mean of its rates times the step,
-        # which differs from generalised-alpha's by a hundredth of the rates' change at most.
+        passing = Passing(time, np.concatenate(forces), np.concatenate(resisted))
+        self._last = passing, chain
         lost = math.nan if self._untold else self._assembly.dampers.lost(time)
         driven = 0.0
         if self._kept is not None:
-            begin, old_forces, old_rates, old_chain = self._kept
-            lost += 0.25 * (time - begin) * float((pushing + old_forces) @ (moving + old_rates))
-            if chain is not None and old_chain is not None:
-                driven, lost_in_cables = work_between(old_chain, chain)
+            before, chain_before = self._kept
+            lost += lost_between(before, passing)
+            if chain is not None and chain_before is not None:
+                driven, lost_in_cables = work_between(chain_before, chain)
                 lost += lost_in_cables
         work = float(np.sum(self._forces * (state.position - state.begun)[self._loaded]))
         if self._weight is not None:

@@ -24,13 +24,14 @@ damper works against, and in the intrinsic measure they are not.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
 
 from ringsim.engine.rotations import Array
+from ringsim.stepping.losses import Passing, lost_between
 
 _KIND = exu.OutputVariableType
 _SHORT = 0.25
@@ -40,33 +41,24 @@ STIFFENING = 1.0 + 1.5 / _SHORT
 """Largest stiffness of a rod with its damper over that of the rod alone; 3/2 is a0 h of BDF2."""
 
 
-class Reading(NamedTuple):
-    """Time (s), strains, their rates and the forces of all dampers, shape (dampers, 6).
-
-    These are forces and moments in the elements' middles, tension positive, N and N m.
-    """
-
-    time: float
-    strains: Array
-    rates: Array
-    forces: Array
-    by_velocity: bool
-
-
 class RodDampers:
-    """The dampers of all elements of all rods of a model, in their order; ``latest`` reading."""
+    """The dampers of all elements of all rods of a model, in their order.
+
+    ``latest`` are their forces and moments in the elements' middles, tension positive, N and N m,
+    and the rates of strain that they resist, shape (dampers, 6), when they were read last.
+    """
 
     def __init__(self, system: Any) -> None:
         self._system = system
         none = np.zeros((0, 6))
-        self.latest = Reading(-1.0, none, none, none, by_velocity=False)
+        self.latest, self._strains = Passing(-1.0, none, none), none
         self._dampers: list[Any] = []
         self._matrices: list[Array] = []
         self._short = 0.0
         self._past: list[tuple[float, Array]] = []
         self._prepared = (-1.0, -1.0)
         self._lead, self._offsets, self._by_velocity = 0.0, np.zeros(6), False
-        self._kept: Reading | None = None
+        self._kept: Passing | None = None
 
     def add(self, markers: list[Any], damping: Array, relaxation: float) -> None:
         """A damper C, shape (6, 6), N s/m and N m s, between two markers that coincide, of a rod's
@@ -90,7 +82,7 @@ class RodDampers:
             # By now exudyn has moved the current state on: only a reading knows the start's.
             if self.latest.time != start:
                 raise RuntimeError(f"the rods' dampers were not read at {start:.9g} s")
-            self._past = [*self._past[-1:], (start, self.latest.strains)]
+            self._past = [*self._past[-1:], (start, self._strains)]
         matrices, by_velocity = np.array(self._matrices), time - start < self._short
         if by_velocity != self._by_velocity:
             self._by_velocity = by_velocity
@@ -103,7 +95,7 @@ class RodDampers:
             self._set("offset", self._offsets)
 
     def lost(self, time: float) -> float:
-        """Energy taken since the reading that was kept last, J: mean force times change of strain.
+        """Energy taken since the reading that was kept last, J; see ``lost_between``.
 
         ``time`` is that of the current state, s, which ends the step that was prepared last.
         """
@@ -117,16 +109,11 @@ class RodDampers:
             self._intrinsic(wanted=False)
         else:
             rates = self._lead * (strains - self._offsets)
-        before = self._kept
         forces = np.einsum("nij,nj->ni", np.array(self._matrices), rates)
-        self.latest = Reading(time, strains, rates, forces, self._by_velocity)
-        if before is None:
-            return 0.0
-        moved = strains - before.strains
-        if before.by_velocity and self._by_velocity:
-            # The rates that the forces are made of balance an impact twice as well.
-            moved = 0.5 * (time - before.time) * (before.rates + rates)
-        return 0.5 * float(np.sum((before.forces + forces) * moved))
+        # The rates that the forces are made of balance an impact twice as well as the strains.
+        places = None if self._by_velocity else strains
+        self.latest, self._strains = Passing(time, forces, rates, places), strains
+        return 0.0 if self._kept is None else lost_between(self._kept, self.latest)
 
     def keep(self) -> None:
         """Count what is lost from the last reading on."""

@@ -23,6 +23,7 @@ from ringsim.scene import Scene
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks
+from ringsim.stepping.memory import Remembering
 from ringsim.stepping.run_control import RunControl
 from ringsim.theory.scales import scales_of
 from ringsim.variables import Outcome
@@ -58,8 +59,10 @@ class NoBalanceError(Exception):
     """Newton found no state in balance; why."""
 
 
-class Integration:
+class Integration(Remembering):
     """One run of a model."""
+
+    changing = ("_moves", "_easy", "_steps", "_strains")
 
     def __init__(self, model: FrameModel, watch: Watch | None = None) -> None:
         self._model, self._watch = model, watch

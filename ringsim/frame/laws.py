@@ -88,7 +88,8 @@ class Openings(NamedTuple):
 class JointLaws:
     """All torques of a scene's joints.
 
-    ``damping`` is the torque over the rate of each angle where friction is linear, N m s/rad.
+    ``damping`` is the torque over the rate of each angle where friction is linear, N m s/rad, and
+    ``stuck`` are the faults that hold V-joints, (plane, section), at opening angles, rad.
     """
 
     def __init__(self, scene: Scene, skeleton: Skeleton, openings: Openings) -> None:
@@ -104,7 +105,7 @@ class JointLaws:
         self._pawl = latch.at(np.arange(sections)) if latch is not None and latch.pushes else None
         self.latched = np.zeros(openings.angle.shape, dtype=bool)
         self._latches = False
-        self._stuck: list[tuple[StuckVJoint, tuple[int, int], float]] = []
+        self.stuck: list[tuple[StuckVJoint, tuple[int, int], float]] = []
 
     def _rub(self, family: str, law: JointFriction, skeleton: Skeleton) -> None:
         joints = skeleton.layout.joints
@@ -135,7 +136,7 @@ class JointLaws:
 
     def stick(self, fault: StuckVJoint, place: tuple[int, int], opening: float) -> None:
         """Hold a V-joint, (plane, section), at an opening angle (rad)."""
-        self._stuck.append((fault, place, opening))
+        self.stuck.append((fault, place, opening))
 
     def fail(self, place: tuple[int, int]) -> None:
         """Break the spring of a V-joint, (plane, section)."""
@@ -177,7 +178,7 @@ class JointLaws:
                 return pawl.torque(x)
 
             found.append((own, sense, sense * angles[own], sense * rates[own], lift))
-        for fault, place, opening in self._stuck:
+        for fault, place, opening in self.stuck:
             where = np.array([own[place]])
             turned = np.pi - sense[place] * angles[where] - opening
             found.append(

@@ -1,28 +1,13 @@
 """Energies of a state, and what has passed since the state that was kept last."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ringsim.cable.state import ChainState, work_between
 from ringsim.frame.kernels import Strains, kinetic_energy
 from ringsim.frame.model import FrameModel
 from ringsim.frame.state import State
-from ringsim.layout.pose import Array
 from ringsim.stepping.instant import Energies
-
-
-class Passing(NamedTuple):
-    """Time (s), forces that take energy, their places and the rates of these, shape (n,); cables.
-
-    Pairs of forces and places are N and m, or N m and rad.
-    """
-
-    time: float
-    forces: Array
-    places: Array
-    rates: Array
-    chain: ChainState | None
+from ringsim.stepping.losses import Passing, lost_between
 
 
 class EnergyMeter:
@@ -34,8 +19,8 @@ class EnergyMeter:
 
     def __init__(self, model: FrameModel) -> None:
         self._model = model
-        self._kept: Passing | None = None
-        self._last: Passing | None = None
+        self._kept: tuple[Passing, ChainState | None] | None = None
+        self._last: tuple[Passing, ChainState | None] | None = None
 
     def read(self, time: float, state: State, strains: Strains) -> Energies:
         """Energies of a state at a time (s) with its strains and, if there are cables, its chain.
@@ -73,29 +58,17 @@ class EnergyMeter:
             rates.append(straining.ravel())
         if state.chain is not None:
             elastic += float(state.chain.elastic_energy.sum())
-        passing = np.concatenate(forces), np.concatenate(places), np.concatenate(rates)
-        self._last = Passing(time, *passing, state.chain)
+        passing = Passing(time, *(np.concatenate(each) for each in (forces, rates, places)))
+        self._last = passing, state.chain
         lost = driven = 0.0
-        if (before := self._kept) is not None:
-            lost = lost_between(before, self._last)
-            if before.chain is not None and state.chain is not None:
-                driven, rubbed = work_between(before.chain, state.chain)
+        if self._kept is not None:
+            before, chain = self._kept
+            lost = lost_between(before, passing)
+            if chain is not None and state.chain is not None:
+                driven, rubbed = work_between(chain, state.chain)
                 lost += rubbed
         return Energies(kinetic, elastic, model.work(state), lost, driven)
 
     def keep(self) -> None:
         """Count from the last reading on."""
         self._kept = self._last
-
-
-def lost_between(before: Passing, after: Passing) -> float:
-    """Work in J of forces in a step h in which they and the rates of their places go linearly:
-
-        mean force times displacement + h (F2 - F1) (v2 - v1) / 12.
-
-    Without the second part, never negative where friction grows with the rate, every change of
-    speed would seem to cost energy.
-    """
-    step, rises = after.time - before.time, after.forces - before.forces
-    mean = 0.5 * float((before.forces + after.forces) @ (after.places - before.places))
-    return mean + step / 12.0 * float(rises @ (after.rates - before.rates))

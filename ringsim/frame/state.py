@@ -8,6 +8,7 @@ from ringsim.frame.balance import Held
 from ringsim.frame.following import Followed
 from ringsim.frame.kernels import Pose
 from ringsim.layout.pose import Array
+from ringsim.stepping.memory import Memory
 
 
 class Groups(NamedTuple):
@@ -50,6 +51,18 @@ class State:
     def net(self) -> tuple[Array, Array, Array, Array]:
         """Places and rates of the strings' ends, (n, 3), and of the hub, (3,)."""
         return self.place.ends, self.rate.ends, self.place.hub[0], self.rate.hub[0]
+
+    def memory(self) -> Memory:
+        """All but the cables, see ``ringsim.stepping.memory``."""
+        return {"arrays": self._arrays()}
+
+    def recall(self, memory: Memory) -> None:
+        """Go on from a memory."""
+        for own, value in zip(self._arrays(), memory["arrays"], strict=True):
+            own[...] = value
+
+    def _arrays(self) -> list[Array]:
+        return [*self.pose, self.hub, self.strains, *self.followed]
 
     def stand(self) -> tuple[Array, ...]:
         """Copies of all places."""

@@ -12,20 +12,18 @@ from ringsim.cable.faults.jammed_pulley import JammedPulley
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.state import ChainState
 from ringsim.frame.integrate import Integration
-from ringsim.frame.kernels import Strains
 from ringsim.frame.laws import JointLaws
 from ringsim.frame.model import FrameModel
 from ringsim.frame.state import State
-from ringsim.outputs.history import forget_last, take_over
 from ringsim.outputs.stored import States, StoredState, cleared, struck_by
 from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import Fault
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.stepping.going_on import begin_anew, go_on
+from ringsim.stepping.going_on import go_on
 from ringsim.stepping.instant import Instant
-from ringsim.stepping.memory import Memory, instant, kept
+from ringsim.stepping.memory import Memory
 from ringsim.variables import Outcome
 
 Watch = Callable[[Instant], None]
@@ -48,7 +46,6 @@ class Storing(Integration):
     def __init__(
         self, model: FrameModel, watch: Watch | None = None, start: StoredState | None = None
     ) -> None:
-        self._held: list[tuple[Fault, float]] = []
         super().__init__(model, watch)
         interval = model.scene.record.state_interval
         self._states = None if interval is None else States(interval)
@@ -68,28 +65,20 @@ class Storing(Integration):
     def _accept(self, step: float, after: State, found: Instant) -> None:
         super()._accept(step, after, found)
         if self._states is not None and self._states.due(self._control):
-            self._states.keep(self._control, self.history, self._memory())
-
-    def _strike(self, now: Instant) -> bool:
-        for fault in struck_by(tuple(self._faults), now.time):
-            if isinstance(fault, StuckVJoint):
-                self._held.append((fault, float(now.angles[self._place(fault)])))
-        return super()._strike(now)
+            self._states.keep(self._control, self.history, self.memory())
 
     def _place(self, fault: StuckVJoint | FailedSpring) -> tuple[int, int]:
         return self._scene.structure.planes.index(fault.plane), fault.section - 1
 
-    def _memory(self) -> Memory:
-        """All that the next step depends on."""
-        now, cables = self._now, self._model.cables
-        memory: Memory = {
-            "pose": list(now.pose), "hub": now.hub, "strains": now.strains,
-            "followed": list(now.followed), "moves": self._moves, "easy": self._easy,
-            "steps": self._steps, "latches": kept(self._latches, ("caught", "_earlier")),
-            "straining": [self._strains.before, self._strains.lead],
-            "reaction": getattr(self._model, "reaction", None),
-            "stuck": [opening for _, opening in self._held],
-        }  # fmt: skip
+    def memory(self) -> Memory:
+        """See ``Remembering``: all that the next step depends on, but step control."""
+        now, model, cables = self._now, self._model, self._model.cables
+        memory = super().memory() | {
+            "state": now.memory(),
+            "latches": self._latches.memory(),
+            "reaction": getattr(model, "reaction", None),
+            "stuck": [opening for *_, opening in model.laws.stuck],
+        }
         if cables is not None and now.chain is not None:
             ropes = cables.ropes
             memory["ropes"] = [ropes.starts, ropes.content, ropes.alive]
@@ -97,24 +86,22 @@ class Storing(Integration):
             memory["winches"] = cables.winches.memory()
         return memory
 
+    def recall(self, memory: Memory) -> None:
+        """See ``Remembering``; faults and cables are left to ``_go_on``."""
+        super().recall(memory)
+        self._now = self._model.start.copy()
+        self._now.recall(memory["state"])
+        self._latches.recall(memory["latches"])
+        if memory["reaction"] is not None:
+            self._model.reaction = memory["reaction"]
+
     def _go_on(self, start: StoredState) -> None:
         """Take a stored state over."""
         model, memory, changed = self._model, start.memory, start.changed_to(self._scene)
-        state = model.start.copy()
-        arrays = (*state.pose, state.hub, state.strains, *state.followed)
-        stored = (*memory["pose"], memory["hub"], memory["strains"], *memory["followed"])
-        for own, value in zip(arrays, stored, strict=True):
-            own[...] = value
-        self._now, self._moves, self._steps = state, memory["moves"], memory["steps"]
-        self._easy, latches = memory["easy"], memory["latches"]
-        self._latches.caught = latches["caught"]
-        if latches["_earlier"] is not None:
-            self._latches._earlier = instant(latches["_earlier"])
-        self._strains = Strains(state.strains, *memory["straining"])
-        if memory["reaction"] is not None:
-            model.reaction = memory["reaction"]
-        go_on(self._control, memory["stepping"], changed, start.name)
-        take_over(self.history, start.history, memory["counts"], start.name)
+        self.recall(memory)
+        state = self._now
+        go_on(self._control, self._scene.solver, memory["stepping"], changed, start.name)
+        self.history.take_over(start.history, memory["recorder"], start.name)
         gone = cleared(self._scene, start)
         self._strike_again(start, gone)
         if model.cables is not None:
@@ -128,8 +115,8 @@ class Storing(Integration):
         lost = before.kinetic + before.elastic - before.work
         lost -= after.kinetic + after.elastic - after.work
         energies = after._replace(lost=before.lost + lost, driven=before.driven)
-        forget_last(self.history)
-        begin_anew(self._control, self._read(replace(now, energies=energies)), lost)
+        self.history.forget_last()
+        self._control.begin_anew(self._read(replace(now, energies=energies)), lost)
         self._latch(start.time)
 
     def _strike_again(self, start: StoredState, gone: list[Fault]) -> None:
@@ -137,13 +124,12 @@ class Storing(Integration):
         model = self._model
         # Those of the start have struck this model already, where it stood then.
         model.laws = JointLaws(self._scene, model.skeleton, model.openings)
-        openings, self._held = list(start.memory["stuck"]), []
+        openings = list(start.memory["stuck"])
         for fault in struck_by(start.scene.faults, start.time):
             opening = openings.pop(0) if isinstance(fault, StuckVJoint) else math.nan
             if fault in gone:
                 continue
             if isinstance(fault, StuckVJoint):
-                self._held.append((fault, opening))
                 model.laws.stick(fault, self._place(fault), opening)
             elif isinstance(fault, FailedSpring):
                 model.laws.fail(self._place(fault))

@@ -10,18 +10,22 @@ from numpy.typing import NDArray
 from ringsim.outputs.family import COORDINATES, OUTPUTS, VARIABLES, Array, Output, axes, holds
 from ringsim.outputs.latching import missed
 from ringsim.outputs.series import Reading, Run, Series, output_times
+from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
 from ringsim.stepping.locks import lock_times
+from ringsim.stepping.memory import Memory, Remembering
 from ringsim.variables import Fate, Outcome, Reason, Status
 
 
-class Recorder:
+class Recorder(Remembering):
     """A run of a scene: ``times``, ``angles``, ... of all accepted steps (see ``Instant``).
 
     An engine sets ``status``, ``fate`` and ``reason``, how and why it has ended, and what its
     solver took.
     """
+
+    changing = ("newton_iterations", "jacobians", "_lost", "_driven")
 
     def __init__(self, scene: Scene, coordinates: Mapping[str, NDArray[Any]] | None = None) -> None:
         """Begin a run; ``coordinates`` are those that its outputs declare themselves."""
@@ -50,6 +54,56 @@ class Recorder:
         now = replace(now, energies=energies._replace(work=work, lost=self._lost, driven=0.0))
         for output, readings in self._readings.items():
             readings.append(output.read(now))
+
+    def forget_last(self) -> None:
+        """Take the last step out, to note it anew."""
+        last = self.energies[-1]
+        self._lost -= last.lost
+        self._driven -= last.driven
+        for steps in (*self._lists().values(), self.energies, *self._readings.values()):
+            steps.pop()
+
+    def memory(self) -> Memory:
+        """See ``Remembering``; of the steps their number, see ``history``."""
+        return super().memory() | {"steps": len(self.times)}
+
+    def history(self) -> Memory:
+        """All steps so far, as arrays along the first axis; None of outputs that could not tell."""
+        readings: Memory = {}
+        for output, values in self._readings.items():
+            untold = any(value is None for value in values)
+            readings[type(output).__name__] = None if untold else np.array(values, dtype=float)
+        lists: Memory = {name: np.array(steps) for name, steps in self._lists().items()}
+        return lists | {"energies": np.array(self.energies), "readings": readings}
+
+    def take_over(self, history: Memory, memory: Memory, where: str) -> None:
+        """Go on behind the steps of another one, up to where it had the memory; ``where`` is what
+        messages call that.
+
+        Raises
+        ------
+        InputError
+            If outputs need readings that the other one has not made.
+        """
+        self.recall(memory)
+        steps, known = memory["steps"], history["readings"]
+        for output, readings in self._readings.items():
+            name = type(output).__name__
+            if name not in known:
+                names = ", ".join(variable.name for variable in output.variables)
+                raise InputError(
+                    f"record: {where} has no readings of {names}: leave out what asks for them "
+                    f"({', '.join(output.needs)}), or record them in the first run, too"
+                )
+            past = known[name]
+            readings[:] = [None] * steps if past is None else list(past[:steps])
+        for name, own in self._lists().items():
+            values = history[name][:steps]
+            own[:] = values.tolist() if values.ndim == 1 else list(values)
+        self.energies[:] = [Energies(*row.tolist()) for row in history["energies"][:steps]]
+
+    def _lists(self) -> dict[str, list[Any]]:
+        return {name: getattr(self, name) for name in ("times", "angles", "rates", "gaps")}
 
     def outcome(self) -> Outcome:
         """Put the run on the output grid; what lies after its end is NaN."""

@@ -7,18 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ringsim.outputs.history import counts_of, history_of
 from ringsim.outputs.recorder import Recorder
 from ringsim.parts.faults.family import AT_ONCE, Fault
 from ringsim.refusal import InputError, show
 from ringsim.scene import Scene
-from ringsim.stepping.going_on import control_memory
 from ringsim.stepping.instant import Array
 from ringsim.stepping.memory import Memory, pack, unpack
 from ringsim.stepping.run_control import RunControl
 from ringsim.variables import Status
 
-FORMAT = 1
+FORMAT = 2
 """Of what is stored; a state of another format is refused."""
 
 
@@ -117,7 +115,7 @@ class States:
     def keep(self, control: RunControl, recorder: Recorder, memory: Memory) -> None:
         """Store a state with what an engine remembers."""
         self.skip(control.now.time)
-        stepping = {"stepping": control_memory(control), "counts": counts_of(recorder)}
+        stepping = {"stepping": control.memory(), "recorder": recorder.memory()}
         form, numbers = pack(memory | stepping)
         self._times.append(control.now.time)
         self._forms.append(form)
@@ -127,7 +125,7 @@ class States:
         """See ``ringsim.variables.Outcome.states``."""
         if not self._times:
             return {}
-        form, numbers = pack(history_of(recorder))
+        form, numbers = pack(recorder.history())
         lengths = [len(each) for each in (numbers, *self._numbers)]
         return {
             "state_time": np.array(self._times),

@@ -6,6 +6,7 @@ import numpy as np
 
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.locks import StopContact
+from ringsim.stepping.memory import Memory, Remembering
 from ringsim.variables import Cause, Reason
 
 BEND, PEAK_BEND = 0.05, 0.4
@@ -22,14 +23,25 @@ _RECOVERY = 10
 has made Newton fail to pass.  Before stops it stays as it is, or it would fail at the next."""
 
 
-class ConstantSteps:
+class ConstantSteps(Remembering):
     """Steps of one length, shortened only where Newton fails, which may ``recover`` it after that;
     ``step`` is the next wanted, s.
     """
 
+    changing = ("step", "_last", "_since")
+
     def __init__(self, step: float, recover: bool) -> None:
         self.step = self._full = self._last = step
         self._since, self._recovery = 0, _RECOVERY if recover else math.inf
+
+    def recall(self, memory: Memory) -> None:
+        """See ``Remembering``."""
+        super().recall(memory)
+        self.step = min(self.step, self._full)
+
+    def begin_anew(self) -> None:
+        """Go on as from the start: what has made Newton fail may be gone."""
+        self.step = self._full
 
     def advance(self, now: Instant, stops: StopContact) -> None:
         """Let a shortened step grow again."""

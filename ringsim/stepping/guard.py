@@ -11,6 +11,7 @@ import numpy as np
 from ringsim.parts.solver import Solver
 from ringsim.stepping.constant_steps import unresolved
 from ringsim.stepping.instant import Instant, Scales
+from ringsim.stepping.memory import Remembering
 from ringsim.variables import Cause, Reason
 
 GAIN, LOSS = 2.0, 5.0
@@ -26,8 +27,10 @@ GAP = 1e-4
 _CURE = "reduce solver.step or solver.tolerance"
 
 
-class Guard:
+class Guard(Remembering):
     """Watches one run from its first instant on."""
+
+    changing = ("_run", "_lost", "_driven", "_low", "_high", "_worst")
 
     def __init__(self, solver: Solver, scales: Scales) -> None:
         self._tolerance, self._scales = solver.energy_tolerance, scales
@@ -39,7 +42,8 @@ class Guard:
 
     def judge(self, now: Instant) -> Reason:
         """Why the run must stop here: cause, measured value, bound and cure; empty if not."""
-        self._run.append(now)
+        if self._constant or not self._run:  # constant steps are judged by all of a run
+            self._run.append(now)
         time, found, start = now.time, now.energies, self._run[0].energies
         self._lost += found.lost
         self._driven += found.driven
@@ -68,6 +72,12 @@ class Guard:
         factor = GAIN if balance > 0.0 else LOSS
         words = f"{factor:g} times solver.energy_tolerance"
         return self._unbalanced(time, balance, self._scales.energy, factor, words)
+
+    def begin_anew(self, now: Instant, lost: float) -> None:
+        """Go on from how a change makes the present instant, which has taken so much energy, J."""
+        if len(self._run) > 1:
+            self._run[-1] = now
+        self._lost += lost
 
     def verdict(self) -> Reason:
         """Why a run that ended by itself is not sound after all; empty if it is."""

@@ -11,6 +11,7 @@ from ringsim.parts.faults.failed_latch import FailedLatch
 from ringsim.parts.persection import spread
 from ringsim.stepping.instant import Array, Instant
 from ringsim.stepping.locks import crossing
+from ringsim.stepping.memory import Remembering
 
 ON_STOP = 1e-9
 """Angle past 180 deg at which a stop has hardly begun to push, rad."""
@@ -24,8 +25,10 @@ class Meeting(NamedTuple):
     rate: float
 
 
-class Latches:
+class Latches(Remembering):
     """The latches of a scene; ``caught`` is whether each holds, shape (planes, sections)."""
+
+    changing = ("caught", "_earlier")
 
     def __init__(self, scene: Any) -> None:
         shape = len(scene.structure.planes), scene.structure.sections

@@ -8,6 +8,7 @@ import numpy as np
 
 from ringsim.hermite import first_zero
 from ringsim.stepping.instant import Array, Instant
+from ringsim.stepping.memory import Remembering
 from ringsim.variables import PLANES
 
 _NEAR = 0.1
@@ -38,13 +39,15 @@ class StopContact(NamedTuple):
     resting_rate: float = 0.0
 
 
-class Locks:
+class Locks(Remembering):
     """The V-joints' memory of their stops.
 
     ``deployed`` and ``stowed`` are whether each V-joint has reached 180 deg, and the stowed stop,
     shape (planes, sections), even if it has bounced since.  One that starts on the stowed stop has
     to leave it before it can come back.
     """
+
+    changing = ("deployed", "stowed", "_away")
 
     def __init__(
         self, angles: Array, stowed_angle: float | None, planes: Sequence[str] = PLANES

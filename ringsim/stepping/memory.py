@@ -6,17 +6,17 @@ says where each lies; Python writes floats so that they read back bit by bit.
 
 import json
 from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Mapping
 from enum import Enum
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ringsim.stepping.instant import Array, Energies, Instant
+from ringsim.variables import Cause, Reason
 
 Memory = dict[str, Any]
-"""Names and values: None, numbers, texts, arrays, lists and tables of these."""
+"""Names and values: None, numbers, texts, arrays, instants, reasons, lists and tables of these."""
 
 
 def pack(memory: Any) -> tuple[str, Array]:
@@ -32,7 +32,7 @@ def pack(memory: Any) -> tuple[str, Array]:
 
 
 def unpack(form: str, numbers: Array) -> Any:
-    """What ``pack`` was given; tuples are lists, dataclasses tables.
+    """What ``pack`` was given; tuples are lists, codes numbers.
 
     Raises
     ------
@@ -52,8 +52,10 @@ def _packed(value: Any, rows: list[Array], used: list[int]) -> Any:
         return {"array": [begin, list(value.shape), value.dtype.kind]}
     if isinstance(value, Enum):
         return value.value
-    if is_dataclass(value) and not isinstance(value, type):
-        value = {one.name: getattr(value, one.name) for one in fields(value)}
+    if isinstance(value, Reason):
+        return {"reason": [value.cause.value, str(value)]}
+    if isinstance(value, Instant):
+        return {"instant": [_packed(one, rows, used) for one in vars(value).values()]}
     if isinstance(value, Mapping):
         own = [[key, _packed(one, rows, used)] for key, one in value.items()]
         return {"items": own}
@@ -69,36 +71,38 @@ def _unpacked(value: Any, numbers: Array) -> Any:
         return value
     if "items" in value:
         return {key: _unpacked(one, numbers) for key, one in value["items"]}
+    if "reason" in value:
+        cause, text = value["reason"]
+        return Reason(Cause(cause), text)
+    if "instant" in value:
+        time, angles, rates, energies, *more = _unpacked(value["instant"], numbers)
+        return Instant(time, angles, rates, Energies(*energies), *more)
     begin, shape, kind = value["array"]
     types = {"f": np.float64, "i": np.int64, "b": np.bool_}
     end = begin + int(np.prod(shape))
     return numbers[begin:end].astype(types[kind]).reshape(shape)
 
 
-def kept(thing: Any, names: Sequence[str]) -> Memory:
-    """Attributes of an object."""
-    return {name: getattr(thing, name) for name in names}
+class Remembering:
+    """What a run changes in an object, for another one of its class to go on from.
 
+    ``changing`` are the attributes that change; all others follow from the scene that goes on.
+    """
 
-def restore(thing: Any, memory: Memory) -> None:
-    """Give an object its attributes back, in the types that they have there."""
-    for name, value in memory.items():
-        setattr(thing, name, _like(getattr(thing, name), value))
+    changing: ClassVar[tuple[str, ...]] = ()
+
+    def memory(self) -> Memory:
+        """What changes, to be packed before it changes again."""
+        return {name: getattr(self, name) for name in self.changing}
+
+    def recall(self, memory: Memory) -> None:
+        """Take over what another one remembers, in the types that it has here."""
+        for name in self.changing:
+            setattr(self, name, _like(getattr(self, name), memory[name]))
 
 
 def _like(present: Any, value: Any) -> Any:
     """A value in the type of the present one."""
-    if isinstance(present, Instant):
-        return instant(value)
-    if isinstance(present, deque):
-        return deque(value)
-    if isinstance(present, Enum):
-        return type(present)(value)
     if isinstance(present, tuple) and hasattr(present, "_fields"):
         return type(present)(*value)
-    return value
-
-
-def instant(memory: Memory) -> Instant:
-    """An instant from its table."""
-    return Instant(**(memory | {"energies": Energies(*memory["energies"])}))
+    return type(present)(value) if isinstance(present, (Enum, deque, tuple)) else value

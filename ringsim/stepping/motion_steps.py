@@ -9,6 +9,7 @@ import numpy as np
 from ringsim.parts.solver import Solver
 from ringsim.stepping.instant import Array, Instant, Scales
 from ringsim.stepping.locks import StopContact
+from ringsim.stepping.memory import Memory, Remembering
 from ringsim.stepping.repeats import FALL, GROWTH, SHORTEST
 
 _LOCAL_ERROR = 0.1
@@ -43,13 +44,15 @@ _FADING = 20.0
 """Steps over which the largest d''' fades, so that its passage through zero opens no step."""
 
 
-class MotionSteps:
+class MotionSteps(Remembering):
     """Steps that keep the relative error in time of the mean opening angle a near a tolerance,
 
         h = sqrt(tolerance |a'| / (C |a'''|)),
 
     and that meet stops with small ones.  ``step`` is the one wanted next, s.
     """
+
+    changing = ("step", "_bend", "_past")
 
     def __init__(self, solver: Solver, scales: Scales) -> None:
         self._solver, self._reference, self._bend = solver, scales.rate, 0.0
@@ -60,6 +63,11 @@ class MotionSteps:
         self._stride = max(1.0, math.sqrt(_AT / solver.tolerance))
         self._past: deque[tuple[float, float]] = deque()
         self.step = min(solver.step / _FIRST, scales.first_step)
+
+    def recall(self, memory: Memory) -> None:
+        """See ``Remembering``."""
+        super().recall(memory)
+        self.step = min(self.step, self._solver.step)
 
     def advance(self, now: Instant, stops: StopContact) -> None:
         """Choose the step after an accepted one."""
@@ -112,13 +120,15 @@ class MotionSteps:
         return next((past for past in reversed(self._past) if past[0] <= time), None)
 
 
-class DeviationSteps:
+class DeviationSteps(Remembering):
     """Steps that resolve how a ring vibrates about its mean motion over a run of duration T,
 
         h = sqrt(e |d| / (C T |d'''|)),
 
     at least T / MOST, with the largest deviation d from the mean angle of all V-joints.
     """
+
+    changing = ("_past", "_largest", "_bend", "_limit")
 
     def __init__(self, tolerance: float, duration: float) -> None:
         """Let errors add up to so much of the largest deviation over the ``duration`` (s)."""

@@ -7,11 +7,13 @@ a safety factor and bounds of the ratio stand, too.
 
 import math
 from abc import ABC, abstractmethod
+from typing import ClassVar
 
 import numpy as np
 
 from ringsim.parts.solver import TENSION_BEND, Solver
 from ringsim.stepping.instant import Array, Energies, Instant, Scales
+from ringsim.stepping.memory import Remembering
 
 GROWTH, FALL = 1.5, 0.2
 """Largest and smallest ratio of successive steps: a step behind a much shorter one would see that
@@ -33,10 +35,12 @@ PATIENCE = 300
 """Steps of a ring without cables that are repeated at the tolerance 1e-4; impacts need fewer."""
 
 
-class Indicator(ABC):
+class Indicator(Remembering, ABC):
     """Judges steps by a number that must not exceed its allowance; ``limit`` is the largest next
     step in s, infinite before the first.
     """
+
+    changing: ClassVar[tuple[str, ...]] = ("limit",)
 
     def __init__(self, solver: Solver) -> None:
         self.limit = math.inf
@@ -77,6 +81,8 @@ class EnergyImbalance(Indicator):
 
     Without ropes at most ``PATIENCE`` steps are repeated.
     """
+
+    changing = (*Indicator.changing, "_refused", "_work", "_stored", "_exchanged")
 
     def __init__(self, solver: Solver, scales: Scales) -> None:
         super().__init__(solver)
@@ -139,6 +145,8 @@ class TensionBend(Indicator):
     Against the straight line through the step before, of length h1, it bends over one of length h2
     by |T2 - T1 - (T1 - T0) h2 / h1|.
     """
+
+    changing = (*Indicator.changing, "_largest", "_past")
 
     def __init__(self, solver: Solver, slack_tension: float) -> None:
         super().__init__(solver)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ringsim.stepping.instant import Array, Instant
+from ringsim.stepping.memory import Remembering
 
 MOVED = 0.01
 """Angle that a V-joint at rest may still move by within a window, rad: V-joints that a stopped
@@ -18,7 +19,7 @@ _STILL = 1e-12
 """Kinetic energy that is round-off, over the structure's reference energy."""
 
 
-class Rest:
+class Rest(Remembering):
     """Watches whether anything moves or will move.
 
     A structure is at rest once no V-joint has moved by more than ``MOVED`` within a window in which
@@ -27,12 +28,14 @@ class Rest:
     Nor may a V-joint reach its stop in the time that is left if it goes on as it creeps.
     """
 
+    changing = ("_since", "_angles", "_largest")
+
     def __init__(self, start: Instant, end_time: float, energy: float) -> None:
         """Begin to watch at this instant a run that ends at ``end_time`` (s), of a structure with a
         reference energy (J).
         """
         self._end, self.window, self._still = end_time, WINDOW * end_time, _STILL * energy
-        self._begin(start)
+        self.begin(start)
 
     def reached(self, now: Instant, ahead: Callable[[Array, Array], Array]) -> bool:
         """Whether the structure is at rest by now; to be asked after every step.
@@ -42,7 +45,7 @@ class Rest:
         """
         moved: Array = now.angles - self._angles
         if now.driven or np.abs(moved).max() > MOVED:
-            self._begin(now)
+            self.begin(now)
         late = now.time - self._since > 0.5 * self.window
         self._largest[late] = max(self._largest[late], now.energies.kinetic)
         if now.time - self._since < self.window:
@@ -51,10 +54,10 @@ class Rest:
         arrives = np.any(_MARGIN * creeping >= ahead(now.angles, moved))
         if not arrives and self._largest[True] <= max(self._largest[False], self._still):
             return True
-        self._begin(now)
+        self.begin(now)
         return False
 
-    def _begin(self, now: Instant) -> None:
+    def begin(self, now: Instant) -> None:
         """Open a window: where it starts, and the largest energy in its halves."""
         self._since, self._angles = now.time, now.angles
         self._largest = {False: 0.0, True: 0.0}

@@ -14,6 +14,7 @@ from ringsim.stepping.constant_steps import ConstantSteps
 from ringsim.stepping.guard import Guard
 from ringsim.stepping.instant import Instant, Scales
 from ringsim.stepping.locks import Locks, Overrun, StopContact, lock_times
+from ringsim.stepping.memory import Memory, Remembering
 from ringsim.stepping.motion_steps import DeviationSteps, MotionSteps
 from ringsim.stepping.repeats import EnergyImbalance, Indicator, TensionBend
 from ringsim.stepping.rest import MOVED, Rest
@@ -34,12 +35,17 @@ def overstrained(strain: float, time: float, limits: Limits, missing: str) -> st
     )
 
 
-class RunControl:
+class RunControl(Remembering):
     """Steps, care and guard of one run.
 
     ``now`` is the last accepted state, ``goes_on`` whether there is a step from there, ``status``,
     ``fate`` and ``reason`` how the run has ended, ``repeats`` how many steps were repeated.
     """
+
+    changing = (
+        "now", "goes_on", "status", "fate", "reason",
+        "repeats", "_count", "_farthest", "_settled_at",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -76,6 +82,35 @@ class RunControl:
         self.status, self.fate, self.reason = Status.OK, Fate.NONE, Reason()
         self.goes_on = True
         self._watch()
+
+    @property
+    def settled(self) -> bool:
+        """Whether all V-joints had locked for as long as they shall settle."""
+        return self.now.time >= self._settled_at
+
+    def memory(self) -> Memory:
+        """See ``Remembering``; with that of all parts by their kinds, after an accepted step."""
+        parts = {kind: part.memory() for kind, part in self._parts().items()}
+        return super().memory() | {"settling": self._settling, "parts": parts}
+
+    def recall(self, memory: Memory) -> None:
+        """See ``Remembering``; other settings may have given a control other parts."""
+        super().recall(memory)
+        self._settled_at += self._settling - memory["settling"]
+        for kind, part in self._parts().items():
+            if kind in memory["parts"]:
+                part.recall(memory["parts"][kind])
+        self._leave_tensions()
+
+    def begin_anew(self, now: Instant, lost: float) -> None:
+        """Go on from how a changed scene makes the present instant; ``lost`` is the energy that the
+        change has taken since the reading that it replaces, J.
+        """
+        self.now = now
+        self._guard.begin_anew(now, lost)
+        self._rest.begin(now)
+        if isinstance(self._steps, ConstantSteps):
+            self._steps.begin_anew()
 
     def next_step(self, next_event: float = math.inf) -> float:
         """The next step, s; it must not pass the time ``next_event`` (s), as of a fault."""
@@ -155,6 +190,21 @@ class RunControl:
                 f"stop, at {past.time:.6g} s (limits.overrun = {self._limits.overrun:g} deg)"
             )
 
+    @property
+    def _settling(self) -> float:
+        """Time from the last lock to the end, s."""
+        return self._solver.settling_time if self._locks is None or self._locks.stops else 0.0
+
+    def _parts(self) -> dict[str, Remembering]:
+        parts = self._steps, self._guard, self._rest, self._locks, self._deviations
+        found = (one for one in (*parts, *self._indicators) if one is not None)
+        return {type(one).__name__: one for one in found}
+
+    def _leave_tensions(self) -> None:
+        """After the last lock what tensions do is in no result but the series."""
+        if math.isfinite(self._settled_at):
+            self._indicators = self._indicators[:1]
+
     def _contact(self, at: Instant) -> StopContact:
         return StopContact() if self._locks is None else self._locks.contact(at)
 
@@ -173,14 +223,13 @@ class RunControl:
         self.reason = Reason(text=f"all V-joints have reached {where}")
         # Settling counts from the last lock within this step: what happens after it must not
         # depend on where steps end.
-        time, settling = self.now.time, self._solver.settling_time if locks.stops else 0.0
+        time = self.now.time
         ends = [(one.time, one.angles, one.rates) for one in (before, self.now)]
         times = lock_times(*map(np.array, zip(*ends, strict=True)))
         last = float(np.fmax.reduce(times, axis=None))
-        end = (last if math.isfinite(last) else time) + settling
+        end = (last if math.isfinite(last) else time) + self._settling
         self._settled_at = end if end > time * (1.0 + _ROUND_OFF) else time
-        # What tensions do from here on is in no result but the series.
-        self._indicators = self._indicators[:1]
+        self._leave_tensions()
 
     def _note_end(self, before: float) -> None:
         """End a run that has settled, or reached the end time or the step limit."""

@@ -74,13 +74,10 @@ def test_a_balanced_ring_starts_as_in_flight() -> None:
 
 @pytest.mark.parametrize("base", ["fixed", "free"])
 def test_engines_agree(base: str) -> None:
-    """With equal steps and rods.  What friction takes they count by rules that differ in h^2: of
-    the fixed ring by 3e-2, 9e-3 and 2.5e-3 in steps of 10, 5 and 2.5 ms.
-    """
+    """With equal steps and rods."""
     scene = ground(
         EVERYTHING | {"planes": "both", "corners": [2, 3, 4]} if base == "fixed" else EVERYTHING,
         boom__base=base, solver__newton_tolerance=1e-7, solver__end_time=0.5,
-        solver__step=2e-3,
     )  # fmt: skip
     here, there = by_frames(scene), by_exudyn(scene)
     assert not here.status.failed, here.reason
@@ -89,9 +86,10 @@ def test_engines_agree(base: str) -> None:
         one, other = here.values[name], there.values[name]
         largest = np.nanmax(np.abs(other))
         assert np.nanmax(np.abs(one - other)) <= 2e-3 * largest, name
-    # Rods that are let go under their weight ring, which steps damp in both alike.
+    # Rods that are let go under their weight ring, which steps of 10 ms damp in both alike.
     errors = [float(each.values["energy_error"]) for each in (here, there)]
-    assert max(errors) < 5e-3
+    assert errors[0] == pytest.approx(errors[1], rel=1e-2)
+    assert errors[0] < 0.05
 
 
 def test_tangent() -> None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ringsim.stepping.instant import Energies, Instant
-from ringsim.stepping.memory import instant, kept, pack, restore, unpack
-from ringsim.variables import Fate
+from ringsim.stepping.locks import Overrun
+from ringsim.stepping.memory import Remembering, pack, unpack
+from ringsim.variables import Cause, Fate, Reason
 
 LEAVES = st.one_of(
     st.none(), st.booleans(), st.integers(-(10**9), 10**9), st.floats(allow_nan=False), st.text()
@@ -44,29 +46,36 @@ def test_arrays_keep_shape_and_type() -> None:
         assert (found == array).all()
 
 
-class Thing:
+NOW = Instant(0.1, np.eye(2), np.eye(2), Energies(1.0, 2.0, 3.0, 4.0), tensions=np.ones(3))
+
+
+class Thing(Remembering):
+    changing = ("past", "largest", "fate", "worst", "reason", "now")
+
     def __init__(self) -> None:
-        self.past: deque[tuple[float, float]] = deque([(1.0, 2.0)])
-        self.largest = {False: math.inf, True: 0.5}
-        self.fate = Fate.STALLED
-        self.now = Instant(0.1, np.eye(2), np.eye(2), Energies(1.0, 2.0, 3.0, 4.0))
+        self.past: deque[tuple[float, float]] = deque()
+        self.largest = {False: 0.0, True: 0.0}
+        self.fate, self.worst, self.reason = Fate.NONE, Overrun(), Reason()
+        self.now: Instant | None = None
 
 
 def test_attributes_come_back_in_their_types() -> None:
-    names = ("past", "largest", "fate", "now")
     one, other = Thing(), Thing()
-    other.past.clear()
-    other.largest, other.fate = {}, Fate.NONE
-    other.now = Instant(0.0, np.zeros(1), np.zeros(1), Energies(0.0, 0.0, 0.0, 0.0))
-    restore(other, unpack(*pack(kept(one, names))))
+    one.past.append((1.0, 2.0))
+    one.largest, one.fate, one.worst = {False: math.inf}, Fate.STALLED, Overrun(0.1, "upper 1", 2.0)
+    one.reason, one.now = Reason(Cause.NEWTON, "it gave up"), NOW
+    other.recall(unpack(*pack(one.memory())))
     assert other.past.popleft() == [1.0, 2.0]
     assert other.largest == one.largest
     assert other.fate is Fate.STALLED
-    assert other.now.energies == one.now.energies
+    assert other.worst.joint == "upper 1"
+    assert other.reason == "it gave up"
+    assert other.reason.cause is Cause.NEWTON
+    assert isinstance(other.now, Instant)
     assert isinstance(other.now.energies, Energies)
-    assert (other.now.angles == one.now.angles).all()
+    assert other.now.energies == NOW.energies
+    assert (other.now.angles == NOW.angles).all()
 
 
 def test_an_instant_without_cables_comes_back() -> None:
-    now = Thing().now
-    assert instant(unpack(*pack({"now": now}))["now"]).tensions is None
+    assert unpack(*pack([replace(NOW, tensions=None)]))[0].tensions is None

@@ -13,6 +13,7 @@ from ringsim.parts.limits import Limits
 from ringsim.parts.solver import Solver
 from ringsim.stepping.instant import Energies, Instant, Scales
 from ringsim.stepping.locks import Locks
+from ringsim.stepping.memory import pack, unpack
 from ringsim.stepping.run_control import RunControl
 from ringsim.variables import Fate, Status
 
@@ -97,6 +98,25 @@ def test_the_run_ends_settled_after_the_exact_time_of_the_last_lock() -> None:
     # The step was chosen for the rate at its beginning.
     rate = falling(exact - meeting)[1]
     assert meeting <= math.radians(0.05) * math.sqrt(3.0) / rate
+
+
+@pytest.mark.parametrize("stowed", [BEGIN - 0.1, None], ids=["stops", "none"])
+def test_a_run_that_goes_on_settles_as_long_as_its_own_scene_says(stowed: float | None) -> None:
+    """At 180 deg it would have gone on for 0.05 s, and does for 0.1 s; without stops neither."""
+    motion, ends = Motion(), []
+    start = motion.at(0.0)
+    first, other = (
+        RunControl(Solver(settling_time=time), SCALES, start, Locks(start.angles, stowed))
+        for time in (0.05, 0.1)
+    )
+    while not first.now.angles.min() >= math.pi:
+        first.accept(motion.at(first.now.time + first.next_step()))
+    other.recall(unpack(*pack(first.memory())))
+    for control in (first, other):
+        while control.goes_on:
+            control.accept(motion.at(control.now.time + control.next_step()))
+        ends.append(control.now.time)
+    assert ends[1] - ends[0] == pytest.approx(0.05 if stowed else 0.0, abs=1e-12)
 
 
 def test_no_step_passes_an_event_and_the_last_two_share_the_way() -> None:
