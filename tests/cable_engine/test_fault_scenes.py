@@ -16,13 +16,14 @@ ENERGY = 3e-4
 """The balance closes over a fault as it does without: what it lets go is booked as lost."""
 
 
-def struck(*faults: dict[str, Any], end: float = 2.5) -> Outcome:
+def struck(*faults: dict[str, Any], end: float = 2.5, **values: Any) -> Outcome:
     return outcome(
         truss(
             structure__opening_angle=60.0,
             both__winch__winding={"kind": "ramp", "speed": 0.05, "duration": 0.5},
             faults=[{"time": STRIKES} | fault for fault in faults],
             solver__end_time=end,
+            **values,
         )
     )
 
@@ -83,8 +84,10 @@ def test_a_stuck_joint_stays_and_the_rest_goes_on() -> None:
 
 
 def test_faults_before_their_time_change_nothing() -> None:
-    faulty = struck({"kind": "cut-cable", "cable": 1, "span": 2, "time": 3.0})
-    sound = struck()
-    for name in ("opening_angle", "cable_tension"):
-        # One more unknown in the linear solver: round-off alone.
-        np.testing.assert_allclose(faulty.values[name], sound.values[name], rtol=1e-7, atol=1e-9)
+    # Steps that follow the energy's imbalance follow its round-off, too: a part in 1e8 of a step.
+    steps: dict[str, Any] = {"solver__step_control": "constant", "solver__step": 5e-3}
+    faulty = struck({"kind": "cut-cable", "cable": 1, "span": 2, "time": 3.0}, **steps)
+    sound = struck(**steps)
+    # One more unknown in the linear solver: round-off alone, which a rope of 1e5 N makes a force.
+    for name, least in (("opening_angle", 1e-9), ("cable_tension", 1e5 * 1e-11)):
+        np.testing.assert_allclose(faulty.values[name], sound.values[name], rtol=1e-7, atol=least)
