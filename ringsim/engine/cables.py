@@ -39,11 +39,17 @@ class CableDrive:
         present = [cable for _, cable in self.present]
         self.path, system = path, assembly.system
         parameter = system.GetNodeParameter
-        reference = [parameter(node, "referenceCoordinates") for node in path.nodes]
-        self._reference = path.by_node(np.concatenate(reference))
+        reference, moved = (
+            path.by_node(
+                np.concatenate([parameter(node, f"{which}Coordinates") for node in path.nodes])
+            )
+            for which in ("reference", "initial")
+        )
+        self._reference = reference
         self._columns = np.concatenate([assembly.coordinates_of(node) for node in path.nodes])
         self.chain = Chain(present, path.per_cable)
-        start = path.place(self._reference, np.zeros_like(self._reference))
+        # Rods that are not as drawn have unstrained nodes as a reference, and begin elsewhere.
+        start = path.place(reference + moved, np.zeros_like(reference))
         self.ropes = self.chain.start(start.points)
         self.winches = Winches(present)
         self._answered: tuple[tuple[float, bytes, bytes], ChainState, Placed] | None = None

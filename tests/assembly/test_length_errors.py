@@ -249,3 +249,19 @@ def test_the_ideal_ring_refuses_what_strains_it() -> None:
         refuse_if_not_ideal(ring(rods__length_error=scattered(1e-4)))
     with pytest.raises(InputError, match=r"record\.shape = true"):
         refuse_if_not_ideal(ring(record__shape=True))
+
+
+@pytest.mark.parametrize("errors", [
+    {"rods__length_error": scattered(2e-4, 3)}, {"structure__angle_error": [0.05, -0.03, 0.02]},
+])  # fmt: skip
+def test_ropes_begin_as_long_as_the_path_that_the_assembly_leaves(errors: dict[str, Any]) -> None:
+    """In both engines: without slack and before the winch turns a rope has 0.69 of its width."""
+    values = {name.replace("__", "."): value for name, value in errors.items()}
+    scene = load_scene("ring18-cable").with_values(
+        {"structure.sections": 3, "boom": "none", "net": "none", "solver.end_time": 0.05,
+         "solver.step": 0.05, "record.interval": 0.05} | values
+    )  # fmt: skip
+    frames, full = (solve(scene).values["cable_tension"] for solve in (by_frames, by_exudyn))
+    at_rest = scene.cables.upper.slack_width * math.log(2.0)
+    for tension in (frames, full):
+        assert np.abs(tension[..., 0] / at_rest - 1.0).max() < 1e-4
