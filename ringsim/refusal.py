@@ -123,6 +123,8 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
             choices = " or ".join(map(show, [value] if value in kinds else kinds))
             none = f', or {where} = "{LEFT_OUT}" to leave it out' if value is False else ""
             return f"{shown} must be a table: write [{where}], and below it kind = {choices}{none}"
+        case "tuple_type" if size := _components(field):
+            return f"{shown} must be a list of {size} numbers{f' in{unit}' if unit else ''}"
         case "tuple_type" if tables:
             return f"{shown} must be a list of tables: write [[{where}]], and its keys below"
         case "value_error":
@@ -139,6 +141,13 @@ def _describe(fault: Any, model: type[BaseModel]) -> str:
     optional = field is not None and type(None) in typing.get_args(field.annotation)
     # Who writes "never" looks for the word that leaves a value out.
     return f'{line}, or "none" to leave it out' if optional else line
+
+
+def _components(field: FieldInfo | None) -> int:
+    """How many values a vector has; 0 of all other fields."""
+    kinds = [] if field is None else [field.annotation, *typing.get_args(field.annotation)]
+    inner = [typing.get_args(each) for each in kinds if typing.get_origin(each) is tuple]
+    return next((len(each) for each in inner if Ellipsis not in each), 0)
 
 
 def _meant(text: str, kind: str) -> str:

@@ -4,7 +4,7 @@ import importlib
 import logging
 import os
 import sys
-from typing import Any
+from typing import Any, TextIO
 
 import click
 from click.shell_completion import CompletionItem
@@ -77,8 +77,41 @@ def cli() -> None:
     logging.basicConfig(format="%(message)s")
 
 
+class _Told:
+    """Standard output whose reader may stop reading (``ringsim run ... | head``): what a verb was
+    called for is done all the same.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write, to nowhere once nobody reads."""
+        try:
+            return self._stream.write(text)
+        except BrokenPipeError:
+            self._go_nowhere()
+            return len(text)
+
+    def flush(self) -> None:
+        """Hand over what is written."""
+        try:
+            self._stream.flush()
+        except BrokenPipeError:
+            self._go_nowhere()
+
+    def _go_nowhere(self) -> None:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self._stream.fileno())
+        os.close(nowhere)
+
+
 def main() -> None:
     """Entry point of the command ``ringsim``."""
+    sys.stdout = _Told(sys.stdout)  # type: ignore[assignment]
     # Before numpy is loaded: its matrices are small here, and threads that wait for each other
     # cost half as much again as the run.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -97,7 +130,4 @@ def main() -> None:
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted", err=True)
         code = EXIT_INTERRUPTED
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = EXIT_DONE
     sys.exit(code or EXIT_DONE)

@@ -7,7 +7,8 @@ from ringsim.choice import kind_of, kinds_of
 from ringsim.parts.margin.family import MarginStandard
 from ringsim.scene import Scene
 from ringsim.tables import text_table
-from ringsim.theory.drive_margin import DriveMargin, Margin
+from ringsim.theory.drive_margin import MOST, DriveMargin, Margin
+from ringsim.theory.plane_margin import PlaneMargin
 
 _ANGLES = 13
 
@@ -33,17 +34,41 @@ def margin_lines(scene: Scene) -> Iterator[str]:
         [
             f"{math.degrees(now.angle):.1f}",
             *(f"{force:.4g}" for force in (now.available, *(now.resisting[k] for k in kinds))),
-            *(f"{course[row].margin:.3f}" for course in courses.values()),
+            *(_told(course[row].margin) for course in courses.values()),
         ]
         for row, now in enumerate(first)
     ]
     yield from text_table(["angle (deg)", "drive", *kinds, *drives], rows)
     for name, drive in drives.items():
         yield f"{name}: {_verdict(drive.least(courses[name]))}"
+        yield from (f"  {line}" for line in _by_plane(scene, drive.standard))
+
+
+def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
+    """The margin of each plane, if both have cables and these are not alike."""
+    cables = scene.cables
+    if cables is None or None in (cables.upper, cables.lower):
+        return
+    if cables.upper == cables.lower:
+        yield "each plane has half of the drive"
+        return
+    for number, plane in enumerate(scene.structure.planes):
+        drive = PlaneMargin(scene, standard, number)
+        least = drive.least(drive.course(_ANGLES))
+        share = least.available / drive.whole(least.angle).available
+        yield (
+            f"{plane}: {100.0 * share:.3g} % of the drive against half of all that resists: "
+            f"{_verdict(least)}"
+        )
+
+
+def _told(margin: float) -> str:
+    """A dash where next to nothing resists."""
+    return f"{margin:.3f}" if margin < MOST else "-"
 
 
 def _verdict(least: Margin) -> str:
-    if not math.isfinite(least.margin):
+    if least.margin >= MOST:
         return "nothing resists"
     word = "enough" if least.margin >= 0.0 else "NOT enough"
     return f"least margin {least.margin:.3f} at {math.degrees(least.angle):.2f} deg: {word}"

@@ -113,6 +113,17 @@ def command(
     }  # fmt: skip
     # Solved in seconds, the ideal ring needs no bar.
     outcomes = outcomes or {"ideal": run_ideal(chosen)}
+    datasets = [to_dataset(outcome, chosen) for outcome in outcomes.values()]
+    dataset, lines = datasets[-1], []
+    if fidelity == "both":
+        from ringsim.analysis.engines import run_lines, with_frame
+
+        lines = list(run_lines(outcomes["frame"], outcomes["full"]))
+        dataset = with_frame(*reversed(datasets))
+    # Replaced, not refused: to change a scene and run it again is what one does all day, and
+    # scripts do it with one name.  Everything of a run can be computed again from its file.
+    done = "replaced" if target.exists() else "wrote"
+    save(dataset, target)
     for by, outcome in outcomes.items():
         values = outcome.values
         became = "" if outcome.status.failed else f", {outcome.fate.word.replace('_', ' ')}"
@@ -124,18 +135,8 @@ def command(
             label = (VARIABLES[name].summary or ("",))[0]
             if anew or name != "total_steps":
                 click.echo(f"  {label:20s}{told}")
-    datasets = [to_dataset(outcome, chosen) for outcome in outcomes.values()]
-    dataset = datasets[-1]
-    if fidelity == "both":
-        from ringsim.analysis.engines import run_lines, with_frame
-
-        for line in run_lines(outcomes["frame"], outcomes["full"]):
-            click.echo(f"  {line}")
-        dataset = with_frame(*reversed(datasets))
-    # Replaced, not refused: to change a scene and run it again is what one does all day, and
-    # scripts do it with one name.  Everything of a run can be computed again from its file.
-    done = "replaced" if target.exists() else "wrote"
-    save(dataset, target)
+    for line in lines:
+        click.echo(f"  {line}")
     click.echo(f"{done} {target}")
     if plot:
         from ringsim.plots.run import draw_run

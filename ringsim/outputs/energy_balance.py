@@ -31,7 +31,8 @@ class EnergyBalance(Output):
     def reduce(self, run: Run, series: Series) -> Values:
         """Each interpolated by itself: the losses may be unknown (NaN) where the others are not."""
         kinetic, elastic, work, lost = series.values.T
-        balance = kinetic - kinetic[0] + elastic - elastic[0] + lost - work
+        # What a fault takes at the start is not in the first energies any more.
+        balance = kinetic - kinetic[0] + elastic - elastic[0] + lost - lost[0] - work
         exchanged = max(np.abs(work).max(), np.ptp(kinetic), np.ptp(elastic), 1e-300)
         names = [variable.name for variable in self.variables]
         return dict(zip(names, [*series.on_grid(), np.abs(balance).max() / exchanged], strict=True))

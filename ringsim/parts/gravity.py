@@ -9,7 +9,9 @@ from ringsim.units import ListIn, Model, Unit
 
 def _some(vector: tuple[float, ...]) -> tuple[float, ...]:
     if not any(vector):
-        raise ValueError("must not be zero: leave gravity out")
+        raise ValueError(
+            f"gravity.vector = {list(vector)} m/s^2 must not be zero: leave gravity out"
+        )
     return vector
 
 

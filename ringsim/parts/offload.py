@@ -62,8 +62,11 @@ class Offload(Model):
                     f"offload.corners[{k}] = {corner} must be at most {count}: this structure has "
                     "no such corner"
                 )
-        if len(set(self.corners)) < len(self.corners):
-            raise ValueError("offload.corners names a corner twice: leave one of them out")
+        for k, corner in enumerate(self.corners, 1):
+            if corner in self.corners[: k - 1]:
+                raise ValueError(
+                    f"offload.corners[{k}] = {corner} names a corner twice: leave one of them out"
+                )
 
     def hold(self, up: Array, lifts: Array, moved: Array, rates: Array) -> Hold:
         """Of lines that carry ``lifts`` (n,), N, at the start, of corners that have moved since, m,

@@ -35,13 +35,14 @@ class FactorTable(Model):
             raise ValueError(f"temperatures = ... {late[0]:g} K must be above the one before it")
         return self
 
-    def require_covers(self, name: str, value: Values) -> None:
-        """Raise a ValueError if a temperature (K) of the part ``name`` lies outside."""
+    def require_covers(self, part: str, field: str, value: Values) -> None:
+        """Raise a ValueError if a temperature (K) of a part lies outside of its table ``field``."""
         first, last = self.temperatures[0], self.temperatures[-1]
-        if min(np.ravel(value)) < first or max(np.ravel(value)) > last:
+        out = [one for one in np.ravel(value).tolist() if not first <= one <= last]
+        if out:
             raise ValueError(
-                f"temperature.{name}.value must lie within {first:g} .. {last:g} K, for which its "
-                "table has factors: extend the table"
+                f"temperature.{part}.value = {out[0]:g} K must lie within {first:g} .. {last:g} K, "
+                f"for which it has factors: extend temperature.{part}.{field}.temperatures"
             )
 
     def at(self, value: Values) -> Values:
@@ -115,16 +116,16 @@ class Temperature(Model):
         tables = [(name, group, group.stiffness) for name, group in self.rods()]
         for name, group, table in tables:
             if table is not None:
-                table.require_covers(name, group.value)
+                table.require_covers(name, "stiffness", group.value)
         if self.joint is not None:
-            self.joint.friction.require_covers("joint", self.joint.value)
+            self.joint.friction.require_covers("joint", "friction", self.joint.value)
             if not scene.joints.present():
                 raise ValueError(
                     "temperature.joint: no joint has friction: add one, as [joints.hinge], or "
                     "leave it out"
                 )
         if self.pulley is not None:
-            self.pulley.friction.require_covers("pulley", self.pulley.value)
+            self.pulley.friction.require_covers("pulley", "friction", self.pulley.value)
             if scene.cables is None:
                 raise ValueError(
                     "temperature.pulley: there is no cable: add [cables.upper], or leave it out"

@@ -45,8 +45,9 @@ class Guard(Remembering):
         if self._constant or not self._run:  # constant steps are judged by all of a run
             self._run.append(now)
         time, found, start = now.time, now.energies, self._run[0].energies
-        self._lost += found.lost
-        self._driven += found.driven
+        if len(self._run) > 1:  # what a fault takes at the start is not in it any more
+            self._lost += found.lost
+            self._driven += found.driven
         work = found.work + self._driven
         stored = found.kinetic + found.elastic
         balance = stored - start.kinetic - start.elastic + self._lost - work

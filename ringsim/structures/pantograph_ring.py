@@ -102,9 +102,10 @@ class PantographRing(Structure):
             )
         for error in np.ravel(0.0 if self.angle_error is None else self.angle_error):
             if not LEAST_OPENING <= self.opening_angle + error <= 179.9:
+                cure = "lower" if error > 0.0 else "raise"
                 raise ValueError(
                     f"angle_error = {error:g} deg must leave opening_angle = {self.opening_angle} "
-                    f"deg between {LEAST_OPENING:g} and 179.9 deg: lower it"
+                    f"deg between {LEAST_OPENING:g} and 179.9 deg: {cure} it"
                 )
         if self.corner_mass == 0.0:
             raise ValueError(

@@ -34,13 +34,14 @@ LATE = np.radians([168.0, 170.0, 172.0, 174.0, 176.0, 177.0, 178.0, 179.0])
 
 class Margin(NamedTuple):
     """At one opening angle (rad): what would drive without friction in the pulleys, all that
-    resists, without a standard's factors, N m; and the margin with them.
+    resists, without a standard's factors, N m; the margin with them, and the rate (rad/s) for it.
     """
 
     angle: float
     available: float
     resisting: dict[str, float]
     margin: float
+    rate: float
 
 
 class DriveMargin:
@@ -59,7 +60,7 @@ class DriveMargin:
                 "(leave margin out)"
             )
         self._mechanism = Mechanism(scene)
-        self._standard = standard
+        self.standard = standard
         self._drive = Drive(scene, self._mechanism, at_speed=standard.keep_speed)
         self._resistances = resistances(scene, self._mechanism)
         self._ends_steeply = scene.latch is not None or isinstance(scene.net, BoundaryNet)
@@ -74,7 +75,7 @@ class DriveMargin:
         """At an opening angle (rad); of a run at its rate (rad/s), acceleration (rad/s^2) and time
         (s), else at the speed that the winches are commanded to.
         """
-        standard, now = self._standard, folding(self._mechanism, 0.5 * (math.pi - angle))
+        standard, now = self.standard, folding(self._mechanism, 0.5 * (math.pi - angle))
         rate = self._drive.speed(now) if rate is None else max(rate, 0.0)
         opening = Opening(angle, rate, acceleration, now)
         ideal, driving = (self._drive.force(now, factor, time) for factor in (0.0, 1.0))
@@ -88,7 +89,7 @@ class DriveMargin:
                 drive -= standard.driving_spring * force
         required *= standard.motorisation
         margin = drive / required - 1.0 if required > 0.0 else math.inf
-        return Margin(angle, ideal, resisting, margin)
+        return Margin(angle, ideal, resisting, margin, rate)
 
     def course(self, count: int = 33) -> list[Margin]:
         """At so many angles from the start to 180 deg, and more where parts resist at the end."""

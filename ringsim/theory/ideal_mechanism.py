@@ -164,7 +164,7 @@ class Mechanism:
         """Generalised force of gravity and of what lines carry on (V, W, p), N and N m."""
         if self._gravity is None:
             return np.zeros(len(now.matrix))
-        down, n = self._down(now), len(now.place)
+        down, n = self.gravity(now), len(now.place)
         first = self._weighed @ now.functions
         whole, turning = self._weighing * down, np.cross(first[:, 0], down)
         return np.concatenate([whole, turning, first[:, 1 : n + 1].T @ down])
@@ -176,10 +176,10 @@ class Mechanism:
         arm = self._weighed @ now.values
         if self.fixed:
             arm = arm - self._weighing * (self._held[0] @ now.values)
-        return float(arm @ self._down(now))
+        return float(arm @ self.gravity(now))
 
-    def _down(self, now: Configuration) -> Array:
-        """Gravity in the structure's axes."""
+    def gravity(self, now: Configuration) -> Array:
+        """In the structure's axes, m/s^2; only where there is any."""
         assert self._gravity is not None
         if not self.fixed:
             return self._gravity

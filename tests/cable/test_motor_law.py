@@ -52,7 +52,9 @@ def motor(**fields):
         # of the stalling tension's torque up to the line, 1 / 0.3 times as much.
         ({"back_efficiency": 0.5}, 3.0 * STALLING, 0.0),
         ({"back_efficiency": 0.5}, 1.25 / 0.3 * STALLING, -0.25 * FREE),
-        ({"back_efficiency": 0.5}, 9.0 / 0.3 * STALLING, -FREE),
+        # Along the line, whatever the command, to ten times the speed without load.
+        ({"back_efficiency": 0.5, "speed": 60.0}, 9.0 / 0.3 * STALLING, -8.0 * FREE),
+        ({"back_efficiency": 0.5}, 12.0 / 0.3 * STALLING, -10.0 * FREE),
     ],
 )  # fmt: skip
 def test_the_drum_turns_where_motor_and_rope_have_the_same_torque(fields, tension, speed):
@@ -92,9 +94,26 @@ def test_speed_falls_with_the_tension_and_power_is_not_made(tension, voltage, co
     assert law.speed_at(1.1 * tension) <= speed
     torque = float(law.torque(tension, speed))
     given_out, taken = torque * speed / law.travel, tension * speed
-    # Winding, the rope gets 60 % of the shaft's power; turned back, the shaft gets a share of it.
+    # Winding, the rope gets 60 % of the shaft's power; turned back, the shaft gets a share of it,
+    # unless the motor is weaker than that.
     efficiency = 0.6 if speed > 0.0 else 0.0 if back is None else 1.0 / back
-    assert taken == pytest.approx(efficiency * given_out, rel=1e-9, abs=1e-15)
+    if back is None or speed > 0.0 or (limit is None and speed > law.limits()[0]):
+        assert taken == pytest.approx(efficiency * given_out, rel=1e-9, abs=1e-15)
+    else:
+        assert taken <= efficiency * given_out * (1.0 - 1e-9) or taken == pytest.approx(0.0)
+    assert torque <= law.available(speed / law.travel) * (1.0 + 1e-9) + 1e-15
+
+
+def test_a_limit_holds_while_the_rope_turns_the_motor_back():
+    """40 N ask for 0.004 N m at the shaft, 0.8 of the limit are 0.0024 N m: the rest is braked."""
+    law = motor(back_efficiency=0.5, torque_limit=0.003, derating=0.8, stall_torque=0.01)
+    tension = 0.004 * 100.0 / 0.02 / 0.5
+    speed = law.speed_at(tension)
+    assert speed < -FREE
+    assert law.torque(tension, speed) == pytest.approx(0.0024, rel=1e-12)
+    # A rope that gives way: the motor yields at its limit, within its band.
+    tension, speed = pulled(law, -0.1 * FREE)
+    assert tension == pytest.approx(0.0024 * (1.0 + 0.1 * 0.05) * 100.0 / 0.02 / 0.5, rel=2e-3)
 
 
 def pulled(law, rate, steps=200, step=0.02):

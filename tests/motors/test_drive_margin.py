@@ -17,6 +17,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
 from ringsim.theory.drive_margin import PULLEYS, DriveMargin
+from ringsim.theory.plane_margin import PlaneMargin
 
 ANGLES = np.radians([62.0, 90.0, 130.0, 170.0, 179.0])
 PLAIN = EcssMechanisms(
@@ -126,6 +127,28 @@ def test_a_commanded_speed_leaves_less_torque_and_counts_viscous_friction() -> N
     rate = 300.0 * 1e-4 / shortening
     assert found.resisting["joint friction"] == pytest.approx(12 * 0.5 * rate, rel=1e-6)
     assert found.available == pytest.approx(0.5 * driven(scene, angle, 0.0), rel=1e-6)
+
+
+def test_each_plane_has_its_own_cable_against_half_of_all_that_resists() -> None:
+    weak = {"cables.lower.winch.winding": MOTOR | {"stall_torque": 0.0005}}
+    scene = ring(joints__vjoint={"coulomb": 0.05}, loads__force=0.1).with_values(weak)
+    planes = [PlaneMargin(scene, PLAIN, number) for number in (0, 1)]
+    for angle in ANGLES[1:3]:
+        shortening = -by_differences(lambda at: spans(scene, at)[0], angle)
+        cosine = 0.04 * np.cos(0.5 * spans(scene, angle)[1])
+        eta = np.insert((1.0 - cosine) / (1.0 + cosine), 0, 1.0, axis=1)
+        pulls = STALL * np.array([1.0, 0.25])
+        drives = pulls * np.sum(np.cumprod(eta, axis=1) * shortening, axis=1)
+        whole = DriveMargin(scene, PLAIN).at(angle)
+        loads = whole.available - float(pulls @ shortening.sum(axis=1))
+        assert loads > 0.05
+        for plane, drive in zip(planes, drives, strict=True):
+            found = plane.at(angle)
+            expected = (drive + 0.5 * loads) / (0.5 * 12 * 0.05) - 1.0
+            assert found.margin == pytest.approx(expected, rel=1e-6)
+        halves = [plane.at(angle) for plane in planes]
+        assert sum(half.available for half in halves) == pytest.approx(whole.available)
+        assert np.mean([half.margin for half in halves]) == pytest.approx(whole.margin)
 
 
 def test_the_least_margin_is_least() -> None:

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from scipy.integrate import quad
 
 from motor_rings import ring
+from ringsim.layout.layout import layout_of
 from ringsim.parts.hinge_spring.family import HingeSpring
 from ringsim.parts.hinge_spring.linear import LinearSpring
 from ringsim.parts.hinge_spring.table import TableSpring
@@ -20,6 +21,7 @@ from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
 from ringsim.theory.drive_margin import DriveMargin
 from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.variables import Status
 
 LINEAR = {"kind": "linear", "stiffness": 0.004, "preload": 0.01}
 LAWS = {
@@ -94,6 +96,31 @@ def test_engines_agree_with_the_ideal_ring(fidelity: str) -> None:
     )
     assert float(found.energy_error) < 1e-3
     assert float(truth.energy_error) < 1e-6
+
+
+@pytest.mark.parametrize("fidelity", ["frame", "full"])
+def test_what_a_fault_takes_at_the_start_is_booked_once(fidelity: str) -> None:
+    """A spring, and an upper rope of 2 mm less than its path whose winch waits."""
+    folded = math.radians(120.0)
+    short = {"initial_slack": -0.002, "friction": {"kind": "none"}, "axial_stiffness": 1e4,
+             "winch.start_time": 5.0}  # fmt: skip
+    scene = sprung(
+        cables={"upper": {"winch": {"winding": {"kind": "constant", "speed": 0.01}}}},
+        solver__end_time=0.1, solver__tolerance=1e-3,
+        faults=[
+            {"kind": "failed-spring", "plane": "lower", "section": 2, "time": 0.0},
+            {"kind": "cut-cable", "cable": 1, "span": 3, "time": 0.0},
+        ],
+    ).with_values({f"cables.upper.{name}": value for name, value in short.items()})  # fmt: skip
+    spring = 0.01 * folded + 0.5 * 0.004 * folded**2
+    layout = layout_of(scene)
+    places = [layout.sheave(each)[0] for each in layout.paths[0]]
+    path = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    rope = 0.5 * 1e4 * 0.002**2 / (path - 0.002)
+    found = simulate(scene, fidelity)
+    assert float(found.dissipation[0]) == pytest.approx(spring + rope, rel=1e-3)
+    assert int(found.status) == Status.OK
+    assert float(found.energy_error) < 1e-3
 
 
 @pytest.mark.parametrize(

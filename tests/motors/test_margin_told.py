@@ -48,6 +48,25 @@ def test_check_prints_the_margin_of_the_ideal_ring(scene: Scene, tmp_path: Path)
     assert re.search(r"^nasa-std-5017b: least", both, re.M)
 
 
+def test_a_dead_winch_is_told_beside_a_strong_one(scene: Scene, tmp_path: Path) -> None:
+    torques = {"upper": 1.0, "lower": 1e-9}
+    values = {f"cables.{name}.winch.winding.stall_torque": t for name, t in torques.items()}
+    text = told(tmp_path / "two.toml", scene.with_values(values))
+    assert re.search(r"^ecss-e-st-33-01c: least margin \S+ at \S+ deg: enough$", text, re.M)
+    assert re.search(r"^  upper: 100 % of the drive .* deg: enough$", text, re.M)
+    assert re.search(
+        r"^  lower: 1e-07 % .* least margin -1.000 at \S+ deg: NOT enough$", text, re.M
+    )
+    assert "each plane has half" in told(tmp_path / "even.toml", scene)
+
+
+def test_where_round_off_resists_there_is_no_number(scene: Scene, tmp_path: Path) -> None:
+    """The net's pull goes with the cosine of half the angle, to 1e-17 at 180 deg."""
+    text = told(tmp_path / "net.toml", scene.with_values({"joints": {}}))
+    last = next(line for line in text.splitlines() if line.startswith("180.0"))
+    assert last.split()[-1] == "-"
+
+
 def test_check_refuses_a_drive_without_limit() -> None:
     result = CliRunner().invoke(cli, ["check", "truss2", "--margin"])
     assert result.exit_code == 2

@@ -303,3 +303,27 @@ def test_a_scene_file_without_its_ending_is_suggested(tmp_path: Path) -> None:
     assert str(refused.value) == (
         f"{whole}: no such file, and no built-in scene of that name (did you mean {whole}.toml?)"
     )
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"gravity.vector": [0, 0, 0]},
+         "gravity.vector = [0.0, 0.0, 0.0] m/s^2 must not be zero: leave gravity out"),
+        ({"gravity.vector": 9.81}, "gravity.vector = 9.81 m/s^2 must be a list of 3 numbers"),
+        ({"spacecraft": {"mass": 1.0, "inertia": 2.0}},
+         "spacecraft.inertia = 2.0 kg m^2 must be a list of 3 numbers"),
+        ({"structure.angle_error": -10.0, "structure.opening_angle": 8.0},
+         "angle_error = -10 deg must leave opening_angle = 8.0 deg between 1 and 179.9 deg: raise"),
+        ({"structure.angle_error": 10.0, "structure.opening_angle": 175.0}, "deg: lower it"),
+        ({"temperature.joint.value": [150.0] * 17 + [600.0],
+          "temperature.joint.friction": {"temperatures": [100.0, 400.0], "factors": [2.0, 1.0]}},
+         "temperature.joint.value = 600 K must lie within 100 .. 400 K, for which it has factors: "
+         "extend temperature.joint.friction.temperatures"),
+        ({"offload.corners": [1, 3, 3], "boom.base": "fixed", "gravity.vector": [0, 0, -9.81]},
+         "offload.corners[3] = 3 names a corner twice"),
+    ],
+)  # fmt: skip
+def test_a_refusal_of_a_part_tells_value_and_cure(values: dict[str, object], text: str) -> None:
+    with pytest.raises(InputError, match=re.escape(text)):
+        load_scene("ring18-motor").with_values(values)

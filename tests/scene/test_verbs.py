@@ -1,6 +1,8 @@
 """``ringsim scenes`` and ``ringsim check``."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -94,3 +96,20 @@ def test_check_of_any_number_of_sections(sections: int) -> None:
 @pytest.mark.parametrize("verb", ["scenes", "check", "run", "campaign"])
 def test_help_lists_the_verb(verb: str) -> None:
     assert verb in run("--help")
+
+
+@pytest.mark.parametrize("verb", ["check", "run"])
+def test_a_reader_that_stops_reading_costs_no_result(verb: str, tmp_path: Path) -> None:
+    """As ``ringsim run ... | head -1`` does."""
+    out = tmp_path / "pipe.nc"
+    quick = ["--fidelity", "ideal", "--set", "solver.end_time=0.2", "--out", str(out)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "ringsim", verb, "ring18", *(quick if verb == "run" else [])],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    assert process.returncode == 0
+    assert out.exists() == (verb == "run")

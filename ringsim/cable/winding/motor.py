@@ -18,6 +18,11 @@ from ringsim.units import (
     Unit,
 )
 
+_BACKWARDS = 10.0
+"""Speed up to which a rope turns a motor back, over the motor's without a load: feedback needs a
+bound, and where the line has eleven times the torque at standstill no motor is meant any more.
+What pulls harder is braked."""
+
 
 class MotorWinding(FeedbackWinding):
     """A motor with a straight torque-speed line, a gear and a drum.
@@ -30,6 +35,7 @@ class MotorWinding(FeedbackWinding):
     turns the motor back (r the drum's radius, n the gear's ratio, e and e' its efficiencies).  The
     drum turns at the speed at which both are equal, not above the commanded one; it stands where
     the motor is too weak to wind and the rope to turn it back, always so if the gear locks itself.
+    Turned back it goes along its line, up to ten times its speed without a load.
     The inertias of rotor and gear are left out: the motor is in balance with its rope at any time.
 
     >>> motor = MotorWinding(
@@ -131,16 +137,17 @@ class MotorWinding(FeedbackWinding):
         """Torque of the motor while it winds at a speed (m/s) against a tension (N), N m.
 
         What the motor does not need it does not give; what it gives beyond its load while it stands
-        is held by the gear.
+        is held by the gear.  What turns it back with more than its largest torque meets a brake.
         """
-        return np.clip(self.available(np.asarray(speed) / self.travel), *self.loads(tension))
+        return np.clip(self.available(np.asarray(speed) / self.travel), 0.0, self.loads(tension)[1])
 
     def speed_at(self, tension: float) -> float:
         """Speed of the drum's rope at a tension (N), in m/s; see the class."""
         holding, winding = self.loads(tension)
         forward, back = self._shaft_at(winding), self._shaft_at(holding)
         wanted = forward if forward > 0.0 else min(back, 0.0)
-        return self.travel * min(max(wanted, -self.fastest), self.fastest)
+        low, high = self.limits()
+        return min(max(self.travel * wanted, low), high)
 
     def _shaft_at(self, load: float) -> float:
         """Speed of the shaft (rad/s) at which the motor has the torque of a load (N m)."""
@@ -171,6 +178,6 @@ class MotorWinding(FeedbackWinding):
         return self.speed_at(tension)
 
     def limits(self) -> tuple[float, float]:
-        """Standstill, or full speed backwards, to full speed."""
-        most = self.travel * self.fastest
-        return (0.0 if self.back_efficiency is None else -most), most
+        """Standstill, or the most that a rope turns it back, to full speed."""
+        back = 0.0 if self.back_efficiency is None else _BACKWARDS * self.voltage
+        return -self.travel * back * self.no_load_speed, self.travel * self.fastest

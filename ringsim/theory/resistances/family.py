@@ -1,5 +1,6 @@
 """The family of resistances to the opening of a ring of rigid rods."""
 
+from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from ringsim.choice import load_package
 from ringsim.parts.margin.family import Category
 from ringsim.scene import Scene
+from ringsim.theory.carried import Carried
 from ringsim.theory.ideal_mechanism import Configuration, Mechanism
 
 
@@ -41,6 +43,11 @@ class Resistance:
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
         self.scene, self.mechanism = scene, mechanism
+
+    @cached_property
+    def carried(self) -> Carried:
+        """The corners on lines of a scene that has an offload."""
+        return Carried(self.scene, self.mechanism)
 
     @property
     def present(self) -> bool:

@@ -1,4 +1,4 @@
-"""Inertia of all moving parts."""
+"""Inertia of all moving parts, trolleys of a ground test among them."""
 
 import numpy as np
 
@@ -29,4 +29,8 @@ class InertiaResistance(Resistance):
 
     def _inertia(self, now: Configuration) -> float:
         rates = np.concatenate([self.mechanism.rigid_rates(now), now.rate])
-        return float(rates @ now.matrix @ rates)
+        found = float(rates @ now.matrix @ rates)
+        if (offload := self.scene.offload) is not None and offload.trolley_mass > 0.0:
+            ways = 2.0 * self.carried.at(now).ways
+            found += offload.trolley_mass * float(ways @ ways)
+        return found
