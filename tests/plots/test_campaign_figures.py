@@ -15,6 +15,7 @@ from ringsim.analysis import courses as courses_module
 from ringsim.analysis import reading as blocks_module
 from ringsim.analysis.campaign_samples import median_and_worst
 from ringsim.analysis.courses import course, courses
+from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.plots.campaign import by_ending
@@ -77,6 +78,10 @@ def test_the_fan_shows_quantiles_of_the_deviation(mixed: xr.Dataset) -> None:
             np.abs(lags(6)[:, section]), abs=1e-5
         )
     assert "worst: sample 6" in words(figure)
+    assert figure.axes[0].get_xlabel().startswith("Share of the run")
+    figure.draw_without_rendering()
+    box = figure.legends[0].get_window_extent()
+    assert 0 <= box.x0 < box.x1 <= figure.bbox.width  # few sections make a narrow figure
 
 
 def test_runs_of_different_length_are_laid_over_each_other() -> None:
@@ -144,6 +149,11 @@ def test_distributions_are_steps_with_limits(mixed: xr.Dataset) -> None:
     np.testing.assert_allclose(step.get_ydata()[1:], np.arange(1, 6) / 5)
     assert limit.get_xdata()[0] == 3.0
     assert panel.get_title(loc="left") == "n = 5 of 8"
+    (dots,) = [line for line in panel.lines if line.get_marker() == "o"]
+    told = analyse(mixed)["asynchrony_max"].sel(statistic=["quantile_05", "median", "quantile_95"])
+    np.testing.assert_allclose(dots.get_xdata(), told)
+    one = distributions(made_campaign(1)).axes[0]
+    assert not [line for line in one.lines if line.get_marker() == "o"]
 
 
 def test_convergence_ends_at_mean_and_quantile(mixed: xr.Dataset) -> None:
@@ -154,8 +164,24 @@ def test_convergence_ends_at_mean_and_quantile(mixed: xr.Dataset) -> None:
     assert mean.get_ydata()[-1] == pytest.approx(values.mean())
     assert mean.get_ydata()[1] == pytest.approx(values[:2].mean())
     assert quantile.get_ydata()[-1] == pytest.approx(np.quantile(values, 0.95))
-    assert len(panel.collections) == 1
-    assert not convergence(made_campaign(4, kind="sobol")).axes[-1].collections
+    assert not panel.collections  # five samples have no interval
+    assert not convergence(made_campaign(9, kind="sobol")).axes[-1].collections
+
+
+def test_the_band_of_convergence_is_the_interval_of_the_analysis() -> None:
+    campaign = made_campaign(12)
+    figure = convergence(campaign)
+    (band,) = figure.axes[-1].collections
+    drawn_at = band.get_paths()[0].vertices
+    assert drawn_at[:, 0].min() == 8
+    ends = np.unique(drawn_at[drawn_at[:, 0] == 12, 1])
+    known = analyse(campaign)["peak_tension_interval"].sel(statistic="mean")
+    np.testing.assert_allclose(ends, np.sort(known))
+    assert "95 % interval of the mean" in words(figure)
+    one = convergence(made_campaign(1))
+    assert one.axes[-1].get_title(loc="left").endswith("n = 1")
+    assert all(float(tick).is_integer() for tick in one.axes[-1].get_xticks())
+    assert "interval" not in words(one)
 
 
 def test_tension_by_span(mixed: xr.Dataset) -> None:
@@ -178,6 +204,7 @@ def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     np.testing.assert_allclose(points["deployed (5)"][:, 1], mixed["asynchrony_max"].values[GOOD])
     places, labels = drawn(mixed["cables_lower_winch_stop_time"])
     assert labels == ["3.0", "none"]
+    assert "below the line" not in words(by_input(made_campaign(3)))
     assert places.tolist() == [0, 1] * 4
 
 
@@ -199,7 +226,7 @@ def test_the_median_is_a_sample_and_the_worst_has_the_largest_asynchrony(
 
 def test_all_figures_of_a_file(tmp_path: Path, mixed: xr.Dataset) -> None:
     save(mixed, tmp_path / "campaign.nc")
-    done = CliRunner().invoke(cli, ["plot", str(tmp_path / "campaign.nc"), "--plot-format", "svg"])
+    done = CliRunner().invoke(cli, ["plot", str(tmp_path), "--plot-format", "svg"])
     assert done.exit_code == 0, done.output
     names = {path.name for path in tmp_path.glob("*.svg")}
     # Five samples are too few for a correlation.
