@@ -40,8 +40,9 @@ class SubsetSimulation(Design):
     most_levels: Annotated[int, Field(ge=1, le=30)] = 8
     """Levels after which nothing rarer is looked for."""
     check: Annotated[int, Field(ge=0)] = 0
-    """Runs in the event, lost ones and those that fall short of their goal that are repeated with
-    the full model in the end: so many of them at most, evenly spread over all."""
+    """So many runs at most are repeated with the full model in the end: half of them are those
+    outside the event that are nearest to it; the others are in the event, lost, or short of their
+    goal, evenly spread over all."""
     _known: Array = PrivateAttr(default_factory=lambda: np.empty(0))
 
     @model_validator(mode="after")
