@@ -45,7 +45,7 @@ def approach(campaign: xr.Dataset) -> list[tuple[Array, Array]]:
     return found
 
 
-def _interval(each: Array, chains: Array) -> tuple[Array, float]:
+def replicated_interval(each: Array, chains: Array) -> tuple[Array, float]:
     """Interval of the probability that replicates ``each`` estimate, and the mean's coefficient of
     variation by their scatter (NaN for a single one); ``chains`` are their own coefficients.
 
@@ -75,7 +75,7 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
     found = design.levels(known)
     each = np.array([one.probability for one in found.repetitions])
     chains = np.array([one.variation for one in found.repetitions])
-    ends, variation = _interval(each, chains)
+    ends, variation = replicated_interval(each, chains)
     units = campaign[design.of].attrs.get("units", "1")
     sign, bound = (">", design.above) if design.above is not None else ("<", design.below)
     event = f"{design.of} {sign} {bound:g}{'' if units == '1' else f' {units}'}"

@@ -171,7 +171,8 @@ class Slot:
             if message:
                 raise InputError(str(message))
             process.ready = True
-            self._deadline = time.monotonic() + self._allowance.timeout
+            self._begin = time.monotonic()  # what it takes to start is not the run's
+            self._deadline = self._begin + self._allowance.timeout
         now = time.monotonic()
         if now < self._look:
             return None

@@ -78,6 +78,18 @@ class SubsetSimulation(Design):
         bound = self.above if self.above is not None else self.below
         return self.sign * float(bound if bound is not None else np.nan)
 
+    @property
+    def most_runs(self) -> int:
+        """Runs with all levels, without checks."""
+        chains = round(self.samples * self.share)
+        return self.replicates * (self.samples + self.most_levels * (self.samples - chains))
+
+    def runs_told(self, runs: int) -> str:
+        """How many runs the design has, in words, of so many that are known by now."""
+        if self.ended:
+            return f"{runs}, and all levels have run"
+        return f"{runs} so far: their results tell which come next; {self.most_runs} at most"
+
     def responses(self, values: Array, lost: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Array:
         """Responses of runs by the output, NaN where it has no value, and which runs were lost.
 
