@@ -1,5 +1,6 @@
 """Designs that grow with their results: which samples come next, and how well they went."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,6 +47,17 @@ def _suspects(folder: Folder, known: Array, design: SubsetSimulation) -> tuple[i
     count = min(design.check - len(near), len(found))
     chosen = np.linspace(0, len(found) - 1, count).round().astype(int)
     return tuple(np.union1d(found[chosen], near).tolist())
+
+
+def growth_told(folder: Folder) -> str:
+    """How many runs a campaign that grows has, in words; nothing of others."""
+    table = json.loads(folder.attributes.get("design", "{}"))
+    if table.get("kind") != "subset-simulation":
+        return ""
+    design = SubsetSimulation.model_validate(table)
+    if not len(folder.survey().missing):
+        design = design.knowing(_responses(folder, design))
+    return design.runs_told(folder.table.samples)
 
 
 def is_open(campaign: Campaign) -> bool:
