@@ -52,18 +52,18 @@ def replicated_interval(each: Array, chains: Array) -> tuple[Array, float]:
     A replicate is a product of many shares: its logarithm is nearly normal, and lies below that of
     the probability by half its variance on average, since its mean is exact.  That variance is
     taken from the chains, which know it better than a few replicates do; the width comes from the
-    replicates' scatter alone, or for a single one from its chains.
+    replicates' scatter, but is not less than that from their chains: few may agree by chance.
     """
     count, middle = len(each), float(each.mean())
     if not (each > 0.0).all():
         return np.full(2, np.nan), np.nan
     logs, square = np.log(each), float(np.mean(chains**2))
-    variation, half = np.nan, float(norm.ppf(0.5 + LEVEL / 2)) * square**0.5
+    variation, half = np.nan, float(norm.ppf(0.5 + LEVEL / 2)) * (square / count) ** 0.5
     if count > 1:
         variation = float(each.std(ddof=1) / middle / count**0.5)
-        half = student(count) * float(logs.std(ddof=1)) / count**0.5
+        half = max(half, student(count) * float(logs.std(ddof=1)) / count**0.5)
     ends = np.exp(logs.mean() + square / 2 + np.array([-half, half]))
-    # Replicates that agree by chance may leave the mean outside.
+    # Their mean may be outside still.
     return np.array([min(ends[0], middle), max(ends[1], middle)]), variation
 
 

@@ -126,8 +126,8 @@ def test_nor_on_a_kill(tail, bench):
 
 
 def test_runs_in_the_event_are_repeated_with_the_full_engine(bench, tail):
-    """The stand-in for it deploys a tenth of a percent later, so that all are confirmed; of the three
-    runs outside that are nearest some are in the event there.
+    """The stand-in for it deploys a tenth of a percent later, so that all are confirmed, and runs
+    outside may be in the event there.
     """
     path = write(bench)
     text = path.read_text().replace('kind = "subset', 'check = 7\nkind = "subset')

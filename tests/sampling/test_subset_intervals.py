@@ -92,8 +92,15 @@ def test_no_interval_unless_every_replicate_came_to_the_event():
     ends, variation = replicated_interval(np.array([1e-3]), np.array([0.5]))
     assert ends[0] < 1e-3 < ends[1]
     assert np.isnan(variation)
-    # Replicates that agree by chance: their mean is in the interval still.
-    ends, _ = replicated_interval(np.full(4, 1e-3), np.full(4, 0.9))
+
+
+def test_replicates_that_agree_by_chance_are_no_surer_than_their_chains():
+    ends, variation = replicated_interval(np.full(4, 1e-3), np.full(4, 0.4))
+    assert variation == 0.0
+    half = norm.ppf(0.975) * 0.4 / 2.0
+    np.testing.assert_allclose(ends, 1e-3 * np.exp(0.4**2 / 2 + np.array([-half, half])))
+    # With many of them the mean may lie outside what their logarithms say.
+    ends, _ = replicated_interval(np.full(100, 1e-3), np.full(100, 0.9))
     assert ends[0] == 1e-3
 
 
