@@ -4,7 +4,8 @@
 
 ``winding_laws.png`` from runs/winding-laws, ``sections.png`` from runs/sections-N;
 ``stalling_motor.png`` from runs/stalling-motor: the margin of the rigid ring without a standard's
-factors, against what the flexible one did.
+factors, against what the flexible one did; ``rare_asynchrony.png`` from runs/rare-asynchrony and
+runs/plain, of which it prints the table, too.
 """
 
 import math
@@ -17,9 +18,13 @@ from matplotlib.figure import Figure
 from pictures import save
 
 import ringsim
+from ringsim.analysis.binomial import share_interval
 from ringsim.analysis.campaign_samples import endings
+from ringsim.analysis.quantities import good
+from ringsim.analysis.tails import replicated_interval, subset_simulation
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import LOOKS
+from ringsim.sampling.subset_levels import Repetition, levels
 from ringsim.theory.drive import Drive
 from ringsim.theory.ideal_mechanism import Mechanism
 from ringsim.theory.resistances.family import Opening, folding, resistances
@@ -137,10 +142,104 @@ def stalling_motor(runs: Path) -> Figure:
     return figure
 
 
+def repetitions(campaign: xr.Dataset, limit: float) -> list[Repetition]:
+    """What each replicate of a campaign of subset simulation tells of a lower limit: the same runs
+    come first, whatever the limit.
+    """
+    design = subset_simulation(campaign)
+    assert design is not None
+    known = design.responses(campaign[design.of].to_numpy(), ~good(campaign))
+    of = design.levels(known).replicate[: len(known)]
+    return [
+        levels(known[of == k], design.samples, design.share, 1, limit, design.most_levels)
+        .repetitions[0]
+        for k in range(design.replicates)
+    ]  # fmt: skip
+
+
+def fitted(plain: xr.Dataset, limits: np.ndarray, most: int = 60) -> np.ndarray:
+    """Probabilities of the asynchrony above limits by a fit to the plain samples: the larger of two
+    functions of the friction of one cable's pulleys and of the other's, the same with both changed
+    over, and linear; with normal scatter as large as what it leaves.
+    """
+    upper, lower = (
+        plain[f"cables_{plane}_friction_coefficient"].to_numpy() / 4e-4 for plane in PLANES
+    )
+    values, rods = (
+        plain["asynchrony_max"].to_numpy(),
+        plain["rods_young_modulus"].to_numpy() / 12e10,
+    )
+
+    def columns(own: np.ndarray, other: np.ndarray, rods: np.ndarray) -> np.ndarray:
+        return np.column_stack([np.ones(len(own)), own, other, rods])
+
+    first = upper.sum(axis=1) > lower.sum(axis=1)
+    for _ in range(20):
+        own = np.where(first[:, None], columns(upper, lower, rods), columns(lower, upper, rods))
+        factors = np.linalg.lstsq(own, values, rcond=None)[0]
+        both = columns(upper, lower, rods) @ factors, columns(lower, upper, rods) @ factors
+        first = both[0] > both[1]
+    left = values - np.maximum(*both)
+    print(f"fit: {1.0 - left.var() / values.var():.4f} of the variance, {left.std():.3f} deg left")
+    rng, found, width = np.random.default_rng(0), np.zeros(len(limits)), np.log1p(0.25) ** 0.5
+    for _ in range(most):
+        upper, lower = np.exp(width * rng.standard_normal((2, 100_000, 8)) - width**2 / 2)
+        rods = 1.0 + 0.05 * rng.standard_normal(100_000)
+        own = np.maximum(
+            columns(upper, lower, rods) @ factors, columns(lower, upper, rods) @ factors
+        )
+        own += left.std() * rng.standard_normal(len(own))
+        found += (own[:, None] > limits).mean(axis=0) / most
+    return found
+
+
+@style.styled
+def rare_asynchrony(runs: Path) -> Figure:
+    """Probability to be above a limit: plain samples with their exact band, a fit to them, and the
+    replicates of subset simulation.
+    """
+    with xr.open_dataset(runs / "plain" / "campaign.nc") as file:
+        plain = file.isel(sample=good(file)).load()  # a campaign that was ended early has gaps
+    values = np.sort(plain["asynchrony_max"].to_numpy())
+    limits = np.array([3.2, 3.6, 3.9, 4.2, 4.6, 5.0, 5.3])
+    figure = Figure(figsize=(8.0, 4.6))
+    axes = figure.subplots()
+    above = np.arange(len(values) - 1, 0, -1)
+    band = np.array([share_interval(count, len(values)) for count in above.tolist()])
+    axes.fill_between(values[:-1], *band.T, step="post", color=style.BLUE, alpha=0.2, linewidth=0.0,
+                      label=f"{len(values)} plain samples, 95 %, exact")  # fmt: skip
+    axes.step(values[:-1], above / len(values), where="post", color=style.BLUE, linewidth=1.2)
+    grid = np.linspace(2.5, 5.6, 32)
+    fit = fitted(plain, np.append(grid, limits))
+    axes.plot(grid, fit[: len(grid)], color=style.INK, linewidth=1.0, linestyle=(0, (4, 3)),
+              label="fit to the plain samples")  # fmt: skip
+    with xr.open_dataset(runs / "rare-asynchrony" / "campaign.nc") as file:
+        rare = file.load()
+    for number, one in enumerate(repetitions(rare, float(limits[-1]))):
+        axes.plot(grid, [one.beyond(x) for x in grid], color=style.VERMILLION, linewidth=0.9,
+                  label="" if number else "subset simulation, a line a replicate")  # fmt: skip
+    for limit, fits in zip(limits.tolist(), fit[len(grid) :], strict=True):
+        found = repetitions(rare, limit)
+        each = np.array([one.probability for one in found])
+        (low, high), _ = replicated_interval(each, np.array([one.variation for one in found]))
+        count = int((values > limit).sum())
+        exact = share_interval(count, len(values))
+        print(
+            f"| {limit:g} | {count} | {count / len(values):.2g} | {exact[0]:.2g} .. {exact[1]:.2g} "
+            f"| {each.mean():.2g} | {low:.2g} .. {high:.2g} | {fits:.2g} | {each}"
+        )
+        axes.errorbar(limit, each.mean(), [[each.mean() - low], [high - each.mean()]], capsize=3,
+                      color=style.VERMILLION, marker="s", markersize=4, linewidth=1.0)  # fmt: skip
+    axes.set(yscale="log", xlabel="Largest asynchrony (degree)", ylabel="Probability of more")
+    axes.set(xlim=(2.5, 5.6), ylim=(1e-6, 1.0))
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
 def main() -> None:
     """Draw all of them."""
     runs = Path(sys.argv[1])
-    for draw in (winding_laws, sections, stalling_motor):
+    for draw in (winding_laws, sections, stalling_motor, rare_asynchrony):
         save(draw(runs), f"{draw.__name__}.png")
 
 

@@ -11,6 +11,7 @@ from ringsim.analysis.binomial import share_interval
 from ringsim.analysis.intervals import LEVEL, Array, student
 from ringsim.analysis.quantities import CHECKED, good, lost
 from ringsim.sampling.designs.subset_simulation import SubsetSimulation
+from ringsim.sampling.subset_levels import Repetition
 from ringsim.variables import Status
 
 
@@ -29,13 +30,13 @@ def _responses(campaign: xr.Dataset, design: SubsetSimulation) -> Array:
 
 def approach(campaign: xr.Dataset) -> list[tuple[Array, Array]]:
     """Of each replicate the values of the output that its levels reached, the event's last, with
-    the probability to be at or beyond each; what has no probability yet is left out.
+    the probability to be beyond each; what has no probability yet is left out.
     """
     if (design := subset_simulation(campaign)) is None:
         return []
     found = []
     for one in design.levels(_responses(campaign, design)).repetitions:
-        places, shares = [*one.thresholds], [*one.beyond]
+        places, shares = [*one.thresholds], [*one.shares]
         if one.probability > 0.0:
             places, shares = [*places, design.target], [*shares, one.probability]
         # Runs without a value are beyond all: a threshold among them has no place on an axis.
@@ -44,24 +45,37 @@ def approach(campaign: xr.Dataset) -> list[tuple[Array, Array]]:
     return found
 
 
-def tail(campaign: xr.Dataset) -> dict[str, Any]:
-    """Variables ``tail_...`` of a campaign of subset simulation; none of other campaigns.
+def replicated_interval(each: Array, chains: Array) -> tuple[Array, float]:
+    """Interval of the probability that replicates ``each`` estimate, and the mean's coefficient of
+    variation by their scatter (NaN for a single one); ``chains`` are their own coefficients.
 
-    The interval is that of the logarithm: of independent replicates Student's t from their
-    scatter; of a single one the normal limit from the correlation of its chains.
+    A replicate is a product of many shares: its logarithm is nearly normal, and lies below that of
+    the probability by half its variance on average, since its mean is exact.  That variance is
+    taken from the chains, which know it better than a few replicates do; the width comes from the
+    replicates' scatter, but is not less than that from their chains: few may agree by chance.
     """
+    count, middle = len(each), float(each.mean())
+    if not (each > 0.0).all():
+        return np.full(2, np.nan), np.nan
+    logs, square = np.log(each), float(np.mean(chains**2))
+    variation, half = np.nan, float(norm.ppf(0.5 + LEVEL / 2)) * (square / count) ** 0.5
+    if count > 1:
+        variation = float(each.std(ddof=1) / middle / count**0.5)
+        half = max(half, student(count) * float(logs.std(ddof=1)) / count**0.5)
+    ends = np.exp(logs.mean() + square / 2 + np.array([-half, half]))
+    # Their mean may be outside still.
+    return np.array([min(ends[0], middle), max(ends[1], middle)]), variation
+
+
+def tail(campaign: xr.Dataset) -> dict[str, Any]:
+    """Variables ``tail_...`` of a campaign of subset simulation; none of other campaigns."""
     if (design := subset_simulation(campaign)) is None:
         return {}
     known = _responses(campaign, design)
     found = design.levels(known)
     each = np.array([one.probability for one in found.repetitions])
     chains = np.array([one.variation for one in found.repetitions])
-    middle, count = float(each.mean()), len(each)
-    by_chains = float(np.sqrt(np.mean(chains**2) / count))
-    variation, wide = by_chains, float(norm.ppf(0.5 + LEVEL / 2))
-    if count > 1 and middle > 0:
-        variation, wide = float(each.std(ddof=1) / middle / count**0.5), student(count)
-    ends = middle * np.exp(np.array([-wide, wide]) * variation)
+    ends, variation = replicated_interval(each, chains)
     units = campaign[design.of].attrs.get("units", "1")
     sign, bound = (">", design.above) if design.above is not None else ("<", design.below)
     event = f"{design.of} {sign} {bound:g}{'' if units == '1' else f' {units}'}"
@@ -69,22 +83,15 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
     def told(words: str) -> dict[str, str]:
         return {"long_name": words, "units": "1"}
 
-    inside, both = (known > design.target) & good(campaign), np.zeros(len(known), dtype=bool)
-    again = inside & both
-    if f"{design.of}{CHECKED}" in campaign:
-        both = campaign[f"status{CHECKED}"].to_numpy() == Status.OK
-        values = campaign[f"{design.of}{CHECKED}"].to_numpy().astype(float)
-        again = inside & both & (design.responses(values, ~both) > design.target)
     return {
-        "tail_checked": (
-            (), int((inside & both).sum()), told("runs in the event repeated with the full engine"),
+        "tail_probability": (
+            (), float(each.mean()), told(f"probability of {event}") | {"event": event},
         ),
-        "tail_confirmed": ((), int(again.sum()), told("of these, runs in the event there, too")),
-        "tail_probability": ((), middle, told(f"probability of {event}") | {"event": event}),
         "tail_probability_interval": ("bound", ends, told("interval of 95 % of that probability")),
         "tail_variation": ((), variation, told("coefficient of variation of that probability")),
         "tail_variation_of_chains": (
-            (), by_chains, told("the same from the correlation of chains alone"),
+            (), float(np.sqrt(np.mean(chains**2) / len(each))),
+            told("the same from the correlation of chains alone"),
         ),
         "tail_replicate_probability": (
             "tail_replicate", each, told("probability by each replicate"),
@@ -95,32 +102,96 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
         ),
         "tail_lost": ((), int(lost(campaign).sum()), told("runs that failed: taken as no event")),
         "tail_ended": ((), int(found.ended), told("whether all levels have run")),
+        **_checks(campaign, design, known, found.repetitions, units),
+    }  # fmt: skip
+
+
+def _checks(
+    campaign: xr.Dataset,
+    design: SubsetSimulation,
+    known: Array,
+    found: list[Repetition],
+    units: str,
+) -> dict[str, Any]:
+    """What the runs repeated with the full engine say, and the probability with the limit moved by
+    what the engines differ at most: nearer, and farther.
+    """
+    inside, both = (known > design.target) & good(campaign), np.zeros(len(known), dtype=bool)
+    again, apart = both, 0.0
+    if f"{design.of}{CHECKED}" in campaign:
+        both = (campaign[f"status{CHECKED}"].to_numpy() == Status.OK) & good(campaign)
+        values = campaign[f"{design.of}{CHECKED}"].to_numpy().astype(float)
+        full = design.responses(values, ~both)
+        again, pairs = full > design.target, both & np.isfinite(full) & np.isfinite(known)
+        apart = float(np.max(np.abs(full - known), where=pairs, initial=0.0))
+    moved = [
+        float(np.mean([one.beyond(design.target + step) for one in found]))
+        for step in (apart, -apart)
+    ]
+    counts = {
+        "tail_checked": (inside & both, "runs in the event repeated with the full engine"),
+        "tail_confirmed": (inside & both & again, "of these, runs in the event there, too"),
+        "tail_checked_outside": (~inside & both, "runs outside the event repeated with it"),
+        "tail_missed": (~inside & both & again, "of these, runs in the event there"),
+    }
+    return {
+        **{
+            name: ((), int(chosen.sum()), {"long_name": words, "units": "1"})
+            for name, (chosen, words) in counts.items()
+        },
+        "tail_difference": (
+            (), apart,
+            {"long_name": f"largest difference of {design.of} by the engines", "units": units},
+        ),
+        "tail_probability_moved": (
+            "bound", np.array(moved),
+            {"long_name": "probability with the limit moved by as much", "units": "1"},
+        ),
     }  # fmt: skip
 
 
 def tail_lines(analysis: xr.Dataset) -> list[str]:
-    """The same as a sentence; none without it."""
+    """The same as sentences; none without it."""
     if "tail_probability" not in analysis:
         return []
     one = {str(n): v.to_numpy() for n, v in analysis.items() if str(n).startswith("tail_")}
     event = analysis["tail_probability"].attrs["event"]
     if not one["tail_ended"]:
         return [f"probability of {event}: not all levels have run"]
+    runs = f"{analysis.attrs['samples']} runs, {int(one['tail_lost'])} lost and taken as no event"
+    count, probability = len(one["tail_levels"]), float(one["tail_probability"])
     low, high = one["tail_probability_interval"]
-    by = f"{len(one['tail_levels'])} replicates of {one['tail_levels'].max()} levels at most"
-    line = (
-        f"probability of {event}: {float(one['tail_probability']):.3g} (95 % {low:.2g} .. "
-        f"{high:.2g}), coefficient of variation {float(one['tail_variation']):.2g} from {by}, "
-        f"{float(one['tail_variation_of_chains']):.2g} from the correlation of chains; "
-        f"{analysis.attrs['samples']} runs, {int(one['tail_lost'])} lost and taken as no event"
-    )
-    if not (checked := int(one["tail_checked"])):
-        return [line]
-    confirmed = int(one["tail_confirmed"])
-    low, high = share_interval(confirmed, checked)
-    return [
-        line,
-        f"{confirmed} of {checked} runs in the event that were repeated with the full engine are "
-        f"in it there, too (95 % {low:.2g} .. {high:.2g} of all); events that only the full engine "
-        "sees are not looked for",
+    if np.isnan(low):
+        empty = int((one["tail_replicate_probability"] == 0.0).sum())
+        return [
+            f"probability of {event}: {probability:.3g}, without an interval: {empty} of {count} "
+            f"replicates did not reach it, and {int(np.isnan(probability))} have no probability"
+            f"; {runs}"
+        ]
+    by_chains = f"{float(one['tail_variation_of_chains']):.2g} from the correlation of chains"
+    variation = f"{float(one['tail_variation']):.2g} from {count} replicates, " if count > 1 else ""
+    lines = [
+        f"probability of {event}: {probability:.3g} (95 % {low:.2g} .. {high:.2g}), coefficient of "
+        f"variation {variation}{by_chains}; {one['tail_levels'].max()} levels at most, {runs}"
     ]
+    if checked := int(one["tail_checked"]):
+        confirmed = int(one["tail_confirmed"])
+        low, high = share_interval(confirmed, checked)
+        lines.append(
+            f"{confirmed} of {checked} runs in the event that were repeated with the full engine "
+            f"are in it there, too (95 % {low:.2g} .. {high:.2g} of all)"
+        )
+    if outside := int(one["tail_checked_outside"]):
+        lines.append(
+            f"{int(one['tail_missed'])} of {outside} repeated runs outside it, the nearest ones "
+            "and those that fell short of their goal, are in it by the full engine"
+        )
+    if checked or outside:
+        farther, nearer = one["tail_probability_moved"]
+        units = analysis["tail_difference"].attrs["units"]
+        lines.append(
+            f"with the limit moved by the largest difference of the engines, "
+            f"{float(one['tail_difference']):.2g} {units}, the probability is {farther:.3g} to "
+            f"{nearer:.3g}"
+        )
+    return lines

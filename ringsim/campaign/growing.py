@@ -1,5 +1,6 @@
 """Designs that grow with their results: which samples come next, and how well they went."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,11 +37,27 @@ def grown(campaign: Campaign, path: Path) -> Campaign:
 
 
 def _suspects(folder: Folder, known: Array, design: SubsetSimulation) -> tuple[int, ...]:
-    """Runs on which the probability depends most: in the event, lost, or short of their goal."""
+    """Runs on which the probability depends most: the nearest ones outside the event, half of what
+    is wanted; of those in it, lost, or short of their goal the rest, evenly spread.
+    """
     short = ~np.isin(folder.survey().fate, (*GOALS, Fate.NONE))
     found = np.flatnonzero((known > design.target) | np.isneginf(known) | short)
-    chosen = np.linspace(0, len(found) - 1, min(design.check, len(found))).round().astype(int)
-    return tuple(found[chosen].tolist())
+    outside = np.setdiff1d(np.arange(len(known)), found)
+    near = outside[np.argsort(-known[outside], kind="stable")][: design.check // 2]
+    count = min(design.check - len(near), len(found))
+    chosen = np.linspace(0, len(found) - 1, count).round().astype(int)
+    return tuple(np.union1d(found[chosen], near).tolist())
+
+
+def growth_told(folder: Folder) -> str:
+    """How many runs a campaign that grows has, in words; nothing of others."""
+    table = json.loads(folder.attributes.get("design", "{}"))
+    if table.get("kind") != "subset-simulation":
+        return ""
+    design = SubsetSimulation.model_validate(table)
+    if not len(folder.survey().missing):
+        design = design.knowing(_responses(folder, design))
+    return design.runs_told(folder.table.samples)
 
 
 def is_open(campaign: Campaign) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.campaign.folder import opened_as
+from ringsim.campaign.growing import grown
 from ringsim.campaign.start import Order
 from ringsim.campaign.status import in_words
 from ringsim.choice import kind_of
@@ -13,12 +14,15 @@ from ringsim.execution.local import Local
 from ringsim.execution.work import Array, Work, relative_cost
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.designs.grouped import Grouped
+from ringsim.sampling.designs.subset_simulation import SubsetSimulation
 from ringsim.sampling.values import labels_of
 from ringsim.storage.journal import Survey, survey
 from ringsim.storage.result import Result, check_of, sample_of
 
 Samples = NDArray[np.int64]
 _MOST_SHOWN = 10
+_SHORT = 20.0
+"""A trial run that takes longer hardly consists of loading code, s."""
 
 
 def plan(order: Order, workers: int) -> list[str]:
@@ -28,7 +32,7 @@ def plan(order: Order, workers: int) -> list[str]:
     cost runs as a trial, and nothing of it is kept.  So is that of checks by the judging engine.
     """
     order.check()
-    campaign, share = order.campaign, order.share
+    campaign, share = grown(order.campaign, order.folder), order.share
     table = campaign.draw()
     old = opened_as(campaign, order.folder, table, order.solving)
     identity = old.attributes["identity"] if old is not None else ""
@@ -40,7 +44,7 @@ def plan(order: Order, workers: int) -> list[str]:
         f"({kind_of(design)} design), {len(todo)} to run here",
         *(
             [f"  runs           {design.runs_told(table.samples)}"]
-            if isinstance(design, Grouped)
+            if isinstance(design, Grouped | SubsetSimulation)
             else []
         ),
         f"  folder         {order.folder}",
@@ -53,6 +57,11 @@ def plan(order: Order, workers: int) -> list[str]:
         lines.append(f"  looks          {looks} (stop_when)")
     each, told = _predicted(order, table, found, todo, lambda sample: sample)
     lines += [f"  cost           {words}" for words in told]
+    most = 0.0
+    if isinstance(design, SubsetSimulation) and not design.ended:
+        done = table.samples - len(found.missing)
+        one = each.mean() if len(each) else np.nanmean(found.seconds)
+        most = float(one) * (design.most_runs - done) / workers
     if every := campaign.specification.check_every:
         checked = np.arange(0, table.samples, every)
         judged = survey(order.folder, identity, table.samples, checks=True)
@@ -68,7 +77,9 @@ def plan(order: Order, workers: int) -> list[str]:
     if not len(each):
         return [*lines, "  nothing is left to run"]
     whole = max(each.sum() / min(workers, len(each)), each.max())
-    return [*lines, f"  predicted      about {in_words(float(whole))}"]
+    checks = "; checks come on top" if getattr(design, "check", 0) else ""
+    more = f" for these, up to {in_words(most)} with all levels{checks}" if most else ""
+    return [*lines, f"  predicted      about {in_words(float(whole))}{more}"]
 
 
 def _predicted(
@@ -88,11 +99,12 @@ def _predicted(
         work = Work(
             solver=order.solving, scene=campaign.scene.to_table(),
             values_of=lambda sample: table.values_of(sample_of(sample)),
-            allowance=campaign.specification.limits, keep=kept.append, stop=lambda: "",
-            judge=order.judge,
+            allowance=campaign.specification.limits, keep=kept.append, judge=order.judge,
+            stop=lambda: "long enough" if kept and kept[0].seconds > _SHORT else "",
         )  # fmt: skip
-        Local(1).run([number(trial)], work)
-        (result,) = kept
+        # A process's first run loads code: a short one is repeated.
+        Local(1).run([number(trial)] * 2, work)
+        result = kept[-1]
         per_cost = result.seconds / cost[trial]
         basis = f"from a trial run of sample {trial}: {result.status.word}, {result.reason}"
     each = per_cost * cost[todo]

@@ -111,7 +111,7 @@ def _run_missing(campaign: Folder, choices: Choices, stop: StopRequest) -> None:
         values_of=lambda number: campaign.table.values_of(sample_of(number)) | own,
         allowance=choices.allowance, judge=campaign.attributes.get("judge", ""),
         keep=lambda result: journal.append(replace(result, overrides=own)),
-        stop=lambda: stop.reason,
+        stop=lambda: stop.reason, more=choices.more,
     )  # fmt: skip
     samples: list[int] = []
     progress = None

@@ -134,3 +134,5 @@ def _start(scheduler: Scheduler, order: Callable[[], Order], then: Callable[[Pat
         return Ended(code, first=first)
     except InputError as error:
         return Ended(refused=error, first=first)
+    finally:
+        scheduler.close()

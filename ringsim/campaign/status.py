@@ -7,6 +7,7 @@ from collections import Counter
 
 from ringsim.analysis.campaign_notes import ending_lines
 from ringsim.campaign.folder import Folder
+from ringsim.campaign.growing import growth_told
 from ringsim.campaign.stopping import End, decided, looks_of
 from ringsim.storage.locks import in_use
 from ringsim.storage.netcdf import NOT_RUN
@@ -34,7 +35,7 @@ def status_lines(campaign: Folder) -> list[str]:
     planned, end = campaign.table.samples, decided(campaign)
     if end is not None:
         campaign = campaign.first(end.samples)
-    found, now = campaign.survey(), time.time()
+    found, now, growth = campaign.survey(), time.time(), growth_told(campaign)
     left = len(found.missing)
     counts = Counter(found.status.tolist())
     words = {int(Status.OK): Status.OK.word, NOT_RUN: "not_run"}
@@ -42,6 +43,7 @@ def status_lines(campaign: Folder) -> list[str]:
         f"{campaign.attributes['campaign_name']}: {campaign.table.samples - left} of "
         f"{campaign.table.samples} samples done, {left} left",
         *_stopping(campaign, planned, end),
+        *([f"  runs           {growth}"] if growth else []),
         *(f"  {words[code]:<14} {counts[code]}" for code in words if counts[code]),
     ]
     endings = ending_lines(found.fate, found.status, lambda k: next(found.results([k])).reason)
@@ -78,7 +80,8 @@ def status_lines(campaign: Folder) -> list[str]:
         lines.append(f"  running        {len(unfinished)}: {listed}")
     if rate > 0.0:
         lines.append(f"  rate           {rate:.3g} samples/s")
-        lines.append(f"  time left      about {in_words(left / rate)}")
+        of = " for these" if growth else ""
+        lines.append(f"  time left      about {in_words(left / rate)}{of}")
     return lines
 
 

@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Sequence
-from contextlib import ExitStack, closing
 from multiprocessing.connection import wait
 
 from ringsim.execution.slot import TICK, Slot
@@ -16,24 +15,38 @@ class Local(Scheduler):
 
     def __init__(self, workers: int) -> None:
         self.workers, self.description = workers, f"{workers} local workers"
+        self._slots: list[Slot] = []
 
     def run(self, samples: Sequence[int], work: Work) -> str:
         """See :meth:`Scheduler.run`."""
-        queue = deque(samples)
-        with ExitStack() as open_slots:
-            made = (
-                Slot(work.solver, work.scene, work.allowance, work.judge)
-                for _ in range(min(self.workers, len(queue)))
-            )
-            slots = [open_slots.enter_context(closing(slot)) for slot in made]
+        queue, stands = deque(samples), False
+        try:
+            slots = self._ready(min(self.workers, len(queue)), work)
             while not work.stop():
                 for slot in slots:
                     slot.serve(queue, work)
                 busy = [slot.pipe for slot in slots if slot.busy]
                 if not busy:
+                    stands = work.more
                     break
                 wait(busy, timeout=TICK)
             return work.stop()
+        finally:
+            if not stands:
+                self.close()
+
+    def close(self) -> None:
+        """See :meth:`Scheduler.close`."""
+        while self._slots:
+            self._slots.pop().close()
+
+    def _ready(self, count: int, work: Work) -> list[Slot]:
+        """Slots that stand since the last run, if they were set up for such work, and new ones."""
+        if any(not slot.suits(work) for slot in self._slots):
+            self.close()
+        while len(self._slots) < count:
+            self._slots.append(Slot(work.solver, work.scene, work.allowance, work.judge))
+        return self._slots[:count]
 
 
 class Serial(Scheduler):

@@ -145,6 +145,10 @@ class Slot:
         self.busy = False
         self._begin = self._deadline = self._look = 0.0
 
+    def suits(self, work: Work) -> bool:
+        """Whether it is set up for the runs of this work."""
+        return tuple(self._setup.values()) == (work.solver, work.scene, work.allowance, work.judge)
+
     def submit(self, sample: int, values: dict[str, Any]) -> None:
         """Start a sample, or refuse if that cannot be done; the slot must not be busy."""
         self._begin, self._deaths = time.monotonic(), 0
@@ -167,7 +171,8 @@ class Slot:
             if message:
                 raise InputError(str(message))
             process.ready = True
-            self._deadline = time.monotonic() + self._allowance.timeout
+            self._begin = time.monotonic()  # what it takes to start is not the run's
+            self._deadline = self._begin + self._allowance.timeout
         now = time.monotonic()
         if now < self._look:
             return None

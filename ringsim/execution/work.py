@@ -60,6 +60,8 @@ class Work:
     """Tell rank 0 what goes on; results of other ranks come without their arrays."""
     judge: str = ""
     """What maps the scenes of checks to outcomes; see ``ringsim.storage.result.check_of``."""
+    more: bool = False
+    """Whether such work may follow: solver processes of this machine then stand ready for it."""
 
 
 class Scheduler:
@@ -77,6 +79,9 @@ class Scheduler:
     def run(self, samples: Sequence[int], work: Work) -> str:
         """Run rank 0's samples, first ones first; returns why it stopped before the end, if so."""
         raise NotImplementedError
+
+    def close(self) -> None:
+        """End what stands ready for further work."""
 
     def from_first(self, value: _T) -> _T:
         """The value of rank 0, on all ranks."""

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import numpy as np
 import xarray as xr
 
 from ringsim.analysis.binomial import share_interval
@@ -29,19 +30,19 @@ def rare_event(campaign: xr.Dataset) -> RareEvent | None:
         return RareEvent(rows, ["Not all levels have run: there is no probability yet"])
     low, high = found["tail_probability_interval"].to_numpy()
     each = ", ".join(f"{p:.2g}" for p in found["tail_replicate_probability"].to_numpy())
+    by_chains = f"{float(found['tail_variation_of_chains']):.2g} by the chains alone"
+    scatter = f"{float(found['tail_variation']):.2g} by the replicates, "
     rows += [
         ["probability", f"{float(found['tail_probability']):.3g}"],
-        ["95 % interval", f"{low:.2g} to {high:.2g}"],
-        [
-            "coefficient of variation",
-            f"{float(found['tail_variation']):.2g} by the replicates, "
-            f"{float(found['tail_variation_of_chains']):.2g} by the chains alone",
-        ],
+        ["95 % interval", "none" if np.isnan(low) else f"{low:.2g} to {high:.2g}"],
+        ["coefficient of variation", f"{scatter if replicates > 1 else ''}{by_chains}"],
         ["by each replicate", each],
         ["levels", f"{levels} at most, in {replicates} replicates"],
         ["runs", f"{runs}, {lost} lost and taken as no event"],
     ]
     notes = []
+    if np.isnan(low):
+        notes.append("Not every replicate reached the event: raise samples or most_levels")
     if checked := int(found["tail_checked"]):
         confirmed = int(found["tail_confirmed"])
         low, high = share_interval(confirmed, checked)
@@ -49,5 +50,17 @@ def rare_event(campaign: xr.Dataset) -> RareEvent | None:
             "in the event by the full engine, too",
             f"{confirmed} of {checked} repeated runs (95 %: {low:.2g} to {high:.2g} of all)",
         ])  # fmt: skip
-        notes.append("Events that only the full engine sees are not looked for")
+    if outside := int(found["tail_checked_outside"]):
+        rows.append([
+            "in the event by the full engine alone",
+            f"{int(found['tail_missed'])} of the {outside} nearest runs outside it",
+        ])  # fmt: skip
+    if checked or outside:
+        apart = found["tail_difference"]
+        farther, nearer = found["tail_probability_moved"].to_numpy()
+        rows.append([
+            f"probability with the limit moved by {float(apart):.2g} {apart.attrs['units']}, what "
+            "the engines differ by",
+            f"{farther:.3g} to {nearer:.3g}",
+        ])  # fmt: skip
     return RareEvent(rows, notes)

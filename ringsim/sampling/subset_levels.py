@@ -5,7 +5,9 @@ these few, chains of candidates start.  A candidate keeps a part of its parent i
 space and draws the rest anew, so that it is distributed as the inputs are; the chain moves there
 if it is beyond the threshold, else it stays.
 Sources: Au and Beck, Probabilistic Engineering Mechanics 16 (2001), levels and coefficient of
-variation; Papaioannou, Betz, Zwirglmaier and Straub, ibid. 41 (2015), conditional sampling.
+variation; Papaioannou, Betz, Zwirglmaier and Straub, ibid. 41 (2015), conditional sampling;
+Brehier, Gazeau, Goudenege, Lelievre and Rousset, Annals of Applied Probability 26 (2016), where
+thresholds must lie for the mean of the probability to be exact.
 """
 
 from collections.abc import Generator, Sequence
@@ -50,8 +52,18 @@ class Repetition:
     """Coefficient of variation by the correlation within chains; too small if levels depend."""
     thresholds: list[float] = field(default_factory=list)
     """Of the levels passed."""
-    beyond: list[float] = field(default_factory=list)
-    """Probability of a response at or above each of them."""
+    shares: list[float] = field(default_factory=list)
+    """Probability of a response beyond each of them."""
+    states: list[Array] = field(default_factory=list)
+    """Responses of every level, the first without a threshold; those of a chain may be equal."""
+
+    def beyond(self, response: float) -> float:
+        """Probability of a response beyond this one; NaN if there is none yet."""
+        if np.isnan(self.probability):
+            return np.nan
+        passed = int(np.searchsorted(self.thresholds, response, side="right"))
+        before = self.shares[passed - 1] if passed else 1.0
+        return before * float((self.states[passed] > response).mean())
 
 
 @dataclass
@@ -118,27 +130,34 @@ def _simulation(
     length = round(1.0 / share)
     chains = samples // length
     here, response = yield Batch(np.full(samples, -1), 1.0, 0)
-    probability, squares, anew = 1.0, 0.0, _FIRST
+    probability, squares, anew, before = 1.0, 0.0, _FIRST, -np.inf
     for level in range(most + 1):
-        seeds = np.argsort(-response, kind="stable")[:chains]
-        bound = float(response[seeds[-1]])
+        found.states.append(response)
+        # The highest response outside the share, and those that equal it stay outside.  With the
+        # lowest inside, as in most texts, each level adds a share of 1 / (chains - 1) on average.
+        bound = float(np.sort(response)[-chains - 1])
         beyond = response > target
-        last = beyond.sum() >= chains or level == most
-        inside = beyond if last else response >= bound
+        last = beyond.sum() > chains or level == most
+        inside = beyond if last else response > bound
         if not last and bound == -np.inf:
             return  # too few samples tell anything
+        if not last and not inside.any():  # all of the best are equal: they go on together
+            bound = float(np.max(response, where=response < bound, initial=before))
+            inside = response > bound
         probability *= float(inside.mean())
         squares += _variance(inside, chains if level else samples)
         if last:
             found.probability, found.variation = probability, float(np.sqrt(squares))
             return
         found.thresholds.append(bound)
-        found.beyond.append(probability)
+        found.shares.append(probability)
+        before = bound
+        seeds = np.resize(np.flatnonzero(inside), chains)
         states, values = here[seeds], response[seeds]
         course, heights = [states], [values]
         for step in range(1, length):
             numbers, candidates = yield Batch(states, anew, level + 1)
-            moved = candidates >= bound
+            moved = candidates > bound
             states, values = np.where(moved, numbers, states), np.where(moved, candidates, values)
             course.append(states)
             heights.append(values)

@@ -8,12 +8,14 @@ import subprocess
 import sys
 import textwrap
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from ringsim.execution.local import Local
 from ringsim.execution.slot import Slot
-from ringsim.execution.work import Allowance
+from ringsim.execution.work import Allowance, Work
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 from ringsim.variables import Status
@@ -60,6 +62,27 @@ def test_process_is_kept_for_the_next_sample(slots):
     first, second = result_of(slot, 3), result_of(slot, 4)
     assert (first.sample, second.sample) == (3, 4)
     assert process_of(first) == process_of(second) != os.getpid()
+
+
+def test_processes_stand_ready_while_more_work_follows(monkeypatch):
+    """Batches of a design that grows: one process for all of them, and none is left behind."""
+    monkeypatch.syspath_prepend(str(HERE))
+    local, kept = Local(1), []
+    for more in (True, True, False, False):
+        work = Work(
+            "slot_solver:run", BASE.to_table(), lambda sample: {}, Allowance(), kept.append,
+            stop=lambda: "", more=more,
+        )  # fmt: skip
+        assert local.run([len(kept)], work) == ""
+    first, second, third, fourth = (process_of(result) for result in kept)
+    assert first == second == third != fourth
+    for process in (first, fourth):
+        with pytest.raises(ProcessLookupError):
+            os.kill(process, 0)
+    local.run([4], replace(work, more=True))
+    local.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(process_of(kept[-1]), 0)
 
 
 def test_process_is_replaced_after_its_share_of_runs(slots):

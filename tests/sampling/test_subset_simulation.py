@@ -52,21 +52,6 @@ def test_a_linear_limit_is_found(exact):
     assert 0.5 < stated / (error / each.mean()) < 2.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("exact", [1e-3, 1e-5])
-def test_the_mean_of_many_is_exact_and_intervals_cover(exact):
-    beta, inside, means = -norm.ppf(exact), [], []
-    for seed in range(40):
-        found, _ = simulate(design(beta, samples=500, replicates=8), linear, seed)
-        each = np.array([one.probability for one in found])
-        variation = each.std(ddof=1) / each.mean() / 8**0.5
-        ends = each.mean() * np.exp(np.array([-2.365, 2.365]) * variation)
-        inside.append(ends[0] <= exact <= ends[1])
-        means.append(each.mean())
-    assert abs(np.mean(means) - exact) < 4.0 * np.std(means) / 40**0.5
-    assert sum(inside) >= 33  # of 40 at 95 %: fewer once in a thousand times
-
-
 def test_a_limit_with_two_sides_and_one_below_are_found():
     """Twice the tail of a normal variable, from both sides at once; and a lower tail."""
     exact = 2.0 * ndtr(-3.5)

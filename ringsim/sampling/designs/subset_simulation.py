@@ -40,8 +40,9 @@ class SubsetSimulation(Design):
     most_levels: Annotated[int, Field(ge=1, le=30)] = 8
     """Levels after which nothing rarer is looked for."""
     check: Annotated[int, Field(ge=0)] = 0
-    """Runs in the event, lost ones and those that fall short of their goal that are repeated with
-    the full model in the end: so many of them at most, evenly spread over all."""
+    """So many runs at most are repeated with the full model in the end: half of them are those
+    outside the event that are nearest to it; the others are in the event, lost, or short of their
+    goal, evenly spread over all."""
     _known: Array = PrivateAttr(default_factory=lambda: np.empty(0))
 
     @model_validator(mode="after")
@@ -76,6 +77,18 @@ class SubsetSimulation(Design):
         """Response beyond which the event is."""
         bound = self.above if self.above is not None else self.below
         return self.sign * float(bound if bound is not None else np.nan)
+
+    @property
+    def most_runs(self) -> int:
+        """Runs with all levels, without checks."""
+        chains = round(self.samples * self.share)
+        return self.replicates * (self.samples + self.most_levels * (self.samples - chains))
+
+    def runs_told(self, runs: int) -> str:
+        """How many runs the design has, in words, of so many that are known by now."""
+        if self.ended:
+            return f"{runs}, and all levels have run"
+        return f"{runs} so far: their results tell which come next; {self.most_runs} at most"
 
     def responses(self, values: Array, lost: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Array:
         """Responses of runs by the output, NaN where it has no value, and which runs were lost.

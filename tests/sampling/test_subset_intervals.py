@@ -1,0 +1,134 @@
+"""Small subset simulations: their mean is exact, and their intervals hold the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import binom, norm
+
+from ringsim.analysis.binomial import share_interval
+from ringsim.analysis.tails import replicated_interval
+from ringsim.cable.friction.bearing import BearingFriction
+from ringsim.sampling.subset_levels import Answer, Repetition, _simulation
+from ringsim.scene import load_scene
+from ringsim.theory.drive import Drive
+from ringsim.theory.ideal_mechanism import Mechanism
+from ringsim.theory.resistances.family import folding
+
+AXES = 18
+
+
+def simulated(response, rng, *, target, samples, share=0.1, axes=AXES):
+    """One simulation of a response of points in standard normal space, shape (n, axes)."""
+    found, points = Repetition(), np.empty((0, axes))
+    simulation = _simulation(found, samples, share, target, 12)
+    batch = next(simulation)
+    while True:
+        new = batch.anew * rng.standard_normal((len(batch.parents), axes))
+        if batch.parents[0] >= 0:
+            new += np.sqrt(1.0 - batch.anew**2) * points[batch.parents]
+        numbers, points = np.arange(len(points), len(points) + len(new)), np.vstack([points, new])
+        try:
+            batch = simulation.send(Answer(numbers, response(new)))
+        except StopIteration:
+            return found
+
+
+def linear(points):
+    return points.sum(axis=1) / points.shape[1] ** 0.5
+
+
+@pytest.mark.parametrize(
+    ("exact", "samples", "replicates", "campaigns"),
+    [
+        (1e-3, 100, 8, 100),
+        pytest.param(1e-3, 500, 4, 300, marks=pytest.mark.slow),
+        pytest.param(1e-5, 100, 4, 300, marks=pytest.mark.slow),
+        pytest.param(1e-5, 100, 16, 300, marks=pytest.mark.slow),
+        pytest.param(1e-5, 500, 8, 300, marks=pytest.mark.slow),
+    ],
+)
+def test_the_mean_is_exact_and_intervals_hold_the_truth(exact, samples, replicates, campaigns):
+    """Thresholds at the lowest response inside the share would add 24 % (1e-3) and 67 % (1e-5) to
+    the mean of levels of 100, and 16 replicates would hold the truth in 67 of 100 campaigns.
+    """
+    rng, target = np.random.default_rng(0), -norm.ppf(exact)
+    found = [
+        [simulated(linear, rng, target=target, samples=samples) for _ in range(replicates)]
+        for _ in range(campaigns)
+    ]
+    each = np.array([[one.probability for one in many] for many in found])
+    chains = np.array([[one.variation for one in many] for many in found])
+    # What is left, by the correlation within chains, is some 5 % at 1e-5.
+    assert abs(each.mean() / exact - 1.0) < 0.05 + 4.0 * each.std() / exact / each.size**0.5
+    ends = np.array([replicated_interval(*both)[0] for both in zip(each, chains, strict=True)])
+    held = int(((ends[:, 0] <= exact) & (exact <= ends[:, 1])).sum())
+    # Of intervals that hold it in 92 % or more, fewer do once in a thousand times.
+    assert held >= binom.ppf(1e-3, campaigns, 0.92), held
+
+
+def test_equal_responses_at_a_threshold_go_on_together():
+    """A response of a few values only: 3 with probability 1e-3, 2 with 0.02, 1 with 0.2."""
+    limits = norm.isf([0.2, 0.02, 1e-3])
+    rng = np.random.default_rng(1)
+    found = [
+        simulated(
+            lambda points: np.searchsorted(limits, points[:, 0]).astype(float), rng,
+            target=2.5, samples=200, axes=2,
+        )
+        for _ in range(40)
+    ]  # fmt: skip
+    each = np.array([one.probability for one in found])
+    assert abs(each.mean() - 1e-3) < 4.0 * each.std() / 40**0.5
+    for one in found:
+        assert one.beyond(2.5) == one.probability
+        assert one.beyond(-1.0) == 1.0
+        assert (np.diff(one.thresholds) >= 0.0).all()
+
+
+def test_no_interval_unless_every_replicate_came_to_the_event():
+    ends, _ = replicated_interval(np.array([1e-3, 0.0]), np.array([0.5, np.inf]))
+    assert np.isnan(ends).all()
+    ends, variation = replicated_interval(np.array([1e-3]), np.array([0.5]))
+    assert ends[0] < 1e-3 < ends[1]
+    assert np.isnan(variation)
+
+
+def test_replicates_that_agree_by_chance_are_no_surer_than_their_chains():
+    ends, variation = replicated_interval(np.full(4, 1e-3), np.full(4, 0.4))
+    assert variation == 0.0
+    half = norm.ppf(0.975) * 0.4 / 2.0
+    np.testing.assert_allclose(ends, 1e-3 * np.exp(0.4**2 / 2 + np.array([-half, half])))
+    # With many of them the mean may lie outside what their logarithms say.
+    ends, _ = replicated_interval(np.full(100, 1e-3), np.full(100, 0.9))
+    assert ends[0] == 1e-3
+
+
+def test_brute_force_agrees_on_the_drive_of_a_ring_whose_pulleys_differ():
+    """Statics of a cable of ``ring18-motor``: what scatter of 53 bearings leaves of its drive."""
+    scene = load_scene("ring18-motor")
+    mechanism, cable = Mechanism(scene), scene.cables.upper
+    reeved, _ = Drive(scene, mechanism).reeved(folding(mechanism, scene.structure.coordinate))
+
+    def lost(points):
+        """Share of the drive that pulleys take, each sample with a friction of its own each."""
+        coefficients = 4e-4 * np.exp(0.6 * points)
+        laws = [BearingFriction(coefficient=tuple(each)) for each in coefficients.tolist()]
+        decays = [law.log_decay(reeved.angles, cable.pulley_radius) for law in laws]
+        left = np.exp(np.cumsum(np.pad(decays, ((0, 0), (1, 0))), axis=1))
+        return 1.0 - left @ reeved.shortening / reeved.shortening.sum()
+
+    pulleys, limit = len(reeved.angles), 0.81
+    brute = lost(np.random.default_rng(5).standard_normal((4000, pulleys)))
+    low, high = share_interval(int((brute > limit).sum()), len(brute))
+    assert 0.03 < (brute > limit).mean() < 0.08
+    rng = np.random.default_rng(6)
+    found = [
+        simulated(lost, rng, target=limit, samples=80, share=0.25, axes=pulleys) for _ in range(8)
+    ]
+    each = np.array([one.probability for one in found])
+    ends, _ = replicated_interval(each, np.array([one.variation for one in found]))
+    assert max(low, ends[0]) < min(high, ends[1])
+    assert abs(each.mean() - (brute > limit).mean()) < 4.0 * np.hypot(
+        each.std(ddof=1) / 8**0.5, (0.05 / 4000) ** 0.5
+    )
