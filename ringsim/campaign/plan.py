@@ -78,8 +78,8 @@ def plan(order: Order, workers: int) -> list[str]:
         return [*lines, "  nothing is left to run"]
     whole = max(each.sum() / min(workers, len(each)), each.max())
     checks = "; checks come on top" if getattr(design, "check", 0) else ""
-    more = f" for these, up to {in_words(most)} with all levels{checks}" if most else ""
-    return [*lines, f"  predicted      about {in_words(float(whole))}{more}"]
+    rest = f" for these, up to {in_words(most)} with all levels{checks}" if most else ""
+    return [*lines, f"  predicted      about {in_words(float(whole))}{rest}"]
 
 
 def _predicted(
