@@ -111,7 +111,7 @@ class _Told:
 
 def main() -> None:
     """Entry point of the command ``ringsim``."""
-    sys.stdout = _Told(sys.stdout)  # type: ignore[assignment]
+    sys.stdout = _Told(sys.stdout)
     # Before numpy is loaded: its matrices are small here, and threads that wait for each other
     # cost half as much again as the run.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
