@@ -90,7 +90,10 @@ def read_state(path: str | Path, at: float | None = None) -> StoredState:
         )
     number = len(times) - 1 if at is None else int(np.argmin(np.abs(times - at)))
     if at is not None and not abs(times[number] - at) <= _SAME * max(at, 1.0):
-        raise InputError(f"--at {at:g}: {path} holds no state at that time; it has {_told(times)}")
+        raise InputError(
+            f"--at {at:g}: {path} holds no state at that time; it has {_told(times)}: take --at "
+            f"{times[number]:.6g}"
+        )
     numbers = state.to_numpy()
     cuts = [0, *data["state_begin"].to_numpy().tolist(), len(numbers)]
     form, own = str(data["state_form"].to_numpy()[number]), slice(*cuts[number + 1 : number + 3])

@@ -11,6 +11,8 @@ from ringsim.outputs.peaks import ties, with_ties
 _POINTS = 8
 """Points in each step at which the largest spread is looked for: a parabola rises above the largest
 of so many by at most a 64th of what it rises above the chord of the step."""
+_TOLD = 5e-5
+"""Below this it is told as 0.0000 deg, and nobody is behind."""
 
 
 class Asynchrony(Output):
@@ -62,9 +64,9 @@ class Asynchrony(Output):
         return values
 
     def told(self, values: Values, span_names: SpanNames) -> str:
-        """As "at 16.1 s: upper 10 behind lower 2"; empty if all joints open alike."""
+        """As "at 16.1 s: upper 10 behind lower 2"; empty if all joints are told alike."""
         known = str(values.get("asynchrony_leader_plane", ""))
-        if not (known and values["asynchrony_max"] > 0.0):
+        if not (known and values["asynchrony_max"] >= _TOLD):
             return ""
         time, size = (float(values[f"asynchrony_max{end}"]) for end in ("_time", ""))
         joints, dims = list[str](), ("plane", "section")

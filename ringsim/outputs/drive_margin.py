@@ -1,6 +1,8 @@
 """Drive and resistance by kind along a run, and the margin between them by a standard."""
 
-from ringsim.outputs.family import Output, Run, Series, Values, Variable
+import math
+
+from ringsim.outputs.family import Output, Run, Series, SpanNames, Values, Variable
 
 LAST_LOCK = "deployment_time"
 """What is open needs no drive any more."""
@@ -38,6 +40,13 @@ class DriveMargins(Output):
         Variable("least_drive_margin_time", (), "s", "time of the smallest margin of the drive"),
         Variable("least_drive_margin_angle", (), "degree", "mean opening angle then"),
     )  # fmt: skip
+
+    def told(self, values: Values, span_names: SpanNames) -> str:
+        """As "at 20.5 deg and 0.1 s: NOT enough"."""
+        names = [f"least_drive_margin{end}" for end in ("", "_angle", "_time")]
+        margin, angle, time = (float(values.get(name, math.nan)) for name in names)
+        word = "enough" if margin >= 0.0 else "NOT enough"
+        return f"at {angle:.4g} deg and {time:.4g} s: {word}"
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Nothing: ``ringsim.theory.drive_margin`` knows them."""

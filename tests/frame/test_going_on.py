@@ -162,7 +162,9 @@ def test_what_cannot_go_on_is_refused_with_the_cure(tmp_path: Path) -> None:
             simulate(scene.with_values(values), start=start)
     with pytest.raises(InputError, match=r'"full": .* of the engine "frame".*"frame"'):
         simulate(scene.with_values({"record.state_interval": "none"}), "full", start=start)
-    with pytest.raises(InputError, match=r"--at 0.015: .* it has 0.01, 0.02, 0.03 s"):
+    with pytest.raises(
+        InputError, match=r"--at 0.015: .* it has 0.01, 0.02, 0.03 s: take --at 0.0[12]"
+    ):
         read_state(file, 0.015)
     ended = _ended(tmp_path)
     with pytest.raises(InputError, match="same: take an earlier state"):

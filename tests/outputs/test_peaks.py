@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from ringsim.cli import cli
 from ringsim.outputs.asynchrony import Asynchrony
 from ringsim.outputs.cable_tension import CableTension
+from ringsim.outputs.drive_margin import DriveMargins
 from ringsim.outputs.family import axes
 from ringsim.outputs.net_tension import NetTension
 from ringsim.outputs.rod_stress import RodStress
@@ -147,6 +148,15 @@ def test_stresses_and_joints_that_are_alike_are_told_together() -> None:
     values = axes(TRUSS) | {"opening_angle": np.degrees(run.angles.on_grid(run.rates.values))}
     told = Asynchrony().told(values | Asynchrony().reduce(run, series), {})
     assert told == "at 2 s: upper and lower 1 behind upper and lower 2"
+    alike = Asynchrony().reduce(run, series) | {"asynchrony_max": 4e-5}
+    assert Asynchrony().told(values | alike, {}) == ""
+
+
+@pytest.mark.parametrize(("margin", "word"), [(-0.2, "NOT enough"), (0.0, "enough")])
+def test_the_least_margin_is_told_with_its_angle_and_verdict(margin: float, word: str) -> None:
+    least = {"least_drive_margin": margin, "least_drive_margin_angle": 21.25}
+    told = DriveMargins().told(least | {"least_drive_margin_time": 0.5}, {})
+    assert told == f"at 21.25 deg and 0.5 s: {word}"
 
 
 def test_the_summary_of_a_run_tells_both_planes() -> None:
