@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 from tabulate import DataRow, TableFormat, tabulate
 
@@ -25,6 +26,18 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     sides = ["left", *["right"] * (len(head) - 1)]
     text = tabulate(list(rows), head, "simple", disable_numparse=True, colalign=sides)
     return str(text).splitlines()
+
+
+class Table(NamedTuple):
+    """A table, for terminals and pages alike, and what is to be said below it."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    notes: Sequence[str] = ()
+
+    def lines(self) -> list[str]:
+        """The table as text; notes alone if it has no rows."""
+        return [*(text_table(self.head, self.rows) if self.rows else ()), *self.notes]
 
 
 def number_text(value: float, digits: int = 4) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Sequence
 
 import numpy as np
@@ -26,8 +27,9 @@ design = {{ kind = "{kind}", samples = {samples} }}
 "structure.sections" = 4
 boom = "none"
 [requirements]
-asynchrony_max = {{ max = 3.0, probability = 0.9 }}
-outcome = {{ is = "deployed", probability = 0.9 }}
+asynchrony_max = {{ max = 3.0, probability = 0.9, confidence = 0.9 }}
+deployment_time = {{ max = 40.0, probability = 0.5, confidence = 0.9 }}
+outcome = {{ is = "deployed", probability = 0.9, confidence = 0.9 }}
 """
 
 
@@ -101,8 +103,9 @@ def made_campaign(
         says = {"role": "input", "path": path, "units": units, "distribution": law}
         found[name] = (dims, values, says)
     text = TEXT.format(kind=kind, samples=samples)
-    found.attrs |= {"campaign": text, "campaign_name": "made", "title": "Made by hand <&> quoted",
-                    "seed": 3}  # fmt: skip
+    wanted = json.dumps(tomllib.loads(text)["requirements"])
+    found.attrs |= {"campaign": text, "requirements": wanted, "campaign_name": "made",
+                    "title": "Made by hand <&> quoted", "seed": 3}  # fmt: skip
     return found
 
 

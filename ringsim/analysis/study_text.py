@@ -18,7 +18,7 @@ from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
 from ringsim.analysis.tails import tail, tail_lines
 from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.refusal import InputError
-from ringsim.tables import interval_text, number_text, text_table
+from ringsim.tables import Table, interval_text, number_text, text_table
 
 
 def told(analysis: xr.Dataset) -> list[str]:
@@ -27,13 +27,10 @@ def told(analysis: xr.Dataset) -> list[str]:
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
     lines += [*filter(None, [analysis.attrs["stopping"]]), *tail_lines(analysis)]
-    parts = (
-        _requirements, _outcomes, _outputs, _errors, sensitivity_lines, influence_lines,
-        reweighting_lines,
-    )  # fmt: skip
-    for part in parts:
-        if more := list(part(analysis)):
-            lines += ["", *more]
+    written = (_outcomes, _outputs, _errors, sensitivity_lines, influence_lines, reweighting_lines)
+    for part in (verdict_table(analysis).lines(), *(list(each(analysis)) for each in written)):
+        if part:
+            lines += ["", *part]
     return lines
 
 
@@ -49,14 +46,13 @@ def verdict_lines(campaign: xr.Dataset) -> list[str]:
         found = judge(population_of(campaign), read_requirements(own, "requirements"), placed)
     except InputError as error:
         return [*lines, f"the requirements cannot be judged: {error}"]
-    return [*lines, *_requirements(found)]
+    return [*lines, *verdict_table(found).lines()]
 
 
-def _requirements(analysis: xr.Dataset) -> Iterator[str]:
-    if "requirement" not in analysis.dims:
-        return
+def verdict_table(analysis: xr.Dataset) -> Table:
+    """The verdicts, a row a requirement; no rows without requirements."""
     rows, notes = [], list[str]()
-    for name in analysis["requirement"].values:
+    for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
         one = {str(n): v.item() for n, v in analysis.sel(requirement=name).items() if not v.dims}
         verdict, worst = Verdict(one["verdict"]), Verdict(one["verdict_worst_case"])
         further = one["further_samples"]
@@ -78,8 +74,7 @@ def _requirements(analysis: xr.Dataset) -> Iterator[str]:
         "requirement", "probability", "confidence", "verdict", "estimate", "one-sided bounds",
         "used", "violating", "lost", "if lost ones violate", "further",
     )  # fmt: skip
-    yield from text_table(head, rows)
-    yield from notes
+    return Table(head, rows, notes)
 
 
 def _words(verdict: Verdict) -> str:

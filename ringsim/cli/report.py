@@ -15,7 +15,7 @@ from ringsim.refusal import InputError
 @click.option("--out", metavar="FILE", type=PATH, default=Path("report.html"), show_default=True)
 @click.option(
     "--analysis", metavar="FILE", type=PATH,
-    help="File of ringsim analyse --out with what to show instead of today's verdicts and indices.",
+    help="File of ringsim analyse --out with what to show instead of an analysis of today.",
 )  # fmt: skip
 def command(folder: Path, out: Path, analysis: Path | None) -> None:
     """Write one page about the campaign in DIR, which holds campaign.nc, or about such a file.
@@ -43,17 +43,13 @@ def _write(campaign: Any, file: Path, out: Path, analysis: Path | None) -> None:
 
     if "sample" not in campaign.dims or not {"scene", "campaign"} <= campaign.attrs.keys():
         raise InputError(f"{file}: holds no campaign: give the folder that ringsim campaign named")
-    if analysis is not None:
-        judged = _load(analysis)
-    else:
-        from ringsim.analysis.study import analyse
-
-        judged = analyse(campaign)
-    if analysis is not None and not {"requirement", "output"} & set(judged.dims):
+    known = None if analysis is None else _load(analysis)
+    if known is not None and "statistic" not in known.dims:
         raise InputError(
-            f"--analysis {analysis}: holds neither verdicts nor what matters: leave it out"
+            f"--analysis {analysis}: holds no analysis: give what ringsim analyse --out has "
+            "written, or leave it out"
         )
-    size = write_report(campaign, out, str(file.parent), judged)
+    size = write_report(campaign, out, str(file.parent), known)
     click.echo(f"wrote {out} ({size / 1e6:.2f} MB)")
     if size > LARGEST:
         click.echo(f"{out}: larger than {LARGEST / 1e6:g} MB, the size it is meant to have")

@@ -11,6 +11,8 @@ from ringsim.analysis.campaign_samples import campaign_file, endings
 from ringsim.analysis.design import placement
 from ringsim.analysis.quantities import good
 from ringsim.analysis.stopping import stopping_lines
+from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import verdict_table
 from ringsim.files import write_text
 from ringsim.plots.campaign.figures import figures_of
 from ringsim.plots.inline import inline
@@ -39,9 +41,9 @@ def write_report(
 def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) -> str:
     """The page as text: nothing in it refers to another file or address.
 
-    Verdicts on requirements are those of ``analysis``, along ``requirement``, and so is what
-    matters, along ``output``; the page itself only counts.
+    All statistics are those of ``analysis``, what ``analyse`` gives, by default of today.
     """
+    analysis = analyse(campaign) if analysis is None else analysis
     wanted = campaign_file(campaign)
     failures, more = tables.failures(campaign, folder)
     values, head = model.values(campaign)
@@ -66,7 +68,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "outcomes": tables.outcomes(campaign), "tail": rare_event(campaign),
         "statistics": statistics, "statistics_head": head_of_statistics,
         "no_population": "" if placed.population or not placed.kind else placed.told,
-        "requirements": tables.requirements(campaign), "verdicts": tables.verdicts(analysis),
+        "verdicts": verdict_table(analysis),
         "matters": what_matters(analysis), "peaks": peak_lines(campaign), "stopping": stopping,
         "figures": figures, "player": player(campaign), "failures": failures, "more": more,
         "truth": tables.truth(campaign), "notes": notes, "inputs": tables.drawn(campaign),

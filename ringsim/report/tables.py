@@ -13,12 +13,11 @@ from ringsim.analysis.campaign_samples import (
     distribution_of,
     endings,
     inputs,
-    requirements_of,
     scalars,
     values_of,
 )
 from ringsim.analysis.design import placement
-from ringsim.analysis.quantities import CHECKED, good
+from ringsim.analysis.quantities import CHECKED
 from ringsim.refusal import show
 from ringsim.variables import GOALS, Cause
 
@@ -63,53 +62,6 @@ def statistics(campaign: xr.Dataset) -> tuple[list[str], Rows]:
             f"{number(values[low])} ({samples[low]})", f"{number(values[high])} ({samples[high]})",
         ])  # fmt: skip
     return [*_HEAD, *(_MOMENTS if moments else []), *_EXTREMES], rows
-
-
-def requirements(campaign: xr.Dataset) -> Rows:
-    """Number, what is asked, met by how many of those that tell, and how many do not."""
-    rows = []
-    for name, wanted in requirements_of(campaign).items():
-        if "is" in wanted:
-            words, asked = endings(campaign), wanted["is"]
-            asked = [asked] if isinstance(asked, str) else asked
-            told = words[good(campaign)]
-            met, known = int(np.isin(told, [w.replace("_", " ") for w in asked]).sum()), len(told)
-        elif name in campaign:
-            values = values_of(campaign, name)[1]
-            low, high = wanted.get("min", -np.inf), wanted.get("max", np.inf)
-            met, known = int(((low <= values) & (values <= high)).sum()), len(values)
-        else:
-            met = known = 0
-        asked = ", ".join(f"{key} {value}" for key, value in wanted.items())
-        left = campaign.sizes["sample"] - known
-        rows.append([name, asked, f"{met} of {known}", str(left)])
-    return rows
-
-
-def verdicts(analysis: xr.Dataset | None) -> Rows:
-    """Requirement, verdict, estimate, bounds, counts, of what ``ringsim analyse --out`` wrote."""
-    if analysis is None or "requirement" not in analysis.dims:
-        return []
-    rows = []
-    for place in range(analysis.sizes["requirement"]):
-        one = {str(n): v.item() for n, v in analysis.isel(requirement=place).items() if not v.dims}
-        rows.append([
-            str(one["requirement_text"]),
-            f"{one['probability_required']:g} with confidence {one['confidence_required']:g}",
-            _flag(analysis["verdict"], one["verdict"]), number(one["probability"]),
-            f"{number(one['probability_lower'])} to {number(one['probability_upper'])}",
-            str(one["samples_used"]), str(one["samples_violating"]), str(one["samples_lost"]),
-            _flag(analysis["verdict_worst_case"], one["verdict_worst_case"]),
-            str(one["further_samples"]) if one["further_samples"] > 0 else "-",
-        ])  # fmt: skip
-    return rows
-
-
-def _flag(variable: xr.DataArray, code: int) -> str:
-    """The word of a code, by the CF attributes of its variable."""
-    codes = np.atleast_1d(variable.attrs["flag_values"]).tolist()
-    word: str = str(variable.attrs["flag_meanings"]).split()[codes.index(code)]
-    return word.replace("_", " ")
 
 
 def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:

@@ -14,6 +14,7 @@ import xarray as xr
 from click.testing import CliRunner
 from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_positions
 
+from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
@@ -22,6 +23,7 @@ from ringsim.plots.ring import lines_at
 from ringsim.report import tables
 from ringsim.report.page import LARGEST, page
 from ringsim.report.player import player
+from ringsim.report.sensitivity import what_matters
 from ringsim.shapes import COMPUTED, FROM_ANGLES
 
 VOID = {"meta", "br", "img", "input", "link", "hr"}
@@ -120,11 +122,8 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
     at = next(k for k, cell in enumerate(cells) if cell.startswith("largest tension"))
     assert cells[at + 1 : at + 5] == ["N", "5", "3", f"{good.mean():.5g}"]
     assert cells[at + 9 : at + 11] == ["20 (0)", "26 (6)"]
-    at = cells.index("outcome")
-    assert cells[at + 2 : at + 4] == ["4 of 5", "3"]
-    spread = campaign["asynchrony_max"].values[[0, 1, 3, 4, 6]]
-    at = cells.index("asynchrony_max")
-    assert cells[at + 2] == f"{(spread <= 3.0).sum()} of 5"
+    at = cells.index("outcome is deployed")
+    assert cells[at + 6 : at + 9] == ["5", "1", "2"]
 
 
 def test_every_value_of_the_scene_has_its_origin(made: tuple[str, xr.Dataset, str]) -> None:
@@ -233,34 +232,29 @@ def test_the_verb(tmp_path: Path) -> None:
         assert code == EXIT_BAD_INPUT
         assert told.startswith(f"{where}: {words}")
     code, told = run(str(tmp_path), "--out", out, "--analysis", str(tmp_path / "run.nc"))
-    assert (code, "holds neither verdicts nor what matters" in told) == (EXIT_BAD_INPUT, True)
+    assert (code, "holds no analysis" in told) == (EXIT_BAD_INPUT, True)
     code, told = run(str(tmp_path), "--out", str(tmp_path / "page.pdf"))
     assert (code, told.endswith("the page is HTML: write page.html\n")) == (EXIT_BAD_INPUT, True)
 
 
-def test_verdicts_are_those_of_the_analysis() -> None:
-    flags = {"flag_values": np.array([0, 1], "i1"), "flag_meanings": "not_met met"}
-    columns = {
-        "requirement_text": ["asynchrony_max <= 3 degree"], "probability_required": [0.9],
-        "confidence_required": [0.8], "probability": [0.95], "probability_lower": [0.91],
-        "probability_upper": [0.99], "samples_used": [6], "samples_violating": [1],
-        "samples_lost": [2], "further_samples": [-1],
-    }  # fmt: skip
-    analysis = xr.Dataset({name: ("requirement", values) for name, values in columns.items()})
-    analysis["verdict"] = ("requirement", np.array([1], "i1"), flags)
-    analysis["verdict_worst_case"] = ("requirement", np.array([0], "i1"), flags)
-    text = page(made_campaign(8, failed=(2, 5)), "runs/made", analysis)
+def test_verdicts_are_those_of_the_analysis_and_nothing_counts_again() -> None:
+    campaign = made_campaign(8, failed=(2, 5), stalled=(4,))
+    text, found = page(campaign, "runs/made"), analyse(campaign)
+    known = found.sel(requirement="deployment_time")
+    used, violating, lost = (int(known[f"samples_{n}"]) for n in ("used", "violating", "lost"))
+    assert (used, violating, lost) == (6, 1, 2)
     cells = Page(text).cells
-    at = cells.index("asynchrony_max <= 3 degree")
-    assert cells[at + 1 : at + 10] == [
-        "0.9 with confidence 0.8", "met", "0.95", "0.91 to 0.99", "6", "1", "2", "not met", "-",
-    ]  # fmt: skip
-    assert "without a verdict" not in text
+    at = cells.index("deployment_time <= 40 s")
+    assert cells[at + 3 : at + 5] == ["not yet shown", f"{float(known.probability):.4g}"]
+    assert cells[at + 6 : at + 9] == ["6", "1", "2"]
+    assert "1 of the violations are samples without a value" in text
+    # One table tells of a requirement, so that no other count can contradict it.
+    assert "Met by" not in text
+    assert sum(cell.startswith("deployment_time") for cell in cells) == 1
+    assert "not met" not in Page(page(campaign, "runs/made", analyse(campaign, {}))).cells
 
 
 def test_what_matters_is_that_of_the_analysis() -> None:
-    campaign = made_campaign(8)
-    campaign.attrs["design"] = '{"kind": "saltelli", "samples": 8}'
     names = {"output": ["asynchrony_max"], "factor": ["rods", "force"]}
     analysis = xr.Dataset(coords=names)
     for name, values in (("total_index", [0.25, 0.75]), ("first_order_index", [0.2, 0.6])):
@@ -270,15 +264,12 @@ def test_what_matters_is_that_of_the_analysis() -> None:
     for name, value in (("index_used", 7), ("index_lost", 1), ("missing", 2)):
         analysis[name] = "output", [value]
     analysis["missing_by_inputs"] = "output", [0.4]
-    text = page(campaign, "runs/made", analysis)
-    found = Page(text)
-    assert "matters" in found.ids
-    at = found.cells.index("asynchrony_max by force")
-    assert found.cells[at + 1 : at + 7] == [
-        "0.75", "0.65 .. 0.85", "0.6", "0.5 .. 0.7", "7", "1",
+    found = what_matters(analysis)
+    assert found.rows == [
+        ["asynchrony_max by force", "0.75", "0.65 .. 0.85", "0.6", "0.5 .. 0.7", "7", "1"],
+        ["asynchrony_max by rods", "0.25", "0.15 .. 0.35", "0.2", "0.1 .. 0.3", "7", "1"],
     ]  # fmt: skip
-    assert found.cells.index("asynchrony_max by rods") == at + 7
-    assert "whatever their inputs are (p = 0.4)" in text
+    assert "whatever their inputs are (p = 0.4)" in found.notes[0]
 
 
 def test_numerical_truth_tells_error_bars_and_differences_of_engines() -> None:
