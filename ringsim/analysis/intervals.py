@@ -4,7 +4,7 @@ Points of one Sobol or Latin hypercube design depend on each other: what scatter
 its replicates.  All functions take the samples along the last axis.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,11 @@ _BATCH = 1 << 23
 def spread(values: Array, axis: int = -1) -> Array:
     """Standard deviation with n - 1 in the denominator."""
     return np.asarray(np.std(values, axis=axis, ddof=1))
+
+
+def quantile(values: Array, probability: float | Sequence[float]) -> Array:
+    """Quantiles of samples as all tables and figures tell them: numpy's, linear between ranks."""
+    return np.asarray(np.quantile(values, probability, axis=-1))
 
 
 def of_independent(values: Array, statistic: Callable[..., Any]) -> tuple[Array, Array]:
@@ -154,7 +159,7 @@ def quantile_of_replicates(
     read off the distribution of all samples.  NaN if it reaches beyond that.
     Source: Woodruff, J. Am. Statistical Association 47 (1952).
     """
-    middle = np.quantile(values, probability, axis=-1, keepdims=True)
+    middle = quantile(values, probability)[..., None]
     _, scatter, count = _jackknife((values <= middle).astype(float), replicate, np.mean)
     half, size = student(count) * scatter, values.shape[-1]
     ordered = np.sort(values, axis=-1)

@@ -144,7 +144,9 @@ def estimates(values: Array, placed: Placement) -> Array:
         found |= {"minimum": values.min(), "maximum": values.max()}
         if placed.population:
             found |= {"mean": values.mean()}
-            found |= dict(zip(QUANTILES, np.quantile(values, [*QUANTILES.values()]), strict=True))
+            found |= dict(
+                zip(QUANTILES, intervals.quantile(values, [*QUANTILES.values()]), strict=True)
+            )
             found["standard_deviation"] = (
                 float(intervals.spread(values)) if len(values) > 1 else np.nan
             )

@@ -15,6 +15,7 @@ from ringsim.analysis import courses as courses_module
 from ringsim.analysis import reading as blocks_module
 from ringsim.analysis.campaign_samples import median_and_worst
 from ringsim.analysis.courses import course, courses
+from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.plots.campaign import by_ending
@@ -144,6 +145,11 @@ def test_distributions_are_steps_with_limits(mixed: xr.Dataset) -> None:
     np.testing.assert_allclose(step.get_ydata()[1:], np.arange(1, 6) / 5)
     assert limit.get_xdata()[0] == 3.0
     assert panel.get_title(loc="left") == "n = 5 of 8"
+    (dots,) = [line for line in panel.lines if line.get_marker() == "o"]
+    told = analyse(mixed)["asynchrony_max"].sel(statistic=["quantile_05", "median", "quantile_95"])
+    np.testing.assert_allclose(dots.get_xdata(), told)
+    one = distributions(made_campaign(1)).axes[0]
+    assert not [line for line in one.lines if line.get_marker() == "o"]
 
 
 def test_convergence_ends_at_mean_and_quantile(mixed: xr.Dataset) -> None:

@@ -6,9 +6,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from ringsim.analysis.campaign_samples import requirements_of, scalars, told, values_of
+from ringsim.analysis.intervals import quantile
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import head
 
+_LEVELS = [0.05, 0.5, 0.95]
+"""Where dots are."""
 _STEPS = 2000
 """Steps of a curve at most: more than a figure resolves."""
 
@@ -30,9 +33,9 @@ def distributions(campaign: xr.Dataset) -> Figure:
         shown = np.unique(np.linspace(0, len(values) - 1, min(len(values), _STEPS)).astype(int))
         axes.step(np.append(values[:1], values[shown]), np.append(0.0, share[shown]), where="post",
                   color=style.BLUE)  # fmt: skip
-        for level in (0.05, 0.5, 0.95):
-            at = np.quantile(values, level, method="inverted_cdf")
-            axes.plot(at, level, "o", color=style.INK, markersize=4, clip_on=False, zorder=4)
+        if len(values) > 1:
+            axes.plot(quantile(values, _LEVELS), _LEVELS, "o", color=style.INK, markersize=4,
+                      clip_on=False, zorder=4)  # fmt: skip
         for word, limit in limits(campaign, name):
             axes.axvline(limit, color=style.VERMILLION, linestyle=(0, (5, 2)), linewidth=1.3)
             axes.annotate(f"{word} {limit:g}", (limit, 0.03), rotation=90, ha="right",
