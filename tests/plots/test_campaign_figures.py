@@ -160,8 +160,24 @@ def test_convergence_ends_at_mean_and_quantile(mixed: xr.Dataset) -> None:
     assert mean.get_ydata()[-1] == pytest.approx(values.mean())
     assert mean.get_ydata()[1] == pytest.approx(values[:2].mean())
     assert quantile.get_ydata()[-1] == pytest.approx(np.quantile(values, 0.95))
-    assert len(panel.collections) == 1
-    assert not convergence(made_campaign(4, kind="sobol")).axes[-1].collections
+    assert not panel.collections  # five samples have no interval
+    assert not convergence(made_campaign(9, kind="sobol")).axes[-1].collections
+
+
+def test_the_band_of_convergence_is_the_interval_of_the_analysis() -> None:
+    campaign = made_campaign(12)
+    figure = convergence(campaign)
+    (band,) = figure.axes[-1].collections
+    drawn_at = band.get_paths()[0].vertices
+    assert drawn_at[:, 0].min() == 8
+    ends = np.unique(drawn_at[drawn_at[:, 0] == 12, 1])
+    known = analyse(campaign)["peak_tension_interval"].sel(statistic="mean")
+    np.testing.assert_allclose(ends, np.sort(known))
+    assert "95 % interval of the mean" in words(figure)
+    one = convergence(made_campaign(1))
+    assert one.axes[-1].get_title(loc="left").endswith("n = 1")
+    assert all(float(tick).is_integer() for tick in one.axes[-1].get_xticks())
+    assert "interval" not in words(one)
 
 
 def test_tension_by_span(mixed: xr.Dataset) -> None:

@@ -1,9 +1,11 @@
 """Head, caption and colours that the figures of a campaign share."""
 
 import textwrap
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -38,6 +40,16 @@ def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> No
         legend.get_title().set_color(style.GREY)
     else:
         figure.supxlabel(words, x=0.012, ha="left", fontsize=9, color=style.GREY)
+
+
+def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:
+    """One legend for all panels, each word once: not every panel has all kinds of marks."""
+    words = {
+        label: handle
+        for axes in panels
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(words.values(), words.keys(), loc="outside lower center", ncols=columns)
 
 
 def bands(values: NDArray[np.floating]) -> NDArray[np.floating]:
