@@ -18,7 +18,7 @@ from ringsim.analysis.design import Placement
 from ringsim.analysis.drawn import drawn
 from ringsim.analysis.influence import groups_of
 from ringsim.analysis.intervals import Array
-from ringsim.analysis.quantities import good, numbers, quantities
+from ringsim.analysis.quantities import good, lost, numbers, quantities
 from ringsim.analysis.requirements import Requirement
 
 _LEAST_OF_A_KIND = 10
@@ -72,7 +72,7 @@ def sensitivity(
     ``second_order_index``) along ``factor``, those of kind morris ``mean_absolute_effect``,
     ``mean_effect`` and ``effect_deviation``, plain ones ``given_data_index`` and ``chance_level``
     along ``input``; each with its ``..._interval``.  ``index_used`` and ``index_lost`` count blocks
-    or samples, ``missing`` the samples without the output, and ``missing_by_inputs`` is the
+    or samples, ``missing`` the samples without the output (``missing_lost`` of failed runs), and ``missing_by_inputs`` is the
     probability that samples missing at random would go with inputs as much: below 0.05 there is no
     index.  ``names`` are the outputs to tell of beside failures, by default all.
     """
@@ -89,7 +89,7 @@ def sensitivity(
     block = None if blocks is None else np.repeat(np.arange(len(blocks.rows)), blocks.size)
     tested: dict[bytes, tuple[float, list[given_data.Bins]]] = {}
     found: dict[str, Found] = {}
-    counts = np.zeros((len(outputs), 3), dtype=np.int64)
+    counts, gone = np.zeros((len(outputs), 4), dtype=np.int64), lost(campaign)
     chance = np.full(len(outputs), np.nan)
     for k, (name, (values, _)) in enumerate(outputs.items()):
         missing = np.isnan(values)
@@ -99,7 +99,7 @@ def sensitivity(
         if (key := missing.tobytes()) not in tested:
             tested[key] = dependence(missing, inputs.values, block), []
         chance[k], bins = tested[key]
-        counts[k] = whole.sum(), len(whole) - whole.sum(), missing.sum()
+        counts[k] = whole.sum(), len(whole) - whole.sum(), missing.sum(), (missing & gone).sum()
         if chance[k] < LEVEL:
             continue
         if blocks is None:
@@ -122,6 +122,7 @@ def sensitivity(
         "index_used": f"{of} that indices are from",
         "index_lost": f"{of} that are left out, because a sample of them has no value",
         "missing": f"samples of {count} without a value",
+        "missing_lost": "of these, samples whose run failed",
     }.items()):  # fmt: skip
         made[name] = "output", counts[:, k], {"long_name": about, "units": "1"}
     about = "probability that samples missing at random go with inputs as much"

@@ -71,21 +71,25 @@ def gate_lines(analysis: xr.Dataset) -> Iterator[str]:
     """What became of outputs that samples lack: why there is no index, or why there is one."""
     if "missing_by_inputs" not in analysis:
         return
-    outputs: dict[tuple[int, float], list[str]] = {}
+    outputs: dict[tuple[int, int, float], list[str]] = {}
     blocks = ", and the rest of their blocks," if "factor" in analysis.dims else ""
     for output in analysis["output"].values:
         one = analysis.sel(output=output)
         if count := one["missing"].item():
             chance = round(one["missing_by_inputs"].item(), 4)
-            outputs.setdefault((count, chance), []).append(output)
-    for (count, chance), names in outputs.items():
+            failed = one["missing_lost"].item()
+            outputs.setdefault((count, failed, chance), []).append(output)
+    for (count, failed, chance), names in outputs.items():
         who = ", ".join(names[:_MOST]) + (f" and {len(names) - _MOST} more" * (len(names) > _MOST))
         p = f"p = {chance:.2g}" if chance else "p < 0.0001"
         if chance < LEVEL:
+            cures = ["require or analyse the outcome instead"] * (failed < count)
+            if failed:  # what did not fail has no value because of what the antenna did
+                cures.append(f"mend the {failed} that failed (ringsim campaign --retry-failed)")
             yield (
                 f"no index of {who}: {count} samples have no value, and which ones depends on "
                 f"inputs ({p}), so that the others are another population: see what separates "
-                "failures, mend them (ringsim campaign --retry-failed), or narrow the inputs"
+                f"them, {', '.join(cures)}, or narrow the inputs"
             )
         else:
             yield (

@@ -7,7 +7,16 @@ import pytest
 from SALib.analyze import morris as salib_morris
 from SALib.analyze import sobol as salib_sobol
 
-from made import drawn_campaign, grouped, ishigami, ishigami_indices, points, response
+from made import (
+    UNIT,
+    campaign,
+    drawn_campaign,
+    grouped,
+    ishigami,
+    ishigami_indices,
+    points,
+    response,
+)
 from ringsim.analysis import effects, given_data, sobol_indices
 from ringsim.analysis.blocks import blocks_of
 from ringsim.analysis.dependence import dependence
@@ -20,6 +29,7 @@ from ringsim.sampling.designs.morris import Morris
 from ringsim.sampling.designs.random import RandomDesign
 from ringsim.sampling.designs.saltelli import Saltelli
 from ringsim.sampling.designs.sobol import Sobol
+from ringsim.variables import Fate, Status
 
 PAIR = {"pair": ("x1", "x2")}
 # Of 1,000 campaigns the share that holds the truth has a standard error of 0.7 %, of 80 2.4 %.
@@ -324,3 +334,17 @@ def test_pulleys_matter_by_mean_by_quarter_and_by_place():
     assert index["mean of friction"] == pytest.approx(4.5**2 / 16 / 4.25, abs=0.08)
     partial = found.asynchrony_max_partial_rank_correlation.to_series()
     assert partial["mean of friction[5..8]"] > 0.9 > partial["mean of friction"] > 0.3
+
+
+def test_runs_are_to_be_mended_only_if_they_failed() -> None:
+    for status, words in ((Status.OK, "require or analyse the outcome"), (Status.TIMEOUT, "mend")):
+        x = np.random.default_rng(4).random((60, 1))
+        gone = x[:, 0] > 0.7
+        made = campaign(
+            np.where(gone, np.nan, x[:, 0]), status=np.where(gone, status, Status.OK),
+            outcome=np.where(gone, Fate.PARTLY_DEPLOYED, Fate.DEPLOYED),
+        )  # fmt: skip
+        made["x1"] = "sample", x[:, 0], {"role": "input", "path": "x1", "distribution": UNIT}
+        (line,) = (s for s in told(analyse(made)) if s.startswith("no index of asynchrony_max"))
+        assert words in line
+        assert ("--retry-failed" in line) == (status == Status.TIMEOUT)

@@ -261,7 +261,7 @@ def test_what_matters_is_that_of_the_analysis() -> None:
         analysis[name] = ("output", "factor"), [values]
         ends = np.stack([np.array(values) - 0.1, np.array(values) + 0.1], axis=-1)
         analysis[f"{name}_interval"] = ("output", "factor", "bound"), ends[None]
-    for name, value in (("index_used", 7), ("index_lost", 1), ("missing", 2)):
+    for name, value in (("index_used", 7), ("index_lost", 1), ("missing", 2), ("missing_lost", 2)):
         analysis[name] = "output", [value]
     analysis["missing_by_inputs"] = "output", [0.4]
     found = what_matters(analysis)
