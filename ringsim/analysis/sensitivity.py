@@ -72,9 +72,10 @@ def sensitivity(
     ``second_order_index``) along ``factor``, those of kind morris ``mean_absolute_effect``,
     ``mean_effect`` and ``effect_deviation``, plain ones ``given_data_index`` and ``chance_level``
     along ``input``; each with its ``..._interval``.  ``index_used`` and ``index_lost`` count blocks
-    or samples, ``missing`` the samples without the output (``missing_lost`` of failed runs), and ``missing_by_inputs`` is the
-    probability that samples missing at random would go with inputs as much: below 0.05 there is no
-    index.  ``names`` are the outputs to tell of beside failures, by default all.
+    or samples, ``missing`` the samples without the output, ``missing_lost`` those of failed runs
+    among them, and ``missing_by_inputs`` is the probability that samples missing at random would
+    go with inputs as much: below 0.05 there is no index.  ``names`` are the outputs to tell of
+    beside failures, by default all.
     """
     blocks, inputs = blocks_of(campaign), drawn(campaign)
     outputs = {

@@ -50,5 +50,10 @@ def distributions(campaign: xr.Dataset) -> Figure:
         if number % columns == 0:
             axes.set_ylabel("Samples at or below")
     most = max((len(values_of(campaign, name)[0]) for name in names), default=0)
-    head(figure, campaign, "Distributions", f"{told(campaign, most)}. Dots: 5, 50 and 95 %.")
+    head(
+        figure,
+        campaign,
+        "Distributions",
+        f"{told(campaign, most)}. Dots: quantiles of 5, 50 and 95 %, as in tables.",
+    )
     return figure

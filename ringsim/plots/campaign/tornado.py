@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from ringsim.analysis.blocks import population_of
 from ringsim.analysis.campaign_samples import scalars, told, values_of
+from ringsim.analysis.dependence import LEVEL
 from ringsim.analysis.design import placement
 from ringsim.analysis.drawn import drawn
 from ringsim.analysis.influence import LEAST, influence
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import head
+from ringsim.plots.campaign.frame import head, legend
 
 MEASURES = {
     "total_index": "Total Sobol' index",
@@ -38,6 +39,8 @@ _NONE = np.empty(0), np.empty((0, 2)), np.empty(0), np.empty((0, 2))
 class Bars(NamedTuple):
     """Bars of one output, the longest first, at most 8; intervals NaN where there are none."""
 
+    measure: str
+    """A key of ``MEASURES``; empty if there is no bar."""
     names: list[str]
     values: NDArray[np.floating]
     ends: NDArray[np.floating]
@@ -51,65 +54,80 @@ class Bars(NamedTuple):
 
 
 def analysed(campaign: xr.Dataset) -> xr.Dataset:
-    """The indices that the design of a campaign allows of its main numbers."""
-    placed = placement(campaign)
-    found = sensitivity(campaign, {}, placed, scalars(campaign))
-    if any(name in found for name in MEASURES):
+    """The indices that the design of a campaign allows of its main numbers, and rank correlations
+    where some number has no index.
+    """
+    names, placed = scalars(campaign), placement(campaign)
+    found = sensitivity(campaign, {}, placed, names)
+    if all(_measure(found, name) for name in names):
         return found
-    plain = influence(population_of(campaign), {}, placed)
-    return xr.merge([found, plain]) if "output" in found.dims else plain
+    return xr.merge([found, influence(population_of(campaign), {}, placed)])
 
 
-def measure_of(analysis: xr.Dataset) -> str:
-    """The most telling measure that an analysis has; empty if none."""
-    for name in MEASURES:
-        own = [v for key, v in analysis.items() if _is(str(key), name)]
-        if any(bool(np.isfinite(each).any()) for each in own):
-            return name
-    return ""
+def _measure(analysis: xr.Dataset, output: str) -> str:
+    """The most telling measure that an analysis has of an output; empty if none."""
+    held = (name for name in MEASURES if (one := _values(analysis, name, output)) is not None
+            and bool(np.isfinite(one).any()))  # fmt: skip
+    return next(held, "")
 
 
-def _is(variable: str, measure: str) -> bool:
-    """Whether a variable is a measure, of one output or of all."""
-    if measure == "rank_correlation" and variable.endswith("partial_rank_correlation"):
-        return False
-    return variable == measure or variable.endswith(f"_{measure}")
+def _values(analysis: xr.Dataset, variable: str, output: str) -> xr.DataArray | None:
+    """A variable of one output, or None: of indices along ``output``, of correlations by name."""
+    if f"{output}_{variable}" in analysis:
+        return analysis[f"{output}_{variable}"]
+    if variable in analysis and output in analysis["output"]:
+        return analysis[variable].sel(output=output)
+    return None
 
 
-def bars_of(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, Bars]]:
-    """The bars of every output that has some, or that the test of what is missing refuses."""
-    if measure in analysis:
-        for output in analysis["output"].values.tolist():
-            one = analysis.sel(output=output)
-            used, lost = one["index_used"].item(), one["index_lost"].item()
-            (dim,) = one[measure].dims
-            told = f"{'blocks' if dim == 'factor' else 'samples'}: {used} used, {lost} lost"
-            if not np.isfinite(one[measure]).any():
-                told = f"no index: {one['missing'].item()} samples have no value,\nby their inputs"
-                told += f" (p = {max(one['missing_by_inputs'].item(), 1e-4):.1g} at most)"
-            yield output, _bars(one, measure, str(dim), told)
-        return
-    for name in analysis.data_vars:
-        output = str(name).removesuffix(f"_{measure}")
-        if _is(str(name), measure) and output != name:
-            one = analysis[[name, f"{name}_interval"]].rename(
-                {name: measure, f"{name}_interval": f"{measure}_interval"}
+def bars_of(campaign: xr.Dataset) -> Iterator[tuple[str, Bars]]:
+    """The bars of every main number, then those of failures, by the most telling measure of each;
+    what has none only if samples without a value are why.
+    """
+    analysis, names = analysed(campaign), scalars(campaign)
+    others = analysis["output"].values.tolist() if "output" in analysis.dims else []
+    for output in [*names, *(name for name in others if name not in names)]:
+        measure, told = _measure(analysis, output), ""
+        if output in others:
+            told = _counted(analysis.sel(output=output), blocks="factor" in analysis.dims)
+        if measure.endswith("rank_correlation"):
+            told = "\n".join(
+                filter(None, [f"samples: {len(values_of(campaign, output)[0])}", told])
             )
-            yield output, _bars(one, measure, "input", "")
+        if measure or told:
+            yield output, _bars(analysis, measure, output, told)
 
 
-def _bars(one: xr.Dataset, measure: str, dim: str, told: str) -> Bars:
-    values = one[measure].values
+def _counted(one: xr.Dataset, *, blocks: bool) -> str:
+    """Samples or blocks that indices of an output are from, or why it has none."""
+    if one["missing_by_inputs"].item() < LEVEL:
+        chance = max(one["missing_by_inputs"].item(), 1e-4)
+        why = f"{one['missing'].item()} samples have no value,\nby their inputs"
+        return f"no index: {why} (p = {chance:.1g} at most)"
+    if not MEASURES.keys() & set(one):
+        return ""
+    of = "blocks" if blocks else "samples"
+    return f"{of}: {one['index_used'].item()} used, {one['index_lost'].item()} lost"
+
+
+def _bars(analysis: xr.Dataset, measure: str, output: str, told: str) -> Bars:
+    if not measure:
+        return Bars("", [], *_NONE, np.nan, told)
+    known = _values(analysis, measure, output)
+    assert known is not None
+    values, (dim,) = known.values, known.dims
     order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")[:_MOST]
     order = order[np.isfinite(values[order])]
-    none = np.full((len(order), 2), np.nan)
-    second = _INSIDE.get(measure, ("", ""))[0]
-    level = one["chance_level"].values[order] if "chance_level" in one else none[:0, 0]
+
+    def of(variable: str, shape: tuple[int, ...]) -> NDArray[np.floating]:
+        found = _values(analysis, variable, output)
+        return np.full((len(order), *shape), np.nan) if found is None else found.values[order]
+
+    second, _ = _INSIDE.get(measure, ("-", ""))
+    level = of("chance_level", ()) if measure == "given_data_index" else np.empty(0)
     return Bars(
-        [str(name) for name in one[dim].values[order]], values[order],
-        one[f"{measure}_interval"].values[order] if f"{measure}_interval" in one else none,
-        one[second].values[order] if second else none[:, 0],
-        one[f"{second}_interval"].values[order] if second else none,
+        measure, [str(name) for name in analysis[dim].values[order]], values[order],
+        of(f"{measure}_interval", (2,)), of(second, ()), of(f"{second}_interval", (2,)),
         float(np.max(level, initial=0.0)) or np.nan, told,
     )  # fmt: skip
 
@@ -125,31 +143,24 @@ def explained(campaign: xr.Dataset) -> bool:
 
 
 @style.styled
-def tornado(campaign: xr.Dataset, measure: str = "") -> Figure:
-    """A panel a main number, a bar an input or group; whiskers are intervals of 95 %.
-
-    ``measure`` is a key of ``MEASURES``; by default the most telling one that the design allows.
-    """
-    analysis = analysed(campaign)
-    measure = measure or measure_of(analysis)
-    found = list(bars_of(analysis, measure))[:_MOST_PANELS] if measure else []
-    found = found or [("", Bars([], *_NONE, np.nan, "no measure is known"))]
+def tornado(campaign: xr.Dataset) -> Figure:
+    """A panel a main number, a bar an input or group; whiskers are intervals of 95 %."""
+    found = list(bars_of(campaign))[:_MOST_PANELS]
+    found = found or [("", Bars("", [], *_NONE, np.nan, "no measure is known"))]
     rows = max(len(bars.names) for _, bars in found)
     figure, panels, _ = style.new_panels(len(found), 5.2, 0.9 + 0.34 * rows, 1.1, most=2)
     certain = False
     for axes, (output, bars) in zip(panels, found, strict=True):
-        _draw(axes, bars, measure)
+        _draw(axes, bars)
         certain = certain or bool(np.isfinite(bars.ends).any())
         words = style.label(campaign[output], width=42) if output in campaign else output
         axes.set_title(words, fontsize=9.5, color=style.INK)
         units = campaign[output].attrs.get("units", "1") if output in campaign else "1"
-        unit = f" ({units})" if measure == "mean_absolute_effect" and units != "1" else ""
+        unit = f" ({units})" if bars.measure == "mean_absolute_effect" and units != "1" else ""
         below = f"\n{bars.told}" if bars.told and bars.names else ""
-        axes.set_xlabel(f"{MEASURES.get(measure, '')}{unit}{below}", fontsize=9)
-    legends = [axes.get_legend_handles_labels() for axes in panels]
-    handles, labels = max(legends, key=lambda each: len(each[1]))
-    if len(labels) > 1:
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        axes.set_xlabel(f"{MEASURES.get(bars.measure, '')}{unit}{below}", fontsize=9)
+    if any(len(axes.get_legend_handles_labels()[1]) > 1 for axes in panels):
+        legend(figure, panels)
     whiskers = "Whiskers: intervals of 95 %." if certain else "The design allows no intervals."
     most = max((len(values_of(campaign, name)[0]) for name in scalars(campaign)), default=0)
     caption = f"{told(campaign, most)}. {whiskers} The longest {_MOST} bars at most."
@@ -157,13 +168,14 @@ def tornado(campaign: xr.Dataset, measure: str = "") -> Figure:
     return figure
 
 
-def _draw(axes: Axes, bars: Bars, measure: str) -> None:
+def _draw(axes: Axes, bars: Bars) -> None:
     height = np.arange(len(bars.names))[::-1].astype(float)
     if not bars.names:
         axes.text(0.5, 0.5, bars.told, ha="center", va="center", transform=axes.transAxes,
                   fontsize=9, color=style.VERMILLION)  # fmt: skip
         axes.set_xticks([])
         return
+    measure = bars.measure
     word = MEASURES[measure][0].lower() + MEASURES[measure][1:]
     second = bool(np.isfinite(bars.inside).any())
     shift = 0.17 if second else 0.0
