@@ -1,25 +1,34 @@
 """What matters, as lines for people."""
 
-from collections.abc import Iterator
+from collections.abc import Collection
 
 import numpy as np
 import xarray as xr
 
 from ringsim.analysis.intervals import LEVEL, Array
 from ringsim.analysis.quantities import quantities
-from ringsim.tables import interval_text, number_text, text_table
+from ringsim.tables import Table, interval_text, number_text
 
 _NAMED = {False: 5, True: 3}
 """Inputs that are told for each output and group, and single places of such that have many."""
 
 
-def influence_lines(analysis: xr.Dataset) -> Iterator[str]:
-    """The inputs that go with each output most, and that separate each group best."""
+def influence_tables(
+    analysis: xr.Dataset, outputs: Collection[str] | None = None
+) -> tuple[Table, ...]:
+    """The inputs that go with each output most (of ``outputs``, by default of all), and that
+    separate each group best.
+    """
     if "input_is_place" not in analysis:  # too few samples
-        return
+        return ()
+    found = [_correlated(analysis, quantities() if outputs is None else outputs)]
+    return (*found, _separated(analysis)) if "group" in analysis.dims else (*found,)
+
+
+def _correlated(analysis: xr.Dataset, outputs: Collection[str]) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
-    rows, certain, least = [], False, 0
-    for output in quantities():
+    rows, notes, certain, least, lacking = [], list[str](), False, 0, list[str]()
+    for output in outputs:
         if f"{output}_rank_correlation" not in analysis:
             continue
         plain, partial = (
@@ -32,29 +41,30 @@ def influence_lines(analysis: xr.Dataset) -> Iterator[str]:
         certain = certain or bool(np.isfinite(plain[1]).any())
         used = int(analysis[f"{output}_samples"].values[0])
         least = min(least or used, used)
+        chosen = _largest(plain[0], place)
         rows += [
             (f"{output} with {names[k]}", *_told(*plain, k), *_told(*partial, k), str(used))
-            for k in _largest(plain[0], place)
+            for k in chosen
         ]  # fmt: skip
+        if np.isnan(partial[0][chosen]).any():
+            alike = [str(names[k]) for k in chosen if np.isnan(plain[0][k])]
+            why = f"{alike[0]} is the same in all samples used" if alike else (
+                "they are too few, or inputs depend on each other"
+            )  # fmt: skip
+            lacking.append(f"{output} ({used} samples used: {why})")
+    if lacking:
+        notes.append(f"no partial correlation, which holds the other inputs: {', '.join(lacking)}")
     if rows:
-        head = ("rank correlation", "correlation", "95 % interval", "partial", "95 % interval")
-        yield from text_table((*head, "used"), rows)
-        if certain:
-            yield (
-                f"the largest of {len(names)} inputs; by chance alone the intervals of about "
-                f"{(1 - LEVEL) * len(names):.2g} of them leave out zero"
-            )
-        else:
-            yield (
-                f"the largest of {len(names)} inputs; by chance alone one in twenty reaches "
-                f"{1.96 / (least - 1) ** 0.5:.2g}"
-            )
-    if "group" in analysis.dims:
-        yield ""
-        yield from _separated(analysis)
+        chance = (
+            f"the intervals of about {(1 - LEVEL) * len(names):.2g} of them leave out zero"
+            if certain else f"one in twenty reaches {1.96 / (least - 1) ** 0.5:.2g}"
+        )  # fmt: skip
+        notes.append(f"the largest of {len(names)} inputs; by chance alone {chance}")
+    head = ("rank correlation", "correlation", "95 % interval", "partial", "95 % interval")
+    return Table((*head, "used"), rows, notes)
 
 
-def _separated(analysis: xr.Dataset) -> Iterator[str]:
+def _separated(analysis: xr.Dataset) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
     rows = []
     for group in analysis["group"].values:
@@ -64,8 +74,9 @@ def _separated(analysis: xr.Dataset) -> Iterator[str]:
             (f"{group}: {names[k]}", *_told(middle, ends, k), str(one["group_samples"].item()))
             for k in _largest(middle - 0.5, place)
         ]  # fmt: skip
-    head = ("what separates", "probability that it is larger", "95 % interval", "samples")
-    yield from text_table(head, rows)
+    return Table(
+        ("what separates", "probability that it is larger", "95 % interval", "samples"), rows
+    )
 
 
 def _largest(values: Array, place: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[int]:

@@ -1,14 +1,17 @@
 """Indices of sensitivity as lines for people."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import numpy as np
 import xarray as xr
 
 from ringsim.analysis.dependence import LEVEL
 from ringsim.analysis.intervals import Array
-from ringsim.tables import interval_text, number_text, text_table
+from ringsim.analysis.quantities import quantities
+from ringsim.tables import Table, interval_text, number_text
 
+Outputs = Collection[str] | None
+"""Names of outputs to tell of beside failures; None for all."""
 _MOST = 5
 """Groups or inputs that are told for each output."""
 _MOST_PLACES = 3
@@ -30,16 +33,8 @@ def _ends(interval: Array) -> str:
     return interval_text(float(interval[0]), float(interval[1]), 2)
 
 
-def measures_of(analysis: xr.Dataset) -> tuple[str, ...]:
-    """The measures that an analysis holds, the one that orders groups first; empty if none."""
-    return next((names for names in SETS if names[0] in analysis), ())
-
-
-def told_rows(analysis: xr.Dataset) -> tuple[list[str], list[list[str]]]:
-    """Head and rows of a table: the groups, or inputs, that matter most for each output."""
-    names = measures_of(analysis)
-    if not names:
-        return [], []
+def _told(analysis: xr.Dataset, names: tuple[str, ...], outputs: Outputs) -> Table:
+    """The groups, or inputs, that matter most for each output."""
     (dim,) = analysis[names[0]].dims[1:]
     place = (
         analysis["input_is_place"].values
@@ -51,7 +46,7 @@ def told_rows(analysis: xr.Dataset) -> tuple[list[str], list[list[str]]]:
     for name in names:
         head += [HEADS[name]] + ["95 % interval"] * (f"{name}_interval" in analysis)
     rows = []
-    for output in analysis["output"].values:
+    for output in chosen_of(analysis, outputs):
         one = analysis.sel(output=output)
         size = np.nan_to_num(one[names[0]].values, nan=-np.inf)
         order = np.argsort(-size, kind="stable")
@@ -64,16 +59,16 @@ def told_rows(analysis: xr.Dataset) -> tuple[list[str], list[list[str]]]:
                 if f"{name}_interval" in one:
                     row.append(_ends(one[f"{name}_interval"].values[k]))
             rows.append([*row, str(one["index_used"].item()), str(one["index_lost"].item())])
-    return [*head, f"{of} used", "lost"], rows
+    return Table([*head, f"{of} used", "lost"], rows)
 
 
-def gate_lines(analysis: xr.Dataset) -> Iterator[str]:
+def _gate(analysis: xr.Dataset, only: Outputs) -> Iterator[str]:
     """What became of outputs that samples lack: why there is no index, or why there is one."""
     if "missing_by_inputs" not in analysis:
         return
     outputs: dict[tuple[int, int, float], list[str]] = {}
     blocks = ", and the rest of their blocks," if "factor" in analysis.dims else ""
-    for output in analysis["output"].values:
+    for output in chosen_of(analysis, only):
         one = analysis.sel(output=output)
         if count := one["missing"].item():
             chance = round(one["missing_by_inputs"].item(), 4)
@@ -98,31 +93,41 @@ def gate_lines(analysis: xr.Dataset) -> Iterator[str]:
             )
 
 
-def sensitivity_lines(analysis: xr.Dataset) -> Iterator[str]:
-    """Tables of indices, and what they leave out."""
-    head, rows = told_rows(analysis)
-    if rows:
-        yield from text_table(head, rows)
-        if "mean_absolute_effect" in analysis:
-            yield (
+def sensitivity_tables(analysis: xr.Dataset, outputs: Outputs = None) -> list[Table]:
+    """Indices of failures and of ``outputs``, by default of all, and what they leave out."""
+    found, notes = [], list[str]()
+    if names := next((names for names in SETS if names[0] in analysis), ()):
+        if "mean_absolute_effect" in names:
+            notes.append(
                 "mu*: mean absolute change of the output, in its unit, when the group moves by "
                 "half of its levels; sigma: scatter of that change"
             )
-        elif "total_index" in analysis and analysis["total_index_interval"].isnull().all():
-            yield "no intervals: give design.replicates = 8, or more, for independent replicates"
-        elif "given_data_index" in analysis:
-            yield (
+        elif "total_index" in names and analysis["total_index_interval"].isnull().all():
+            notes.append(
+                "no intervals: give design.replicates = 8, or more, for independent replicates"
+            )
+        elif "given_data_index" in names:
+            notes.append(
                 "shares of the variance by one input alone, from bins: corrected for chance, too "
                 "small where the output bends within a bin"
             )
+        found.append(_told(analysis, names, outputs)._replace(notes=notes))
     if "second_order_index" in analysis:
-        yield from _second(analysis)
-    yield from gate_lines(analysis)
+        found.append(_second(analysis, outputs))
+    if lines := list(_gate(analysis, outputs)):
+        found.append(Table((), (), lines))
+    return found
 
 
-def _second(analysis: xr.Dataset) -> Iterator[str]:
+def chosen_of(analysis: xr.Dataset, outputs: Outputs) -> list[str]:
+    """Of the outputs with indices those to tell of: failures are no quantities."""
+    known = analysis["output"].values.tolist()
+    return [n for n in known if outputs is None or n in outputs or n not in quantities()]
+
+
+def _second(analysis: xr.Dataset, outputs: Outputs) -> Table:
     rows, factors = [], analysis["factor"].values
-    for output in analysis["output"].values:
+    for output in chosen_of(analysis, outputs):
         one = analysis.sel(output=output)
         values = one["second_order_index"].values
         found = [(j, k) for j in range(len(factors)) for k in range(j) if np.isfinite(values[j, k])]
@@ -130,6 +135,4 @@ def _second(analysis: xr.Dataset) -> Iterator[str]:
             ends = one["second_order_index_interval"].values[j, k]
             rows.append((f"{output} by {factors[k]} with {factors[j]}",
                          number_text(values[j, k], 2), _ends(ends)))  # fmt: skip
-    if rows:
-        yield ""
-        yield from text_table(("what explains", "second-order index", "95 % interval"), rows)
+    return Table(("what explains", "second-order index", "95 % interval"), rows)

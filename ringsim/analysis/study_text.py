@@ -1,24 +1,24 @@
 """An analysis of a campaign as lines for people."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Collection
 
 import numpy as np
 import xarray as xr
 
 from ringsim.analysis.blocks import population_of
 from ringsim.analysis.design import placement
-from ringsim.analysis.influence_text import influence_lines
+from ringsim.analysis.influence_text import influence_tables
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.reweighting_text import reweighting_lines
-from ringsim.analysis.sensitivity_text import sensitivity_lines
+from ringsim.analysis.sensitivity_text import sensitivity_tables
 from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
 from ringsim.analysis.tails import tail, tail_lines
 from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.refusal import InputError
-from ringsim.tables import Table, interval_text, number_text, text_table
+from ringsim.tables import Table, interval_text, number_text
 
 
 def told(analysis: xr.Dataset) -> list[str]:
@@ -27,10 +27,14 @@ def told(analysis: xr.Dataset) -> list[str]:
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
     lines += [*filter(None, [analysis.attrs["stopping"]]), *tail_lines(analysis)]
-    written = (_outcomes, _outputs, _errors, sensitivity_lines, influence_lines, reweighting_lines)
-    for part in (verdict_table(analysis).lines(), *(list(each(analysis)) for each in written)):
-        if part:
-            lines += ["", *part]
+    for table in (
+        verdict_table(analysis), outcome_table(analysis), _outputs(analysis), error_table(analysis),
+        *sensitivity_tables(analysis), *influence_tables(analysis),
+    ):  # fmt: skip
+        if more := table.lines():
+            lines += ["", *more]
+    if more := list(reweighting_lines(analysis)):
+        lines += ["", *more]
     return lines
 
 
@@ -81,7 +85,8 @@ def _words(verdict: Verdict) -> str:
     return verdict.word.replace("_", " ")
 
 
-def _outcomes(analysis: xr.Dataset) -> Iterator[str]:
+def outcome_table(analysis: xr.Dataset) -> Table:
+    """What the antenna did, and how runs were lost, with shares."""
     rows = [
         (
             str(kind), f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}",
@@ -92,24 +97,21 @@ def _outcomes(analysis: xr.Dataset) -> Iterator[str]:
         for kind in analysis["kind"].values
         for one in [analysis.sel(kind=kind)]
     ]  # fmt: skip
-    head = ("outcome", "samples", "share", "95 % interval", *_parts())
-    yield from text_table(head, rows)
+    return Table(("outcome", "samples", "share", "95 % interval", *_parts()), rows)
 
 
 def _parts() -> list[str]:
     return [f"first {part:.0%}" for part in PARTS[:-1]]
 
 
-def _outputs(analysis: xr.Dataset) -> Iterator[str]:
+def _outputs(analysis: xr.Dataset) -> Table:
     rows = []
     for name in outputs_in(analysis):
         used, lost, absent, _ = (str(n) for n in analysis[f"{name}_samples"].values)
         units = analysis[name].attrs["units"]
         values = analysis[name].values
         least, most = values[-2:]
-        # So many that the range has four of its own.
-        larger = max(abs(least), abs(most)) / (most - least) if most > least else 1.0
-        fine = max(4, int(np.log10(larger)) + 4)
+        fine = digits_of(least, most)
         for k, statistic in enumerate(STATISTICS):
             value = values[k]
             # What is alike in all samples takes one row.
@@ -128,8 +130,13 @@ def _outputs(analysis: xr.Dataset) -> Iterator[str]:
         "output", "unit", "statistic", "estimate", "95 % interval", *_parts(), "used", "lost",
         "no value",
     )  # fmt: skip
-    if rows:
-        yield from text_table(head, rows)
+    return Table(head, rows)
+
+
+def digits_of(least: float, most: float) -> int:
+    """So many digits that a range has four of its own."""
+    larger = max(abs(least), abs(most)) / (most - least) if most > least else 1.0
+    return max(4, int(np.log10(larger)) + 4)
 
 
 def outputs_in(analysis: xr.Dataset) -> list[str]:
@@ -137,9 +144,10 @@ def outputs_in(analysis: xr.Dataset) -> list[str]:
     return [name for name in quantities() if name in analysis]
 
 
-def _errors(analysis: xr.Dataset) -> Iterator[str]:
+def error_table(analysis: xr.Dataset, names: Collection[str] | None = None) -> Table:
+    """What makes means wrong, and by how much; ``names`` are the outputs, by default all."""
     rows = []
-    for name in outputs_in(analysis):
+    for name in outputs_in(analysis) if names is None else names:
         errors = analysis[f"{name}_error_of_mean"].values
         mean, *_, least, most = analysis[name].values
         if np.isfinite(errors).any() and np.isfinite(mean) and least < most:
@@ -155,8 +163,7 @@ def _errors(analysis: xr.Dataset) -> Iterator[str]:
         "error of the mean of", "unit", "sampling (standard error)", "numerical (error bars)",
         "engines (difference)", "dominates",
     )  # fmt: skip
-    if rows:
-        yield from text_table(head, rows)
+    return Table(head, rows)
 
 
 def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:

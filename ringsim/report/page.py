@@ -7,18 +7,19 @@ import jinja2
 import xarray as xr
 
 from ringsim.analysis.campaign_notes import budget_lines, override_lines, peak_lines, restart_lines
-from ringsim.analysis.campaign_samples import campaign_file, endings
+from ringsim.analysis.campaign_samples import campaign_file, endings, scalars
 from ringsim.analysis.design import placement
+from ringsim.analysis.influence_text import influence_tables
 from ringsim.analysis.quantities import good
+from ringsim.analysis.sensitivity_text import sensitivity_tables
 from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.study import analyse
-from ringsim.analysis.study_text import verdict_table
+from ringsim.analysis.study_text import error_table, outcome_table, verdict_table
 from ringsim.files import write_text
 from ringsim.plots.campaign.figures import figures_of
 from ringsim.plots.inline import inline
 from ringsim.report import model, tables
 from ringsim.report.player import player
-from ringsim.report.sensitivity import what_matters
 from ringsim.report.tail import rare_event
 
 LARGEST = 2_000_000
@@ -55,7 +56,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     )  # fmt: skip
     placed = placement(campaign)
     stopping = stopping_lines(campaign, placed)
-    head_of_statistics, statistics = tables.statistics(campaign)
+    names = scalars(campaign)
     design = dict(wanted.get("design", {}))
     design.pop("samples", None)  # a call with --samples changes it
     context: dict[str, Any] = {
@@ -65,11 +66,13 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "not_run": int((endings(campaign) == "not run").sum()),
         "design": design.pop("kind", "unknown"), "design_more": design,
         "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),
-        "outcomes": tables.outcomes(campaign), "tail": rare_event(campaign),
-        "statistics": statistics, "statistics_head": head_of_statistics,
+        "outcomes": outcome_table(analysis), "tail": rare_event(campaign),
+        "statistics": tables.statistics(campaign, analysis), "errors": error_table(analysis, names),
         "no_population": "" if placed.population or not placed.kind else placed.told,
         "verdicts": verdict_table(analysis),
-        "matters": what_matters(analysis), "peaks": peak_lines(campaign), "stopping": stopping,
+        "matters": [*influence_tables(analysis, names), *sensitivity_tables(analysis, names)],
+        "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
+        "peaks": peak_lines(campaign), "stopping": stopping,
         "figures": figures, "player": player(campaign), "failures": failures, "more": more,
         "truth": tables.truth(campaign), "notes": notes, "inputs": tables.drawn(campaign),
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),

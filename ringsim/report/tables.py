@@ -16,9 +16,10 @@ from ringsim.analysis.campaign_samples import (
     scalars,
     values_of,
 )
-from ringsim.analysis.design import placement
 from ringsim.analysis.quantities import CHECKED
+from ringsim.analysis.study_text import digits_of
 from ringsim.refusal import show
+from ringsim.tables import Table, interval_text, number_text
 from ringsim.variables import GOALS, Cause
 
 MOST_FAILURES = 100
@@ -32,36 +33,44 @@ def number(value: float) -> str:
     return f"{value:.5g}" if np.isfinite(value) else "-"
 
 
-def outcomes(campaign: xr.Dataset) -> Rows:
-    """Ending, samples, share of all."""
-    words = endings(campaign).tolist()
-    return [[word, str(n), f"{n / len(words):.1%}"] for word, n in Counter(words).most_common()]
+_MOMENTS = {
+    "mean": "Mean", "standard_deviation": "Std. dev.", "quantile_05": "5 %", "median": "Median",
+    "quantile_95": "95 %",
+}  # fmt: skip
 
 
-_HEAD = ["Number", "Unit", "n used", "n left out"]
-_MOMENTS = ["Mean", "Std. dev.", "5 %", "Median", "95 %"]
-_EXTREMES = ["Least (sample)", "Largest (sample)"]
-
-
-def statistics(campaign: xr.Dataset) -> tuple[list[str], Rows]:
-    """Heads, and a row a main number: what, unit, n, lost, mean, deviation, quantiles, extremes.
+def statistics(campaign: xr.Dataset, analysis: xr.Dataset) -> Table:
+    """A row a main number: estimates of the analysis with intervals, extremes, samples.
 
     Extremes alone where samples stand for no population: their mean would be that of the design.
     """
-    rows, placed = [], placement(campaign)
-    moments = placed.population or not placed.kind
-    for name in scalars(campaign):
+    rows, known = [], [name for name in scalars(campaign) if name in analysis]
+    moments = _MOMENTS if any(np.isfinite(analysis[name]).sum() > 2 for name in known) else {}
+    for name in known:
+        says, found = campaign[name].attrs, analysis[name]
+        ends, counts = analysis[f"{name}_interval"], analysis[f"{name}_samples"]
+        least, most = (found.sel(statistic=s).item() for s in ("minimum", "maximum"))
         samples, values = values_of(campaign, name)
-        says, deviation = campaign[name].attrs, values.std(ddof=1) if len(values) > 1 else np.nan
-        low, high = int(values.argmin()), int(values.argmax())
-        told = [values.mean(), deviation, *np.quantile(values, (0.05, 0.5, 0.95))]
-        rows.append([
-            str(says.get("long_name", name)), str(says.get("units", "1")), str(len(values)),
-            str(campaign.sizes["sample"] - len(values)),
-            *(number(float(each)) for each in told if moments),
-            f"{number(values[low])} ({samples[low]})", f"{number(values[high])} ({samples[high]})",
-        ])  # fmt: skip
-    return [*_HEAD, *(_MOMENTS if moments else []), *_EXTREMES], rows
+        fine, cells = digits_of(least, most), []
+        for each in moments:
+            low, high = ends.sel(statistic=each).values
+            cells.append(number_text(found.sel(statistic=each).item(), fine))
+            if np.isfinite(low) or np.isfinite(high):
+                cells[-1] += f" ({interval_text(low, high, fine)})"
+        for value in (least, most):
+            first = samples[values == value][:1]
+            cells.append(number_text(value, fine) + "".join(f" ({sample})" for sample in first))
+        used, lost, absent = (str(counts.sel(counted=c).item()) for c in _COUNTS)
+        unit = str(says.get("units", "1"))
+        rows.append([str(says.get("long_name", name)), unit, *cells, used, lost, absent])
+    extremes = ("Least (sample)", "Largest (sample)", "n used", "Lost", "No value")
+    notes = (
+        ["In brackets intervals of 95 %"] if any("(" in c for r in rows for c in r[2:-5]) else []
+    )
+    return Table(("Number", "Unit", *moments.values(), *extremes), rows, notes)
+
+
+_COUNTS = ("used", "lost", "without_value")
 
 
 def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:

@@ -21,7 +21,7 @@ from ringsim.analysis import effects, given_data, sobol_indices
 from ringsim.analysis.blocks import blocks_of
 from ringsim.analysis.dependence import dependence
 from ringsim.analysis.intervals import of_independent, spread
-from ringsim.analysis.sensitivity_text import sensitivity_lines
+from ringsim.analysis.sensitivity_text import sensitivity_tables
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.sampling.designs.latin_hypercube import LatinHypercube
@@ -316,7 +316,7 @@ def test_plain_designs_have_first_order_indices_with_intervals_where_parts_are_i
         sobol.given_data_index.sel(output="asynchrony_max"), ishigami_indices()[0], atol=0.02
     )
     assert np.isnan(sobol.given_data_index_interval).all()
-    assert any("asynchrony_max by x2" in line for line in sensitivity_lines(sobol))
+    assert any("asynchrony_max by x2" in line for line in sensitivity_tables(sobol)[0].lines())
 
 
 def test_pulleys_matter_by_mean_by_quarter_and_by_place():

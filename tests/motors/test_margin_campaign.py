@@ -100,7 +100,7 @@ def test_the_report_shows_them(campaign: xr.Dataset) -> None:
 def test_a_grid_has_extremes_and_no_means(campaign: xr.Dataset) -> None:
     listed = campaign.assign_attrs(design='{"kind": "grid"}')
     for kind, made in (("random", campaign), ("grid", listed)):
-        heads, rows = tables.statistics(made)
+        heads, rows, _ = tables.statistics(made, analyse(made))
         assert ("Mean" in heads) == (kind == "random")
         assert {len(row) for row in rows} == {len(heads)}
         (convergence,) = (each for each in PICTURES if each.name == "convergence")

@@ -14,6 +14,8 @@ import xarray as xr
 from click.testing import CliRunner
 from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_positions
 
+from ringsim.analysis.binomial import share_interval
+from ringsim.analysis.sensitivity_text import sensitivity_tables
 from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
@@ -23,7 +25,6 @@ from ringsim.plots.ring import lines_at
 from ringsim.report import tables
 from ringsim.report.page import LARGEST, page
 from ringsim.report.player import player
-from ringsim.report.sensitivity import what_matters
 from ringsim.shapes import COMPUTED, FROM_ANGLES
 
 VOID = {"meta", "br", "img", "input", "link", "hr"}
@@ -120,8 +121,12 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
     cells = Page(text).cells
     good = campaign["peak_tension"].values[[0, 1, 3, 4, 6]]
     at = next(k for k, cell in enumerate(cells) if cell.startswith("largest tension"))
-    assert cells[at + 1 : at + 5] == ["N", "5", "3", f"{good.mean():.5g}"]
-    assert cells[at + 9 : at + 11] == ["20 (0)", "26 (6)"]
+    assert cells[at + 1 : at + 3] == ["N", f"{good.mean():.4g}"]
+    assert cells[at + 7 : at + 12] == ["20 (0)", "26 (6)", "5", "2", "0"]
+    # Shares of outcomes have intervals, those of the analysis.
+    at = cells.index("deployed")
+    low, high = share_interval(4, 5)
+    assert cells[at + 1 : at + 4] == ["4 of 5", "0.8", f"{low:.4g} .. {high:.4g}"]
     at = cells.index("outcome is deployed")
     assert cells[at + 6 : at + 9] == ["5", "1", "2"]
 
@@ -264,12 +269,32 @@ def test_what_matters_is_that_of_the_analysis() -> None:
     for name, value in (("index_used", 7), ("index_lost", 1), ("missing", 2), ("missing_lost", 2)):
         analysis[name] = "output", [value]
     analysis["missing_by_inputs"] = "output", [0.4]
-    found = what_matters(analysis)
+    found, gate = sensitivity_tables(analysis)
     assert found.rows == [
         ["asynchrony_max by force", "0.75", "0.65 .. 0.85", "0.6", "0.5 .. 0.7", "7", "1"],
         ["asynchrony_max by rods", "0.25", "0.15 .. 0.35", "0.2", "0.1 .. 0.3", "7", "1"],
     ]  # fmt: skip
-    assert "whatever their inputs are (p = 0.4)" in found.notes[0]
+    assert "whatever their inputs are (p = 0.4)" in gate.notes[0]
+
+
+def test_the_page_has_all_that_the_analysis_tells_of_main_numbers() -> None:
+    campaign, random = made_campaign(12, stalled=(3, 6, 9)), np.random.default_rng(0)
+    campaign["cables_upper_friction_coefficient"][:] = random.random((12, 3))
+    campaign["peak_tension_error"] = campaign["peak_tension"] * 0.0 + 0.5
+    campaign.attrs |= {"fidelity": "frame", "source": "ringsim 0.1.0: compiled"}
+    text, known = page(campaign, "runs/made"), analyse(campaign)
+    cells = Page(text).cells
+    low, high = known["peak_tension_interval"].sel(statistic="mean").values
+    at = next(k for k, cell in enumerate(cells) if cell.startswith("largest tension"))
+    assert cells[at + 2] == f"{known['peak_tension'].values[0]:.4g} ({low:.4g} .. {high:.4g})"
+    assert "In brackets intervals of 95 %" in text
+    at = cells.index("peak_tension with rods.young_modulus")
+    assert cells[at + 1] == "1"
+    assert any(cell.startswith("stalled: ") for cell in cells)
+    assert cells[cells.index("dominates") + 1] == "asynchrony_max"
+    at = cells.index("peak_tension", cells.index("dominates"))
+    assert cells[at + 5] == "sampling (engines unknown)"
+    assert "in the fidelity <b>frame</b>" in text
 
 
 def test_numerical_truth_tells_error_bars_and_differences_of_engines() -> None:

@@ -22,14 +22,14 @@ def _counts(samples: int, most: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(1, samples, min(most, samples)).astype(int))
 
 
-def running(values: Array) -> tuple[Array, Array, Array]:
+def running(values: Array) -> tuple[NDArray[np.int64], Array, Array]:
     """Counts, and mean and 95 % quantile of so many first samples each."""
     counts = _counts(len(values), _POINTS)
     mean = np.array([values[:n].mean() for n in counts])
     return counts, mean, np.array([quantile(values[:n], 0.95) for n in counts])
 
 
-def band(values: Array) -> tuple[Array, Array]:
+def band(values: Array) -> tuple[NDArray[np.int64], Array]:
     """Counts, and the interval of the mean that the analysis gives for so many first samples,
     shape (counts, 2); only counts that have one.
     """
