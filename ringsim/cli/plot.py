@@ -30,11 +30,12 @@ def command(
     require_animate(colour, animate=animate)
     if sample is not None and not animate:
         raise InputError(f"--sample {sample}: says nothing without --animate; give both")
-    from ringsim.analysis.stored import open_stored
+    from ringsim.analysis.stored import MERGED, open_stored
     from ringsim.plots.campaign.figures import draw_campaign
     from ringsim.plots.run import draw_run
 
     with open_stored(file) as dataset:
+        file = file / MERGED if file.is_dir() else file
         campaign = "sample" in dataset.dims
         needed = {"scene", "campaign"} if campaign else {"scene", "reason"}
         if not needed <= dataset.attrs.keys() or "status" not in dataset:
