@@ -65,19 +65,17 @@ def by_input(campaign: xr.Dataset) -> Figure:
             axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
             axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.set_ylim(low - 0.24 * size, high + 0.1 * size)
-        axes.set_xlabel(_label(campaign[each]), fontsize=9, labelpad=9)
+        axes.set_xlabel(_label(campaign[each]), fontsize=9, labelpad=15)
         if number % columns == 0 and name:
             axes.set_ylabel(style.label(campaign[name], width=30), fontsize=9)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)))
     lost = int((height == foot).sum())
-    head(
-        figure,
-        campaign,
-        "Outcome by input",
-        f"All {len(words)} samples; {lost} without the "
-        "number stand below the line. Inputs of many places by their mean.",
+    below = f"; {lost} without the number stand below the line" if lost else ""
+    note = (
+        " Inputs of many places by their mean." if any(campaign[n].ndim > 1 for n in names) else ""
     )
+    head(figure, campaign, "Outcome by input", f"All {len(words)} samples{below}.{note}")
     return figure
 
 
