@@ -78,6 +78,10 @@ def test_the_fan_shows_quantiles_of_the_deviation(mixed: xr.Dataset) -> None:
             np.abs(lags(6)[:, section]), abs=1e-5
         )
     assert "worst: sample 6" in words(figure)
+    assert figure.axes[0].get_xlabel().startswith("Share of the run")
+    figure.draw_without_rendering()
+    box = figure.legends[0].get_window_extent()
+    assert 0 <= box.x0 < box.x1 <= figure.bbox.width  # few sections make a narrow figure
 
 
 def test_runs_of_different_length_are_laid_over_each_other() -> None:
@@ -200,6 +204,7 @@ def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     np.testing.assert_allclose(points["deployed (5)"][:, 1], mixed["asynchrony_max"].values[GOOD])
     places, labels = drawn(mixed["cables_lower_winch_stop_time"])
     assert labels == ["3.0", "none"]
+    assert "below the line" not in words(by_input(made_campaign(3)))
     assert places.tolist() == [0, 1] * 4
 
 
@@ -221,7 +226,7 @@ def test_the_median_is_a_sample_and_the_worst_has_the_largest_asynchrony(
 
 def test_all_figures_of_a_file(tmp_path: Path, mixed: xr.Dataset) -> None:
     save(mixed, tmp_path / "campaign.nc")
-    done = CliRunner().invoke(cli, ["plot", str(tmp_path / "campaign.nc"), "--plot-format", "svg"])
+    done = CliRunner().invoke(cli, ["plot", str(tmp_path), "--plot-format", "svg"])
     assert done.exit_code == 0, done.output
     names = {path.name for path in tmp_path.glob("*.svg")}
     # Five samples are too few for a correlation.

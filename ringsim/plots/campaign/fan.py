@@ -53,6 +53,7 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
         axes.set_title(f"section {sections[number]}", fontsize=9, pad=3)
         if number + columns >= len(sections):
             axes.tick_params(labelbottom=True)
+            axes.set_xlabel(style.label(found["share"], width=24), fontsize=8)
     largest = [style.largest_magnitude(each) for each in (found, one) if each is not None]
     span = max(1.05 * max(largest), LEAST_SPAN)
     grid[0].set(xlim=(0.0, 1.0), ylim=(-span, span), xticks=(0.0, 0.5, 1.0))
@@ -63,7 +64,6 @@ def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
     lines = [Line2D([], [], color=style.GREY, label="median")]
     if one is not None:
         lines += [Line2D([], [], color=style.INK, linewidth=0.9, label=f"worst: sample {worst}")]
-    figure.legend(handles=words + lines, loc="outside lower center", ncols=len(words + lines))
-    axis, counted = found["share"].attrs["long_name"], told(campaign, len(read.samples))
-    head(figure, campaign, "Ahead and behind", f"{counted}. Axis: {axis}.")
+    figure.legend(handles=words + lines, loc="outside lower center", ncols=3)
+    head(figure, campaign, "Ahead and behind", f"{told(campaign, len(read.samples))}.")
     return figure
