@@ -83,8 +83,8 @@ def _gate(analysis: xr.Dataset, only: Outputs) -> Iterator[str]:
                 cures.append(f"mend the {failed} that failed (ringsim campaign --retry-failed)")
             yield (
                 f"no index of {who}: {counted(count, 'sample')} without a value, and which ones "
-                f"depends on inputs ({p}), so that the others are another population: see what separates "
-                f"them, {', '.join(cures)}, or narrow the inputs"
+                f"depends on inputs ({p}), so that the others are another population: see what "
+                f"separates them, {', '.join(cures)}, or narrow the inputs"
             )
         else:
             yield (
