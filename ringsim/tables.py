@@ -40,6 +40,15 @@ class Table(NamedTuple):
         return [*(text_table(self.head, self.rows) if self.rows else ()), *self.notes]
 
 
+def counted(number: int, noun: str) -> str:
+    """A number of things.
+
+    >>> counted(1, "further sample"), counted(2, "sample")
+    ('1 further sample', '2 samples')
+    """
+    return f"{number} {noun}" + "s" * (number != 1)
+
+
 def number_text(value: float, digits: int = 4) -> str:
     """A number with so many digits, or a dash."""
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"

@@ -130,7 +130,10 @@ def _correlated(
 def groups_of(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement]
 ) -> dict[str, tuple[Mask, Mask]]:
-    """Samples to be told from the rest, and of which samples they are; only those of some size."""
+    """Samples to be told from the rest, and of which samples they are; only those of some size.
+
+    What the same samples are has one name, parted by semicolons.
+    """
     ok, gone = good(campaign), lost(campaign)
     found = {"lost": (gone, ok | gone)}
     for fate in Fate:
@@ -138,11 +141,11 @@ def groups_of(
             found[fate.word] = (ok & (campaign[OUTCOME].to_numpy() == fate), ok)
     for name, wanted in requirements.items():
         found[f"violates {wanted.told(name)}"] = (violations(campaign, name, wanted), ok)
-    return {
-        word: (own, of)
-        for word, (own, of) in found.items()
-        if min(own.sum(), of.sum() - own.sum()) >= _LEAST_GROUP
-    }
+    alike: dict[bytes, list[str]] = {}
+    for word, (own, of) in found.items():
+        if min(own.sum(), of.sum() - own.sum()) >= _LEAST_GROUP:
+            alike.setdefault(own.tobytes() + of.tobytes(), []).append(word)
+    return {"; ".join(words): found[words[0]] for words in alike.values()}
 
 
 def _separated(

@@ -8,7 +8,7 @@ import xarray as xr
 from ringsim.analysis.dependence import LEVEL
 from ringsim.analysis.intervals import Array
 from ringsim.analysis.quantities import quantities
-from ringsim.tables import Table, interval_text, number_text
+from ringsim.tables import Table, counted, interval_text, number_text
 
 Outputs = Collection[str] | None
 """Names of outputs to tell of beside failures; None for all."""
@@ -82,14 +82,14 @@ def _gate(analysis: xr.Dataset, only: Outputs) -> Iterator[str]:
             if failed:  # what did not fail has no value because of what the antenna did
                 cures.append(f"mend the {failed} that failed (ringsim campaign --retry-failed)")
             yield (
-                f"no index of {who}: {count} samples have no value, and which ones depends on "
-                f"inputs ({p}), so that the others are another population: see what separates "
-                f"them, {', '.join(cures)}, or narrow the inputs"
+                f"no index of {who}: {counted(count, 'sample')} without a value, and which ones "
+                f"depends on inputs ({p}), so that the others are another population: see what "
+                f"separates them, {', '.join(cures)}, or narrow the inputs"
             )
         else:
             yield (
-                f"{who}: {count} samples have no value, as far as one can tell whatever their "
-                f"inputs are ({p}); they{blocks} are left out"
+                f"{who}: {counted(count, 'sample')} without a value, as far as one can tell "
+                f"whatever their inputs are ({p}); they{blocks} are left out"
             )
 
 

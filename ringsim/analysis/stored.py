@@ -21,11 +21,11 @@ def open_stored(path: Path) -> xr.Dataset:
         file = path / MERGED
         if not file.exists():
             inside = (path / "design.nc").exists()
-            cure = (
-                f"its results are not merged yet: give ringsim merge {path} first"
-                if inside
-                else "there is no campaign in it: give the folder that ringsim campaign named"
-            )
+            cure = "there is no campaign in it: give the folder that ringsim campaign named"
+            if inside and any(path.glob("journals/*")):
+                cure = f"its results are not merged yet: give ringsim merge {path} first"
+            elif inside:
+                cure = "no sample of it has run yet: give ringsim campaign the same file again"
             raise InputError(f"{path}: this folder holds no {MERGED}: {cure}")
     try:
         found = xr.open_dataset(file, engine="netcdf4")
@@ -39,6 +39,11 @@ def open_stored(path: Path) -> xr.Dataset:
             "in"
         ) from None
     except (OSError, ValueError) as error:
+        if file.suffix == ".toml":
+            raise InputError(
+                f"{file}: this says what to run, and holds no results: give the folder that "
+                "ringsim campaign named, runs/NAME by default"
+            ) from None
         reason = getattr(error, "strerror", None) or error
         raise InputError(
             f"{file}: cannot be read as a netCDF file: {reason}; give a file that ringsim has "

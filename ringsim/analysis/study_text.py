@@ -18,23 +18,25 @@ from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
 from ringsim.analysis.tails import tail, tail_lines
 from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.refusal import InputError
-from ringsim.tables import Table, interval_text, number_text
+from ringsim.tables import Table, counted, interval_text, number_text
 
 
 def told(analysis: xr.Dataset) -> list[str]:
-    """All lines: requirements, outcomes, outputs, errors."""
-    counts = f"{analysis.attrs['samples']} samples, design {analysis.attrs['design'] or 'unknown'}"
+    """All lines: outcomes, outputs, errors, what matters; verdicts last, where they are seen."""
+    counts = counted(analysis.attrs["samples"], "sample")
+    counts += f", design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
     lines += [*filter(None, [analysis.attrs["stopping"]]), *tail_lines(analysis)]
     for table in (
-        verdict_table(analysis), outcome_table(analysis), _outputs(analysis), error_table(analysis),
+        outcome_table(analysis), _outputs(analysis), error_table(analysis),
         *sensitivity_tables(analysis), *influence_tables(analysis),
     ):  # fmt: skip
         if more := table.lines():
             lines += ["", *more]
-    if more := list(reweighting_lines(analysis)):
-        lines += ["", *more]
+    for more in (list(reweighting_lines(analysis)), verdict_table(analysis).lines()):
+        if more:
+            lines += ["", *more]
     return lines
 
 
@@ -68,11 +70,12 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             _words(worst) if one["samples_lost"] else "-", str(further) if further > 0 else "-",
         ))  # fmt: skip
         if further > 0:
-            notes.append(f"{name}: {further} further samples without a violation would show it")
+            notes.append(
+                f"{name}: {counted(further, 'further sample')} without a violation would show it"
+            )
         if missing := one["samples_without_value"]:
             notes.append(
-                f"{name}: {missing} of the violations are samples without a value, whose antenna "
-                "did not get so far"
+                f"{name}: violations without a value, as the antenna did not get so far: {missing}"
             )
     head = (
         "requirement", "probability", "confidence", "verdict", "estimate", "one-sided bounds",

@@ -71,9 +71,9 @@ def plan(order: Order, workers: int) -> list[str]:
             f"  checks         {len(checked)} samples with the full engine, too, {len(open_)} to "
             "run here"
         )
-        more, told = _predicted(order, table, judged, open_, check_of)
+        own, told = _predicted(order, table, judged, open_, check_of)
         lines += [f"  cost of checks {words}" for words in told]
-        each = np.concatenate([each, more])
+        each = np.concatenate([each, own])
     if not len(each):
         return [*lines, "  nothing is left to run"]
     whole = max(each.sum() / min(workers, len(each)), each.max())

@@ -8,13 +8,14 @@ from ringsim.execution.slot import TICK, Slot
 from ringsim.execution.solve import load_solver, solve
 from ringsim.execution.work import Scheduler, Work
 from ringsim.scene import Scene
+from ringsim.tables import counted
 
 
 class Local(Scheduler):
     """A number of solver processes, supervised by one event loop."""
 
     def __init__(self, workers: int) -> None:
-        self.workers, self.description = workers, f"{workers} local workers"
+        self.workers, self.description = workers, counted(workers, "local worker")
         self._slots: list[Slot] = []
 
     def run(self, samples: Sequence[int], work: Work) -> str:

@@ -25,6 +25,8 @@ from ringsim.variables import GOALS, Cause
 MOST_FAILURES = 100
 """Rows of the table of failures; the page says how many more there are."""
 _SHOWN = ("title", "source", "execution", "seed", "solver", "identity", "date_created")
+_MOST_NAMED = 20
+"""Samples of a row that are named."""
 Rows = list[list[str]]
 
 
@@ -74,21 +76,24 @@ _COUNTS = ("used", "lost", "without_value")
 
 
 def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
-    """Sample, ending, cause, reason, command that repeats it; and how many are left out.
+    """Samples, ending, cause, reason, command that repeats the first; how many rows are left out.
 
-    Runs that lost their numbers, and sound ones in which the antenna fell short of its goal.
+    Runs that lost their numbers, and sound ones in which the antenna fell short of its goal; a row
+    for all that ended in the same way.
     """
     words, goals = endings(campaign), [goal.word for goal in GOALS] + ["ok", "not run"]
     causes = {int(cause): cause.word.replace("_", " ") for cause in Cause if cause}
-    rows = [
-        [
-            str(sample), words[place], causes.get(int(campaign["cause"][place]), ""),
-            str(campaign["reason"].values[place]), f"ringsim replay {shlex.quote(folder)} {sample}",
-        ]
-        for place, sample in enumerate(campaign["sample"].values.tolist())
-        if words[place] not in goals
-    ]  # fmt: skip
-    rows.sort(key=lambda row: not row[1].startswith("failed"))
+    codes, reasons = campaign["cause"].values.tolist(), campaign["reason"].values.tolist()
+    alike: dict[tuple[str, str, str], list[int]] = {}
+    for place, sample in enumerate(campaign["sample"].values.tolist()):
+        if words[place] not in goals:
+            how = str(words[place]), causes.get(int(codes[place]), ""), str(reasons[place])
+            alike.setdefault(how, []).append(sample)
+    rows = []
+    for how, samples in sorted(alike.items(), key=lambda each: not each[0][0].startswith("failed")):
+        named = ", ".join(map(str, samples[:_MOST_NAMED]))
+        named += f" and {len(samples) - _MOST_NAMED} more" * (len(samples) > _MOST_NAMED)
+        rows.append([named, *how, f"ringsim replay {shlex.quote(folder)} {samples[0]}"])
     return rows[:MOST_FAILURES], max(0, len(rows) - MOST_FAILURES)
 
 
@@ -108,7 +113,8 @@ def drawn(campaign: xr.Dataset) -> Rows:
         else:
             extent = f"{number(float(values.min()))} to {number(float(values.max()))}"
         places = variable.shape[1] if variable.ndim > 1 else 1
-        unit = str(variable.attrs.get("units", "1"))
+        # Values of which some are words have no unit in the file.
+        unit = "-" if values.dtype.kind in "OU" else str(variable.attrs.get("units", "1"))
         rows.append([", ".join(paths), unit, str(places), law, extent])
     return rows
 

@@ -97,7 +97,15 @@ def test_a_requirement_of_the_command_line_replaces_the_file_s(study):
     [
         (lambda folder: None, "no such file or folder"),
         (lambda folder: folder.mkdir(), "no campaign in it"),
-        (lambda folder: (folder.mkdir(), (folder / "design.nc").touch()), "ringsim merge"),
+        (lambda folder: (folder.mkdir(), (folder / "design.nc").touch()), "no sample of it has"),
+        (
+            lambda folder: (
+                (folder / "journals").mkdir(parents=True),
+                (folder / "design.nc").touch(),
+                (folder / "journals/all.journal").touch(),
+            ),
+            "ringsim merge",
+        ),
         (lambda folder: folder.write_text("text"), "cannot be read as a netCDF file"),
         (lambda folder: xr.Dataset({"status": 0}).to_netcdf(folder), "holds no samples"),
     ],
@@ -106,6 +114,12 @@ def test_what_is_no_campaign_is_refused(make, words, tmp_path):
     make(tmp_path / "given")
     with pytest.raises(InputError, match=words):
         analyse(tmp_path / "given")
+
+
+def test_a_campaign_s_file_is_no_result(tmp_path):
+    (tmp_path / "study.toml").write_text(CAMPAIGN)
+    with pytest.raises(InputError, match="this says what to run"):
+        analyse(tmp_path / "study.toml")
 
 
 def test_the_output_needs_a_name_of_netcdf(tmp_path):

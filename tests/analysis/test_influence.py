@@ -172,3 +172,18 @@ def test_inputs_that_were_not_drawn_are_left_out():
     assert not drawn(made).names
     assert "input" not in analyse(made).dims
     assert isinstance(analyse(made), xr.Dataset)
+
+
+def test_what_the_same_samples_are_is_told_once_and_verdicts_come_last() -> None:
+    x = np.random.default_rng(3).random(20)
+    stalled = x > 0.6
+    outcome = np.where(stalled, Fate.STALLED, Fate.DEPLOYED)
+    made = campaign(np.where(stalled, np.nan, 1.0), outcome=outcome)
+    made = with_inputs(made, x1=x)
+    share = {"probability": 0.5, "confidence": 0.9}
+    wanted = {"outcome": {"is": "deployed"} | share, "asynchrony_max": {"max": 2.0} | share}
+    found = analyse(made, wanted)
+    assert found["group"].values.tolist() == [
+        "stalled; violates outcome is deployed; violates asynchrony_max <= 2 degree"
+    ]
+    assert told(found)[-1].startswith("asynchrony_max: violations without a value")

@@ -95,7 +95,7 @@ def test_an_antenna_that_never_deploys_violates_a_deployment_time():
     assert found.samples_violating.item() == found.samples_without_value.item() == 5
     assert verdict(found, "deployment_time") == Verdict.NOT_MET
     assert found.deployment_time_samples.values.tolist() == [45, 0, 5, 0]
-    assert "5 of the violations are samples without a value" in text_of(found)
+    assert "violations without a value, as the antenna did not get so far: 5" in text_of(found)
 
 
 def test_samples_that_have_not_run_are_neither_used_nor_lost():

@@ -131,6 +131,15 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
     assert cells[at + 6 : at + 9] == ["5", "1", "2"]
 
 
+def test_samples_that_ended_alike_share_a_row_and_words_have_no_unit() -> None:
+    campaign = made_campaign(30, failed=(2,), stalled=tuple(range(5, 30)))
+    rows, more = tables.failures(campaign, "made")
+    assert [row[1] for row in rows] == ["failed: timeout", "stalled"]
+    assert rows[1][0] == ", ".join(map(str, range(5, 25))) + " and 5 more"
+    assert (rows[1][-1], more) == ("ringsim replay made 5", 0)
+    assert {row[0]: row[1] for row in tables.drawn(campaign)}["cables.lower_winch_stop_time"] == "-"
+
+
 def test_every_value_of_the_scene_has_its_origin(made: tuple[str, xr.Dataset, str]) -> None:
     cells = Page(made[2]).cells
     for path, value, origin in (
@@ -252,7 +261,7 @@ def test_verdicts_are_those_of_the_analysis_and_nothing_counts_again() -> None:
     at = cells.index("deployment_time <= 40 s")
     assert cells[at + 3 : at + 5] == ["not yet shown", f"{float(known.probability):.4g}"]
     assert cells[at + 6 : at + 9] == ["6", "1", "2"]
-    assert "1 of the violations are samples without a value" in text
+    assert "as the antenna did not get so far: 1." in text
     # One table tells of a requirement, so that no other count can contradict it.
     assert "Met by" not in text
     assert sum(cell.startswith("deployment_time") for cell in cells) == 1
