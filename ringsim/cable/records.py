@@ -29,7 +29,7 @@ AnyWinding = Annotated[Winding, OneOf()]
 
 LEAST_HELD = 1e-3
 """Tension that a winch keeps whose rope is slack when its plane locks, N: next to nothing."""
-RESTING = 1e-3
+RESTING = 1e-2
 """A motor that answers to the tension stands still below this share of its usual speed: it comes to
 rest exponentially, never quite."""
 

@@ -5,10 +5,12 @@ tension falls to the share eta.  With two winches a rope rests where both have l
 generalised force on the opening angle is - sum T_j dL_j / d(angle): virtual work.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from ringsim.cable.friction.family import PulleyFriction
 from ringsim.cable.limited import why_unlimited
 from ringsim.cable.records import Cable
 from ringsim.layout.pose import Array
@@ -39,6 +41,7 @@ class Drive:
         points, self._at_speed = mechanism.points, at_speed
         self._cables = [] if scene.cables is None else scene.cables.present()
         self._paths = [points.path(number) for number in range(len(self._cables))]
+        self._laws: dict[float, list[PulleyFriction]] = {}
         self._loads = points.forces
         self._loaded = bool(self._loads[0].any())
         reason = why_unlimited(scene.cables, scene.structure.planes)
@@ -70,24 +73,28 @@ class Drive:
             found.append(Reeved(shortening, angles))
         return found
 
-    def speed(self, now: Configuration) -> float:
+    def speed(self, over: Sequence[Reeved]) -> float:
         """Rate of the opening angle at which winches wind as commanded, rad/s; the least of all.
 
-        0 where they need not, or have no command: a motor slows down until it has the torque.
+        ``over`` is how they are ``reeved``.  0 where they need not, or have no command: a motor slows down until it has the torque.
         """
         rates = [] if self._at_speed else [0.0]
-        for cable, reeved in zip(self.cables, self.reeved(now), strict=True):
+        for cable, reeved in zip(self.cables, over, strict=True):
             commands = sum(winch.winding.commanded_speed() for winch in cable.winches)
             rates.append(commands / max(float(reeved.shortening.sum()), 1e-300))
         return min(rates, default=0.0)
 
-    def force(self, now: Configuration, friction: float = 1.0, time: float | None = None) -> float:
+    def force(
+        self, now: Configuration, over: Sequence[Reeved], friction: float = 1.0,
+        time: float | None = None,
+    ) -> float:  # fmt: skip
         """What drives, N m, with so many times the friction of the pulleys; at a time (s) only of
-        the winches that are switched on.
+        the winches that are switched on; ``over`` is how the cables are ``reeved`` now.
         """
+        if friction not in self._laws:  # the same few factors at every angle
+            self._laws[friction] = [cable.friction.factored(friction) for cable in self.cables]
         found = 0.0
-        for cable, reeved in zip(self.cables, self.reeved(now), strict=True):
-            law = cable.friction.factored(friction)
+        for cable, law, reeved in zip(self.cables, self._laws[friction], over, strict=True):
             steps = law.bound_decay(reeved.angles, cable.pulley_radius)
             tensions = np.zeros(len(reeved.shortening))
             for winch, way in zip(cable.winches, _ways(cable), strict=True):

@@ -75,10 +75,11 @@ class DriveMargin:
         (s), else at the speed that the winches are commanded to.
         """
         standard, now = self._standard, folding(self._mechanism, 0.5 * (math.pi - angle))
-        rate = self._drive.speed(now) if rate is None else max(rate, 0.0)
+        over = self._drive.reeved(now)
+        rate = self._drive.speed(over) if rate is None else max(rate, 0.0)
         opening = Opening(angle, rate, acceleration, now)
-        ideal, driving = (self._drive.force(now, factor, time) for factor in (0.0, 1.0))
-        drive = self._drive.force(now, standard.friction, time)
+        ideal, driving = (self._drive.force(now, over, factor, time) for factor in (0.0, 1.0))
+        drive = self._drive.force(now, over, standard.friction, time)
         resisting, required = {PULLEYS: ideal - driving}, 0.0
         for one in self._resistances:
             resisting[one.kind] = force = one.force(opening)

@@ -15,7 +15,7 @@ from ringsim.cable.ropes import Ropes
 from ringsim.layout.pose import Array
 from ringsim.parts.limits import Limits
 from ringsim.scene import Scene
-from ringsim.stepping.rest import MOVED, WINDOW
+from ringsim.stepping.rest import GROWTH, MOVED, WINDOW
 from ringsim.stepping.run_control import TOLD, overstrained
 from ringsim.theory.ideal_motion import IdealMotion
 from ringsim.variables import Cause, Fate, Reason, Status
@@ -139,7 +139,8 @@ class Course:
         begun = np.searchsorted(times, (1.0 - WINDOW) * self._time, side="right") - 1
         last = states[begun:]
         moved = max(2.0 * abs(float(state[0] - self._state[0])) for state in last)
-        return moved < MOVED and abs(float(self._state[rate])) <= abs(float(last[0][rate]))
+        now, then = (abs(float(state[rate])) for state in (self._state, last[0]))
+        return moved < MOVED and now**2 <= GROWTH * then**2
 
     def _note_overrun(self, limits: Limits) -> None:
         """Tell how far the V-joints went past their stops, and whether that was too far."""

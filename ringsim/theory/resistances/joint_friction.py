@@ -26,11 +26,10 @@ class JointFrictionResistance(Resistance):
 
     def force(self, opening: Opening) -> float:
         """See ``Resistance``."""
-        found = 0.0
+        found, (places, rates) = 0.0, (opening.now.values, opening.now.functions[:, -2])
         for law, sides in self._joints:
             first, second = (
-                np.einsum("ja,ja->j", opening.now.moved(ahead)[0], opening.now.moved(along)[2])
-                for ahead, along in sides
+                np.einsum("ja,ja->j", ahead @ places, along @ rates) for ahead, along in sides
             )
             turn = 0.5 * np.abs(second - first)
             found += float(np.sum(law.resistance(turn * opening.rate) * turn))
