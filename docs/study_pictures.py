@@ -3,8 +3,8 @@
     python docs/study_pictures.py runs
 
 ``winding_laws.png`` from runs/winding-laws, ``sections.png`` from runs/sections-N;
-``stalling_motor.png`` from runs/stalling-motor: the margin of the rigid ring without a standard's
-factors, against what the flexible one did.
+``stalling_motor.png`` from runs/stalling-motor and runs/stalling-motor-ground: the margin of the
+rigid ring without a standard's factors, against what the flexible one did, and ground over flight.
 """
 
 import math
@@ -16,15 +16,17 @@ import xarray as xr
 from matplotlib.figure import Figure
 from pictures import save
 
-import ringsim
 from ringsim.analysis.campaign_samples import endings
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import LOOKS
+from ringsim.scene import scene_from_toml
 from ringsim.theory.drive import Drive
 from ringsim.theory.ideal_mechanism import Mechanism
 from ringsim.theory.resistances.family import Opening, folding, resistances
 from ringsim.variables import PLANES
 
+NEVER = 66.0
+"""Where rings stand that are not deployed at the end, s."""
 COUNTS = (6, 9, 12, 18, 27, 36)
 NUMBERS = {
     "asynchrony_max": "Largest asynchrony (degree)",
@@ -89,9 +91,9 @@ def static_margins(campaign: xr.Dataset) -> np.ndarray:
     """Of the rigid ring of every sample at its start, without factors; negative: it cannot open.
 
     What drives over what resists, less one.  Friction of joints is linear in its coefficient, what
-    a cable drives in its winch's tension.
+    a cable drives in its winch's tension; weight is the same for all samples.
     """
-    scene = ringsim.load_scene("ring18-motor")
+    scene = scene_from_toml(campaign.attrs["scene"], source="attribute scene")
     mechanism = Mechanism(scene)
     drive, start = Drive(scene, mechanism), math.pi - 2.0 * scene.structure.coordinate
     now = folding(mechanism, scene.structure.coordinate)
@@ -118,22 +120,38 @@ def static_margins(campaign: xr.Dataset) -> np.ndarray:
 
 @style.styled
 def stalling_motor(runs: Path) -> Figure:
-    """Deployment time over the static margin; samples that never deploy at the top."""
-    with xr.open_dataset(runs / "stalling-motor" / "campaign.nc") as campaign:
-        margins, words = static_margins(campaign), endings(campaign)
-        times = campaign["deployment_time"].to_numpy()
-    figure = Figure(figsize=(8.0, 4.0))
-    axes = figure.subplots()
-    top = 1.12 * np.nanmax(times)
-    for word in sorted(set(words.tolist())):
-        own = words == word
-        colour, marker = LOOKS[word]
-        axes.plot(margins[own], np.nan_to_num(times[own], nan=top), marker, color=colour,
-                  markersize=5, alpha=0.8, label=f"{word} ({own.sum()})")  # fmt: skip
-    axes.axvline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
-    axes.set_xlabel("Margin of the rigid ring at 20 deg, without factors")
-    axes.set_ylabel("Deployment time (s); at the top: none")
-    figure.legend(loc="outside lower center", ncols=4)
+    """Flight and ground: deployment time over the static margin; samples that never deploy at the
+    top.  Then the pairs: time on the ground over that in flight, at the edges what did not deploy.
+    """
+    figure = Figure(figsize=(11.0, 4.2))
+    panels = figure.subplots(1, 3, width_ratios=(3, 3, 3))
+    found = []
+    for axes, name in zip(panels, ("stalling-motor", "stalling-motor-ground"), strict=False):
+        with xr.open_dataset(runs / name / "campaign.nc") as campaign:
+            margins, words = static_margins(campaign), endings(campaign)
+            times = campaign["deployment_time"].to_numpy()
+        found.append(times)
+        for word in sorted(set(words.tolist())):
+            own = words == word
+            colour, marker = LOOKS[word]
+            axes.plot(margins[own], np.nan_to_num(times[own], nan=NEVER), marker, color=colour,
+                      markersize=4.5, alpha=0.8, label=word)  # fmt: skip
+        axes.axvline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+        axes.set_xlabel("Margin of the rigid ring, no factors")
+        axes.set_title("On the ground" if "ground" in name else "In flight", fontsize=10)
+    panels[0].set_ylabel("Deployment time (s); at the top: none")
+    count = min(map(len, found))
+    flight, ground = (np.nan_to_num(times[:count], nan=NEVER) for times in found)
+    panels[2].plot(flight, ground, "o", color=style.INK, markersize=4.0, alpha=0.6)
+    panels[2].axline((30.0, 30.0), slope=1.0, color=style.GREY, linewidth=0.8)
+    panels[2].set(xlabel="In flight (s); at the edge: never", ylabel="On the ground (s)",
+                  title="Pairs")  # fmt: skip
+    panels[2].title.set_fontsize(10)
+    handles = {
+        label: handle for axes in panels[:2]
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }  # fmt: skip
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4)
     return figure
 
 

@@ -38,6 +38,23 @@ def test_motors_stall_where_they_meet_the_net() -> None:
     np.testing.assert_allclose(kept.motor_speed, 0.0, atol=0.05)
 
 
+@pytest.mark.parametrize("short", [True, False])
+def test_dry_friction_holds_a_ring_that_is_short_of_drive(short: bool) -> None:
+    """Virtual work in the stowed ring: two V spans shorten for each V-joint that turns."""
+    offset, bar, phi = 0.105, 0.2889, np.radians(60.0)
+    span = np.sqrt(bar**2 + offset**2 + 2.0 * bar * offset * np.sin(phi))
+    holding = STALL * bar * offset * np.cos(phi) / span
+    scene = ring(
+        cables__upper__friction={"kind": "none"}, cables__lower__friction={"kind": "none"},
+        joints__vjoint={"coulomb": (1.03 if short else 0.8) * holding, "rate": 2e-4},
+        solver__end_time=20.0,
+    )  # fmt: skip
+    found = simulate(scene, "frame")
+    assert (Fate(found.outcome.item()) is Fate.STALLED) == short
+    farthest = float(found.opening_angle.max())
+    assert farthest == pytest.approx(60.0, abs=0.2) if short else farthest > 120.0
+
+
 def test_outputs_of_motors_tell_what_their_words_say() -> None:
     found = simulate(ring(solver__end_time=3.0), "ideal")
     assert found.motor_torque.dims == ("plane", "winch", "time")

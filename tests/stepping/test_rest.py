@@ -70,6 +70,12 @@ def test_what_creeps_by_less_than_it_may_until_the_end_rests() -> None:
     assert math.isnan(rests_at(lambda t: (BEGIN + fast * t, fast)))
 
 
+def test_creep_that_gains_a_few_per_cent_rests() -> None:
+    """Through what dry friction is at low rates, towards angles at which there is more drive."""
+    slow = 0.2 * MOVED / (WINDOW * END)
+    assert rests_at(lambda t: (BEGIN + slow * t * (1.0 + 0.01 * t), slow * (1.0 + 0.02 * t))) < 2.0
+
+
 def test_what_creeps_to_a_stop_that_it_will_reach_is_no_rest() -> None:
     """Half of what a joint at rest may move by, a little way in front of its stop."""
     slow = 0.5 * MOVED / (WINDOW * END)
