@@ -76,7 +76,8 @@ class Drive:
     def speed(self, over: Sequence[Reeved]) -> float:
         """Rate of the opening angle at which winches wind as commanded, rad/s; the least of all.
 
-        ``over`` is how they are ``reeved``.  0 where they need not, or have no command: a motor slows down until it has the torque.
+        ``over`` is how they are ``reeved``.  0 where they need not, or have no command: a motor
+        slows down until it has the torque.
         """
         rates = [] if self._at_speed else [0.0]
         for cable, reeved in zip(self.cables, over, strict=True):
