@@ -184,7 +184,7 @@ def span_sizes(axes: Axes, sizes: np.ndarray) -> None:
 
 
 def plain_numbers(axis: Axis) -> None:
-    """Ticks of a logarithmic axis as 0.01 instead of a power of ten, and only the major ones."""
+    """Ticks with all of their number, no power of ten beside the axis, and only the major ones."""
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 

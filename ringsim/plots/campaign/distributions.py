@@ -43,7 +43,7 @@ def distributions(campaign: xr.Dataset) -> Figure:
                           fontsize=9)  # fmt: skip
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-        axes.ticklabel_format(axis="x", useOffset=False)
+        style.plain_numbers(axes.xaxis)
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.set_xlabel(style.label(campaign[name], width=38))
         axes.set_title(f"n = {len(values)} of {campaign.sizes['sample']}", fontsize=9)
