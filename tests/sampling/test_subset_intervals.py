@@ -101,7 +101,7 @@ def test_replicates_that_agree_by_chance_are_no_surer_than_their_chains():
     np.testing.assert_allclose(ends, 1e-3 * np.exp(0.4**2 / 2 + np.array([-half, half])))
     # With many of them the mean may lie outside what their logarithms say.
     ends, _ = replicated_interval(np.full(100, 1e-3), np.full(100, 0.9))
-    assert ends[0] == 1e-3
+    assert ends[0] == pytest.approx(1e-3)
 
 
 def test_brute_force_agrees_on_the_drive_of_a_ring_whose_pulleys_differ():
