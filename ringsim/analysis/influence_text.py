@@ -66,17 +66,19 @@ def _correlated(analysis: xr.Dataset, outputs: Collection[str]) -> Table:
 
 def _separated(analysis: xr.Dataset) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
-    rows = []
+    rows, notes = [], list[str]()
     for group in analysis["group"].values:
         one = analysis.sel(group=group)
+        first, *others = str(group).split("; ")
+        if others:
+            notes.append(f"{first} are the same samples as: {', '.join(others)}")
         middle, ends = one["separation"].values, one["separation_interval"].values
         rows += [
-            (f"{group}: {names[k]}", *_told(middle, ends, k), str(one["group_samples"].item()))
+            (f"{first}: {names[k]}", *_told(middle, ends, k), str(one["group_samples"].item()))
             for k in _largest(middle - 0.5, place)
         ]  # fmt: skip
-    return Table(
-        ("what separates", "probability that it is larger", "95 % interval", "samples"), rows
-    )
+    head = ("what separates", "probability that it is larger", "95 % interval", "samples")
+    return Table(head, rows, notes)
 
 
 def _largest(values: Array, place: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[int]:

@@ -299,7 +299,8 @@ def test_the_page_has_all_that_the_analysis_tells_of_main_numbers() -> None:
     assert "In brackets intervals of 95 %" in text
     at = cells.index("peak_tension with rods.young_modulus")
     assert cells[at + 1] == "1"
-    assert any(cell.startswith("stalled; violates deployment_time") for cell in cells)
+    assert any(cell.startswith("stalled: ") for cell in cells)
+    assert "stalled are the same samples as: violates deployment_time" in text
     assert cells[cells.index("dominates") + 1] == "asynchrony_max"
     at = cells.index("peak_tension", cells.index("dominates"))
     assert cells[at + 5] == "sampling (engines unknown)"
