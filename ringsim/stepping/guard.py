@@ -42,10 +42,11 @@ class Guard(Remembering):
 
     def judge(self, now: Instant) -> Reason:
         """Why the run must stop here: cause, measured value, bound and cure; empty if not."""
-        if self._constant or not self._run:  # constant steps are judged by all of a run
+        first = not self._run
+        if self._constant or first:  # constant steps are judged by all of a run
             self._run.append(now)
         time, found, start = now.time, now.energies, self._run[0].energies
-        if len(self._run) > 1:  # what a fault takes at the start is not in it any more
+        if not first:  # what a fault takes at the start is not in it any more
             self._lost += found.lost
             self._driven += found.driven
         work = found.work + self._driven

@@ -62,7 +62,7 @@ def test_corners_of_a_deployed_ring_of_three_are_those_of_a_pin_jointed_truss() 
     """Pins on the corners' lines: one that stands off by d along the section lengthens its bar by d
     and its diagonal by d times the cosine between both.
     """
-    off = misplaced(1e-5, 3)
+    off = {name: np.abs(sizes).tolist() for name, sizes in misplaced(1e-5, 3).items()}
     scene = ring(3, structure__hinge_offset=0.0, structure__hinge_error=off)
     drawn = layout_at_opening(scene, math.pi)
     at = np.array([[drawn.bodies[k].pose.place for k in plane] for plane in drawn.corners])
