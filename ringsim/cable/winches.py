@@ -95,8 +95,13 @@ def root_of_rising(
 
     By secants from a guess and a slope: an iteration or a step ago the answer was nearly the same,
     and Brent's method would search all speeds of the motor each time.  It decides where bends of
-    the function lead secants astray.  ``excess`` is not positive at ``low``, nor negative at
-    ``high``.
+    the function lead secants astray.  Speeds in m/s; ``excess`` is not positive at ``low``, nor
+    negative at ``high``.
+
+    Raises
+    ------
+    ValueError
+        If the function has no number.
     """
     at, value = guess, excess(guess)
     for _ in range(_SECANTS):

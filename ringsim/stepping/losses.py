@@ -27,7 +27,9 @@ def lost_between(before: Passing, after: Passing) -> float:
 
     Without the second part, never negative where friction grows with the rate, every change of
     speed would seem to cost energy.  A displacement that is not known is the mean rate times the
-    step, which differs from generalised-alpha's by a hundredth of the rates' change at most.
+    step, which differs from generalised-alpha's by a hundredth of the rates' change at most.  Where
+    steps do not resolve a vibration, rates change sign from end to end and too much counts as lost:
+    the balance shows it as energy that was added.
     """
     step, rises = after.time - before.time, after.forces - before.forces
     if before.places is None or after.places is None:

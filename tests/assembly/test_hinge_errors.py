@@ -16,7 +16,7 @@ from ringsim.simulation import simulate
 from ringsim.structures.hinge_error import HingeError
 from ringsim.theory.assembled import assembled
 from ringsim.theory.deployed import deployed
-from test_length_errors import ring, scattered
+from test_length_errors import Bar, of_pin_jointed_truss, ring, scattered
 
 PINS = tuple(HingeError.model_fields)
 
@@ -66,24 +66,19 @@ def test_corners_of_a_deployed_ring_of_three_are_those_of_a_pin_jointed_truss() 
     scene = ring(3, structure__hinge_offset=0.0, structure__hinge_error=off)
     drawn = layout_at_opening(scene, math.pi)
     at = np.array([[drawn.bodies[k].pose.place for k in plane] for plane in drawn.corners])
-    rows, longer = [], []
+    bars: list[Bar] = []
     for k in range(3):
         following = (k + 1) % 3
         level = at[0, following] - at[0, k]
         level /= np.linalg.norm(level)
         for left, right in ((0, 0), (1, 1), (1, 0), (0, 1)):
             along = at[right, following] - at[left, k]
-            row = np.zeros((2, 3, 3))
-            row[left, k], row[right, following] = -along, along
-            rows.append(row.ravel() / np.linalg.norm(along))
             name = ("upper", "lower")
             gone = off[f"{name[left]}_left"][k] + off[f"{name[right]}_right"][k]
             # The rod keeps its length, and its corners are so much further apart.
-            longer.append(gone * float(level @ along) / np.linalg.norm(along))
-    matrix = np.array(rows)
-    assert np.linalg.matrix_rank(matrix) == 12
-    moved = np.linalg.lstsq(matrix, np.array(longer), rcond=None)[0].reshape(-1, 3)
-    expected = np.linalg.norm(moved, axis=1)
+            longer = gone * float(level @ along) / float(np.linalg.norm(along))
+            bars.append(((left, k), (right, following), longer))
+    expected = of_pin_jointed_truss(at, bars)
     found = deployed(scene).deviations.ravel()
     assert np.abs(found - expected).max() < 5e-3 * expected.max()
 

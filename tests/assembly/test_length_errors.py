@@ -86,15 +86,35 @@ def test_forces_of_an_indeterminate_truss_are_those_of_linear_statics() -> None:
     assert found.energy == pytest.approx(energy, rel=1e-4)
 
 
+Bar = tuple[tuple[int, int], tuple[int, int], float]
+"""Plane and corner of both ends, and how much longer it is than drawn, m."""
+
+
+def of_pin_jointed_truss(at: np.ndarray, bars: list[Bar]) -> np.ndarray:
+    """How far the corners ``at`` (planes, corners, 3), m, of a truss of so many bars as hold them
+    move: B u = e L, with u the displacements less those of a rigid body, as in the best fit.
+    """
+    rows = []
+    for one, other, _ in bars:
+        along = at[other] - at[one]
+        row = np.zeros(at.shape)
+        row[one], row[other] = -along, along
+        rows.append(row.ravel() / np.linalg.norm(along))
+    matrix = np.array(rows)
+    assert np.linalg.matrix_rank(matrix) == len(bars) == at.size - 6
+    moved = np.linalg.lstsq(matrix, np.array([longer for *_, longer in bars]), rcond=None)[0]
+    return np.asarray(np.linalg.norm(moved.reshape(-1, 3), axis=1))
+
+
 def test_corners_of_a_deployed_ring_of_three_are_those_of_a_pin_jointed_truss() -> None:
-    """12 bars hold its 6 corners: B u = e L, with u the displacements less those of a rigid body.
-    Rods bend where diagonals do not cross in their middles, with 1e-3 of the stiffness.
+    """12 bars hold its 6 corners.  Rods bend where diagonals do not cross in their middles, with
+    1e-3 of the stiffness.
     """
     errors = scattered(1e-5, 3)
     scene = ring(3, structure__hinge_offset=0.0, rods__length_error=errors)
     drawn = layout_at_opening(scene, math.pi)
     at = np.array([[drawn.bodies[k].pose.place for k in plane] for plane in drawn.corners])
-    bars: list[tuple[tuple[int, int], tuple[int, int], float]] = []
+    bars: list[Bar] = []
     for k in range(3):
         following = (k + 1) % 3
         for plane, name in enumerate(("upper", "lower")):
@@ -102,20 +122,11 @@ def test_corners_of_a_deployed_ring_of_three_are_those_of_a_pin_jointed_truss() 
             bars.append(((plane, k), (plane, following), 0.5 * halves))
         bars.append(((1, k), (0, following), errors["diagonal_rising"][k]))
         bars.append(((0, k), (1, following), errors["diagonal_falling"][k]))
-    places = at.reshape(-1, 3)
-    rows, longer = [], []
-    for one, other, error in bars:
-        first, second = 3 * one[0] + one[1], 3 * other[0] + other[1]
-        along = places[second] - places[first]
-        row = np.zeros((6, 3))
-        row[first], row[second] = -along, along
-        rows.append(row.ravel() / np.linalg.norm(along))
-        longer.append(error * np.linalg.norm(along))
-    matrix = np.array(rows)
-    assert np.linalg.matrix_rank(matrix) == 12
-    moved = np.linalg.lstsq(matrix, np.array(longer), rcond=None)[0].reshape(-1, 3)
-    # The least displacements are free of rigid motion, as is the best fit.
-    expected = np.linalg.norm(moved, axis=1)
+    bars = [
+        (one, other, error * float(np.linalg.norm(at[other] - at[one])))
+        for one, other, error in bars
+    ]
+    expected = of_pin_jointed_truss(at, bars)
     found = deployed(scene).deviations.ravel()
     assert np.abs(found - expected).max() < 5e-3 * expected.max()
 
