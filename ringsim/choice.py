@@ -56,7 +56,8 @@ def leaves_of(family: type[Model]) -> list[type[Model]]:
         load_package(package)
     own = [family] if "kind" in family.__annotations__ else []
     below = [kind for sub in family.__subclasses__() for kind in leaves_of(sub)]
-    return sorted(own + below, key=lambda kind: kind.__name__) or [family]
+    # A kind with two parents of the family is found below both.
+    return sorted(dict.fromkeys(own + below), key=lambda kind: kind.__name__) or [family]
 
 
 @functools.cache

@@ -71,7 +71,9 @@ def known_or_nearest(key: str, known: Iterable[str]) -> str:
     names = list(known)
     if not names:
         return "it has no keys"
-    close = difflib.get_close_matches(key.lower(), names, n=1, cutoff=0.6)
+    close = difflib.get_close_matches(key.lower(), names, n=3, cutoff=0.6)
+    # Of several that begin alike the shortest: what it is, before its time or its angle.
+    close = sorted((name for name in close if close[0].startswith(name)), key=len)
     close += [name for name in names if key and name.startswith(key.lower())]
     return f"did you mean {close[0]}?" if close else f"known: {', '.join(names)}"
 

@@ -8,7 +8,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.blocks import blocks_of
-from ringsim.choice import kinds_of
+from ringsim.choice import kind_of, kinds_of
 from ringsim.files import parse_toml
 from ringsim.refusal import InputError
 from ringsim.sampling.designs.family import Design
@@ -70,6 +70,12 @@ class Placement:
             'replicates), or kind = "random"; bounds of requirements are those of independent '
             "samples"
         )
+
+
+def placement_of(design: Design) -> Placement:
+    """The placement of a design that no sample has been drawn from yet."""
+    replicates = getattr(design, "replicates", 1)
+    return Placement(kind_of(design), design.population, design.independent, replicates)
 
 
 def placement(campaign: xr.Dataset) -> Placement:

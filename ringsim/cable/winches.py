@@ -49,6 +49,8 @@ class _Rope:
     """Speed of all members at which they last balanced the rope, m/s."""
     gain: float = 1.0
     """How fast their excess over the commands rose with it there."""
+    known: tuple[tuple[float, ...], Array] | None = None
+    """The last question and its answer: a tangent asks what its residual has asked."""
 
     def speeds(
         self, elapsed: float, path: float, rate: float, natural: float, rest: float
@@ -58,6 +60,15 @@ class _Rope:
         ``natural`` is the rope's natural length (m) had they not wound since, and ``rest`` the
         speed of its other winches (m/s).
         """
+        question = elapsed, path, rate, natural, rest
+        if self.known is None or self.known[0] != question:
+            self.known = question, self._balanced(*question)
+        return self.known[1]
+
+    def _balanced(
+        self, elapsed: float, path: float, rate: float, natural: float, rest: float
+    ) -> Array:
+        """The answer, by a search from the last one."""
         count, (stiffness, damping_time, width) = len(self.members), self.material
         follow = (path - self.path) / elapsed if elapsed > 0.0 else rate
         laws = [
@@ -154,23 +165,33 @@ class Winches:
 
         The paths of the ropes (m) and their rates (m/s) are not needed if no winch answers.
         """
+        wound, speed = self._prescribed(time)
+        if not self._ropes or paths is None or rates is None:
+            return wound, speed
+        elapsed, asked = self._asked(time, ropes, paths, rates, wound, speed)
+        for k, rope in self._ropes.items():
+            answer = rope.speeds(elapsed, *asked[k])
+            for place, found in zip(rope.members, answer, strict=True):
+                speed[place] = found
+                wound[place] += found * elapsed
+        return wound, speed
+
+    def _prescribed(self, time: float) -> tuple[Array, Array]:
+        """As ``at``, while all that answer to their ropes stand still."""
         wound, speed = self._held.copy(), np.zeros_like(self._held)
         for place, winch in self._winches.items():
             wound[place], speed[place] = winch.at(time, float(self._held[place]))
         for place, more in self._ahead.items():
             wound[place] += more
-        if not self._ropes or paths is None or rates is None:
-            return wound, speed
-        elapsed = time - self._start
-        lengths = np.stack(
-            [paths, rates, ropes.content - ropes.per_rope(wound), ropes.per_rope(speed)]
-        ).T
-        for k, rope in self._ropes.items():
-            answer = rope.speeds(elapsed, *lengths[k].tolist())
-            for place, found in zip(rope.members, answer, strict=True):
-                speed[place] = found
-                wound[place] += found * elapsed
         return wound, speed
+
+    def _asked(
+        self, time: float, ropes: Ropes, paths: Array, rates: Array, wound: Array, speed: Array
+    ) -> tuple[float, list[list[float]]]:
+        """What ``_Rope.speeds`` asks: the time since the step began, and the rest of each rope."""
+        natural = ropes.content - ropes.per_rope(wound)
+        asked = np.stack([paths, rates, natural, ropes.per_rope(speed)], axis=-1)
+        return time - self._start, asked.tolist()
 
     def memory(self) -> list[Any]:
         """Every winch as it is by now: cable, end, table, and what it has wound beyond its law."""
@@ -213,12 +234,12 @@ class Winches:
     def stiffness_left(self, time: float, ropes: Ropes, paths: Array, rates: Array) -> Array:
         """Share of a change of path that stretches the rope, not answered by its winches."""
         left = np.ones(len(ropes.starts))
-        near = ropes.per_rope(self.at(time, ropes, paths, rates)[0])
-        for k in self._ropes:
-            moved = paths.copy()
-            moved[k] += _NUDGE
-            far = ropes.per_rope(self.at(time, ropes, moved, rates)[0])
-            left[k] += (far - near)[k] / _NUDGE
+        elapsed, asked = self._asked(time, ropes, paths, rates, *self._prescribed(time))
+        for k, rope in self._ropes.items():
+            path, *rest = asked[k]
+            near = rope.speeds(elapsed, path, *rest).sum()
+            far = rope.speeds(elapsed, path + _NUDGE, *rest).sum()
+            left[k] += elapsed * float(far - near) / _NUDGE
         return np.clip(left, 0.0, 1.0)
 
     def advance(self, time: float, state: ChainState, slopes: Array) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 from ringsim.campaign.folder import Folder
 from ringsim.campaign.stopping import decided
 from ringsim.files import DRAFT, writing
+from ringsim.refusal import InputError
 from ringsim.storage.journal import DamagedError
 from ringsim.storage.locks import GO_ON, locked
 from ringsim.storage.merge import NAME as MERGED
@@ -25,7 +26,7 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
     ``execution`` says who computed it; if samples or checks are left, it is written only if
     ``partly``.  Of a campaign that its rule has ended it holds the samples up to there.  Returns
     the number of samples left, of failed ones, and the file, or None if it is not written.
-    InputError if the folder cannot be written to.
+    InputError if the folder cannot be written to, or no sample at all has run.
     """
     path, design = campaign.path / MERGED, campaign.attributes
     model = Fidelity[design.get("fidelity", "full").upper()]
@@ -48,6 +49,11 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
             left, failed = len(found.missing), len(found.failed)
             if not partly and (left or len(campaign.unchecked())):
                 return left, failed, None
+            if left == campaign.table.samples:
+                raise InputError(
+                    f"{campaign.path}: none of its {left} samples has run, so there is nothing to "
+                    f"merge: run ringsim campaign with the file of {design['campaign_name']} first"
+                )
             try:
                 failed += write_merged(
                     campaign.path, found, campaign.table, campaign.scene, output, attributes,

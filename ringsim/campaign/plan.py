@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.analysis.design import placement_of
 from ringsim.campaign.folder import opened_as
 from ringsim.campaign.growing import grown
 from ringsim.campaign.start import Order
@@ -51,6 +52,9 @@ def plan(order: Order, workers: int) -> list[str]:
         f"  workers        {workers}",
         *map(_extent, table.columns),
     ]
+    placed = placement_of(design)
+    if placed.population and not placed.has_intervals:
+        lines.append(f"  statistics     {placed.told}")
     if rule := campaign.specification.rule:
         numbers = rule.numbers(table.samples, campaign.specification.rule_replicates)
         looks = ", ".join(map(str, numbers)) or "none before the last sample"
@@ -108,8 +112,9 @@ def _predicted(
         per_cost = result.seconds / cost[trial]
         basis = f"from a trial run of sample {trial}: {result.status.word}, {result.reason}"
     each = per_cost * cost[todo]
-    words = f"{each.mean():.3g} s each ({each.min():.3g} to {each.max():.3g} s), {basis}"
-    return each, [words]
+    ends = f"{each.min():.3g}", f"{each.max():.3g}"
+    spread = f" ({ends[0]} to {ends[1]} s)" if ends[0] != ends[1] else ""
+    return each, [f"{each.mean():.3g} s each{spread}, {basis}"]
 
 
 def _extent(column: Column) -> str:

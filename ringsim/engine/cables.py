@@ -136,8 +136,10 @@ class CableDrive:
                 left: Array | float = 1.0
                 if self.winches.answering:
                     left = self.winches.stiffness_left(t, self.ropes, state.paths, state.path_rates)
+                slip = state.slip_speeds
+                own = (1.0 - state.exponents**2) / slip
                 slopes = self._turning.slopes(
-                    self.ropes, state.speeds, state.exponents, state.slip_speeds
+                    self.ropes, state.speeds, own, lambda speed: np.tanh(speed / slip)
                 )
                 triplets = self.pattern.triplets(state, placed, by_q, by_rate, slopes, left)
         except ValueError as error:

@@ -135,7 +135,9 @@ class FrameCables:
         if self.winches.answering:
             path, path_rate = self.ropes.along(spans.length), self.ropes.along(spans.rate)
             left = self.winches.stiffness_left(time, self.ropes, path, path_rate)
-        slopes = self._turning.slopes(self.ropes, spans.speed, spans.exponent, table.slip_speed)
+        slip = table.slip_speed
+        own = (1.0 - spans.exponent**2) / slip
+        slopes = self._turning.slopes(self.ropes, spans.speed, own, lambda s: np.tanh(s / slip))
         count = turning_pulleys(table, slopes)
         self._factors = factors = np.zeros((2, count, self.points, 3))
         log_slopes = self._chain.log_slopes(spans.angle)

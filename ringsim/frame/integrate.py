@@ -30,13 +30,9 @@ from ringsim.variables import Outcome
 
 _MOST = 25
 """Newton iterations a step at most, as of the full model."""
-_FALL = 0.5
-"""Ratio of successive residuals above which the tangent is renewed: one more iteration costs a
-third of a tangent, and teaches."""
-_DESCENT = 0.9
-"""Ratio of successive residuals above which half the change is tried, and half of that ..."""
-_SMALLEST_SHARE = 0.1
-"""... down to a sixteenth: by then the tangent of the other side is better."""
+_FALL = 0.3
+"""Ratio of successive residuals above which the tangent is renewed: a tangent costs two iterations,
+and secants teach the old one."""
 _EASY = 3
 """Newton iterations up to which a step was easy: the motion is smooth, and a cubic foretells it
 better than a parabola; where ropes swing within a step it does worse."""
@@ -120,7 +116,8 @@ class Integration(Remembering):
         return self._faults[0].time if self._faults else math.inf
 
     def _begin(self) -> None:
-        """Let the winches begin a step."""
+        """Let joints and winches begin a step."""
+        self._model.laws.begin()
         cables, now = self._model.cables, self._control.now
         if cables is not None and self._now.chain is not None:
             slope = self._scene.structure.path_slope
@@ -149,12 +146,13 @@ class Integration(Remembering):
         return Strains(after.strains, (r**2 / (1.0 + r) * before - (1.0 + r) * now) / step, lead)
 
     def _newton(self, time: float, step: float, after: State) -> None:
-        """Newton's method with secants and a line search, in place: where forces bend sharply, as
-        of stops and of pulleys whose friction turns round, a whole step may lead as far to the
-        other side.
+        """Newton's method with secants, in place.
+
+        Changes are taken whole.  Where forces bend sharply, as of stops and of dry friction that
+        turns round, the residual may grow for an iteration: what it finds there is what tells the
+        way back (``ringsim.cable.turning``), and shorter changes would only find it later.
         """
-        model, factored, last, share = self._model, None, math.inf, 1.0
-        begun, change, fresh, secants = after.stand(), np.zeros(0), False, Secants()
+        model, factored, last, secants = self._model, None, math.inf, Secants()
         tolerance = model.tolerance(step, self._strains)
         for taken in range(_MOST):
             try:
@@ -168,22 +166,14 @@ class Integration(Remembering):
                 self._easy = taken <= _EASY
                 return
             self.history.newton_iterations += 1
-            if fresh and norm > _DESCENT * last and share > _SMALLEST_SHARE:
-                share *= 0.5
-                secants.forget()
-                after.take(begun)
-                self._move(after, share * change)
-                continue
-            fresh = factored is None or norm > _FALL * last
-            if factored is None or fresh:
+            if factored is None or norm > _FALL * last:
                 factored = model.tangent(time, step, after, self._strains)
                 secants.forget()
                 self.history.jacobians += 1
                 if not factored.sound:
                     raise NoBalanceError("a pivot of the tangent is too small")
-            last, share, begun = norm, 1.0, after.stand()
-            change = secants.corrected(factored.solve(g))
-            self._move(after, change)
+            last = norm
+            self._move(after, secants.corrected(factored.solve(g)))
         raise NoBalanceError(
             f"Newton's residual is {norm:.3g} N after {_MOST} iterations, step {step:.3g} s"
         )

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.cable.turning import Turning
 from ringsim.frame.parts import Indices
 from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.frame.vectors import compiled
@@ -22,6 +23,7 @@ from ringsim.scene import Scene
 _NUDGE = 1e-7
 """Change of place (m, rad) and rate by which the slopes of laws are measured."""
 _SIDES = np.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
+_ENDS = np.array([[1.0], [-1.0]])
 Law = Callable[[Array, Array], Reaction]
 
 
@@ -95,7 +97,7 @@ class JointLaws:
     def __init__(self, scene: Scene, skeleton: Skeleton, openings: Openings) -> None:
         self._openings, self._stop = openings, scene.stop
         self.damping = np.zeros(len(skeleton.angles))
-        self._friction: list[tuple[JointFriction, Indices, Array]] = []
+        self._friction: list[tuple[JointFriction, Indices, Array, Turning]] = []
         for family, law in scene.joints.present().items():
             self._rub(family, law, skeleton)
         spring, sections = scene.hinge_spring, openings.angle.shape[1]
@@ -126,13 +128,18 @@ class JointLaws:
         if rest:
             sections = np.array([joints[skeleton.angles[n].joint].section for n in rest])
             senses = np.array([skeleton.angles[n].sense for n in rest])
-            self._friction.append((at_section(law, sections), np.array(rest), senses))
+            self._friction.append((at_section(law, sections), np.array(rest), senses, Turning()))
 
     def latch(self, deployed: NDArray[np.bool_]) -> None:
         """Hold these V-joints from both sides from now on, if the stop latches."""
         if self._stop is not None and self._stop.latch:
             self.latched |= deployed
             self._latches = bool(self.latched.any())
+
+    def begin(self) -> None:
+        """Begin a step."""
+        for *_, turning in self._friction:
+            turning.forget()
 
     def stick(self, fault: StuckVJoint, place: tuple[int, int], opening: float) -> None:
         """Hold a V-joint, (plane, section), at an opening angle (rad)."""
@@ -147,12 +154,6 @@ class JointLaws:
     ) -> list[tuple[Indices, Array, Array, Array, Law]]:
         """Angles, senses, coordinates and rates of every law that acts, and the law."""
         found: list[tuple[Indices, Array, Array, Array, Law]] = []
-        for law, own, sense in self._friction:
-
-            def rub(_: Array, rate: Array, law: JointFriction = law) -> Reaction:
-                return Reaction(0.0 * rate, law.torque(rate), 0.0)
-
-            found.append((own, sense, angles[own], sense * rates[own], rub))
         own, sense = self._openings
         if self._stop is not None:
             least, most = folded_between(angles, own, sense)
@@ -191,12 +192,18 @@ class JointLaws:
         """Add all torques but those of linear friction to a residual, whose unknowns of the angles
         are at ``home``; angles in rad and rates in rad/s, shape (a,).
         """
+        for friction, own, sense, turning in self._friction:
+            turned = sense * rates[own]
+            turning.note(friction, turned)
+            g[home[own]] += sense * friction.torque(turned)
         for own, sense, x, rate, law in self._acting(angles, rates):
             g[home[own]] += sense * law(x, rate).total
 
     def passing(self, angles: Array, rates: Array) -> Torques:
         """What all torques take and store."""
         lost, stored = self.damping * rates, 0.0
+        for friction, own, sense, _ in self._friction:
+            lost[own] += sense * friction.torque(sense * rates[own])
         for own, sense, x, rate, law in self._acting(angles, rates):
             reaction = law(x, rate)
             lost[own] += sense * reaction.damping
@@ -214,6 +221,12 @@ class JointLaws:
     def slopes(self, angles: Array, rates: Array, rate_by_angle: float) -> Array:
         """Derivatives of the torques after the angles, whose rates follow them, N m/rad: (a,)."""
         found = self.damping * rate_by_angle
+        for friction, own, sense, turning in self._friction:
+            turned = sense * rates[own]
+            ends = friction.torque(turned + _NUDGE * _ENDS)
+            slope = (ends[0] - ends[1]) / (2.0 * _NUDGE)
+            slope = turning.slopes(friction, turned, slope, friction.torque)
+            found[own] += rate_by_angle * slope
         for own, _, x, rate, law in self._acting(angles, rates):
             found[own] += slope_of(lambda *at, law=law: law(*at).total, x, rate, rate_by_angle)
         return found

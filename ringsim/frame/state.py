@@ -64,18 +64,8 @@ class State:
     def _arrays(self) -> list[Array]:
         return [*self.pose, self.hub, self.strains, *self.followed]
 
-    def stand(self) -> tuple[Array, ...]:
-        """Copies of all places."""
-        place, axes, angle = self.pose
-        return place.copy(), axes.copy(), angle.copy(), self.hub.copy()
-
-    def take(self, places: tuple[Array, ...]) -> None:
-        """Go back to places of ``stand``."""
-        for each, place in zip((*self.pose, self.hub), places, strict=True):
-            each[:] = place
-
     def copy(self) -> "State":
         """Arrays of its own."""
-        place, axes, angle, hub = self.stand()
+        pose, hub = Pose(*(each.copy() for each in self.pose)), self.hub.copy()
         strains, followed = self.strains.copy(), self.followed.copy()
-        return State(Pose(place, axes, angle), hub, strains, followed, self._held)
+        return State(pose, hub, strains, followed, self._held)

@@ -24,6 +24,7 @@ def test_both_ways_of_writing_read_alike():
     ("table", "words"),
     [
         ({"asynchrony_mx": {"max": 1.0, **SHOWN}}, r"did you mean asynchrony_max\?"),
+        ({"drive_margin_min": {"min": 0.0, **SHOWN}}, r"did you mean least_drive_margin\?"),
         ({"asynchrony": {"max": 1.0, **SHOWN}}, "value for each time.*asynchrony_max"),
         ({"peak_tension": {"max": 1.0, "probability": 0.9}}, "confidence is missing"),
         ({"peak_tension": SHOWN}, "give max or min, in N"),

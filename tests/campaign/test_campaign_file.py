@@ -137,6 +137,25 @@ def test_dry_run_tells_the_plan_and_keeps_nothing(bench):
     assert "from 16 samples that are done" in printed
 
 
+def test_dry_run_says_where_there_will_be_no_intervals_and_no_range_of_one(bench):
+    file = bench.write(1)
+    start = ("campaign", file, "--dry-run", "--out", "out")
+    printed = bench.run(*start)
+    assert "no intervals" not in printed
+    assert "s each, from a trial run" in printed
+    file.write_text(file.read_text().replace('"random"', '"sobol"'))
+    assert "give design.replicates = 8" in bench.run(*start)
+
+
+def test_a_folder_without_any_result_is_not_merged(bench):
+    bench.run("campaign", bench.write(2), "--out", "out")
+    for journal in (bench.folder / "out" / "journals").glob("*.journal"):
+        journal.unlink()
+    (bench.folder / "out" / "campaign.nc").unlink()
+    assert "none of its 2 samples has run" in bench.run("merge", "out", code=2)
+    assert not (bench.folder / "out" / "campaign.nc").exists()
+
+
 def test_dry_run_says_what_there_is_a_value_for(bench):
     file = ROOT / "campaigns" / "nonsync_quick.toml"
     printed = bench.run("campaign", file, "--dry-run", "--out", "out", solver="fake_solver:spy")
