@@ -1,8 +1,8 @@
 """Commands of ringsim without the two seconds that each process would spend on imports.
 
-A process that has loaded all verbs forks for each command.  Folder, environment, exit code and what
-is printed are those of a fresh process.  Tests of how a process starts, of what it loads, of signals
-and of MPI start real ones.
+A process that has loaded all verbs forks for each command.  Folder, environment, exit code and
+what is printed are those of a fresh process.  Tests of how a process starts, of what it loads, of
+signals and of MPI start real ones.
 """
 
 from __future__ import annotations

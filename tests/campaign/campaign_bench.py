@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import xarray as xr
-
 from preloaded import ringsim
+
 from ringsim.campaign.folder import open_folder
 from ringsim.storage.journal import Journal, read_journal
 

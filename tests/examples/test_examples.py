@@ -17,9 +17,7 @@ TOGETHER = ("campaign", "analysis")
 ALONE = [(path.stem,) for path in EXAMPLES if path.stem not in TOGETHER]
 
 
-@pytest.mark.parametrize(
-    "scripts", [TOGETHER, *ALONE], ids="-".join
-)
+@pytest.mark.parametrize("scripts", [TOGETHER, *ALONE], ids="-".join)
 def test_an_example_runs(scripts: tuple[str, ...], tmp_path: Path) -> None:
     """One that runs another one first finds in the same folder what that has done."""
     for script in scripts:
