@@ -15,7 +15,7 @@ from ringsim.outputs.error_bars import error_bars, rules
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
-from ringsim.simulation import run
+from ringsim.simulation import run, run_frame
 from ringsim.stepping.constant_steps import ConstantSteps
 from ringsim.stepping.instant import Energies, Instant, Scales
 from ringsim.stepping.locks import StopContact
@@ -188,7 +188,7 @@ def test_bars_cover_what_a_finer_run_finds() -> None:
     scene = ring(**{"solver.error_bars": True})
     barred = run(scene).values
     finer = {"solver.tolerance": 5e-6, "rods.elements": 2, "solver.error_bars": False}
-    truth = run(scene.with_values(finer)).values
+    truth = run_frame(scene.with_values(finer)).values
     for name in ("deployment_time", "asynchrony_max"):
         error = abs(float(barred[name] - truth[name]))
         assert error < barred[f"{name}_error"] < 0.05 * truth[name]

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from preloaded import ringsim
 
 from made import campaign
 from ringsim.cli.analyse import command
@@ -59,11 +56,8 @@ def study(tmp_path_factory):
 
 def run_campaign(folder, text):
     (folder / "study.toml").write_text(text)
-    line = [sys.executable, "-m", "ringsim", "campaign", "study.toml", "--workers", "0"]
-    done = subprocess.run(
-        [*line, "--solver", "stand_in:run"], cwd=folder, capture_output=True, text=True,
-        check=False, env=os.environ | {"PYTHONPATH": f"{Path(__file__).parents[2]}:{folder}"},
-    )  # fmt: skip
+    line = ["campaign", "study.toml", "--workers", 0, "--solver", "stand_in:run"]
+    done = ringsim(*line, folder=folder)  # where the stand-in is found
     assert (folder / "runs/study/campaign.nc").exists(), done.stderr
     return folder / "runs/study"
 

@@ -55,7 +55,8 @@ def test_silence_where_friction_acts_or_where_there_is_none() -> None:
         {"both__slip_speed": 4.2e-5},
         {"both__slip_speed": 2e-4, "both__friction": {"kind": "none"}},
     ):
-        assert "slip_speed" not in run_ideal(slowly(**values)).reason
+        # Both fidelities look at what was wound; the full one takes a third of the time.
+        assert "slip_speed" not in outcome(slowly(**values)).reason
 
 
 def test_a_motor_that_stalls_into_a_crawl_is_judged_by_what_it_wound() -> None:

@@ -39,7 +39,7 @@ def last_of(found: Outcome, name: str) -> np.ndarray:
 
 @pytest.mark.parametrize("winding", [CONSTANT, RAMP], ids=["constant", "ramp"])
 def test_a_prescribed_law_winds_what_it_says(winding: dict[str, Any]) -> None:
-    given = scene(winding=winding)
+    given = scene(winding=winding, solver__end_time=3.0)
     found = outcome(given)
     assert found.status == Status.OK
     times, wound = until(found, "wound_length", 0)
@@ -77,7 +77,7 @@ def test_a_stalling_motor_holds_its_tension_and_runs_where_it_can() -> None:
     assert found.values["energy_error"] < BALANCE
 
 
-@pytest.mark.parametrize("stiffness", [1e3, 1e5, 1e6])
+@pytest.mark.parametrize("stiffness", [1e3, 1e6])
 def test_tension_feedback_keeps_its_target_without_slack(stiffness: float) -> None:
     law = {"kind": "tension-feedback", "target": 0.5, "max_speed": 0.3}
     found = outcome(scene(winding=law, both__axial_stiffness=stiffness))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import xarray as xr
+from preloaded import ringsim
 
 from ringsim.campaign.folder import open_folder
 from ringsim.storage.journal import Journal, read_journal
@@ -22,6 +23,7 @@ PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH",
 MODULES = os.pathsep.join(filter(None, [str(HERE), os.environ.get("PYTHONPATH", "")]))
 """Where the stand-ins for the solver are found."""
 
+PYTHON = [sys.executable, "-m", "ringsim"]
 MPIEXEC = shutil.which("mpiexec", path=PATH)
 NOT_COMPARED = ("wall_time", "cpu_time", "log", "wall_time_checked", "cpu_time_checked")
 """Timings, and the text that a dying process prints."""
@@ -93,18 +95,10 @@ class Bench:
         return path
 
     def command(self, *arguments, ranks=0, solver="fake_solver:run"):
-        front = [sys.executable, "-m", "ringsim"]
+        front = PYTHON
         if ranks:
-            front = [
-                MPIEXEC or "mpiexec",
-                "-n",
-                str(ranks),
-                sys.executable,
-                "-m",
-                "mpi4py",
-                "-m",
-                "ringsim",
-            ]
+            mpi = [MPIEXEC or "mpiexec", "-n", str(ranks)]
+            front = [*mpi, sys.executable, "-m", "mpi4py", "-m", "ringsim"]
         end = ["--solver", solver] if solver and arguments[0] == "campaign" else []
         return [*front, *map(str, arguments), *end]
 
@@ -121,18 +115,27 @@ class Bench:
         return process
 
     def close(self):
-        """End what is still running."""
+        """End what is still running, and close the pipes of what has ended, too."""
         for process in self.processes:
             if process.poll() is None:
                 process.kill()
                 process.communicate()
+            process.stdout.close()
 
-    def run(self, *arguments, ranks=0, solver="fake_solver:run", code=0, timeout=120):
-        done = subprocess.run(
-            self.command(*arguments, ranks=ranks, solver=solver),
-            cwd=self.folder, env=self.environment(), text=True, timeout=timeout,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
-        )  # fmt: skip
+    def run(self, *arguments, ranks=0, solver="fake_solver:run", code=0, timeout=120, fresh=False):
+        """What the command prints; ``fresh`` starts a process that has loaded nothing."""
+        command = self.command(*arguments, ranks=ranks, solver=solver)
+        environment = self.environment()
+        if ranks or fresh:
+            done = subprocess.run(
+                command, cwd=self.folder, env=environment, text=True, timeout=timeout,
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
+            )  # fmt: skip
+        else:
+            done = ringsim(
+                *command[len(PYTHON) :], folder=self.folder, environment=environment,
+                joined=True, timeout=timeout,
+            )  # fmt: skip
         assert done.returncode == code, done.stdout
         return done.stdout
 

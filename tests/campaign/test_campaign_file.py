@@ -158,7 +158,8 @@ def test_a_folder_without_any_result_is_not_merged(bench):
 
 def test_dry_run_says_what_there_is_a_value_for(bench):
     file = ROOT / "campaigns" / "nonsync_quick.toml"
-    printed = bench.run("campaign", file, "--dry-run", "--out", "out", solver="fake_solver:spy")
+    plan = ("campaign", file, "--judge", "fake_solver:spy", "--dry-run", "--out", "out")
+    printed = bench.run(*plan, solver="fake_solver:spy")
     for plane in ("upper", "lower"):
         (line,) = (x for x in printed.splitlines() if f"cables.{plane}.friction.coefficient" in x)
         assert line.endswith(", for each pulley")

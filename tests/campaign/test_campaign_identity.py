@@ -17,15 +17,15 @@ def reference(tmp_path_factory):
     return bench.result("out")
 
 
-@pytest.mark.parametrize("workers", [1, 2, 4])
+@pytest.mark.parametrize("workers", [1, 4])
 def test_local_workers_give_the_serial_file(workers, bench, reference):
     bench.run("campaign", bench.write(), "--workers", workers, "--out", "out")
     xr.testing.assert_identical(comparable(bench.result("out")), comparable(reference))
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
-def test_mpi_ranks_give_the_serial_file(ranks, bench, reference, mpi):
-    bench.run("campaign", bench.write(), "--out", "out", ranks=ranks)
+def test_mpi_ranks_give_the_serial_file(bench, reference, mpi):
+    """Three; two do the same with checks, see test_campaign_judge.py."""
+    bench.run("campaign", bench.write(), "--out", "out", ranks=3)
     xr.testing.assert_identical(comparable(bench.result("out")), comparable(reference))
 
 

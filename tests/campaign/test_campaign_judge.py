@@ -17,7 +17,8 @@ from ringsim.storage.result import check_of, sample_of
 from ringsim.variables import Status
 
 CHECKED = 'fidelity = "frame"\ncheck_every = 2\n'
-START = ("campaign", "small.toml", "--out", "out", "--judge", "fake_solver:judge")
+CALL = ("campaign", "small.toml", "--out", "out", "--judge", "fake_solver:judge")
+START = (*CALL, "--workers", 0)
 
 
 def written(bench, top=CHECKED, samples=5):
@@ -128,7 +129,8 @@ def test_a_check_that_dies_costs_no_sample_and_can_be_repeated(bench):
 def test_nothing_checked_cannot_keep_max_difference(bench):
     written(bench, f"{CHECKED}max_difference = 0.5\n")
     bench.extra["JUDGE_DIES"] = "1"
-    last = bench.run(*START, code=3).strip().splitlines()[-1]
+    printed = bench.run(*CALL, code=3)  # in a process that may die
+    last = printed.strip().splitlines()[-1]
     assert "no sample ended well with both engines" in last
 
 
@@ -154,7 +156,7 @@ def test_a_finished_campaign_may_be_checked_later(bench):
 def test_every_way_to_run_gives_the_same(checked, mpi):
     before = comparable(checked.result("out"))
     for name, options, ranks in (("serial", ("--workers", 0), 0), ("ranks", (), 2)):
-        start = (*START[:2], "--out", name, *START[4:])
+        start = (*CALL[:2], "--out", name, *CALL[4:])
         checked.run(*start, *options, ranks=ranks)
         xr.testing.assert_identical(comparable(checked.result(name)), before)
 
@@ -189,7 +191,7 @@ def test_a_dry_run_tells_what_checks_cost(checked):
     """From one trial check, or from those that are done."""
     written(checked, samples=9)
     for out, open_, basis in (("new", 5, "from a trial run of sample"), ("out", 2, "from 3 sam")):
-        command = ("campaign", "small.toml", "--out", out, *START[4:])
+        command = ("campaign", "small.toml", "--out", out, *CALL[4:])
         printed = checked.run(*command, "--dry-run")
         assert f"5 samples with the full engine, too, {open_} to run here" in printed
         (cost,) = (line for line in printed.splitlines() if "cost of checks" in line)

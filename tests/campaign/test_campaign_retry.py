@@ -16,7 +16,8 @@ WORDS = "solver.tolerance = 0.0001, solver.step = 0.1"
 
 
 def poisoned(bench, *words, code=0):
-    return bench.run(*START, *words, solver="fake_solver:poisoned", code=code)
+    """In one process, which failures of these kinds leave alone."""
+    return bench.run(*START, "--workers", 0, *words, solver="fake_solver:poisoned", code=code)
 
 
 def stored(bench):

@@ -196,7 +196,8 @@ def test_solver_process_that_cannot_start_is_told_and_nobody_waits(ranks, bench,
         request.getfixturevalue("mpi")
     (bench.folder / "sitecustomize.py").write_text("import sys\nsys.executable = '/no/python'\n")
     bench.extra["PYTHONPATH"] = f"{bench.folder}{os.pathsep}{MODULES}"
-    printed = bench.run("campaign", bench.write(4), "--out", "out", ranks=ranks, code=2)
+    start = ("campaign", bench.write(4), "--out", "out")
+    printed = bench.run(*start, ranks=ranks, code=2, fresh=True)
     assert printed.count("the solver process cannot be started") == 1
     assert "Traceback" not in printed
 

@@ -154,7 +154,7 @@ def test_one_sample_is_a_campaign(bench):
 @pytest.mark.parametrize("name", ["ü-Ω 100%", "a#mode=bytes", "[x]*", "file:name", "-x\n'\""])
 def test_folder_may_have_any_name(name, bench):
     out = bench.folder / name
-    bench.run("campaign", bench.write(3), f"--out={name}")
+    bench.run("campaign", bench.write(3), f"--out={name}", "--workers", 0)
     assert finished(out) == {0, 1, 2}
     left, failed, _ = merge(open_folder(out), execution="again", partly=False)
     assert (left, failed) == (0, 0)

@@ -13,10 +13,18 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+TOGETHER = ("campaign", "analysis")
+ALONE = [(path.stem,) for path in EXAMPLES if path.stem not in TOGETHER]
 
 
-@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_runs(script: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("scripts", [TOGETHER, *ALONE], ids="-".join)
+def test_an_example_runs(scripts: tuple[str, ...], tmp_path: Path) -> None:
+    """One that runs another one first finds in the same folder what that has done."""
+    for script in scripts:
+        runs(ROOT / "examples" / f"{script}.py", tmp_path)
+
+
+def runs(script: Path, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-W", "error", str(script)],
         cwd=tmp_path, capture_output=True, text=True, check=False,

@@ -81,8 +81,9 @@ def test_without_a_home_to_write_to_a_temporary_folder_is_told(tmp_path: Path) -
 
 def test_of_two_processes_one_compiles_and_the_other_waits(tmp_path: Path) -> None:
     places = {VARIABLE: str(tmp_path / "cache")}
-    for process in [started(COMPILES, tmp_path, **places) for _ in range(2)]:
-        ended(process)
+    with started(COMPILES, tmp_path, **places) as one, started(COMPILES, tmp_path, **places) as two:
+        ended(one)
+        ended(two)
     assert (tmp_path / "trace").read_text() == "begin end "
 
 

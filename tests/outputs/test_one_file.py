@@ -73,7 +73,7 @@ def test_the_summary_of_a_run_states_it(opening_rate, tmp_path) -> None:
     settings = [f"--set={path}={value}" for path, value in SHORT.items()]
     out = str(tmp_path / "run.nc")
     printed = CliRunner().invoke(
-        cli, ["run", "truss2", "--fidelity=ideal", "--out", out, *settings]
+        cli, ["run", "truss2", "--fidelity=frame", "--out", out, *settings]
     )
     with xr.open_dataset(out) as found:
         line = f"  largest opening rate{float(found.opening_rate_max):10.4f} degree s-1"

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import preloaded
 import pytest
 from click.testing import CliRunner, Result
 
@@ -123,8 +124,6 @@ def test_bad_assignments_are_refused(assignment: str, named: str) -> None:
      ["scenes", "ring81"], ["check", "ring18", "--set"]],
 )  # fmt: skip
 def test_bad_usage_ends_with_one_line(arguments: list[str]) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "ringsim", *arguments], capture_output=True, text=True, check=False
-    )
+    done = preloaded.ringsim(*arguments)
     assert done.returncode == EXIT_BAD_INPUT
     assert len(done.stderr.splitlines()) == 1

@@ -86,7 +86,7 @@ def test_one_section_follows_its_rope():
         joints={"vjoint": {"viscous": viscous}}, structure__opening_angle=60.0,
         cable__winch={"winding": {"kind": "constant", "speed": speed}},
         cable__friction={"kind": "none"}, cable__axial_stiffness=1e8,
-        solver__end_time=20.0,
+        solver__end_time=15.1,
     )  # fmt: skip
     outcome = run_ideal(scene)
     bar, offset = scene.structure.half_bar, scene.cables.upper.block_offset
@@ -116,7 +116,7 @@ def test_after_both_cables_are_cut_it_coasts_against_its_joints():
     cuts = [{"kind": "cut-cable", "time": 2.0, "cable": k, "span": 4} for k in (1, 2)]
     viscous = 0.02
     scene = six(
-        net="none", faults=cuts, solver__end_time=8.0, record__interval=0.5,
+        net="none", faults=cuts, solver__end_time=4.1, record__interval=0.5,
         joints={"vjoint": {"viscous": viscous}},
     )  # fmt: skip
     outcome = run_ideal(scene)
@@ -135,15 +135,18 @@ def test_after_both_cables_are_cut_it_coasts_against_its_joints():
 @pytest.mark.parametrize(
     "values",
     [
-        {},
-        {"cable__end": "both", "cable__damping_time": 0.002},
-        {"cable__end": "last", "cable__friction": {"kind": "capstan", "coefficient": 0.2}},
-        {"cables__upper__initial_slack": 0.01, "stop__latch": False, "cables__lower": "none"},
-        {"joints": {"vjoint": {"viscous": 0.05, "coulomb": 0.01}, "hinge": {"viscous": 0.01}}},
+        {
+            "cable__end": "both", "cable__damping_time": 0.002,
+            "joints": {"vjoint": {"viscous": 0.05, "coulomb": 0.01}, "hinge": {"viscous": 0.01}},
+        },
+        {
+            "cable__end": "last", "cable__friction": {"kind": "capstan", "coefficient": 0.2},
+            "cables__upper__initial_slack": 0.01, "stop__latch": False, "cables__lower": "none",
+        },
         {"faults": [{"kind": "jammed-pulley", "time": 5.0, "cable": 1, "pulley": 8}],
          "solver__end_time": 20.0},
     ],
-    ids=["plain", "both-ends", "capstan", "one-cable", "coulomb", "jam"],
+    ids=["both-ends-coulomb", "capstan-one-cable", "jam"],
 )  # fmt: skip
 def test_energy_balance_closes(values):
     outcome = run_ideal(six(**values))
