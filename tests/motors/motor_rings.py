@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
 from ringsim.scene import Scene, load_scene
 
 MOTOR = {
@@ -12,6 +13,11 @@ TRAVEL = 0.01 / 100.0
 """Rope for a turn of the shaft, m/rad."""
 STALL = 0.002 * 0.6 / TRAVEL
 """Tension at which the motor stalls, N."""
+PLAIN = EcssMechanisms(
+    inertia=1.0, spring=1.0, friction=1.0, gravity=1.0, latch=1.0, driving_spring=1.0,
+    motorisation=1.0,
+)  # fmt: skip
+"""A margin without factors."""
 
 
 def ring(**values: object) -> Scene:

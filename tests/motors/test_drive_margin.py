@@ -8,22 +8,17 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from motor_rings import MOTOR, STALL, ring
+from motor_rings import MOTOR, PLAIN, STALL, ring
 from ringsim.layout.layout import layout_of
 from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
 from ringsim.parts.margin.family import MarginStandard
 from ringsim.parts.margin.nasa_std_5017 import NasaMechanisms
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
-from ringsim.simulation import simulate
 from ringsim.theory.drive_margin import PULLEYS, DriveMargin
 from ringsim.theory.plane_margin import PlaneMargin
 
 ANGLES = np.radians([62.0, 90.0, 130.0, 170.0, 179.0])
-PLAIN = EcssMechanisms(
-    inertia=1.0, spring=1.0, friction=1.0, gravity=1.0, latch=1.0, driving_spring=1.0,
-    motorisation=1.0,
-)  # fmt: skip
 STEP = 1e-4
 
 
@@ -159,34 +154,6 @@ def test_the_least_margin_is_least() -> None:
     assert least.margin <= fine.margin
     assert least.angle == pytest.approx(fine.angle, abs=math.radians(120.0 / 400))
     assert least.margin == pytest.approx(fine.margin, rel=1e-4)
-
-
-def test_the_margin_vanishes_where_a_run_stalls_and_a_run_tells_it() -> None:
-    scene = ring(
-        net__stiffness=300.0, net__neutral_length=0.4, solver__end_time=20.0, record__interval=0.5,
-        joints__vjoint__viscous=2.0, cables__upper__friction={"kind": "none"},
-        cables__lower__friction={"kind": "none"}, margin=PLAIN.model_dump(),
-    )  # fmt: skip
-    found = simulate(scene, "ideal").dropna("time", subset=["opening_angle"])
-    # Close to the stall the motors crawl: what is left of their line is the viscous friction.
-    assert found.drive_margin[-2] == pytest.approx(0.0, abs=1e-4)
-    assert found.drive_margin[1] > 0.5
-    assert found.least_drive_margin == found.drive_margin.min()
-    k = int(np.argmin(found.drive_margin.values))
-    assert found.least_drive_margin_time == found.time[k]
-    assert list(found.resistance.values) == [PULLEYS, "inertia", "joint friction", "net"]
-    assert found.drive_resistance.attrs["units"] == found.drive_available.attrs["units"] == "N m"
-
-
-def test_along_a_run_work_is_drive_less_resistance() -> None:
-    """The ring's equation of motion: what the cables give goes into friction and inertia."""
-    scene = ring(solver__end_time=3.0, record__interval=0.02, margin=PLAIN.model_dump())
-    found = simulate(scene, "ideal").sel(time=slice(0.5, None))
-    lost = found.drive_resistance
-    tension = found.motor_torque.isel(plane=0, winch=0) / MOTOR["stall_torque"]
-    driving = tension * (found.drive_available - lost.sel(resistance=PULLEYS))
-    resisting = lost.sel(resistance="joint friction") + lost.sel(resistance="inertia")
-    np.testing.assert_allclose(driving[2:-2], resisting[2:-2], rtol=2e-3)
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from click.testing import CliRunner
 from motor_rings import ring
 from ringsim.cli import cli
 from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.plots import run
 from ringsim.plots.drive import drive
-from ringsim.plots.run import draw_run
 from ringsim.scene import Scene
 from ringsim.simulation import simulate
 from ringsim.theory.drive_margin import DriveMargin
@@ -73,9 +73,12 @@ def test_check_refuses_a_drive_without_limit() -> None:
     assert 'cables.upper.winch.winding.kind = "constant": it pulls with any force' in result.stderr
 
 
-def test_a_run_draws_what_resists_and_its_least_margin(scene: Scene, tmp_path: Path) -> None:
-    found = simulate(scene, "ideal")
-    assert "run-fig-drive.svg" in [p.name for p in draw_run(found, tmp_path, formats=["svg"])]
+def test_a_run_draws_what_resists_and_its_least_margin(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = simulate(scene, "frame")
+    monkeypatch.setattr(run, "PICTURES", [each for each in run.PICTURES if each[0] == "drive"])
+    assert [p.name for p in run.draw_run(found, tmp_path, formats=["svg"])] == ["run-fig-drive.svg"]
     figure = drive(found)
     upper, lower = figure.axes
     labels = upper.get_legend_handles_labels()[1]
