@@ -10,7 +10,7 @@ from ringsim.analysis.stability import word_of
 from ringsim.engine.build import build
 from ringsim.engine.integrate import Integration
 from ringsim.scene import Scene, load_scene
-from ringsim.simulation import run
+from ringsim.simulation import run, run_frame
 from ringsim.variables import Fate, Status
 
 
@@ -126,7 +126,7 @@ def test_a_ring_that_is_nearly_open_does_not_lock_within_its_first_step() -> Non
         }
     )
     coarse, fine = (
-        run(nearly.model_copy(update={"solver": nearly.solver.refined(k)})) for k in (0, 1)
+        run_frame(nearly.model_copy(update={"solver": nearly.solver.refined(k)})) for k in (0, 1)
     )
     times = [float(outcome.values["deployment_time"]) for outcome in (coarse, fine)]
     assert times[0] == pytest.approx(times[1], rel=0.01)  # what ok promises
