@@ -20,7 +20,7 @@ from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
-from ringsim.plots.campaign.figures import PICTURES
+from ringsim.plots.campaign import figures as of_campaigns
 from ringsim.plots.ring import lines_at
 from ringsim.report import tables
 from ringsim.report.page import LARGEST, page
@@ -72,6 +72,13 @@ class Page(HTMLParser):
             self.cells[-1] += data
 
 
+@pytest.fixture
+def _undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages with a figure or two, where words and tables are what matters."""
+    few = [each for each in of_campaigns.PICTURES if each.name in ("by_input", "distributions")]
+    monkeypatch.setattr(of_campaigns, "PICTURES", few)
+
+
 @pytest.fixture(scope="module", params=KINDS)
 def made(request: pytest.FixtureRequest) -> tuple[str, xr.Dataset, str]:
     campaign = made_campaign(8, **KINDS[request.param])
@@ -95,7 +102,7 @@ def test_the_page_is_well_formed_small_and_loads_nothing(
 def test_every_figure_and_section_is_there(made: tuple[str, xr.Dataset, str]) -> None:
     kind, _, text = made
     ids = set(Page(text).ids)
-    held = [each for each in PICTURES if set(each.needs) <= set(made[1])]
+    held = [each for each in of_campaigns.PICTURES if set(each.needs) <= set(made[1])]
     figures = {f"figure-{each.name}" for each in held} - {"figure-rare_event", "figure-one_by_one"}
     figures -= {"figure-tornado"} if kind == "mixed" else set()  # of too few samples
     assert ids & figures == ({"figure-by_input"} if kind == "lost" else figures)
@@ -226,6 +233,7 @@ def run(*words: str) -> tuple[int, str]:
     return done.exit_code, done.output
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_the_verb(tmp_path: Path) -> None:
     out = str(tmp_path / "page.html")
     save(made_campaign(3), tmp_path / "campaign.nc")
@@ -251,6 +259,7 @@ def test_the_verb(tmp_path: Path) -> None:
     assert (code, told.endswith("the page is HTML: write page.html\n")) == (EXIT_BAD_INPUT, True)
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_verdicts_are_those_of_the_analysis_and_nothing_counts_again() -> None:
     campaign = made_campaign(8, failed=(2, 5), stalled=(4,))
     text, found = page(campaign, "runs/made"), analyse(campaign)
@@ -286,6 +295,7 @@ def test_what_matters_is_that_of_the_analysis() -> None:
     assert "whatever their inputs are (p = 0.4)" in gate.notes[0]
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_the_page_has_all_that_the_analysis_tells_of_main_numbers() -> None:
     campaign, random = made_campaign(12, stalled=(3, 6, 9)), np.random.default_rng(0)
     campaign["cables_upper_friction_coefficient"][:] = random.random((12, 3))
