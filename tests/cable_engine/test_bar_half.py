@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ringsim.scene import Scene
 from ringsim.simulation import run_ideal
 from ringsim.theory.ideal_forces import IdealCables
 from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.variables import Status
+from ringsim.variables import Outcome, Status
 
 
 def scene(half: str = "first", **values: Any) -> Scene:
@@ -25,6 +26,11 @@ def scene(half: str = "first", **values: Any) -> Scene:
         "solver__end_time": 12.0,
     }
     return truss(2, **(fields | values))
+
+
+@cache
+def opened(half: str) -> Outcome:
+    return outcome(scene(half))
 
 
 @pytest.mark.parametrize("end", ["first", "last", "both"])
@@ -48,7 +54,7 @@ def test_points_of_the_model_are_those_of_the_bracket(half: str, end: str, openi
 def test_a_truss_opens_by_the_rope_that_is_wound(half: str) -> None:
     """Where the brackets were turned in the model, the path would not follow the bracket's law."""
     given = scene(half)
-    found = outcome(given)
+    found = opened(half)
     assert found.status == Status.OK
     assert found.values["energy_error"] < 1e-3
     assert given.cables is not None
@@ -83,9 +89,11 @@ def test_brackets_that_cannot_be_are_refused(values: dict[str, Any], text: str) 
 
 @pytest.mark.parametrize("half", ["first", pytest.param("second", marks=pytest.mark.slow)])
 def test_the_ideal_truss_opens_alike(half: str) -> None:
-    full, ideal = outcome(scene(half)), run_ideal(scene(half))
+    """For the first three seconds: the ideal truss on its ropes is the slower one to compute."""
+    full, ideal = opened(half), run_ideal(scene(half, solver__end_time=3.0))
     assert ideal.status == Status.OK
-    kept = full.coordinates["time"] < float(np.nanmin(full.values["lock_time"])) - 0.2
+    assert float(np.nanmin(full.values["lock_time"])) > 3.2
+    kept = full.coordinates["time"] < 2.99
     mean = full.values["opening_angle"].mean(axis=(0, 1))[kept]
     # The sections of the flexible truss run apart by a degree; their mean bends with them.
-    assert mean == pytest.approx(ideal.values["opening_angle"][0, 0][kept], abs=0.2)
+    assert mean == pytest.approx(ideal.values["opening_angle"][0, 0][: kept.sum()], abs=0.2)
