@@ -42,25 +42,26 @@ def test_settings_are_picked_and_told(tmp_path: Path) -> None:
     picked = evidence_for(load_scene("ring18")).pick(0.05)
     with xr.open_dataset(out) as dataset:
         assert f"tolerance = {picked.values['solver.tolerance']}" in dataset.attrs["scene"]
+        assert dataset.attrs["fidelity"] == "frame"
 
 
 @pytest.mark.parametrize(
-    ("words", "represented", "engine"),
-    [([], True, "frame"), (["--fidelity", "full"], True, "full"), ([], False, "full")],
-    ids=["cheapest", "asked-for", "not-represented"],
+    ("words", "represented"),
+    [(["--fidelity", "full"], True), ([], False)],
+    ids=["asked-for", "not-represented"],
 )
-def test_the_cheaper_engine_runs_unless_it_cannot_or_may_not(
-    words: list[str], represented: bool, engine: str, tmp_path: Path, monkeypatch
+def test_the_full_engine_runs_where_the_cheaper_one_cannot_or_may_not(
+    words: list[str], represented: bool, tmp_path: Path, monkeypatch
 ) -> None:
     out = tmp_path / "run.nc"
     if not represented:
         monkeypatch.setattr(simulation, "why_not_frame", lambda scene: "it cannot")
-    asked = ["--accuracy", "0.05", "--out", str(out)]
+    asked = ["--set", "solver.end_time=0.5", "--accuracy", "0.05", "--out", str(out)]
     found = ringsim("run", "ring18", *SMALL, *asked, *words)
     assert found.exit_code == 0, found.output
-    assert f"settings for 0.05: fidelity = {engine}, " in found.output
+    assert "settings for 0.05: fidelity = full, " in found.output
     with xr.open_dataset(out) as dataset:
-        assert dataset.attrs["fidelity"] == engine
+        assert dataset.attrs["fidelity"] == "full"
 
 
 @pytest.mark.parametrize(

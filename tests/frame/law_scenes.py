@@ -62,6 +62,10 @@ def joint(family: str, **law: Any) -> Values:
 
 
 FORCES: dict[str, Values] = {
+    "all-joints": joint("vjoint", viscous=[1e-3, 2e-3, 5e-3], coulomb=1e-3)
+    | joint("pivot", coulomb=1e-3, viscous=1e-3)
+    | joint("hinge", coulomb=1e-3)
+    | {"rods.damping": 0.01},
     "viscous-vjoint": joint("vjoint", viscous=2e-3),
     "dry-vjoint": joint("vjoint", coulomb=1e-3),
     "dry-pivot": joint("pivot", coulomb=1e-3, viscous=1e-3),
@@ -98,6 +102,21 @@ def winding(**law: Any) -> Values:
 
 
 CABLES: dict[str, Values] = {
+    "exact-damped-table": cables(
+        friction={"kind": "bearing-exact", "coefficient": 5e-4},
+        damping_time=2e-3,
+        winch__winding={
+            "kind": "table", "times": [0.0, 0.2, 0.35, 1.0], "lengths": [0.0, 0.01, 0.04, 0.1]
+        },
+    ),
+    "both-bar-half": cables(end="both", bracket={"kind": "bar-half", "angle": 98.0}),
+    "faults": {
+        "faults": [
+            {"kind": "jammed-pulley", "cable": 1, "pulley": 3, "time": 0.2},
+            {"kind": "cut-cable", "cable": 2, "span": 4, "time": 0.25},
+            {"kind": "stuck-vjoint", "plane": "upper", "section": 1, "time": 0.3},
+        ]
+    },
     "bearing": {},
     "bearing-exact": cables(friction={"kind": "bearing-exact", "coefficient": 5e-4}),
     "capstan-pulleys": cables(

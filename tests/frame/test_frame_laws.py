@@ -16,13 +16,15 @@ from ringsim.simulation import simulate
 
 FLOOR = 1e-4
 SLOW = {
-    "forces": {"viscous-sections", "force-sections", "net", "rigid-free", "arc-2-free",
-               "damped-net", "free-stop", "edge-net", "ramps"},
-    "cables": {"last", "capstan-pulleys", "frictionless", "stall", "two-winches", "feedback",
-               "locked", "constant", "arc-2-flexible", "boom-and-net", "late-lower", "taut",
-               "backdrivable"},
+    "forces": {"viscous-vjoint", "dry-vjoint", "dry-pivot", "dry-hinge", "viscous-sections",
+               "damped-rods", "force-sections", "net", "rigid-free", "arc-2-free", "damped-net",
+               "free-stop", "edge-net", "ramps"},
+    "cables": {"bearing", "bearing-exact", "both", "bar-half", "table", "damped-rope", "jammed",
+               "cut", "stuck", "last", "capstan-pulleys", "frictionless", "stall", "two-winches",
+               "feedback", "locked", "constant", "arc-2-flexible", "boom-and-net", "late-lower",
+               "taut", "backdrivable"},
 }  # fmt: skip
-"""Near kin of what runs by default."""
+"""Near kin of what runs by default: some laws run together there, and alone here."""
 
 
 def named(kind: str, scenes: dict[str, dict[str, object]]) -> list[object]:

@@ -1,5 +1,6 @@
 """Frames against the energy quadrature, which knows neither rods nor steps."""
 
+import functools
 import math
 from typing import Any
 
@@ -16,6 +17,7 @@ AGREEMENT = 2e-5
 for fixed ones."""
 
 
+@functools.cache
 def lateness(sections: int, tolerance: float, **values: Any) -> float:
     """Relative error of the time at which the mean opening angle comes to 175 deg."""
     chosen = {name.replace("__", "."): value for name, value in values.items()}
