@@ -1,11 +1,12 @@
 """Orders of convergence, and two rod formulations that have nothing in common but the physics."""
 
+import functools
 import math
 
 import numpy as np
 import pytest
 
-from ring_runs import Array, ideal_time, ring, run
+from ring_runs import Array, Run, ideal_time, ring, run
 
 
 def test_second_order_in_a_constant_step() -> None:
@@ -25,9 +26,14 @@ def test_second_order_in_a_constant_step() -> None:
     np.testing.assert_allclose(orders, 2.0, atol=0.1)
 
 
+@functools.cache
+def nearly_open(tolerance: float) -> Run:
+    return run(ring(3, solver__tolerance=tolerance, solver__end_time=2.48))
+
+
 @pytest.mark.parametrize("tolerance", [4e-4, 1e-4, 2.5e-5])
 def test_a_moving_step_keeps_its_tolerance(tolerance: float) -> None:
-    found = run(ring(3, solver__tolerance=tolerance, solver__end_time=2.48))
+    found = nearly_open(tolerance)
     # 1.5e-5 stands for what no step can take away: elastic strains, which the reference (the
     # limit of constant steps, 5.25e-5 later than the ideal ring) holds only at this modulus.
     limit = ideal_time(found.scene, 170.0) * (1.0 + 5.25e-5)
@@ -36,9 +42,7 @@ def test_a_moving_step_keeps_its_tolerance(tolerance: float) -> None:
 
 def test_a_tighter_tolerance_costs_steps_by_its_root() -> None:
     """h ~ tolerance^(1/2) must hold also where the steps begin to see the rods vibrate."""
-    coarse, fine = (
-        len(run(ring(3, solver__tolerance=t, solver__end_time=2.48)).times) for t in (1e-4, 1e-5)
-    )
+    coarse, fine = (len(nearly_open(t).times) for t in (1e-4, 1e-5))
     assert fine < 1.3 * math.sqrt(10.0) * coarse
 
 
