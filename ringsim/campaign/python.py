@@ -166,7 +166,7 @@ def open_campaign(path: str | Path) -> xr.Dataset:
     Raises
     ------
     InputError
-        If there is no campaign.
+        If there is no campaign, or none of its samples has run.
     """
     path = Path(path)
     if path.is_dir() and _is_behind(path):
