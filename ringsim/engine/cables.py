@@ -13,12 +13,12 @@ import numpy as np
 from ringsim.cable.chain import Chain
 from ringsim.cable.records import Cables
 from ringsim.cable.state import ChainState
-from ringsim.cable.turning import Turning
 from ringsim.cable.winches import Winches
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.cable_jacobian import JacobianPattern
 from ringsim.engine.cable_path import CablePath, Placed
 from ringsim.engine.rotations import Array
+from ringsim.stepping.turning import Turning
 
 
 class CableDrive:

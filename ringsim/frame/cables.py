@@ -15,7 +15,6 @@ from ringsim.cable.faults.family import CableFault
 from ringsim.cable.records import Cables
 from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.state import ChainState
-from ringsim.cable.turning import Turning
 from ringsim.cable.winches import Winches
 from ringsim.frame.chain import (
     Drums,
@@ -37,6 +36,7 @@ from ringsim.frame.mesh import Mesh
 from ringsim.frame.parts import Parts
 from ringsim.frame.skeleton import Skeleton
 from ringsim.layout.pose import Array
+from ringsim.stepping.turning import Turning
 
 
 class FrameCables:

@@ -150,7 +150,7 @@ class Integration(Remembering):
 
         Changes are taken whole.  Where forces bend sharply, as of stops and of dry friction that
         turns round, the residual may grow for an iteration: what it finds there is what tells the
-        way back (``ringsim.cable.turning``), and shorter changes would only find it later.
+        way back (``ringsim.stepping.turning``), and shorter changes would only find it later.
         """
         model, factored, last, secants = self._model, None, math.inf, Secants()
         tolerance = model.tolerance(step, self._strains)

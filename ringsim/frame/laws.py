@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.cable.turning import Turning
 from ringsim.frame.parts import Indices
 from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.frame.vectors import compiled
@@ -19,6 +18,7 @@ from ringsim.parts.persection import at_section
 from ringsim.parts.springs import Reaction
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.stepping.turning import Turning
 
 _NUDGE = 1e-7
 """Change of place (m, rad) and rate by which the slopes of laws are measured."""

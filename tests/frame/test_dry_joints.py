@@ -10,7 +10,7 @@ DRY = {"kind": "viscous-coulomb", "coulomb": 0.05, "viscous": 0.3, "rate": 2e-4}
 
 def test_joints_that_stop_within_a_step_cost_no_repeated_steps() -> None:
     """Joints lock one after the other, and each stops its neighbours.  With tangents alone Newton
-    jumped across the passage of their friction: 91 steps were repeated, after 25 iterations each.
+    jumped across the passage of their friction, and 91 steps were repeated.
     """
     scene = load_scene("ring18-cable").with_values(
         {"structure.sections": 3, "net": "none", "joints.vjoint": DRY}

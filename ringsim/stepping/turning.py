@@ -47,8 +47,8 @@ class Turning:
     def slopes(
         self, owner: object, rates: Array, own: Array, law: Callable[[Array], Array]
     ) -> Array:
-        """Slopes of a law at the iterate noted last, shape (n,), from its rates and ``own``
-        derivatives there.
+        """Slopes of a law at the iterate noted last, shape (n,), in its unit over that of the
+        rates: ``own``, its derivatives there, or what the other side asks for.
         """
         if self._owner is not owner:
             return own
