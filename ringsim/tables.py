@@ -21,9 +21,11 @@ def markdown_table(head: Sequence[object], rows: Iterable[Sequence[object]]) -> 
     return str(tabulate(cells, list(map(str, head)), _NARROW, disable_numparse=True, stralign=None))
 
 
-def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """The lines of a table for a terminal, numbers to the right of what they are of."""
-    sides = ["left", *["right"] * (len(head) - 1)]
+def text_table(head: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> list[str]:
+    """The lines of a table for a terminal, numbers to the right of what they are of: the first
+    ``left`` columns.
+    """
+    sides = ["left" if k < left else "right" for k in range(len(head))]
     text = tabulate(list(rows), head, "simple", disable_numparse=True, colalign=sides)
     return str(text).splitlines()
 
@@ -34,10 +36,27 @@ class Table(NamedTuple):
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
     notes: Sequence[str] = ()
+    left: int = 1
+    """How many of its columns are words."""
 
     def lines(self) -> list[str]:
         """The table as text; notes alone if it has no rows."""
-        return [*(text_table(self.head, self.rows) if self.rows else ()), *self.notes]
+        return [*(text_table(*self[:2], self.left) if self.rows else ()), *self.notes]
+
+
+def slim(table: Table) -> Table:
+    """A table without the columns that say nothing.
+
+    >>> slim(Table(("output", "lost"), [("peak", "-"), ("time", "-")])).head
+    ('output',)
+    """
+    kept = [k for k in range(len(table.head)) if any(row[k] not in ("", "-") for row in table.rows)]
+    return Table(
+        tuple(table.head[k] for k in kept),
+        [tuple(row[k] for k in kept) for row in table.rows],
+        table.notes,
+        table.left,
+    )
 
 
 def counted(number: int, noun: str) -> str:

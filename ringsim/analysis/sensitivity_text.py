@@ -95,28 +95,35 @@ def _gate(analysis: xr.Dataset, only: Outputs) -> Iterator[str]:
 
 def sensitivity_tables(analysis: xr.Dataset, outputs: Outputs = None) -> list[Table]:
     """Indices of failures and of ``outputs``, by default of all, and what they leave out."""
-    found, notes = [], list[str]()
+    found = []
     if names := next((names for names in SETS if names[0] in analysis), ()):
-        if "mean_absolute_effect" in names:
-            notes.append(
-                "mu*: mean absolute change of the output, in its unit, when the group moves by "
-                "half of its levels; sigma: scatter of that change"
-            )
-        elif "total_index" in names and analysis["total_index_interval"].isnull().all():
-            notes.append(
-                "no intervals: give design.replicates = 8, or more, for independent replicates"
-            )
-        elif "given_data_index" in names:
-            notes.append(
-                "shares of the variance by one input alone, from bins: corrected for chance, too "
-                "small where the output bends within a bin"
-            )
-        found.append(_told(analysis, names, outputs)._replace(notes=notes))
+        found.append(_told(analysis, names, outputs)._replace(notes=measure_notes(analysis)))
     if "second_order_index" in analysis:
         found.append(_second(analysis, outputs))
-    if lines := list(_gate(analysis, outputs)):
-        found.append(Table((), (), lines))
-    return found
+    return found + refusals(analysis, outputs)
+
+
+def measure_notes(analysis: xr.Dataset) -> list[str]:
+    """What the measure of the design means, or lacks."""
+    if "mean_absolute_effect" in analysis:
+        return [
+            "mu*: mean absolute change of the output, in its unit, when the group moves by half of "
+            "its levels; sigma: scatter of that change"
+        ]
+    if "total_index" in analysis and analysis["total_index_interval"].isnull().all():
+        return ["no intervals: give design.replicates = 8, or more, for independent replicates"]
+    if "given_data_index" in analysis:
+        return [
+            "shares of the variance by one input alone, from bins: corrected for chance, too small "
+            "where the output bends within a bin"
+        ]
+    return []
+
+
+def refusals(analysis: xr.Dataset, outputs: Outputs = None) -> list[Table]:
+    """What became of outputs that samples lack, as notes."""
+    lines = list(_gate(analysis, outputs))
+    return [Table((), (), lines)] if lines else []
 
 
 def chosen_of(analysis: xr.Dataset, outputs: Outputs) -> list[str]:

@@ -7,37 +7,53 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.blocks import population_of
+from ringsim.analysis.brief import digits_of, output_table, what_matters, what_separates
 from ringsim.analysis.design import placement
 from ringsim.analysis.influence_text import influence_tables
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.reweighting_text import reweighting_lines
-from ringsim.analysis.sensitivity_text import sensitivity_tables
+from ringsim.analysis.sensitivity_text import refusals, sensitivity_tables
 from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
 from ringsim.analysis.tails import tail, tail_lines
 from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.refusal import InputError
-from ringsim.tables import Table, counted, interval_text, number_text
+from ringsim.tables import Table, counted, interval_text, number_text, slim
 
 
-def told(analysis: xr.Dataset) -> list[str]:
-    """All lines: outcomes, outputs, errors, what matters; verdicts last, where they are seen."""
+def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
+    """Outcomes, outputs, errors, what matters; verdicts last, where they are seen.
+
+    ``full`` has the interval and the convergence of every statistic, and every measure of what
+    matters, whatever chance would explain.
+    """
     counts = counted(analysis.attrs["samples"], "sample")
     counts += f", design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
+    if not full:
+        lines.append("all statistics with intervals and convergence, and all inputs: --full")
     lines += [*filter(None, [analysis.attrs["stopping"]]), *tail_lines(analysis)]
-    for table in (
-        outcome_table(analysis), _outputs(analysis), error_table(analysis),
-        *sensitivity_tables(analysis), *influence_tables(analysis),
-    ):  # fmt: skip
-        if more := table.lines():
-            lines += ["", *more]
-    for more in (list(reweighting_lines(analysis)), verdict_table(analysis).lines()):
-        if more:
-            lines += ["", *more]
+    tables = [outcome_table(analysis)]
+    if full:
+        tables += [_outputs(analysis), error_table(analysis)]
+        tables += [*sensitivity_tables(analysis), *influence_tables(analysis)]
+    else:
+        tables += [output_table(analysis, outputs_in(analysis)), _known_errors(analysis)]
+        tables += [what_matters(analysis), *refusals(analysis), what_separates(analysis)]
+    parts = [table.lines() if full else slim(table).lines() for table in tables]
+    parts += [list(reweighting_lines(analysis)), slim(verdict_table(analysis)).lines()]
+    for more in filter(None, parts):
+        lines += ["", *more]
     return lines
+
+
+def _known_errors(analysis: xr.Dataset) -> Table:
+    """The errors, if there is another one than that of sampling."""
+    names = outputs_in(analysis)
+    known = [np.isfinite(analysis[f"{name}_error_of_mean"].values[1:]).any() for name in names]
+    return error_table(analysis) if any(known) else Table((), ())
 
 
 def verdict_lines(campaign: xr.Dataset) -> list[str]:
@@ -134,12 +150,6 @@ def _outputs(analysis: xr.Dataset) -> Table:
         "no value",
     )  # fmt: skip
     return Table(head, rows)
-
-
-def digits_of(least: float, most: float) -> int:
-    """So many digits that a range has four of its own."""
-    larger = max(abs(least), abs(most)) / (most - least) if most > least else 1.0
-    return max(4, int(np.log10(larger)) + 4)
 
 
 def outputs_in(analysis: xr.Dataset) -> list[str]:

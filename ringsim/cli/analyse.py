@@ -21,10 +21,16 @@ from ringsim.refusal import InputError
     help="Tell also what another distribution of a drawn input would give, without new runs: "
     "'loads.force = { kind = \"normal\", mean = 0.012, standard_deviation = 1e-4 }'.",
 )  # fmt: skip
+@click.option(
+    "--full", is_flag=True,
+    help="Tell the interval and the convergence of every statistic, and every measure of what "
+    "matters, whatever chance would explain.",
+)  # fmt: skip
 @click.option("--out", metavar="FILE", type=PATH, help="Write all of it to a netCDF file.")
 def command(
-    source: Path, required: tuple[str, ...], reweighted: tuple[str, ...], out: Path | None
-) -> None:
+    source: Path, required: tuple[str, ...], reweighted: tuple[str, ...], full: bool,
+    out: Path | None,
+) -> None:  # fmt: skip
     """Say what the campaign in DIR (or its campaign.nc) tells: verdicts on requirements, shares of
     outcomes, statistics of outputs with intervals that fit the design, which error dominates, and
     which inputs matter.
@@ -49,7 +55,7 @@ def command(
             found = analyse(campaign, judged, others)
         except InputError as error:
             raise InputError(f"{source}: {error}") from None
-    for line in told(found):
+    for line in told(found, full=full):
         click.echo(line)
     if out is not None:
         save(found, out)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.brief import digits_of
 from ringsim.analysis.campaign_samples import (
     NUMERICAL,
     distribution_of,
@@ -17,7 +18,6 @@ from ringsim.analysis.campaign_samples import (
     values_of,
 )
 from ringsim.analysis.quantities import CHECKED
-from ringsim.analysis.study_text import digits_of
 from ringsim.refusal import show
 from ringsim.tables import Table, interval_text, number_text
 from ringsim.variables import GOALS, Cause

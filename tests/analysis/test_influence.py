@@ -130,7 +130,7 @@ def test_pulleys_matter_by_mean_and_by_place():
     assert (partial.drop(["loads.force", "mean of cables.friction"]) > 0.7).all()
     ends = found.asynchrony_max_rank_correlation_interval.sel(input="loads.force").values
     assert ends[0] < plain["loads.force"] < ends[1] < 0
-    assert any('cables.friction["section 3 V"]' in line for line in told(found))
+    assert any('cables.friction["section 3 V"]' in line for line in told(found, full=True))
 
 
 def test_what_separates_failures_stalls_and_violations_is_found():
@@ -152,7 +152,7 @@ def test_what_separates_failures_stalls_and_violations_is_found():
     assert areas["violates asynchrony_max <= 0.8 degree", "other"] == 1.0
     low, high = found.separation_interval.sel(group="stalled", input="other").values
     assert low < 0.5 < high
-    (line,) = (line for line in told(found) if line.startswith("stalled: force"))
+    (line,) = (line for line in told(found, full=True) if line.startswith("stalled: force"))
     assert line.split()[2] == "0"
     assert line.split()[-1] == str((force < 0.2).sum())
 

@@ -22,7 +22,7 @@ def verdict(found, name="asynchrony_max", which="verdict"):
 
 
 def text_of(found):
-    return "\n".join(told(found))
+    return "\n".join(told(found, full=True))
 
 
 def test_estimates_are_those_of_numpy():

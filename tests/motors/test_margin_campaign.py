@@ -102,7 +102,8 @@ def test_the_report_shows_them(campaign: xr.Dataset, monkeypatch: pytest.MonkeyP
 def test_a_grid_has_extremes_and_no_means(campaign: xr.Dataset) -> None:
     listed = campaign.assign_attrs(design='{"kind": "grid"}')
     for kind, made in (("random", campaign), ("grid", listed)):
-        heads, rows, _ = tables.statistics(made, analyse(made))
+        table = tables.statistics(made, analyse(made))
+        heads, rows = table.head, table.rows
         assert ("Mean" in heads) == (kind == "random")
         assert {len(row) for row in rows} == {len(heads)}
         (convergence,) = (each for each in figures.PICTURES if each.name == "convergence")

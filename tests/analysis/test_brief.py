@@ -1,0 +1,53 @@
+"""An analysis in short: a row an output, and of inputs only those beyond chance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made import drawn_campaign
+from ringsim.analysis.brief import output_table, what_matters
+from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import told
+from ringsim.sampling.designs.random import RandomDesign
+
+
+def linear(x):
+    """Rises with x1 and falls with x2, of which x3 says nothing."""
+    return 3.0 * x[:, 0] - x[:, 1]
+
+
+@pytest.fixture(scope="module")
+def found():
+    return analyse(drawn_campaign(RandomDesign(samples=400), linear, 3, 4))
+
+
+def test_what_matters_is_what_the_output_is_made_of(found):
+    table = what_matters(found)
+    named = [row[:2] for row in table.rows]
+    assert named == [("asynchrony_max", "x1"), ("", "x2")]
+    index, _, rank = (float(table.rows[0][k].split()[0]) for k in (2, 3, 4))
+    assert index == pytest.approx(0.9, abs=0.03)  # 9 of 10 parts of the variance
+    assert rank > 0.9
+    assert table.rows[1][4].startswith("-0.")
+
+
+def test_an_output_of_chance_alone_is_said_to_be_so():
+    noise = np.random.default_rng(3).random(400)
+    table = what_matters(analyse(drawn_campaign(RandomDesign(samples=400), lambda _: noise, 3, 4)))
+    assert not table.rows
+    assert table.notes[-1] == "nothing that chance would not explain: asynchrony_max"
+
+
+def test_an_output_has_one_row_with_its_statistics(found):
+    (row,) = output_table(found, ["asynchrony_max"]).rows
+    mean, *_, least, most = found.asynchrony_max.values
+    assert [float(row[k]) for k in (2, 8, 9)] == pytest.approx([mean, least, most], rel=1e-3)
+    assert row[-1] == "400"
+
+
+def test_the_short_form_is_shorter_and_names_the_long_one(found):
+    short, long = told(found), told(found, full=True)
+    assert len(short) < len(long)
+    assert any("--full" in line for line in short)
+    assert not any("--full" in line for line in long)
