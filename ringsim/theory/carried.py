@@ -8,7 +8,8 @@ from ringsim.layout.bodies import OnBody
 from ringsim.layout.pose import Array
 from ringsim.parts.offload import Offload
 from ringsim.scene import Scene
-from ringsim.theory.ideal_mechanism import Configuration, Mechanism
+from ringsim.theory.configuration import Configuration
+from ringsim.theory.ideal_mechanism import Mechanism
 from ringsim.theory.ideal_points import body_of
 
 
@@ -44,7 +45,7 @@ class Carried:
 
     def at(self, now: Configuration) -> Lines:
         """At a configuration that folds at the unit rate."""
-        places, _, rates = now.moved(self._corners)
+        places, rates = now.places(self._corners), now.velocities(self._corners)
         rigid = self._mechanism.rigid_rates(now)
         # The angle opens by two for one that the coordinate falls.
         moving = -0.5 * (rigid[:3] + np.cross(rigid[3:], places) + rates)
@@ -58,7 +59,7 @@ class Carried:
         return Lines(law, pulls, heights, climbs, np.linalg.norm(level, axis=1))
 
     def _height(self, now: Configuration) -> Array:
-        places = now.moved(self._corners)[0]
+        places = now.places(self._corners)
         if self._base is not None:
             places = places - self._base @ now.values
         return np.asarray(places @ self._up(now))

@@ -16,7 +16,8 @@ from ringsim.cable.records import Cable
 from ringsim.layout.pose import Array
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.theory.ideal_mechanism import Configuration, Mechanism
+from ringsim.theory.configuration import Configuration
+from ringsim.theory.ideal_mechanism import Mechanism
 
 
 class Reeved(NamedTuple):
@@ -62,7 +63,7 @@ class Drive:
         """All cables on a mechanism that folds at the unit rate."""
         found = []
         for path in self._paths:
-            places, _, slopes = now.moved(path)
+            places, slopes = now.places(path), now.velocities(path)
             along, moving = np.diff(places, axis=0), np.diff(slopes, axis=0)
             units = along / np.linalg.norm(along, axis=1)[:, None]
             # The angle opens by two for one that the coordinate falls: L falls as it falls.
@@ -108,7 +109,7 @@ class Drive:
             return found
         loads, places = self._loads
         # Along z in the ring's own axes, as the loads of the rigid ring are.
-        return found - 0.5 * float(np.tensordot(loads, now.moved(places)[2], 2))
+        return found - 0.5 * float(np.sum(loads * now.velocities(places)))
 
 
 def _ways(cable: Cable) -> tuple[int, ...]:

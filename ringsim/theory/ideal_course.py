@@ -17,7 +17,7 @@ from ringsim.parts.limits import Limits
 from ringsim.scene import Scene
 from ringsim.stepping.rest import GROWTH, MOVED, WINDOW
 from ringsim.stepping.run_control import TOLD, overstrained
-from ringsim.theory.ideal_motion import IdealMotion
+from ringsim.theory.ideal_motion import IdealMotion, IdealState
 from ringsim.variables import Cause, Fate, Reason, Status
 
 RELATIVE = 3e-7
@@ -40,7 +40,8 @@ _ROUND_OFF = 1e-9
 class Piece:
     """Steps between two events, while the same ropes and springs (``sprung``) are whole.
 
-    ``times`` and ``states`` are those at the steps' ends, ``rates`` the states' derivatives;
+    ``times`` and ``states`` are those at the steps' ends, ``rates`` the states' derivatives,
+    ``instants`` all that is known there;
     ``inner``, where cables are, times and states at the collocation points within the steps: what
     is stiff is in balance there, and nowhere else between a step's ends.
     """
@@ -51,6 +52,7 @@ class Piece:
     times: list[float] = field(default_factory=list)
     states: list[Array] = field(default_factory=list)
     rates: list[Array] = field(default_factory=list)
+    instants: list[IdealState] = field(default_factory=list)
     inner: list[tuple[float, Array]] = field(default_factory=list)
 
 
@@ -82,6 +84,11 @@ class Course:
     """One run of a scene's ideal ring.
 
     ``lock_time`` is when the V-joints reached 180 deg, s, NaN if they never did.
+
+    Raises
+    ------
+    ValueError
+        If the cables have no answer at the start.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -91,6 +98,7 @@ class Course:
         self.pieces: list[Piece] = []
         self.evaluations, self.jacobians = 0, 0
         self._time, self._state = 0.0, self.motion.start()
+        self.motion.instant(self._time, self._state)  # refuses what has no answer at the start
         self._end, self._contacts = scene.solver.end_time, 0
         roped = self.motion.cables is not None
         self._strained = [_Strained(self.motion, scene.limits.rope_strain)] if roped else []
@@ -102,7 +110,7 @@ class Course:
         breaks = [] if cables is None else cables.breaks
         try:
             for mark in sorted({fault.time for fault in faults} | {*breaks, math.inf}):
-                self.motion.until = mark
+                self.motion.under(until=mark)
                 self._begin()
                 while self._time < min(mark, self._end) * (1.0 - _ALIKE):
                     self._advance(min(mark, self._end))
@@ -163,6 +171,7 @@ class Course:
 
     def _file(self, time: float, state: Array) -> None:
         piece = self.pieces[-1]
+        piece.instants.append(self.motion.instant(time, state))
         piece.times.append(time)
         piece.states.append(state)
         piece.rates.append(self.motion.rates(time, state))
@@ -234,12 +243,11 @@ class Course:
             self.fate = Fate.DEPLOYED
             self.reason = Reason(text="all V-joints have reached 180 deg")
             self._settle(self.lock_time)
-            self.motion.latched = self._catches(-2.0 * rate)
-            if self.motion.cables is not None:
-                self.motion.cables.lock(self._time)
+            self.motion.under(latched=self._catches(-2.0 * rate))
+            self.motion.lock(self._time)
             self._begin()
         elif phi <= 0.0 and not self.motion.latched and self._catches(-2.0 * rate):
-            self.motion.latched = True
+            self.motion.under(latched=True)
             self._begin()
         elif not self.reason and phi >= self._stowed:
             self.fate = Fate.FOLDED

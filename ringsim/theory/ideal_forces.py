@@ -19,7 +19,8 @@ from ringsim.layout.pose import Array, cross
 from ringsim.parts.joint_friction.family import JointFriction
 from ringsim.parts.persection import at_section
 from ringsim.scene import Scene
-from ringsim.theory.ideal_mechanism import Configuration, Mechanism
+from ringsim.theory.configuration import Configuration
+from ringsim.theory.ideal_mechanism import Mechanism
 from ringsim.theory.ideal_points import Points
 from ringsim.theory.spring_energy import SpringEnergy
 
@@ -63,12 +64,8 @@ class Forces:
         """
         lifted = self._lift @ now.values
         force, loss = up @ self._lift @ now.by_place, 0.0
-        for law, sides in self._joints:
-            first, second = (
-                np.einsum("ja,jap->jp", now.moved(ahead)[0], now.moved(along)[1])
-                for ahead, along in sides
-            )
-            slopes = second - first
+        for law, turning in self._joints:
+            slopes = turning.slopes(now)
             speed = slopes @ now.rate
             torque = law.torque(speed)
             force, loss = force - torque @ slopes, loss + float(torque @ speed)
@@ -86,17 +83,35 @@ class Forces:
         return Acting(force, cross(lifted, up), elastic + stored, work, loss)
 
 
+class Turning:
+    """How fast joints turn: z x x . x' of their second parts less that of their first.
+
+    A product of two points' coefficients with the functions, of which the joint's axis and places
+    are a constant part: formed once, shape (joints, functions, functions).
+    """
+
+    def __init__(self, aheads: list[tuple[Array, Array]]) -> None:
+        first, second = (np.einsum("jaf,jag->jfg", *sides) for sides in aheads)
+        joints, functions, _ = first.shape
+        self._shape = joints, functions
+        self._by_function = (second - first).transpose(0, 2, 1).reshape(-1, functions)
+
+    def slopes(self, now: Configuration) -> Array:
+        """Derivatives of the joints' angles after p, shape (joints, n)."""
+        return np.asarray((self._by_function @ now.values).reshape(self._shape) @ now.by_place)
+
+
 def friction_joints(
     points: Points, family: str, law: JointFriction
-) -> tuple[JointFriction, list[tuple[Array, Array]]]:
-    """The law at the joints of a family; z x x and x of their first and second parts."""
+) -> tuple[JointFriction, Turning]:
+    """The law at the joints of a family, and how they turn."""
     joints = [joint for joint in points.layout.joints if joint.family == family]
     axes = np.array([points.layout.pose(joint.first).axes[:, 2] for joint in joints])
     sides = [joint.first for joint in joints], [joint.second for joint in joints]
     alongs = map(points.directions, sides)
     sections = np.array([joint.section for joint in joints])
     aheads = [(np.cross(axes[:, :, None], along, axis=1), along) for along in alongs]
-    return at_section(law, sections), aheads
+    return at_section(law, sections), Turning(aheads)
 
 
 class Pull(NamedTuple):
@@ -185,7 +200,7 @@ class IdealCables:
         ValueError
             If a span has no length, or a winch has wound up its whole rope.
         """
-        points, slopes, velocities = now.moved(self.paths)
+        points, velocities = now.places(self.paths), now.velocities(self.paths)
         ropes, copies = self.ropes, self._copies
         wound, speed = np.zeros((2, len(copies), 2))
         for place, winch in self._winches.items():
@@ -197,7 +212,7 @@ class IdealCables:
         of_points = np.repeat(copies, ropes.points_per_cable)[:, None] * state.point_forces
         return Pull(
             state,
-            np.tensordot(of_points, slopes, 2),
+            now.along(self.paths, of_points),
             self._commands(time, now, state),
             float(on_rope[ropes.of_pulley] @ state.friction_loss + on_rope @ state.damping_loss),
             float(copies @ state.winch_power.sum(axis=1) - on_rope @ (density * state.wound_rates)),

@@ -16,7 +16,6 @@ Source: Kane and Levinson, Dynamics: Theory and Applications (1985), secs. 4.11 
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,55 +25,24 @@ from ringsim.layout.layout import Layout
 from ringsim.layout.pose import Array, skew
 from ringsim.parts.net.hub import SpringNet
 from ringsim.scene import Scene
+from ringsim.theory.configuration import Configuration
 from ringsim.theory.ideal_edge import IdealEdge
 from ringsim.theory.ideal_points import UP, Points, body_of
 
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3))
+_UNIT = np.eye(3)
+_AHEAD, _BEHIND = np.array([5, 6, 1]), np.array([7, 2, 3])
 
 
 def _axial(w: Array) -> Array:
     """Sums of a x b from sums of a b^T, shape (..., 3, 3)."""
-    return np.asarray(np.einsum("abc,...bc->...a", _LEVI_CIVITA, w))
+    flat = w.reshape(*w.shape[:-2], 9)
+    return np.asarray(flat[..., _AHEAD] - flat[..., _BEHIND])
 
 
-class Configuration(NamedTuple):
-    """The mechanism at one instant: its n coordinates p = (q, psi) and their rates, rad and rad/s.
-
-    ``slopes`` are derivatives of p after the free coordinates, shape (n, freedom), ``bias`` is p''
-    less slopes times the free accelerations, rad/s^2; ``first`` and ``second`` are the sums of
-    m P s_k and m (P s_j) (P s_k)^T over columns k of ``functions`` (those of ``Points``) and the
-    first n + 1 of them j, shapes (3, n + 3) and (n + 1, n + 3, 3, 3); ``matrix`` is the mass
-    matrix of (V, W, p'), shape (6 + n, 6 + n).
-    """
-
-    place: Array
-    rate: Array
-    slopes: Array
-    bias: Array
-    functions: Array
-    first: Array
-    second: Array
-    matrix: Array
-
-    @property
-    def values(self) -> Array:
-        """Functions s, so that points are at P s, shape (functions,)."""
-        return self.functions[:, 0]
-
-    @property
-    def by_place(self) -> Array:
-        """Derivatives of s after p, shape (functions, n)."""
-        return self.functions[:, 1:-2]
-
-    def moved(self, points: Array) -> tuple[Array, Array, Array]:
-        """Places of points, their derivatives after p, and velocities, from their coefficients.
-
-        Shapes (points, 3), (points, 3, n) and (points, 3), from (points, 3, functions).
-        """
-        # One product of two matrices: a stack of small ones takes five times as long.
-        found = points.reshape(-1, len(self.functions)) @ self.functions
-        found = found.reshape(len(points), 3, -1)
-        return found[..., 0], found[..., 1:-2], found[..., -2]
+def _trace(w: Array) -> Array:
+    """Sums of a . b from sums of a b^T, shape (..., 3, 3)."""
+    return np.asarray(w.reshape(*w.shape[:-2], 9)[..., ::4].sum(axis=-1))
 
 
 class Mechanism:
@@ -131,12 +99,12 @@ class Mechanism:
         half = (s[:, : n + 1].T @ self._second).reshape(n + 1, len(s), 9)
         second = (s.T @ half).reshape(n + 1, n + 3, 3, 3)
         matrix = np.zeros((6 + n, 6 + n))
-        matrix[:3, :3] = self._mass * np.eye(3)
+        matrix[:3, :3] = self._mass * _UNIT
         matrix[:3, 3:6] = -skew(first[:, 0])
-        matrix[3:6, 3:6] = np.trace(second[0, 0]) * np.eye(3) - second[0, 0]
+        matrix[3:6, 3:6] = _trace(second[0, 0]) * _UNIT - second[0, 0]
         matrix[:3, 6:] = first[:, 1 : n + 1]
         matrix[3:6, 6:] = _axial(second[0, 1 : n + 1]).T
-        matrix[6:, 6:] = np.einsum("jkaa->jk", second[1:, 1 : n + 1])
+        matrix[6:, 6:] = _trace(second[1:, 1 : n + 1])
         matrix[3:6, :3] = matrix[:3, 3:6].T
         matrix[6:, :6] = matrix[:6, 6:].T
         return Configuration(place, rate, slopes, bias, s, first, second, matrix)
@@ -145,8 +113,7 @@ class Mechanism:
         """What the net does while p changes at a rate (rad/s)."""
         if self._net is None:
             return NetForces(np.zeros(len(rate)), 0.0, 0.0)
-        places, slopes, _ = now.moved(self._ends)
-        return self._net.forces(places, slopes, rate)
+        return self._net.forces(now.places(self._ends), now.slopes_of(self._ends), rate)
 
     def net_tensions(self, now: Configuration) -> Array | None:
         """Of cables along a net's edge, N, shape (planes, sections), NaN in planes without; None
@@ -154,7 +121,7 @@ class Mechanism:
         """
         if not isinstance(self._net, IdealEdge):
             return None
-        return self._net.tensions(now.moved(self._ends)[0])
+        return self._net.tensions(now.places(self._ends))
 
     def vertical(self, now: Configuration) -> Array:
         """Unit vector that points up in space, in the structure's axes, if it cannot pitch."""
@@ -234,7 +201,7 @@ class Mechanism:
         # Accelerations of the masses at zero (V' + W x V, W', p'') are linear in s, s' and s''.
         about = second[:, 0] @ whirl.T + 2.0 * second[:, -2] @ turn.T + second[:, -1]
         inertial = whirl @ first[:, 0] + 2.0 * turn @ first[:, -2] + first[:, -1]
-        along = np.einsum("jaa->j", about[1:])
+        along = _trace(about[1:])
         load = np.concatenate([-inertial, torque - _axial(about[0]), forces - along])
         load += self.weight(now)
         reach = np.zeros((len(matrix), rigid + self.freedom))

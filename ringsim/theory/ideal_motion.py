@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.cable.faults.family import CableFault
+from ringsim.cable.ropes import Ropes
 from ringsim.layout.pose import Array, skew
 from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import Fault
@@ -60,15 +61,15 @@ class IdealState(NamedTuple):
 class IdealMotion:
     """The equations of a scene's ideal ring.
 
-    ``latched`` is whether latches hold; ``until`` the time (s) of the next switching, from before
-    which laws of winches are taken; ``refusal`` why the cables could last not be evaluated.
+    ``latched`` is whether latches hold; ``refusal`` why the cables could last not be evaluated.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.mechanism = Mechanism(scene)
         self.forces = Forces(scene, self.mechanism)
         self.cables = None if scene.cables is None else IdealCables(scene, self.mechanism)
-        self.latched, self.until, self.refusal = False, math.inf, ""
+        self.latched, self._until, self.refusal = False, math.inf, ""
+        self._last: tuple[tuple[float, bytes], IdealState] | None = None
         self._initial = scene.structure.coordinate
         n = self.mechanism.freedom
         self._reacts = self.mechanism.fixed and scene.record.reactions
@@ -90,6 +91,34 @@ class IdealMotion:
 
     def instant(self, time: float, state: Array) -> IdealState:
         """Evaluate everything; ValueError if the cables have no answer (ringsim.cable.chain)."""
+        # The solver, its Jacobian and its events ask for the same end of a step.
+        asked = time, state.tobytes()
+        if self._last is None or self._last[0] != asked:
+            self._last = asked, self._evaluated(time, state)
+        return self._last[1]
+
+    def under(
+        self, *, latched: bool | None = None, until: float | None = None,
+        ropes: Ropes | None = None, sprung: Array | None = None,
+    ) -> None:  # fmt: skip
+        """Go on with what is given: whether latches hold, the time (s) of the next switching from
+        before which laws of winches are taken, ropes, and springs that are ``alive``.
+        """
+        self._last = None
+        self.latched = self.latched if latched is None else latched
+        self._until = self._until if until is None else until
+        if sprung is not None:
+            self.forces.springs.alive = sprung
+        if self.cables is not None and ropes is not None:
+            self.cables.ropes = ropes
+
+    def lock(self, time: float) -> None:
+        """All V-joints have locked at a time (s)."""
+        self._last = None
+        if self.cables is not None:
+            self.cables.lock(time)
+
+    def _evaluated(self, time: float, state: Array) -> IdealState:
         mechanism = self.mechanism
         now = mechanism.configuration(state[self._place], state[self._rate])
         rigid = mechanism.rigid_rates(now, state[self._spin] if self._tilts else None)
@@ -97,7 +126,7 @@ class IdealMotion:
         acting = self.forces.act(now, up, self.latched)
         force, pull = acting.force, None
         if self.cables is not None:
-            earlier = min(time, self.until * (1.0 - 1e-12))
+            earlier = min(time, self._until * (1.0 - 1e-12))
             pull = self.cables.pull(earlier, now, state[self._motors].reshape(2, -1))
             force = force + pull.force
         moving, turning = mechanism.accelerations(now, rigid[3:], acting.couple, force)
@@ -141,6 +170,7 @@ class IdealMotion:
         """Derivatives of the rates by differences; nothing depends on the energies."""
         found = np.zeros((self.size, self.size))
         here = self.rates(time, state)
+        kept = self._last
         length, slip = (math.inf, math.inf) if self.cables is None else self.cables.nudges
         steps = np.full(self.size - 2, _ANGLE)
         steps[0] = steps[self._motors] = min(_ANGLE, length)
@@ -149,6 +179,7 @@ class IdealMotion:
             moved = state.copy()
             moved[k] += step
             found[:, k] = (self.rates(time, moved) - here) / (moved[k] - state[k])
+        self._last = kept
         return found
 
     def strike(self, fault: Fault, time: float, state: Array) -> Array:
@@ -159,6 +190,7 @@ class IdealMotion:
         elif isinstance(fault, CableFault) and self.cables is not None:
             assert before.pull is not None
             self.cables.ropes = fault.strike(self.cables.ropes, before.pull.chain)
+        self._last = None
         found = state.copy()
         found[-2] += before.elastic - self.instant(time, state).elastic
         return found

@@ -16,6 +16,7 @@ from ringsim.outputs.series import Carried, Reading, Run, Series, output_times
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
 from ringsim.theory.ideal_course import Course, Piece
+from ringsim.theory.ideal_motion import IdealState
 from ringsim.variables import COUNTS, Fidelity, Outcome
 
 _Reader = Callable[[Reading], Array | float | None]
@@ -64,9 +65,13 @@ class _IdealRun:
         self._steps: list[Reading] = []
         self._balanced: list[Reading] = []  # ends of steps, collocation points between them
         first = course.pieces[0]
-        self._lifted = self._at(first, np.array(first.times[:1]))[0].energies.work
+        self._lifted = first.instants[0].acting.work + first.states[0][-1]
         for piece in course.pieces:
-            ends = self._at(piece, np.array(piece.times))
+            self._under(piece)
+            ends = [
+                self._told(*end)
+                for end in zip(piece.times, piece.states, piece.instants, strict=True)
+            ]
             inner = [self._told(time, state) for time, state in piece.inner]
             self._steps += ends
             self._balanced += sorted([*ends, *inner], key=lambda now: now.time)
@@ -123,25 +128,27 @@ class _IdealRun:
 
     def _at(self, piece: Piece, where: Array) -> list[Reading]:
         """A piece at times within it."""
-        motion = self._course.motion
-        motion.latched, motion.until = piece.latched, piece.times[-1]
-        motion.forces.springs.alive = piece.sprung
-        if motion.cables is not None and piece.ropes is not None:
-            motion.cables.ropes = piece.ropes
+        self._under(piece)
         times, states = np.array(piece.times), np.array(piece.states)
         found = np.repeat(states[:1], len(where), axis=0)
         if len(times) > 1 and len(where):
-            rates, n = np.array(piece.rates), motion.mechanism.freedom
+            rates, n = np.array(piece.rates), self._course.motion.mechanism.freedom
             found = CubicHermiteSpline(times, states, rates)(where)
             known = np.stack([states[:, :n], states[:, n : 2 * n], rates[:, n : 2 * n]], axis=1)
             quintic = BPoly.from_derivatives(times, known)
             found[:, :n], found[:, n : 2 * n] = quintic(where), quintic.derivative()(where)
         return [self._told(float(t), y) for t, y in zip(where, found, strict=True)]
 
-    def _told(self, time: float, state: Array) -> Reading:
+    def _under(self, piece: Piece) -> None:
+        """Evaluate as in a piece from here on."""
+        self._course.motion.under(
+            latched=piece.latched, until=piece.times[-1], ropes=piece.ropes, sprung=piece.sprung
+        )
+
+    def _told(self, time: float, state: Array, known: IdealState | None = None) -> Reading:
         """A state as every output reads it; work counts from the first one."""
         motion = self._course.motion
-        now = motion.instant(time, state)
+        now = motion.instant(time, state) if known is None else known
         work = now.acting.work - self._lifted + state[-1]
         opening, rate = math.pi - 2.0 * state[0], -2.0 * state[motion.mechanism.freedom]
         return Reading(

@@ -102,6 +102,8 @@ class Points:
         found = np.zeros((first + 2 * len(swings), len(p) + 3))
         found[:first, :2] = s[:2].T
         found[:first, -2:] = s[1:].T * [w[0], w[0] ** 2]
+        if not self.swinging:
+            return found
         cosine, sine = np.cos(p[1:]), np.sin(p[1:])
         for k, value, slope in ((first, cosine, -sine), (first + 1, sine, cosine)):
             rows = k + 2 * swings

@@ -23,7 +23,8 @@ import numpy as np
 from ringsim.layout.layout import Layout
 from ringsim.layout.pose import Array
 from ringsim.scene import Scene
-from ringsim.theory.ideal_mechanism import Configuration, Mechanism
+from ringsim.theory.configuration import Configuration
+from ringsim.theory.ideal_mechanism import Mechanism
 from ringsim.theory.spring_energy import SpringEnergy
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)

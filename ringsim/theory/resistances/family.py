@@ -9,7 +9,8 @@ from ringsim.choice import load_package
 from ringsim.parts.margin.family import Category
 from ringsim.scene import Scene
 from ringsim.theory.carried import Carried
-from ringsim.theory.ideal_mechanism import Configuration, Mechanism
+from ringsim.theory.configuration import Configuration
+from ringsim.theory.ideal_mechanism import Mechanism
 
 
 class Opening(NamedTuple):

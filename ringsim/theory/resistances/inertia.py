@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ringsim.theory.ideal_mechanism import Configuration
+from ringsim.theory.configuration import Configuration
 from ringsim.theory.resistances.family import Opening, Resistance, folding
 
 _STEP = 1e-4

@@ -26,11 +26,8 @@ class JointFrictionResistance(Resistance):
 
     def force(self, opening: Opening) -> float:
         """See ``Resistance``."""
-        found, (places, rates) = 0.0, (opening.now.values, opening.now.functions[:, -2])
-        for law, sides in self._joints:
-            first, second = (
-                np.einsum("ja,ja->j", ahead @ places, along @ rates) for ahead, along in sides
-            )
-            turn = 0.5 * np.abs(second - first)
+        found, now = 0.0, opening.now
+        for law, turning in self._joints:
+            turn = 0.5 * np.abs(turning.slopes(now) @ now.rate)
             found += float(np.sum(law.resistance(turn * opening.rate) * turn))
         return found
