@@ -1,4 +1,8 @@
-"""How the documentation is built: ``sphinx-build -W docs OUT``."""
+"""How the documentation is built: ``sphinx-build -W docs OUT``.
+
+It is of the ringsim that is imported, as kernels of notebooks import it: what PYTHONPATH names, or
+what is installed.
+"""
 
 import importlib.metadata
 import os
@@ -6,11 +10,7 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parent)]
-# Kernels of notebooks start anew: they find the sources that are documented, too.
-os.environ["PYTHONPATH"] = os.pathsep.join(
-    filter(None, [str(HERE.parent), os.environ.get("PYTHONPATH", "")])
-)
+sys.path.insert(0, str(HERE))
 
 from made_pages import fill  # noqa: E402
 

@@ -48,11 +48,11 @@ def choose_folder() -> Path:
 def compile_once(kind: Hashable, compiling: Callable[[], object]) -> None:
     """Call ``compiling`` unless compiled code of this kind is there; one process at a time.
 
-    ``kind`` names what else decides about what is compiled, beside the sources; its ``repr`` is
-    that of its content.
+    ``kind`` names what else decides about what is compiled, beside the sources and their place,
+    to which numba ties its files; its ``repr`` is that of its content.
     """
     folder = choose_folder()
-    made = repr((version("numba"), sys.version, _sources(), kind)).encode()
+    made = repr((version("numba"), sys.version, _sources(), str(SOURCES), kind)).encode()
     mark = folder / f"compiled-{hashlib.blake2b(made, digest_size=12).hexdigest()}"
     if mark.exists():
         return

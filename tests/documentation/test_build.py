@@ -23,8 +23,9 @@ from ringsim.reference.tree import ROOTS, places
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The pages, built by the command that the README gives."""
     folder = tmp_path_factory.mktemp("site")
+    words = ["-W", "--keep-going", "-q", "docs", str(folder / "html")]
     done = subprocess.run(
-        [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "docs", str(folder / "html")],
+        [sys.executable, "-P", "-m", "sphinx", *words],
         cwd=ROOT, capture_output=True, text=True, check=False,
         env=os.environ | {"RINGSIM_DOCS_CACHE": str(folder / "notebooks")},
     )  # fmt: skip
