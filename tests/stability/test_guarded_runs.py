@@ -123,6 +123,7 @@ def test_a_ring_that_is_nearly_open_does_not_lock_within_its_first_step() -> Non
             "cables.lower.winch.winding.speed": 3.0,
             "cables.upper.slack_width": 0.05,
             "cables.lower.slack_width": 0.05,
+            "solver.settling_time": 0.0,
         }
     )
     coarse, fine = (
