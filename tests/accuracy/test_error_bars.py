@@ -23,6 +23,7 @@ from ringsim.stepping.motion_steps import MotionSteps
 from ringsim.variables import Fate, Outcome, Status
 
 TIMES = np.linspace(0.0, 4.0, 41)
+SOON = {"structure.opening_angle": 120.0}
 
 
 def ring(**values: object) -> Scene:
@@ -114,7 +115,7 @@ def test_no_bars_without_two_good_runs(which: int) -> None:
 
 
 def test_bars_change_nothing_else() -> None:
-    scene = ring(**{"record.stress": True})
+    scene = ring(**SOON, **{"record.stress": True})
     plain, barred = run(scene), run(scene.with_values({"solver.error_bars": True}))
     bars = {name for name in barred.values if name not in plain.values}
     assert bars == {
@@ -251,7 +252,7 @@ def test_cases_run_as_a_campaign_with_bars_and_steps_as_inputs(tmp_path, capfd) 
         {"solver.step": step, "solver.tolerance": tolerance, "solver.error_bars": True}
         for step, tolerance in ((0.2, 1e-3), (0.1, 3e-5))
     ]
-    scene = ring(**{"solver.end_time": 4.0})
+    scene = ring(**SOON, **{"solver.end_time": 4.0})
     file = run_cases(tmp_path, "steps", scene, cases, workers=1, title="two steps")
     with xr.open_dataset(file) as found:
         assert (found.status == 0).all()

@@ -26,7 +26,7 @@ design = { kind = "random", samples = 2 }
 
 [set]
 "structure.opening_angle" = 160.0
-"solver.end_time" = 2.0
+"solver.end_time" = 0.5
 
 [inputs]
 "cables.upper.winch.winding.speed" = { kind = "uniform", low = 0.009, high = 0.011 }

@@ -1,7 +1,7 @@
 """The table of published cases: what it says of ringsim is what a run gives.
 
-Whole rings of 18 sections and the truss of paper 000.  The truss of
-paper 001 has its own tests (tests/physics_planar), and so has case 1 of paper 002, the main line.
+Whole rings of 18 sections and the truss of paper 000.  The truss of paper 001 has its own tests
+(tests/physics_planar), and so has case 1 of paper 002, the main line.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ LAWS = {
 @pytest.mark.parametrize("name", [pytest.param("stall", marks=pytest.mark.slow), *list(LAWS)[1:]])
 def test_both_models_answer_the_law_alike(name: str) -> None:
     law: dict[str, Any] = LAWS[name]
-    scene = six(cable__winch__winding=law, solver__end_time=3.0, record__interval=0.1)
+    scene = six(cable__winch__winding=law, solver__end_time=1.5, record__interval=0.1)
     full, ideal = run(scene), run_ideal(scene)
     assert not full.status.failed
     assert not ideal.status.failed
