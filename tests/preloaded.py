@@ -1,6 +1,6 @@
 """Commands of ringsim without the two seconds that each process would spend on imports.
 
-A process that has loaded all verbs forks for each command.  Folder, environment, exit code and
+A process that has loaded all modules forks for each command.  Folder, environment, exit code and
 what is printed are those of a fresh process.  Tests of how a process starts, of what it loads, of
 signals and of MPI start real ones.
 """
@@ -14,6 +14,7 @@ import gc
 import importlib
 import json
 import os
+import pkgutil
 import runpy
 import select
 import signal
@@ -23,10 +24,8 @@ import tempfile
 import traceback
 from pathlib import Path
 
-LOADED = (
-    "netCDF4", "ringsim.frame", "ringsim.simulation", "ringsim.storage.merge", "xarray",
-)  # fmt: skip
-"""What most commands load beside their verb."""
+LOADED = ("netCDF4", "scipy.stats", "xarray")
+"""Loaded before ringsim's own modules: what most commands need beside these."""
 
 
 def ringsim(
@@ -76,9 +75,10 @@ def _end(server: subprocess.Popen[bytes]) -> None:
 
 
 def _serve() -> None:
-    from ringsim.cli import VERBS
+    import ringsim
 
-    for name in [*(f"ringsim.cli.{verb}" for verb in VERBS), *LOADED]:
+    ours = (module.name for module in pkgutil.walk_packages(ringsim.__path__, "ringsim."))
+    for name in [*LOADED, *(name for name in ours if not name.endswith("__main__"))]:
         importlib.import_module(name)
     gc.collect()
     gc.freeze()  # pages that forks would otherwise copy

@@ -19,7 +19,8 @@ from ringsim.scene import builtin_scenes, load_scene
 
 SHORT = {
     "structure.opening_angle": 140.0, "solver.end_time": 2.0, "record.interval": 0.25,
-    "joints.vjoint.viscous": 0.2, "solver.step_limit": 800, "solver.tolerance": 4e-3, "solver.settling_time": 0.0,
+    "joints.vjoint.viscous": 0.2, "solver.step_limit": 800, "solver.tolerance": 4e-3,
+    "solver.settling_time": 0.0,
     "cables.upper.slack_width": 0.05, "cables.lower.slack_width": 0.05,
 }  # fmt: skip
 SPEED, STOP = "cables.*.winch.winding.speed", "stop.stiffness"
