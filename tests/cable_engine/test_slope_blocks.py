@@ -160,9 +160,7 @@ def opened(kind: str, **values: Any) -> Outcome:
 
 
 def test_both_kinds_of_rods_open_alike_under_equal_cables() -> None:
-    slopes, exact = (
-        opened(kind, structure__opening_angle=110.0) for kind in ("ancf", "geometrically-exact")
-    )
+    slopes, exact = opened("ancf"), opened("geometrically-exact")
     assert slopes.status == exact.status == Status.OK
     # Beams of different theory that bend by millimetres; three elements each.
     for name, near in (("deployment_time", 1e-4), ("peak_tension", 2e-3), ("asynchrony_max", 2e-2)):
@@ -170,7 +168,7 @@ def test_both_kinds_of_rods_open_alike_under_equal_cables() -> None:
             name
         )
     time = exact.coordinates["time"]
-    kept = (time > 1.0) & (time < 0.85 * float(exact.values["deployment_time"]))
+    kept = (time > 1.0) & (time < 6.0)
     one, other = (f.values["cable_tension"][..., kept] for f in (slopes, exact))
     assert one == pytest.approx(other, rel=2e-3)
     assert slopes.values["energy_error"] < 1e-3

@@ -3,9 +3,9 @@
 import numpy as np
 
 from ringsim.outputs.family import Output, Reading, Run, Series, Values, Variable
-from ringsim.simulation import run
+from ringsim.simulation import run_frame
 
-__all__ = ["run"]
+__all__ = ["run_frame"]
 
 
 class OpeningRate(Output):

@@ -83,7 +83,7 @@ def test_the_summary_of_a_run_states_it(opening_rate, tmp_path) -> None:
 def test_a_campaign_has_it(opening_rate, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("two.toml").write_text(CAMPAIGN, encoding="utf-8")
-    options = ["--workers=1", "--out=out", "--solver=opening_rate:run"]
+    options = ["--workers=1", "--out=out", "--solver=opening_rate:run_frame"]
     printed = CliRunner().invoke(cli, ["campaign", "two.toml", *options])
     assert printed.exit_code == 0, printed.output
     with xr.open_dataset("out/campaign.nc") as found:
