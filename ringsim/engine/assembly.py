@@ -9,6 +9,7 @@ import exudyn.itemInterface as item
 import numpy as np
 from exudyn.advancedUtilities import CreateSymbolicUserFunction
 
+from ringsim.engine.dry_joints import DryJoints
 from ringsim.engine.rod_dampers import RodDampers
 from ringsim.engine.rotations import Array, Indices, turn_of, turn_rates
 from ringsim.layout.pose import Pose
@@ -32,14 +33,16 @@ class Assembly:
 
     Attributes
     ----------
+    size
+        Number of coordinates of the nodes so far.
     starts
         Accelerations (m/s^2, 1/s^2) at which coordinates start, by node, in the nodes' order.
     bodies
         Objects with kinetic energy.
     beams
         Elements with potential energy that are no rods'.
-    rigid_nodes, dampers
-        Nodes with Euler parameters, and dampers of the rods.
+    rigid_nodes, dampers, dry_joints
+        Nodes with Euler parameters, dampers of the rods, and joints with dry friction.
     """
 
     def __init__(self) -> None:
@@ -50,16 +53,17 @@ class Assembly:
         self.beams: list[Any] = []
         self.rigid_nodes: list[Any] = []
         self.dampers = RodDampers(self.system)
+        self.dry_joints = DryJoints(self.system)
         self._laws: dict[Hashable, Any] = {}
         self._places: dict[int, Indices] = {}
-        self._size = 0
+        self.size = 0
 
     def add_node(self, node: Any, acceleration: Array) -> Any:
         """A node whose coordinates have an initial acceleration, shape (coordinates,)."""
         number = self.system.AddNode(node)
         self.starts[int(number)] = acceleration
-        self._places[int(number)] = np.arange(self._size, self._size + len(acceleration))
-        self._size += len(acceleration)
+        self._places[int(number)] = np.arange(self.size, self.size + len(acceleration))
+        self.size += len(acceleration)
         return number
 
     def coordinates_of(self, node: Any) -> Indices:
@@ -138,5 +142,5 @@ class Assembly:
         self.system.Assemble()
         data = self.system.systemData
         start = np.zeros(data.ODE2Size())
-        start[: self._size] = np.concatenate([*self.starts.values()])
+        start[: self.size] = np.concatenate([*self.starts.values()])
         data.SetODE2Coordinates_tt(start, exu.ConfigurationType.Initial)

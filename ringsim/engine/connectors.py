@@ -149,23 +149,25 @@ def _friction(model: Multibody, family: str, law: JointFriction) -> Reacting:
             f'{known or "none"}): leave it out (joints.{family} = "none")'
         )
 
-    def settings(own: JointFriction) -> dict[str, Any]:
-        damping = own.linear_damping()
-        if damping is not None:
-            return {"damping": damping} if damping > 0.0 else {}
-        return model.assembly.symbolic_law(
-            TORSION, own, lambda _angle, rate, _: own.torque(rate, SYMBOLIC)
-        )
-
+    dry = []
     for joint in joints:
-        if found := settings(at_section(law, joint.part.section)):
-            torsion(model, joint.markers, **found)
+        damping = at_section(law, joint.part.section).linear_damping()
+        if damping is None:
+            dry.append(joint)
+        elif damping > 0.0:
+            torsion(model, joint.markers, damping=damping)
+
+    def each(some: list[BuiltJoint]) -> JointFriction:
+        return at_section(law, np.array([joint.part.section for joint in some]))
+
+    if dry:
+        model.assembly.dry_joints.add(each(dry), [joint.markers for joint in dry])
     group = JointGroup(model, joints)
-    each = at_section(law, np.array([joint.part.section for joint in joints]))
+    own = each(joints)
 
     def reaction(state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
         rate = group.rate(state)
-        return Reaction(0.0, each.torque(rate), 0.0), rate
+        return Reaction(0.0, own.torque(rate), 0.0), rate
 
     return reaction
 

@@ -13,11 +13,11 @@ import numpy as np
 from ringsim.cable.ropes import Flags
 from ringsim.cable.state import ChainState
 from ringsim.engine.accelerations import AccelerationMeter
-from ringsim.engine.assembly import Assembly
 from ringsim.engine.base import BaseMeter
 from ringsim.engine.build import Built, build
 from ringsim.engine.meters import BendingMeter, EnergyMeter, StressMeter
 from ringsim.engine.positions import PositionMeter
+from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import Openings, State, joint_groups
 from ringsim.engine.rotations import Array
 from ringsim.engine.settings import newton_norm, solver_settings
@@ -101,8 +101,16 @@ class Integration:
         history, solver, control, system = self.history, self._solver, self._control, self._system
         solver.SetUserFunctionUpdateCurrentTime(system, self._update_time)
         system.SetPostStepUserFunction(self._after_step)
-        predictor = _Predictor(self._built.model.assembly, solver)
-        system.SetPreNewtonResidualUserFunction(predictor.apply)
+        assembly = self._built.model.assembly
+        predictor = Predictor(assembly, solver)
+
+        def before_residual(system: Any, time: float, newton: int, discontinuous: int) -> None:
+            # The rods' dampers read the state that the step starts from, before it is moved.
+            assembly.dampers.prepare(system, time, newton, discontinuous)
+            predictor.apply(time, newton, discontinuous)
+            assembly.dry_joints.follow()
+
+        system.SetPreNewtonResidualUserFunction(before_residual)
         if self._scene.solver.step_control == "motion":
             # A step is judged once: each further look would solve a refused step anew.
             self._settings.timeIntegration.discontinuous.maxIterations = 1
@@ -151,6 +159,7 @@ class Integration:
                 cables.advance(now.time, self._chain, np.array(slopes))
         else:
             solver.it.currentStepSize = control.retry(solver.it.currentStepSize)
+        self._built.model.assembly.dry_joints.begin()
         self._weighed, self._refused = None, False
         solver.it.currentTime = solver.it.currentTime + solver.it.currentStepSize
         system.systemData.SetTime(solver.it.currentTime, exu.ConfigurationType.Current)
@@ -239,57 +248,6 @@ class Integration:
             stretch = float(np.max(self._chain.strains, where=self._chain.ropes.alive, initial=0.0))
             driven = driven or cables.winches.driving(time, self._chain)
         return Instant(time, angles, rates, energies, gap, tensions, stretch, driven)
-
-
-class _Predictor:
-    """Start Newton from the acceleration of the last step instead of zero acceleration.
-
-    exudyn starts a step with zero acceleration at its end, which is off by h^2 beta a in the
-    positions; with stiff rods that costs Newton iterations.  Moving the guess along the
-    integrator's own update (a, h gamma a*, h^2 beta a*), a* = a (1 - alpha_f) / (1 - alpha_m),
-    changes where Newton starts, not what it converges to.  The acceleration is the difference
-    quotient of the velocities, which is smoother than the integrator's own.  Euler parameters are
-    brought back to unit length: their second-order growth would stretch the stiff rods.
-    """
-
-    def __init__(self, assembly: Assembly, solver: Any) -> None:
-        self._data, self._solver = assembly.system.systemData, solver
-        self._dampers = assembly.dampers
-        self._turns = np.array([assembly.coordinates_of(n)[3:7] for n in assembly.rigid_nodes])
-        reference = np.array(self._data.GetODE2Coordinates(exu.ConfigurationType.Reference))
-        self._unturned = reference[self._turns]
-        self._time = -1.0
-        self._last: tuple[float, Array] | None = None
-
-    def apply(self, system: Any, time: float, newton: int, discontinuous: int) -> None:
-        """Called by exudyn before every residual; acts once per step, before the first.
-
-        The rods' dampers come first: they read the state that the step starts from.
-        """
-        self._dampers.prepare(system, time, newton, discontinuous)
-        if newton != 0 or discontinuous != 0 or time == self._time:
-            return
-        self._time = time
-        data, solver, last = self._data, self._solver, self._last
-        start = data.GetSystemStateDict(exu.ConfigurationType.StartOfStep, reference=True)
-        begin = data.GetTime(exu.ConfigurationType.StartOfStep)
-        guess = np.array(start["ODE2Coords_tt"])
-        if last is None or begin > last[0]:
-            self._last = begin, np.array(start["ODE2Coords_t"])
-            if last is not None:
-                guess = (self._last[1] - last[1]) / (begin - last[0])
-        step = solver.it.currentStepSize
-        smooth = (1.0 - solver.alphaF) / (1.0 - solver.alphaM)
-        now = data.GetSystemStateDict(reference=True)
-        place = now["ODE2Coords"]
-        moved = step**2 * solver.newmarkBeta * smooth * guess
-        turned = (place + moved)[self._turns] + self._unturned
-        stretch = 1.0 / np.linalg.norm(turned, axis=1) - 1.0
-        moved[self._turns] += stretch[:, None] * turned
-        guess = moved / (step**2 * solver.newmarkBeta * smooth)
-        place[:] += moved
-        now["ODE2Coords_t"][:] += step * solver.newmarkGamma * smooth * guess
-        now["ODE2Coords_tt"][:] += guess
 
 
 def _detail(message: str) -> str:

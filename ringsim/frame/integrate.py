@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ringsim.cable.faults.family import CableFault
-from ringsim.frame.extrapolation import extrapolated
+from ringsim.stepping.extrapolation import extrapolated
 from ringsim.frame.kernels import Strains, move, moved_between, straighten
 from ringsim.frame.meter import EnergyMeter
 from ringsim.frame.model import FrameModel

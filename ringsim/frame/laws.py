@@ -23,7 +23,6 @@ from ringsim.stepping.turning import Turning
 _NUDGE = 1e-7
 """Change of place (m, rad) and rate by which the slopes of laws are measured."""
 _SIDES = np.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
-_ENDS = np.array([[1.0], [-1.0]])
 Law = Callable[[Array, Array], Reaction]
 
 
@@ -223,10 +222,7 @@ class JointLaws:
         found = self.damping * rate_by_angle
         for friction, own, sense, turning in self._friction:
             turned = sense * rates[own]
-            ends = friction.torque(turned + _NUDGE * _ENDS)
-            slope = (ends[0] - ends[1]) / (2.0 * _NUDGE)
-            slope = turning.slopes(friction, turned, slope, friction.torque)
-            found[own] += rate_by_angle * slope
+            found[own] += rate_by_angle * turning.tangents(friction, turned, friction.torque)
         for own, _, x, rate, law in self._acting(angles, rates):
             found[own] += slope_of(lambda *at, law=law: law(*at).total, x, rate, rate_by_angle)
         return found

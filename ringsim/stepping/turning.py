@@ -15,6 +15,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+_NUDGE = 1e-7
+"""Change of rate (rad/s) by which tangents of laws are measured."""
+_ENDS = np.array([[1.0], [-1.0]])
+
 
 class Turning:
     """Newton's iterates of one step, as far as slopes need them."""
@@ -56,3 +60,8 @@ class Turning:
         secants = (law(rates) - law(other)) / (rates - other)
         # fmax: NaN where the other side was never seen.
         return np.asarray(np.fmax(own, secants * 0.5**self._stayed))
+
+    def tangents(self, owner: object, rates: Array, law: Callable[[Array], Array]) -> Array:
+        """``slopes`` of a law whose derivatives are those of central differences."""
+        ahead, behind = law(rates + _NUDGE * _ENDS)
+        return self.slopes(owner, rates, (ahead - behind) / (2.0 * _NUDGE), law)
