@@ -16,6 +16,7 @@ from ringsim.engine.accelerations import AccelerationMeter
 from ringsim.engine.base import BaseMeter
 from ringsim.engine.build import Built, build
 from ringsim.engine.meters import BendingMeter, EnergyMeter, StressMeter
+from ringsim.engine.newton import Newton
 from ringsim.engine.positions import PositionMeter
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import Openings, State, joint_groups
@@ -102,13 +103,14 @@ class Integration:
         solver.SetUserFunctionUpdateCurrentTime(system, self._update_time)
         system.SetPostStepUserFunction(self._after_step)
         assembly = self._built.model.assembly
-        predictor = Predictor(assembly, solver)
+        predictor, newton_rules = Predictor(assembly, solver), Newton(solver, self._built.model.layout)
 
         def before_residual(system: Any, time: float, newton: int, discontinuous: int) -> None:
             # The rods' dampers read the state that the step starts from, before it is moved.
             assembly.dampers.prepare(system, time, newton, discontinuous)
             predictor.apply(time, newton, discontinuous)
             assembly.dry_joints.follow()
+            newton_rules.apply()
 
         system.SetPreNewtonResidualUserFunction(before_residual)
         if self._scene.solver.step_control == "motion":

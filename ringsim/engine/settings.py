@@ -7,6 +7,7 @@ import exudyn as exu
 import numpy as np
 
 from ringsim.engine.build import Built
+from ringsim.engine.newton import Newton
 from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.scene import Scene
 from ringsim.theory.scales import residual_tolerance
@@ -29,9 +30,7 @@ def solver_settings(scene: Scene, tolerance: float) -> Any:
     time.generalizedAlpha.spectralRadius = scene.solver.spectral_radius
     time.generalizedAlpha.computeInitialAccelerations = False
     time.generalizedAlpha.resetAccelerations = False
-    time.newton.useModifiedNewton = True
-    time.newton.modifiedNewtonJacUpdatePerStep = True
-    time.newton.maxIterations = 25
+    Newton.configure(time.newton)
     time.newton.relativeTolerance = 1e-14
     time.newton.absoluteTolerance = tolerance
     return settings
