@@ -20,7 +20,6 @@ from ringsim.engine.newton import Newton
 from ringsim.engine.positions import PositionMeter
 from ringsim.engine.predictor import Predictor
 from ringsim.engine.readings import Openings, State, joint_groups
-from ringsim.engine.rotations import Array
 from ringsim.engine.settings import newton_norm, solver_settings
 from ringsim.engine.shape import ShapeMeter
 from ringsim.outputs.recorder import Recorder
@@ -102,15 +101,16 @@ class Integration:
         history, solver, control, system = self.history, self._solver, self._control, self._system
         solver.SetUserFunctionUpdateCurrentTime(system, self._update_time)
         system.SetPostStepUserFunction(self._after_step)
-        assembly = self._built.model.assembly
-        predictor, newton_rules = Predictor(assembly, solver), Newton(solver, self._built.model.layout)
+        model = self._built.model
+        assembly, newton = model.assembly, Newton(solver, model.layout)
+        predictor = Predictor(assembly, solver)
 
-        def before_residual(system: Any, time: float, newton: int, discontinuous: int) -> None:
+        def before_residual(system: Any, time: float, count: int, discontinuous: int) -> None:
             # The rods' dampers read the state that the step starts from, before it is moved.
-            assembly.dampers.prepare(system, time, newton, discontinuous)
-            predictor.apply(time, newton, discontinuous)
+            assembly.dampers.prepare(system, time, count, discontinuous)
+            predictor.apply(time, count, discontinuous)
             assembly.dry_joints.follow()
-            newton_rules.apply()
+            newton.apply()
 
         system.SetPreNewtonResidualUserFunction(before_residual)
         if self._scene.solver.step_control == "motion":

@@ -1,11 +1,11 @@
 """When exudyn's modified Newton renews its Jacobian within a step, and when it gives up.
 
 exudyn renews where the residual does not halve, but never before the third iteration; where the
-residual doubles, or after eight iterations, it begins the step anew, without its extrapolated start,
-and renews the Jacobian in every iteration from then on.  Stops, and dry friction that turns round,
-let a residual grow by much more on the way to a solution.  So here
+residual doubles, or after eight iterations, it begins the step anew, without its extrapolated
+start, and renews the Jacobian in every iteration from then on.  Stops, and dry friction that turns
+round, let a residual grow by much more on the way to a solution.  So here
 
-- an iteration that does not halve the residual renews the Jacobian, whichever it is;
+- any iteration, the first ones included, renews the Jacobian where the residual falls too little;
 - growth is no reason to begin anew, but for that of a run-away, by ``_RUNAWAY`` in an iteration:
   there the step is given up, and repeated with a shorter one;
 - the second iteration has a Jacobian of its own where that of the start is worth nothing.  The
@@ -24,6 +24,10 @@ from ringsim.layout.layout import Layout
 _EXEMPT = 2
 """Iterations in which exudyn does not look at the residual's fall."""
 _RUNAWAY = 1e6
+_ROUGH = 30.0
+"""Start's residual over that at which mistaken forces and inertia are alike.  1 renews Jacobians
+for nothing (490 for 318 on ring18), 1e9 leaves them where a ring of 6 that stalls wants new ones.
+"""
 
 
 class Newton:
@@ -31,13 +35,13 @@ class Newton:
 
     iterations = 25
     """Most iterations of a step."""
-    fall = 0.5
+    fall = 0.7
     """Share of the last residual above which the Jacobian is renewed."""
 
     def __init__(self, solver: Any, layout: Layout) -> None:
         self._solver, self._count = solver, 0
         # The residual of a step's start is a norm over all rods, and so is this, kg m.
-        self._inertia = float(np.linalg.norm([rod.mass * rod.length for rod in layout.rods]))
+        self._rough = _ROUGH * float(np.linalg.norm([rod.mass * rod.length for rod in layout.rods]))
 
     @classmethod
     def configure(cls, newton: Any) -> None:
@@ -53,7 +57,7 @@ class Newton:
         now, found = self._solver.it, self._solver.conv
         if now.newtonSteps == 1:
             now.newtonSteps += _EXEMPT
-            if found.residual * now.currentStepSize**2 > self._inertia:
+            if found.residual * now.currentStepSize**2 > self._rough:
                 found.jacobianUpdateRequested = True
         elif 0 < now.newtonSteps == self._count:
             found.stopNewton = True  # exudyn begins anew

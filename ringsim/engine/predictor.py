@@ -9,11 +9,13 @@ from ringsim.engine.assembly import Assembly
 from ringsim.engine.rotations import Array
 from ringsim.stepping.extrapolation import extrapolated
 
+_EASY = 5
+"""Most iterations of a step after which the next one begins with a cubic."""
 _START = exu.ConfigurationType.StartOfStep
 
 
 class Predictor:
-    """Start Newton from the parabola through the last places instead of zero acceleration.
+    """Start Newton from a polynomial through the last places instead of zero acceleration.
 
     exudyn starts a step with zero acceleration at its end, which is off by h^2 beta a in the
     positions.  The squares of such errors stretch the stiff rods in the first iteration, and what a
@@ -23,7 +25,8 @@ class Predictor:
     the velocities would miss the places by ten times as much: velocities are the rougher.  Euler
     parameters are brought back to unit length: their third-order growth would stretch the rods.
 
-    Only nodes of the assembly are moved, not auxiliary unknowns.
+    It is a cubic where the last step was easy, else a parabola: where ropes swing within a step a
+    cubic swings further.  Only nodes of the assembly are moved, not auxiliary unknowns.
     """
 
     def __init__(self, assembly: Assembly, solver: Any) -> None:
@@ -35,6 +38,7 @@ class Predictor:
         self._time = -1.0
         self._last: tuple[float, Array] | None = None
         self._moves: list[tuple[float, Array]] = []
+        self._iterations, self._easy = 0, False
 
     def apply(self, time: float, newton: int, discontinuous: int) -> None:
         """Due before every residual; acts once per attempt at a step, before the first."""
@@ -50,8 +54,8 @@ class Predictor:
         now = self._data.GetSystemStateDict(reference=True)
         place = now["ODE2Coords"]
         moved = step**2 * solver.newmarkBeta * smooth * np.array(start["ODE2Coords_tt"])
-        if self._moves:
-            moved[:size] = begun + extrapolated(self._moves, step) - place[:size]
+        if moves := self._moves[-3 if self._easy else -2 :]:
+            moved[:size] = begun + extrapolated(moves, step) - place[:size]
             moved[size:] = 0.0
         turned = (place + moved)[self._turns] + self._unturned
         stretch = 1.0 / np.linalg.norm(turned, axis=1) - 1.0
@@ -64,10 +68,13 @@ class Predictor:
     def _note(self, begin: float, begun: Array) -> None:
         """Remember a state from which a step starts."""
         last = self._last
-        if last is not None and begin > last[0]:
+        if last is not None and begin <= last[0]:
+            return  # the step is repeated
+        self._last = begin, begun
+        before, self._iterations = self._iterations, self._solver.it.newtonStepsCount
+        if last is not None:
             duration = begin - last[0]
             rate = (begun - last[1]) / duration
             # Before rest it came as it leaves: the even motion through the first state.
-            self._moves = [*(self._moves[-1:] or [(duration, -rate)]), (duration, rate)]
-        if last is None or begin > last[0]:
-            self._last = begin, begun
+            self._moves = [*(self._moves[-2:] or [(duration, -rate)]), (duration, rate)]
+            self._easy = self._iterations - before <= _EASY

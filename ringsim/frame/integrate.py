@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from ringsim.cable.faults.family import CableFault
-from ringsim.stepping.extrapolation import extrapolated
 from ringsim.frame.kernels import Strains, move, moved_between, straighten
 from ringsim.frame.meter import EnergyMeter
 from ringsim.frame.model import FrameModel
@@ -20,6 +19,7 @@ from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.scene import Scene
+from ringsim.stepping.extrapolation import extrapolated
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks

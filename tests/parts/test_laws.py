@@ -90,13 +90,6 @@ def test_exudyn_evaluates_the_reaction_that_numpy_does(part, data, place, rate):
     assert float(reaction.total) == float(reaction.elastic + reaction.damping)
 
 
-@given(FRICTION, RATE)
-def test_exudyn_evaluates_the_friction_that_numpy_does(law, rate):
-    found = by_exudyn(lambda x, v, xp: law.torque(v, xp), 0.0, rate)
-    # Both libraries' own tanh and exp.
-    assert found == pytest.approx(float(law.torque(rate)), rel=1e-14, abs=1e-300)
-
-
 @given(st.floats(-3.0, 3.0))
 def test_every_symbolic_function_is_the_one_of_its_name(value):
     for name in vars(SYMBOLIC):

@@ -30,10 +30,10 @@ class StribeckFriction(JointFriction):
     stribeck_rate: AngularRate = 0.1
     rate: AngularRate = 0.01
 
-    def torque(self, rate: Any, xp: Any = np) -> Any:
-        share = xp.exp(-((rate / self.stribeck_rate) * (rate / self.stribeck_rate)))
+    def torque(self, rate: Any) -> Any:
+        share = np.exp(-((rate / self.stribeck_rate) * (rate / self.stribeck_rate)))
         size = self.sliding + (self.sticking - self.sliding) * share
-        return size * xp.tanh(rate / self.rate)
+        return size * np.tanh(rate / self.rate)
 
     def characteristic_rate(self) -> float:
         return min(self.rate, self.stribeck_rate)

@@ -17,8 +17,8 @@ class JointFriction(Model):
     proportional: ClassVar[tuple[str, ...]] = ()
     """Fields that the torque is proportional to, all together."""
 
-    def torque(self, rate: Any, xp: Any = np) -> Any:
-        """Torque in N m against a rate in rad/s, of the rate's sign; ``xp``: see ``springs``."""
+    def torque(self, rate: Any) -> Any:
+        """Torque in N m against a rate in rad/s, of the rate's sign."""
         raise NotImplementedError
 
     def resistance(self, rate: Any) -> Any:

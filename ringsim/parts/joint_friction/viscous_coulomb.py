@@ -23,9 +23,9 @@ class ViscousCoulombFriction(JointFriction):
     rate: AngularRate = 0.01
     """Rate that regularises the Coulomb torque: 76 % of it acts at this rate."""
 
-    def torque(self, rate: Any, xp: Any = np) -> Any:
+    def torque(self, rate: Any) -> Any:
         """See ``JointFriction``."""
-        return self.viscous * rate + self.coulomb * xp.tanh(rate / self.rate)
+        return self.viscous * rate + self.coulomb * np.tanh(rate / self.rate)
 
     def resistance(self, rate: Any) -> Any:
         """See ``JointFriction``."""
