@@ -9,7 +9,10 @@ polynomial through them in Newton's form, of the divided differences
 from collections.abc import Sequence
 from itertools import pairwise
 
-from ringsim.layout.pose import Array
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 
 def extrapolated(moves: Sequence[tuple[float, Array]], step: float) -> Array:

@@ -101,7 +101,8 @@ def test_joints_that_stop_within_a_step_cost_few_iterations() -> None:
 
 def test_long_steps_begin_close_and_renew_what_is_rough() -> None:
     """A ring that two motors open in steps of up to 0.3 s: with starts from differences of the
-    velocities, and exudyn's own way of beginning anew, 491 iterations, 312 Jacobians, 7 repeats.
+    velocities, and exudyn's own way of beginning anew, 491 iterations, 312 Jacobians and 7 repeated
+    steps, for 216, 51 and none.
     """
     scene = load_scene("ring18-motor").with_values(
         {
@@ -110,7 +111,6 @@ def test_long_steps_begin_close_and_renew_what_is_rough() -> None:
         }
     )  # fmt: skip
     run = Integration(build(scene)).run()
-    print(run.newton_iterations, run.jacobians, run.repeats)
     assert run.newton_iterations < 300
     assert run.jacobians < 150
     assert run.repeats <= 2
