@@ -5,7 +5,8 @@ residual doubles, or after eight iterations, it begins the step anew, without it
 start, and renews the Jacobian in every iteration from then on.  Stops, and dry friction that turns
 round, let a residual grow by much more on the way to a solution.  So here
 
-- any iteration, the first ones included, renews the Jacobian where the residual falls too little;
+- any iteration, the first ones included, renews the Jacobian where the residual falls too little,
+  and each does from the ninth on;
 - growth is no reason to begin anew, but for that of a run-away, by ``_RUNAWAY`` in an iteration:
   there the step is given up, and repeated with a shorter one;
 - the second iteration has a Jacobian of its own where that of the start is worth nothing.  The
@@ -26,7 +27,7 @@ _EXEMPT = 2
 _RUNAWAY = 1e6
 _ROUGH = 30.0
 """Start's residual over that at which mistaken forces and inertia are alike.  1 renews Jacobians
-for nothing (490 for 318 on ring18), 1e9 leaves them where a ring of 6 that stalls wants new ones.
+for nothing (490 for 344 on ring18), 1e9 leaves them where a ring of 6 that stalls wants new ones.
 """
 
 
@@ -35,8 +36,10 @@ class Newton:
 
     iterations = 25
     """Most iterations of a step."""
-    fall = 0.7
+    fall = 0.6
     """Share of the last residual above which the Jacobian is renewed."""
+    patience = 8
+    """Iterations after which it is renewed in any case."""
 
     def __init__(self, solver: Any, layout: Layout) -> None:
         self._solver, self._count = solver, 0
@@ -61,6 +64,8 @@ class Newton:
                 found.jacobianUpdateRequested = True
         elif 0 < now.newtonSteps == self._count:
             found.stopNewton = True  # exudyn begins anew
+        if now.newtonSteps > self.patience + _EXEMPT:
+            found.jacobianUpdateRequested = True
         if now.newtonSteps > 0:
             found.lastResidual = found.lastResidual * _RUNAWAY
         self._count = now.newtonSteps

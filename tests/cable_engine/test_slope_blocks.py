@@ -160,7 +160,9 @@ def opened(kind: str, **values: Any) -> Outcome:
 
 
 def test_both_kinds_of_rods_open_alike_under_equal_cables() -> None:
-    slopes, exact = opened("ancf"), opened("geometrically-exact")
+    # Of the scene's own tolerance, tensions in small ripples have an error of 2.3e-3.
+    fine = {"solver__tolerance": 1e-4}
+    slopes, exact = opened("ancf", **fine), opened("geometrically-exact", **fine)
     assert slopes.status == exact.status == Status.OK
     # Beams of different theory that bend by millimetres; three elements each.
     for name, near in (("deployment_time", 1e-4), ("peak_tension", 2e-3), ("asynchrony_max", 2e-2)):
