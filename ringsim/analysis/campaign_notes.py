@@ -37,8 +37,12 @@ def outcome_lines(campaign: xr.Dataset) -> list[str]:
 def ending_lines(
     fates: NDArray[Any], status: NDArray[Any], reason_of: Callable[[int], str]
 ) -> list[str]:
-    """The same from codes of every sample and what finds the reason of one, "" if it is lost."""
+    """The same from codes of every sample and what finds the reason of one, "" if it is lost.
+
+    Counts are of the samples that have run.
+    """
     good, lines = status == Status.OK, []
+    ran = int(np.sum(status >= Status.OK))  # below: has not run
     for fate in Fate:
         own = np.flatnonzero(good & (fates == fate))
         if not len(own) or fate == Fate.NONE:
@@ -49,14 +53,14 @@ def ending_lines(
             named = ""
         elif why := reason_of(int(own[0])):
             named += f": {textwrap.shorten(why, _LONGEST, placeholder=' ...')}"
-        lines.append(f"{fate.word.replace('_', ' ')}: {len(own)} of {len(fates)}{named}")
+        lines.append(f"{fate.word.replace('_', ' ')}: {len(own)} of {ran}{named}")
     for code in Status:
         own = np.flatnonzero(status == code)
         if code.failed and len(own):
             why = reason_of(int(own[0]))
             first = f"first sample {own[0]}{': ' if why else ''}{why}"
             first = textwrap.shorten(first, _LONGEST, placeholder=" ...")
-            lines.append(f"{code.word.replace('_', ' ')}: {len(own)} of {len(fates)}, {first}")
+            lines.append(f"{code.word.replace('_', ' ')}: {len(own)} of {ran}, {first}")
     return lines
 
 

@@ -66,10 +66,11 @@ def test_a_run_that_never_began_has_its_first_state():
 
 
 def test_it_is_no_less_than_any_recorded_value():
-    scene = ring(3, record__interval=0.003, solver__tolerance=0.05, solver__end_time=5.0)
+    scene = ring(3, record__interval=0.001, solver__tolerance=0.05, solver__end_time=5.0)
     outcome = run(scene)
     until = outcome.coordinates["time"] <= outcome.values["deployment_time"]
     largest = float(outcome.values["asynchrony_max"])
     recorded = float(outcome.values["asynchrony"][until].max())
-    # Between eight points a cubic of the fitted kind rises by a few thousandths of its height.
+    # As a joint locks the spread has a peak a few milliseconds wide.  Between eight points a cubic
+    # of the fitted kind rises by a few thousandths of its height.
     assert recorded <= largest < 1.05 * recorded
