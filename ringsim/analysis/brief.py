@@ -4,12 +4,15 @@ from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsim.analysis.intervals import LEVEL, Array
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.sensitivity_text import HEADS, SETS, measure_notes
 from ringsim.tables import Table, interval_text, number_text
 
+_NORMAL = 1.96
+"""Standard deviations that one in twenty leaves out."""
 _MOST = 3
 """Inputs that are told for each output."""
 _CHANCE = {"given_data_index": "chance_level"}
@@ -64,10 +67,12 @@ def what_matters(analysis: xr.Dataset) -> Table:
         if not found:
             quiet.append(output)
     notes = measure_notes(analysis)
-    if any(row[3] == "-" for row in rows):
+    if any(row[2] == "-" for row in rows):
         count = analysis.sizes["input"]
-        by_chance = f"the intervals of about {(1 - LEVEL) * count:.2g} leave out zero"
-        notes.append(f"rank correlations alone: of {count} inputs, by chance, {by_chance}")
+        notes.append(
+            f"rank correlations alone: by chance about {(1 - LEVEL) * count:.2g} of {count} inputs "
+            "would be told"
+        )
     if quiet:
         notes.append(f"nothing that chance would not explain: {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
@@ -110,13 +115,15 @@ def _correlated(analysis: xr.Dataset) -> list[str]:
 
 
 def _ranked(analysis: xr.Dataset, output: str) -> Iterator[tuple[str, ...]]:
-    """Inputs whose rank correlation with an output without index leaves out zero."""
+    """Inputs whose rank correlation with an output without index is beyond chance."""
     name = f"{output}_rank_correlation"
     if name not in analysis:
         return
     values, ends = analysis[name].values, analysis[f"{name}_interval"].values
+    # Of n independent samples without correlation: variance 1 / (n - 1).
+    beyond = _beyond(values, ends, _NORMAL / (analysis[f"{output}_samples"].values[0] - 1) ** 0.5)
     for k in np.argsort(-np.abs(np.nan_to_num(values))):
-        if ends[k, 0] > 0.0 or ends[k, 1] < 0.0:
+        if beyond[k]:
             yield str(analysis["input"].values[k]), "-", "-", _signed(values[k], ends[k])
 
 
@@ -139,12 +146,16 @@ def what_separates(analysis: xr.Dataset) -> Table:
     """Inputs that are larger, or smaller, in samples that ended otherwise or violate."""
     if "group" not in analysis.dims:
         return Table((), ())
-    rows = []
+    rows, samples = [], analysis.attrs["samples"]
     for group in analysis["group"].values:
         one = analysis.sel(group=group)
         middle, ends = one["separation"].values, one["separation_interval"].values
         order = np.argsort(-np.abs(np.nan_to_num(middle - 0.5)))
-        chosen = [k for k in order if ends[k, 0] > 0.5 or ends[k, 1] < 0.5]
+        own = one["group_samples"].item()
+        # Variance of the area under the curve without a difference: Mann and Whitney (1947).
+        chance = _NORMAL * ((samples + 1) / (12.0 * own * max(samples - own, 1))) ** 0.5
+        beyond = _beyond(middle - 0.5, ends - 0.5, chance)
+        chosen = [k for k in order if beyond[k]]
         first = str(group).split("; ")[0]
         rows += [
             (
@@ -156,6 +167,14 @@ def what_separates(analysis: xr.Dataset) -> Table:
         ]  # fmt: skip
     head = ("what separates", "input", "probability that it is larger", "95 % interval")
     return Table(head, rows, left=2)
+
+
+def _beyond(values: Array, ends: Array, chance: float) -> NDArray[np.bool_]:
+    """Which values stand out of chance: by their intervals, or where there are none because the
+    design gives none, by what one in twenty would reach.
+    """
+    apart = (ends[:, 0] > 0.0) | (ends[:, 1] < 0.0)
+    return np.where(np.isfinite(ends).all(axis=1), apart, np.abs(values) > chance)
 
 
 def _ends(interval: Array, digits: int = 2) -> str:

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from made import drawn_campaign
-from ringsim.analysis.brief import output_table, what_matters
+from ringsim.analysis.brief import output_table, what_matters, what_separates
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.sampling.designs.random import RandomDesign
+from ringsim.sampling.designs.sobol import Sobol
 
 
 def linear(x):
@@ -37,6 +38,22 @@ def test_an_output_of_chance_alone_is_said_to_be_so():
     table = what_matters(analyse(drawn_campaign(RandomDesign(samples=400), lambda _: noise, 3, 4)))
     assert not table.rows
     assert table.notes[-1] == "nothing that chance would not explain: asynchrony_max"
+
+
+def test_designs_without_intervals_are_judged_by_what_chance_would_reach():
+    design = Sobol(samples=32)
+    found = analyse(drawn_campaign(design, linear, 3, 4))
+    assert np.isnan(found.asynchrony_max_rank_correlation_interval).all()
+    table = what_matters(found)
+    ranks = found.asynchrony_max_rank_correlation.sel(input=["x1", "x2"]).values
+    assert abs(ranks[1]) < 1.96 / 31**0.5 < ranks[0]
+    assert [row[1] for row in table.rows] == ["x1"]
+    assert "by chance about 0.15 of 3 inputs" in table.notes[-1]
+    late = analyse(drawn_campaign(design, linear, 3, 4, lost=lambda x: x[:, 0] > 0.7))
+    assert np.isnan(late.separation_interval).all()
+    ((group, name, *_),) = what_separates(late).rows
+    assert group.startswith("lost")
+    assert name == "x1"
 
 
 def test_an_output_has_one_row_with_its_statistics(found):
