@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ringsim.choice import kind_of
-from ringsim.compile_cache import choose_folder, compile_once
+from ringsim.compile_cache import compile_once
 from ringsim.outputs.error_bars import error_bars
 from ringsim.outputs.family import holds
 from ringsim.outputs.stored import StoredState
@@ -106,7 +106,6 @@ def prepare_run_frame(scene: Scene) -> None:
         If it cannot represent the scene.
     """
     _refuse_other_rods(scene)
-    choose_folder()
     from ringsim.frame.integrate import solve
 
     left = iter(range(_COMPILING_STEPS))
@@ -130,7 +129,6 @@ def prepare_run_frame(scene: Scene) -> None:
 
 def why_not_frame(scene: Scene) -> str:
     """Why the frame engine cannot represent a scene; empty if it can."""
-    choose_folder()
     from ringsim.frame.model import FrameModel
 
     try:

@@ -12,6 +12,7 @@ import pytest
 from ringsim.compile_cache import VARIABLE, compile_once
 
 CHOOSES = "from ringsim.compile_cache import choose_folder\nprint(choose_folder())"
+FRAMES_FIRST = "import os, ringsim.frame\nprint(os.environ['NUMBA_CACHE_DIR'])"
 COMPILES = """
 import sys, time
 from pathlib import Path
@@ -57,6 +58,14 @@ def test_compiled_code_goes_to_the_users_cache(tmp_path: Path) -> None:
     assert errors == ""
     out, _ = ended(started(CHOOSES, tmp_path, HOME=str(tmp_path), XDG_CACHE_HOME="/tmp"))
     assert Path(out).parent == Path("/tmp/ringsim")
+
+
+def test_who_imports_a_kernel_first_has_its_code_in_the_same_folder(tmp_path: Path) -> None:
+    """Else numba keeps it beside the sources, and whoever runs a scene compiles it anew."""
+    chosen, found = (
+        ended(started(code, tmp_path, HOME=str(tmp_path)))[0] for code in (CHOOSES, FRAMES_FIRST)
+    )
+    assert found == chosen
 
 
 def test_a_folder_that_is_given_is_taken(tmp_path: Path) -> None:

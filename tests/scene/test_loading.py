@@ -14,10 +14,17 @@ HEAVY = ("exudyn", "numba", "mpi4py", "matplotlib", "xarray", "netCDF4", "scipy"
 def loaded_by(statements: str) -> set[str]:
     """Heavy libraries among the modules of a fresh interpreter after ``statements``."""
     report = f"{statements}\nimport sys\nprint(*[n for n in {HEAVY!r} if n in sys.modules])"
-    done = subprocess.run(
-        [sys.executable, "-c", report], capture_output=True, text=True, check=True
-    )
-    return set(done.stdout.splitlines()[-1].split())
+    return set(printed(report).splitlines()[-1].split())
+
+
+def printed(statements: str) -> str:
+    """By a fresh interpreter.
+
+    With the ringsim that is tested and not the one of this folder (-P): the frames of another
+    place would be compiled once more.
+    """
+    command = [sys.executable, "-P", "-c", statements]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
 def calling(*arguments: str) -> str:
@@ -46,10 +53,7 @@ def test_a_run_loads_its_own_engine_only(fidelity: str, engine: set[str], tmp_pa
 
 def test_importing_ringsim_does_not_even_load_numpy_or_pydantic() -> None:
     report = "import ringsim, sys\nprint('numpy' in sys.modules, 'pydantic' in sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", report], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.split() == ["False", "False"]
+    assert printed(report).split() == ["False", "False"]
 
 
 def test_public_words_are_listed_and_unknown_ones_refused() -> None:
