@@ -1,6 +1,7 @@
 """Finding the stowed angle from a measured deployment time."""
 
 import math
+from functools import cache
 
 from scipy.optimize import brentq
 
@@ -47,6 +48,7 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         [LEAST_OPENING, *held, 0.0 if scene.stop is None else scene.stop.stowed_angle + _CLOSE]
     )
 
+    @cache  # brentq begins with both ends again
     def excess(angle: float) -> float:
         course = Course(plain.with_values({"structure.opening_angle": angle})).run()
         if course.status.failed:

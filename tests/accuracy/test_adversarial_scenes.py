@@ -8,15 +8,17 @@ its last lock, not the 0.97 N of a far winch that sat on the last pulley.
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from ringsim.scene import Scene, load_scene
-from ringsim.simulation import run
-from ringsim.variables import PLANES, Status
+from ringsim.simulation import run, run_frame
+from ringsim.variables import PLANES, Outcome, Status
 
 SCENES = tomllib.loads((Path(__file__).parent / "adversarial_scenes.toml").read_text())
+SOFT = "soft-arc-of-2-taut-ropes"
 TRUTHS = {
     "ring-of-5-slow-last-lock": {
         "deployment_time": 31.71091, "asynchrony_max": 2.026661, "peak_tension": 0.3674,
@@ -33,7 +35,7 @@ TRUTHS = {
     "heavy-ring-of-4-hard-stops": {
         "deployment_time": 0.3390717, "peak_rod_stress": 8.951036e7,
     },
-    "soft-arc-of-2-taut-ropes": {
+    SOFT: {
         "deployment_time": 6.849602, "asynchrony_max": 0.7219657, "peak_tension": 8.398503,
         "peak_rod_stress": 5.279697e6,
     },
@@ -53,15 +55,22 @@ def scene_of(name: str) -> Scene:
     return scene.with_values(pull | far if both else pull)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.slow if name == "soft-arc-of-2-taut-ropes" else ())
+DEAR = {"ring-of-5-slow-last-lock", "arc-of-4-wound-from-both-ends"}
+"""By default frames run them, for a fifth of the price; their bars are made by the same code."""
+CASES = [
+    *(pytest.param(name, run_frame, id=f"{name}-frame") for name in sorted(DEAR)),
+    *(
+        pytest.param(name, run, id=name, marks=pytest.mark.slow if name in DEAR | {SOFT} else ())
         for name in TRUTHS
-    ],
-)
-def test_numbers_are_right_and_covered_by_their_bars(name: str) -> None:
-    outcome = run(scene_of(name).with_values({"solver.error_bars": True}))
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "answer"), CASES)
+def test_numbers_are_right_and_covered_by_their_bars(
+    name: str, answer: Callable[[Scene], Outcome]
+) -> None:
+    outcome = answer(scene_of(name).with_values({"solver.error_bars": True}))
     assert outcome.status is Status.OK
     assert int(outcome.values["restarts"]) == 0
     for output, truth in TRUTHS[name].items():

@@ -44,8 +44,7 @@ def wound_in(speed: float, start: float, **values: Any) -> Outcome:
 
 QUICK = [
     {"both__axial_stiffness": 1e3},
-    {"both__axial_stiffness": 1e6},
-    {"both__friction__coefficient": 0.0},
+    {"both__axial_stiffness": 1e6, "both__friction__coefficient": 0.0},
     {"speed": 0.5},
 ]
 LATE = {"start": 2.0}
@@ -56,7 +55,7 @@ LATE = {"start": 2.0}
     [*QUICK, pytest.param(LATE, marks=pytest.mark.slow)],
     ids=lambda case: "-".join(map(str, case.items())),
 )
-def test_one_value_at_its_end(case: dict[str, Any]) -> None:
+def test_values_at_their_ends(case: dict[str, Any]) -> None:
     values = {"speed": 0.05, "start": 20.0} | case
     found = wound_in(**values)
     sound(found)

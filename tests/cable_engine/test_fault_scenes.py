@@ -11,12 +11,13 @@ from driven import outcome, truss
 from ringsim.stepping.rest import MOVED
 from ringsim.variables import Fate, Outcome
 
-STRIKES = 1.0
+STRIKES = 0.7
+"""Winches have reached their speed at 0.5 s."""
 ENERGY = 3e-4
 """The balance closes over a fault as it does without: what it lets go is booked as lost."""
 
 
-def struck(*faults: dict[str, Any], end: float = 2.5, **values: Any) -> Outcome:
+def struck(*faults: dict[str, Any], end: float = 1.7, **values: Any) -> Outcome:
     return outcome(
         truss(
             structure__opening_angle=60.0,
@@ -44,7 +45,7 @@ def test_beyond_a_jam_the_tension_no_longer_follows_the_winch() -> None:
     assert tension[:, 3:, after].max() < 1e-6
     assert np.diff(found.values["opening_angle"][..., after], axis=-1).min() > 0.0
     # Both motors wind what they are told.
-    assert found.values["wound_length"][:, -1].min() > 0.11
+    assert found.values["wound_length"][:, -1].min() > 0.07
     assert found.values["energy_error"] < ENERGY
 
 
@@ -86,8 +87,8 @@ def test_a_stuck_joint_stays_and_the_rest_goes_on() -> None:
 def test_faults_before_their_time_change_nothing() -> None:
     # Steps that follow the energy's imbalance follow its round-off, too: a part in 1e8 of a step.
     steps: dict[str, Any] = {"solver__step_control": "constant", "solver__step": 5e-3}
-    faulty = struck({"kind": "cut-cable", "cable": 1, "span": 2, "time": 3.0}, end=1.2, **steps)
-    sound = struck(end=1.2, **steps)
+    faulty = struck({"kind": "cut-cable", "cable": 1, "span": 2, "time": 3.0}, end=0.6, **steps)
+    sound = struck(end=0.6, **steps)
     # One more unknown in the linear solver: round-off alone, which a rope of 1e5 N makes a force.
     for name, least in (("opening_angle", 1e-9), ("cable_tension", 1e5 * 1e-11)):
         np.testing.assert_allclose(faulty.values[name], sound.values[name], rtol=1e-7, atol=least)

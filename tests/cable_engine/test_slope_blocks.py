@@ -159,6 +159,7 @@ def opened(kind: str, **values: Any) -> Outcome:
     return outcome(truss(2, **(fields | values)))
 
 
+@pytest.mark.slow  # the runs below open alike until the fault strikes
 def test_both_kinds_of_rods_open_alike_under_equal_cables() -> None:
     # Of the scene's own tolerance, tensions in small ripples have an error of 2.3e-3.
     fine = {"solver__tolerance": 1e-4}
@@ -193,10 +194,17 @@ FAULTS = {
 )
 def test_faults_strike_rods_with_slopes_as_others(fault: str) -> None:
     struck = [FAULTS[fault] | {"time": 0.7}]
+    end = 1.0 if fault == "cut" else 1.4
     slopes, exact = (
-        opened(kind, faults=struck, solver__end_time=1.4, rods__elements=2)
+        opened(kind, faults=struck, solver__end_time=end, rods__elements=2)
         for kind in ("ancf", "geometrically-exact")
     )
+    time = exact.coordinates["time"]
+    kept = (time > 0.18) & (time < 0.7)
+    # Ripples of the tension have an error of 2.3e-3 by the steps; 3.6e-3 and 1.2e-3 deg as measured.
+    for name, near in (("cable_tension", {"rel": 1e-2}), ("opening_angle", {"abs": 5e-3})):
+        one, other = (f.values[name][..., kept] for f in (slopes, exact))
+        assert one == pytest.approx(other, **near), name
     angles, others = (f.values["opening_angle"][..., -1] for f in (slopes, exact))
     for found in (slopes, exact):
         tension = found.values["cable_tension"][0, :, -1]

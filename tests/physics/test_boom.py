@@ -13,7 +13,7 @@ from ringsim.engine.rotations import turn_rates
 from ringsim.parts.boom.flexible import FlexibleBoom
 
 
-@pytest.mark.parametrize("base", ["free", "fixed"])
+@pytest.mark.parametrize("base", [pytest.param("free", marks=pytest.mark.slow), "fixed"])
 def test_a_flexible_boom_hardly_bends(base: str) -> None:
     """A tube of 60 mm against rods of 10 mm: its bending is a hundredth of the rods'."""
     rigid, flexible = (

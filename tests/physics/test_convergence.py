@@ -19,11 +19,11 @@ def test_second_order_in_a_constant_step() -> None:
         run(
             ring(3, solver__step=h, solver__step_control="constant", solver__end_time=2.48)
         ).reaches(170.0)
-        for h in (0.02, 0.01, 0.005, 0.0025)
+        for h in (0.04, 0.02, 0.01, 0.005)
     ]
     changes = np.abs(np.diff(times))
     orders = np.log2(changes[:-1] / changes[1:])
-    np.testing.assert_allclose(orders, 2.0, atol=0.1)
+    np.testing.assert_allclose(orders, 2.0, atol=0.1)  # 1.94 and 2.016
 
 
 @functools.cache
@@ -70,8 +70,8 @@ def refined(kind: str, young_modulus: float, counts: tuple[int, ...]) -> Array:
 
 def test_refining_geometrically_exact_rods() -> None:
     """Second order or better, shown with rods soft enough for their own inertia to matter."""
-    changes = refined("geometrically-exact", 1e9, (1, 2, 4, 8))
-    assert (np.log2(changes[:-1] / changes[1:]) > 1.9).all()
+    coarse, fine = refined("geometrically-exact", 1e9, (1, 2, 4))
+    assert np.log2(coarse / fine) > 1.9
     # At the paper's stiffness one element is enough.
     assert refined("geometrically-exact", 120e9, (1, 2)).max() < math.radians(2e-4)
 

@@ -22,9 +22,8 @@ RING = load_scene("ring18")
 STOWED = RING.structure.opening_angle
 
 
-@pytest.mark.parametrize(
-    "force", [0.015, *(pytest.param(f, marks=pytest.mark.slow) for f in (0.02, 0.03))]
-)
+@pytest.mark.slow  # tests/readme/test_main_line.py looks at 0.015 N in a run that it has anyway
+@pytest.mark.parametrize("force", PUBLISHED)
 def test_the_first_section_opens_along_the_curve_of_the_quadrature(force: float) -> None:
     found = run(RING.with_values({"loads.force": force}))
     first, rates = found.angles[:, :, 0], found.rates[:, :, 0]
@@ -54,7 +53,7 @@ def test_the_first_section_opens_along_the_curve_of_the_quadrature(force: float)
 
 @pytest.mark.parametrize(
     ("sections", "start"),
-    [(18, 150.0), pytest.param(18, 175.0, marks=pytest.mark.slow), (6, 175.0)],
+    [*(pytest.param(18, start, marks=pytest.mark.slow) for start in (150.0, 175.0)), (6, 175.0)],
 )
 def test_reversed_forces_fold_it_to_the_stowed_stop(sections: int, start: float) -> None:
     """How the paper stows its ring: released nearly open, forces of case 1 the other way round.

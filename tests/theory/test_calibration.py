@@ -38,6 +38,7 @@ def stowed(scene: Scene, angle: float) -> Scene:
         pytest.param(
             {"structure__closed": False, "structure__polygon_sections": 18, "boom": "none"},
             id="open arc",
+            marks=pytest.mark.slow,  # another run of the ideal fidelity
         ),
     ],
 )
