@@ -1,9 +1,12 @@
 """What the motors of the winches give."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ringsim.cable.records import Winch
 from ringsim.cable.winding.motor import MotorWinding
 from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
 
@@ -38,23 +41,35 @@ class Motors(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Of the tensions and speeds at the steps; energies are sums of mean torque times turn."""
-        assert run.scene.cables is not None
-        winches = len(run.coordinates["winch"])
-        found = np.full((4, len(series.times), len(run.locks), winches), np.nan)
-        for plane, cable in run.scene.cables.present():
-            locked = float(np.nan_to_num(run.locks[plane].max(), nan=math.inf))
-            for end, winch in enumerate(cable.winches):
-                if not isinstance(motor := winch.winding, MotorWinding):
-                    continue
-                tension, speed, wound = series.values[:, plane, end].T
-                on = np.array([winch.turns(time) for time in series.times])
-                if winch.after_lock == "stop":
-                    on &= series.times <= locked
-                torque = np.where(on, motor.torque(tension, speed), 0.0)
-                shaft, turned = speed / motor.travel, np.diff(wound) / motor.travel
-                energy = np.cumsum(np.append(0.0, 0.5 * (torque[1:] + torque[:-1]) * turned))
-                found[:, :, plane, end] = torque, shaft, torque * shaft, energy
+        times, winches = series.times, len(run.coordinates["winch"])
+        found = np.full((4, len(times), len(run.locks), winches), np.nan)
+        torque, shaft, power, energy = found
+        turned = np.zeros_like(torque)
+        # A run that went on may have had another motor before, or none: each for its own steps.
+        for steps, (plane, end), winch in _motors(run):
+            assert isinstance(motor := winch.winding, MotorWinding)
+            tension, speed, wound = series.values[:, plane, end].T
+            on = np.array([winch.turns(time) for time in times[steps]], dtype=bool)
+            if winch.after_lock == "stop":
+                on &= times[steps] <= np.nan_to_num(run.locks[plane].max(), nan=math.inf)
+            found[:, :, plane, end] = np.nan_to_num(found[:, :, plane, end])
+            place, before = (steps, plane, end), np.maximum(steps - 1, 0)
+            torque[place] = np.where(on, motor.torque(tension[steps], speed[steps]), 0.0)
+            shaft[place] = speed[steps] / motor.travel
+            turned[place] = (wound[steps] - wound[before]) / motor.travel
+        power[:] = torque * shaft
+        energy[:] = 0.0 * torque
+        energy[1:] += np.cumsum(0.5 * (torque[1:] + torque[:-1]) * turned[1:], axis=0)
         return {
             variable.name: Series(series.times, values, series.grid).on_grid()
             for variable, values in zip(self.variables, found, strict=True)
         }
+
+
+def _motors(run: Run) -> Iterator[tuple[NDArray[np.intp], tuple[int, int], Winch]]:
+    """Steps, plane and end of every motor, with its winch as it was then."""
+    for steps, scene in run.stretches():
+        for plane, cable in [] if scene.cables is None else scene.cables.present():
+            for end, winch in enumerate(cable.winches):
+                if isinstance(winch.winding, MotorWinding):
+                    yield steps, (plane, end), winch

@@ -31,6 +31,7 @@ class Recorder(Remembering):
         """Begin a run; ``coordinates`` are those that its outputs declare themselves."""
         self._scene, self._coordinates = scene, coordinates or {}
         self._readings: dict[Output, list[Any]] = {output: [] for output in outputs_of(scene)}
+        self._before: list[tuple[float, Scene]] = []
         self._lost = self._driven = 0.0
         self.times: list[float] = []
         self.angles: list[Array] = []
@@ -74,11 +75,14 @@ class Recorder(Remembering):
             untold = any(value is None for value in values)
             readings[type(output).__name__] = None if untold else np.array(values, dtype=float)
         lists: Memory = {name: np.array(steps) for name, steps in self._lists().items()}
-        return lists | {"energies": np.array(self.energies), "readings": readings}
+        before = [[time, scene.to_table()] for time, scene in self._before]
+        return lists | {
+            "energies": np.array(self.energies), "readings": readings, "before": before
+        }  # fmt: skip
 
-    def take_over(self, history: Memory, memory: Memory, where: str) -> None:
-        """Go on behind the steps of another one, up to where it had the memory; ``where`` is what
-        messages call that.
+    def take_over(self, history: Memory, memory: Memory, scene: Scene, where: str) -> None:
+        """Go on behind the steps of another one, up to where it had the memory, and the scene;
+        ``where`` is what messages call that.
 
         Raises
         ------
@@ -101,6 +105,10 @@ class Recorder(Remembering):
             values = history[name][:steps]
             own[:] = values.tolist() if values.ndim == 1 else list(values)
         self.energies[:] = [Energies(*row.tolist()) for row in history["energies"][:steps]]
+        # What a scene was made of decides about readings that were made with it, ever after.
+        older = [(time, Scene.model_validate(table)) for time, table in history.get("before", [])]
+        now = self.times[-1]
+        self._before = [*((time, one) for time, one in older if time < now), (now, scene)]
 
     def _lists(self) -> dict[str, list[Any]]:
         return {name: getattr(self, name) for name in ("times", "angles", "rates", "gaps")}
@@ -118,7 +126,7 @@ class Recorder(Remembering):
         known = axes(self._scene) | dict(self._coordinates)
         run = Run(
             self._scene, Series(times, angles, grid), Series(times, rates, grid),
-            lock_times(times, angles, rates), counts, known,
+            lock_times(times, angles, rates), counts, known, tuple(self._before),
         )  # fmt: skip
 
         def series_of(output: Output) -> Series | None:

@@ -132,6 +132,20 @@ class Run:
     """What the solver has counted, by variable."""
     coordinates: Mapping[str, NDArray[Any]]
     """Values of all dimensions."""
+    before: tuple[tuple[float, Scene], ...] = ()
+    """Scenes that it had before its own, each with the time up to which it did, s."""
+
+    def stretches(self) -> list[tuple[NDArray[np.intp], Scene]]:
+        """Numbers of the steps that a scene held for, and this scene, one after the other.
+
+        A step to the very time of a change belongs to the scene before.
+        """
+        times = self.angles.times
+        ends = [np.searchsorted(times, time * _SAME, side="right") for time, _ in self.before]
+        bounds, scenes = [0, *ends, len(times)], [*(scene for _, scene in self.before), self.scene]
+        return [
+            (np.arange(*own), scene) for own, scene in zip(pairwise(bounds), scenes, strict=True)
+        ]
 
     @property
     def until(self) -> float:

@@ -31,9 +31,27 @@ class Gravity(Model):
     """Acceleration of what falls freely, along x, y and z of space."""
 
     def check(self, scene: Any) -> None:
-        """Raise a ValueError where nothing would carry the weight."""
-        if not scene.held and scene.offload is None:
+        """Raise a ValueError where nothing would carry the weight, or lines would carry what they
+        are not meant to.
+        """
+        if scene.held:
+            return
+        where = f"gravity.vector = {list(self.vector)} m/s^2 on a free base"
+        if scene.offload is None:
             raise ValueError(
-                f"gravity.vector = {list(self.vector)} m/s^2 on a free base: the structure would "
-                'fall: hold it (boom.base = "fixed"), hang it up ([offload]), or leave gravity out'
+                f"{where}: the structure would fall: hold it "
+                '(boom.base = "fixed"), hang it up ([offload]), or leave gravity out'
+            )
+        if scene.spacecraft is not None:
+            raise ValueError(
+                f"{where} with a spacecraft of {scene.spacecraft.mass:g} kg: the lines of [offload] "
+                'would carry it: hold it (boom.base = "fixed"), or leave [spacecraft] out'
+            )
+        residual = scene.offload.mean_residual
+        if abs(residual) > 1e-12 and scene.offload.stiffness == 0.0:
+            raise ValueError(
+                f"offload.residual = {residual:g} (mean) on a free base: lines of constant force "
+                "leave that share of the weight to nothing, and the structure would "
+                f"{'fall' if residual > 0.0 else 'rise'}: give offload.stiffness, a mean residual "
+                'of 0, or hold the base (boom.base = "fixed")'
             )

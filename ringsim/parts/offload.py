@@ -48,6 +48,13 @@ class Offload(Model):
     trolley_mass: KilogramOrZero = 0.0
     """Of each trolley, which its corner moves along the grid."""
 
+    @property
+    def mean_residual(self) -> float:
+        """Of the chosen corners."""
+        each = np.atleast_1d(self.residual)
+        chosen = [corner - 1 for corner in self.corners] if len(each) > 1 else []
+        return float(each[chosen or slice(None)].mean())
+
     def check(self, scene: Any) -> None:
         """Raise a ValueError where there is no weight, or no such corner."""
         if scene.gravity is None:

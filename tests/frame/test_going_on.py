@@ -122,6 +122,37 @@ def test_a_winch_that_is_switched_on_again_goes_on_with_the_rope_on_its_drum(
     assert run["energy_error"].item() < 1e-3
 
 
+@pytest.mark.parametrize(
+    "change",
+    [{"winding.gear_ratio": 50.0}, {"winding.stall_torque": 2e-5}, {"start_time": 0.02}],
+    ids=str,
+)
+def test_what_a_motor_gave_before_a_change_stays(change: dict[str, float], tmp_path: Path) -> None:
+    """Torque, speed and energy are of the motor that it was; the energy goes on from there."""
+    scene = truss(cables__upper__winch__winding=MOTOR, cables__lower__winch__winding=MOTOR)
+    before, file = stored(scene, tmp_path)
+    now = scene.with_values({f"cables.upper.winch.{k}": v for k, v in change.items()})
+    run = simulate(now, "frame", start=read_state(file, 0.02))
+    upper = {"plane": "upper", "winch": 1}
+    for name in ("motor_torque", "motor_speed", "motor_energy"):
+        old, new = (found[name].sel(upper).values for found in (before, run))
+        np.testing.assert_array_equal(new[:10], old[:10], err_msg=name)
+    assert run["motor_torque"].sel(upper).values[5] > 0.0
+    # Without losses of the gear it is what the rope takes: tension times rope wound.
+    after = run.sel(plane="upper").isel(time=slice(11, None))
+    tension, wound = after["cable_tension"].sel(span=1).values, after["wound_length"].values
+    taken = 0.5 * (tension[1:] + tension[:-1]) * np.diff(wound)
+    given = np.diff(after["motor_energy"].sel(winch=1))
+    assert given == pytest.approx(taken, rel=5e-3)
+    # And again from there: both changes are remembered.
+    save(run, tmp_path / "second.nc")
+    later = scene.with_values({"solver.end_time": 0.034})
+    third = simulate(later, "frame", start=read_state(tmp_path / "second.nc", 0.03))
+    for name in ("motor_torque", "motor_speed", "motor_energy"):
+        old, new = (found[name].sel(upper).values for found in (run, third))
+        np.testing.assert_array_equal(new[:13], old[:13], err_msg=name)
+
+
 def test_a_cleared_fault_lets_go(tmp_path: Path) -> None:
     """What a stuck V-joint and a jammed pulley held is lost, and the truss opens on."""
     faults = [
