@@ -46,8 +46,7 @@ class Motors(Output):
         torque, shaft, power, energy = found
         turned = np.zeros_like(torque)
         # A run that went on may have had another motor before, or none: each for its own steps.
-        for steps, (plane, end), winch in _motors(run):
-            assert isinstance(motor := winch.winding, MotorWinding)
+        for steps, (plane, end), winch, motor in _motors(run):
             tension, speed, wound = series.values[:, plane, end].T
             on = np.array([winch.turns(time) for time in times[steps]], dtype=bool)
             if winch.after_lock == "stop":
@@ -66,10 +65,12 @@ class Motors(Output):
         }
 
 
-def _motors(run: Run) -> Iterator[tuple[NDArray[np.intp], tuple[int, int], Winch]]:
-    """Steps, plane and end of every motor, with its winch as it was then."""
+def _motors(
+    run: Run,
+) -> Iterator[tuple[NDArray[np.intp], tuple[int, int], Winch, MotorWinding]]:
+    """Steps, plane and end of every motor, with its winch and itself as they were then."""
     for steps, scene in run.stretches():
         for plane, cable in [] if scene.cables is None else scene.cables.present():
             for end, winch in enumerate(cable.winches):
                 if isinstance(winch.winding, MotorWinding):
-                    yield steps, (plane, end), winch
+                    yield steps, (plane, end), winch, winch.winding

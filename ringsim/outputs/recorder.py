@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ringsim.outputs.family import COORDINATES, OUTPUTS, VARIABLES, Array, Output, axes, holds
 from ringsim.outputs.latching import missed
 from ringsim.outputs.series import Reading, Run, Series, output_times
+from ringsim.outputs.shocks import unresolved
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
@@ -137,7 +138,8 @@ class Recorder(Remembering):
         values = reduced(run, self._readings, series_of)
         coordinates = spanned(values, known)
         passed = overloads(self._scene, self._readings, series_of)
-        return ended(self.status, self.fate, self.reason, passed, coordinates, values)
+        found = ended(self.status, self.fate, self.reason, passed, coordinates, values)
+        return replace(found, reason=found.reason + unresolved(run))
 
 
 def outputs_of(scene: Scene) -> list[Output]:

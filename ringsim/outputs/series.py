@@ -141,10 +141,12 @@ class Run:
         A step to the very time of a change belongs to the scene before.
         """
         times = self.angles.times
-        ends = [np.searchsorted(times, time * _SAME, side="right") for time, _ in self.before]
-        bounds, scenes = [0, *ends, len(times)], [*(scene for _, scene in self.before), self.scene]
+        ends = [int(np.searchsorted(times, time * _SAME, side="right")) for time, _ in self.before]
+        bounds = pairwise([0, *ends, len(times)])
+        scenes = [*(scene for _, scene in self.before), self.scene]
         return [
-            (np.arange(*own), scene) for own, scene in zip(pairwise(bounds), scenes, strict=True)
+            (np.arange(begin, end), scene)
+            for (begin, end), scene in zip(bounds, scenes, strict=True)
         ]
 
     @property

@@ -1,0 +1,44 @@
+"""Whether the steps of a run were short enough for the shocks of its locks."""
+
+import math
+
+import numpy as np
+
+from ringsim.layout.layout import layout_of
+from ringsim.outputs.series import Run
+
+STEPS = 8.0
+"""Steps in the lowest period of the slowest rod that shocks need.  Measured on `ring18-ground` with
+four sections (17 ms): frames with 22 give base force, base torque and acceleration to 1 %, with 4
+to 1, 8 and 2 %, with 0.9 to 12, 78 and 30 %; exudyn with 3 lacks a third, 70 % and 87 % of them."""
+
+
+def unresolved(run: Run) -> str:
+    """What a reason says of shocks that last no longer than steps; empty if none was asked for."""
+    record, locks = run.scene.record, run.locks[np.isfinite(run.locks)]
+    if not (record.reactions or record.accelerations) or not len(locks):
+        return ""
+    times, period = run.angles.times, slowest_period(run)
+    first = np.clip(np.searchsorted(times, locks) - 1, 0, len(times) - 2)
+    last = np.maximum(np.searchsorted(times, locks + 0.25 * period), first + 1)
+    longest = [float(np.diff(times[i : k + 1]).max()) for i, k in zip(first, last, strict=True)]
+    k = int(np.argmax(longest))
+    if longest[k] <= period / STEPS:
+        return ""
+    return (
+        f"; steps of {1e3 * longest[k]:.2g} ms at the lock at {locks[k]:.6g} s pass over shocks in "
+        f"the rods (period {1e3 * period:.2g} ms): for peaks at base and corners reduce "
+        "solver.tolerance"
+    )
+
+
+def slowest_period(run: Run) -> float:
+    """Longest of the rods' lowest periods of bending, with pinned ends, s.
+
+    2 pi / w, w = (pi / L)^2 sqrt(E I / (rho A)): S. Timoshenko, Vibration Problems in Engineering.
+    """
+    return max(
+        2.0 * rod.length**2 / math.pi
+        * math.sqrt(rod.density * rod.tube.area / (rod.young_modulus * rod.tube.second_moment))
+        for rod in layout_of(run.scene).rods
+    )  # fmt: skip

@@ -1,0 +1,51 @@
+"""Steps that are too long for the shocks of locks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ringsim.outputs.series import Run, Series
+from ringsim.outputs.shocks import slowest_period, unresolved
+from ringsim.scene import load_scene
+
+PERIOD = 2.0 * 0.855**2 / math.pi * 4.0 * math.sqrt(1800.0 / 120e9 / (0.01**2 + 0.00915**2))
+"""Of the diagonals of ring18, 2 x 0.4275 m: rho A / (E I) = 16 rho / (E (D^2 + d^2))."""
+
+
+def run(steps: float, *, lock: float = 1.0, **record: bool) -> Run:
+    """Steps of 50 ms until 0.9 s, then of so many periods of the slowest rod until 2 s."""
+    scene = load_scene("ring18").with_values({f"record.{k}": v for k, v in record.items()})
+    times = np.concatenate([np.arange(0.0, 0.9, 0.05), np.arange(0.9, 2.0, steps * PERIOD)])
+    nothing = Series(times, np.zeros((len(times), 2, 18)), times)
+    locks = np.full((2, 18), np.nan)
+    locks[0, 3] = lock
+    return Run(scene, nothing, nothing, locks, {}, {})
+
+
+def test_the_slowest_rod_is_a_pinned_diagonal() -> None:
+    assert slowest_period(run(1.0)) == pytest.approx(PERIOD, rel=1e-12)
+
+
+@pytest.mark.parametrize("record", ["reactions", "accelerations"])
+def test_steps_longer_than_an_eighth_of_its_period_are_told(record: str) -> None:
+    told = unresolved(run(0.2, **{record: True}))
+    assert told.startswith(
+        f"; steps of {200.0 * PERIOD:.2g} ms at the lock at 1 s pass over shocks"
+    )
+    assert told.endswith("reduce solver.tolerance")
+    assert unresolved(run(0.12, **{record: True})) == ""
+
+
+def test_steps_count_at_locks_alone_and_where_shocks_are_recorded() -> None:
+    assert "lock at 0.5 s" in unresolved(run(0.05, lock=0.5, reactions=True))
+    assert unresolved(run(0.05, lock=1.9, reactions=True)) == ""
+    assert unresolved(run(0.2)) == ""
+    assert unresolved(run(0.2, lock=math.nan, reactions=True)) == ""
+
+
+def test_a_lock_in_the_last_step_counts_that_step() -> None:
+    last = run(0.2, lock=1.999, reactions=True)
+    assert "pass over shocks" in unresolved(last)
