@@ -16,7 +16,11 @@ to 1, 8 and 2 %, with 0.9 to 12, 78 and 30 %; exudyn with 3 lacks a third, 70 % 
 def unresolved(run: Run) -> str:
     """What a reason says of shocks that last no longer than steps; empty if none was asked for."""
     record, locks = run.scene.record, run.locks[np.isfinite(run.locks)]
-    if not (record.reactions or record.accelerations) or not len(locks):
+    if (
+        not (record.reactions or record.accelerations)
+        or not len(locks)
+        or len(run.angles.times) < 2
+    ):
         return ""
     times, period = run.angles.times, slowest_period(run)
     first = np.clip(np.searchsorted(times, locks) - 1, 0, len(times) - 2)
