@@ -5,7 +5,7 @@ Engines are imported by whoever runs them: each costs a second, and its own libr
 
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -26,8 +26,8 @@ from ringsim.scene.substituted import substituted
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.restarts import run_with_restarts
 from ringsim.stored_state import require_fit
-from ringsim.theory.drive_margin import with_margin
 from ringsim.theory.ideal_fidelity import run_ideal, with_remark
+from ringsim.theory.margin_along import with_margin
 from ringsim.threads import one_thread
 from ringsim.variables import Cause, Fidelity, Outcome, Status
 
@@ -93,7 +93,8 @@ def run_frame(
     from ringsim.frame.storing import solve as solve_storing
 
     storing = partial(solve_storing, start=start)
-    outcome = _run(storing, Fidelity.FRAME, scene, watch, refusal=(InputError,))
+    before = [] if start is None else [(start.time, start.scene)]
+    outcome = _run(storing, Fidelity.FRAME, scene, watch, (InputError,), before)
     return outcome if start is None else replace(outcome, began=start.told(scene))
 
 
@@ -150,9 +151,11 @@ def _refuse_other_rods(scene: Scene) -> None:
 
 def _run(
     solve: Solve, fidelity: Fidelity, scene: Scene, watch: Watch | None,
-    refusal: tuple[type[InputError], ...] = (),
+    refusal: tuple[type[InputError], ...] = (), before: Sequence[tuple[float, Scene]] = (),
 ) -> Outcome:  # fmt: skip
-    """Run a scene with an engine, which may raise what is a ``refusal``."""
+    """Run a scene with an engine, which may raise what is a ``refusal``; it had other scenes
+    ``before``, each until a time (s).
+    """
     begin = (time.perf_counter(), time.process_time())
     scene = substituted(scene)
 
@@ -173,7 +176,7 @@ def _run(
     bars = partial(error_bars, elements=scene.rods.elements)
     outcome = run_with_restarts(start, scene.solver, bars)
     outcome.values["fidelity"] = np.array(int(fidelity))
-    return with_remark(with_margin(outcome, scene), scene)
+    return with_remark(with_margin(outcome, scene, before), scene)
 
 
 FIDELITIES: dict[str, Callable[[Scene], Outcome]] = {

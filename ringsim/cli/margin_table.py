@@ -3,10 +3,13 @@
 import math
 from collections.abc import Iterator
 
+from ringsim.cable.faults.family import CableFault
 from ringsim.choice import kind_of, kinds_of
+from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.margin.family import MarginStandard
 from ringsim.scene import Scene
 from ringsim.tables import text_table
+from ringsim.theory.condition import changes_drive, told, turns_ever
 from ringsim.theory.drive_margin import MOST, DriveMargin, Margin
 from ringsim.theory.plane_margin import PlaneMargin
 
@@ -27,7 +30,7 @@ def margin_lines(scene: Scene) -> Iterator[str]:
     }
     courses = {name: drive.course(_ANGLES) for name, drive in drives.items()}
     first = next(iter(courses.values()))
-    # At rest nothing is accelerated, and a net may be slack at every angle.
+    # At rest nothing is accelerated, and a net may be slack at every angle; springs may be gone.
     kinds = [k for k in first[0].resisting if any(now.resisting[k] for now in first)]
     yield "Forces on the opening angle in N m, without factors; margins with those of the standard."
     rows = [
@@ -39,9 +42,28 @@ def margin_lines(scene: Scene) -> Iterator[str]:
         for row, now in enumerate(first)
     ]
     yield from text_table(["angle (deg)", "drive", *kinds, *drives], rows)
+    yield from _exceptions(scene, next(iter(drives.values())))
     for name, drive in drives.items():
-        yield f"{name}: {_verdict(drive.least(courses[name]))}"
+        yield f"{name}: {_verdict(drive.least())}"
         yield from (f"  {line}" for line in _by_plane(scene, drive.standard))
+
+
+def _exceptions(scene: Scene, drive: DriveMargin) -> Iterator[str]:
+    """What faults do to the margin, and winches that are not on all the time."""
+    for number, fault in enumerate(scene.faults, 1):
+        later = "strikes later, not counted here; a run counts it from then on"
+        words = later if fault.time > AT_ONCE and changes_drive(fault) else told(fault)
+        yield f"faults[{number}], {kind_of(fault)} at {fault.time:g} s: {words}"
+    names = [] if scene.cables is None else [number for number, _ in scene.cables.present()]
+    for (cable, end), winch in drive.conditions.winches.items():
+        place = f"cables.{scene.structure.planes[names[cable]]}.{('winch', 'far_winch')[end]}"
+        if not turns_ever(winch):
+            yield f"{place}: never turns, not counted"
+            continue
+        if winch.start_time > drive.conditions.begin:
+            yield f"{place}: starts at {winch.start_time:g} s, not counted here"
+        if winch.stop_time is not None:
+            yield f"{place}: stops at {winch.stop_time:g} s; a run counts it until then"
 
 
 def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
@@ -49,17 +71,16 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
     cables = scene.cables
     if cables is None or None in (cables.upper, cables.lower):
         return
-    if cables.upper == cables.lower:
+    struck = any(isinstance(one, CableFault) and one.time <= AT_ONCE for one in scene.faults)
+    if cables.upper == cables.lower and not struck:
         yield "each plane has half of the drive"
         return
     for number, plane in enumerate(scene.structure.planes):
         drive = PlaneMargin(scene, standard, number)
-        least = drive.least(drive.course(_ANGLES))
-        share = least.available / drive.whole(least.angle).available
-        yield (
-            f"{plane}: {100.0 * share:.3g} % of the drive against half of all that resists: "
-            f"{_verdict(least)}"
-        )
+        least = drive.least()
+        whole = drive.whole(least.angle).available
+        share = f"{100.0 * least.available / whole:.3g}" if whole > 0.0 else "0"
+        yield f"{plane}: {share} % of the drive against half of all that resists: {_verdict(least)}"
 
 
 def _told(margin: float) -> str:

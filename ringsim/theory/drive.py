@@ -1,4 +1,4 @@
-"""What drives a ring of rigid rods: its cables at the tension that their winches have, and loads.
+"""What drives a ring of rigid rods: its cables at the tension that their winches have.
 
 A winch that winds has its tension T at the end of its rope; over each pulley on the way the
 tension falls to the share eta.  With two winches a rope rests where both have left the same.  The
@@ -16,6 +16,7 @@ from ringsim.cable.records import Cable
 from ringsim.layout.pose import Array
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
+from ringsim.theory.condition import Condition, Conditions
 from ringsim.theory.configuration import Configuration
 from ringsim.theory.ideal_mechanism import Mechanism
 
@@ -30,7 +31,8 @@ class Reeved(NamedTuple):
 
 
 class Drive:
-    """Cables and loads of a scene, whose winches wind at all, or ``at_speed`` as commanded.
+    """Cables of a scene, whose winches wind at all, or ``at_speed`` as commanded; ``conditions`` are
+    what faults and switches leave of them.
 
     Raises
     ------
@@ -43,8 +45,7 @@ class Drive:
         self._cables = [] if scene.cables is None else scene.cables.present()
         self._paths = [points.path(number) for number in range(len(self._cables))]
         self._laws: dict[float, list[PulleyFriction]] = {}
-        self._loads = points.forces
-        self._loaded = bool(self._loads[0].any())
+        self.conditions = Conditions(scene, tuple(map(len, self._paths)))
         reason = why_unlimited(scene.cables, scene.structure.planes)
         if reason:
             raise InputError(reason)
@@ -74,42 +75,44 @@ class Drive:
             found.append(Reeved(shortening, angles))
         return found
 
-    def speed(self, over: Sequence[Reeved]) -> float:
+    def speed(self, over: Sequence[Reeved], state: Condition) -> float:
         """Rate of the opening angle at which winches wind as commanded, rad/s; the least of all.
 
         ``over`` is how they are ``reeved``.  0 where they need not, or have no command: a motor
-        slows down until it has the torque.
+        slows down until it has the torque.  Winches that are off, or have no rope, do not count.
         """
         rates = [] if self._at_speed else [0.0]
-        for cable, reeved in zip(self.cables, over, strict=True):
-            commands = sum(winch.winding.commanded_speed() for winch in cable.winches)
-            rates.append(commands / max(float(reeved.shortening.sum()), 1e-300))
+        for (number, _), reach in state.reach.items():
+            if reach.any():
+                commands = sum(
+                    winch.winding.commanded_speed()
+                    for (cable, end), winch in self.conditions.winches.items()
+                    # Winches on one rope share what the ring releases of it.
+                    if cable == number and np.array_equal(state.reach.get((cable, end)), reach)
+                )
+                released = float(reach @ over[number].shortening)
+                rates.append(commands / max(released, 1e-300))
         return min(rates, default=0.0)
 
-    def force(
-        self, now: Configuration, over: Sequence[Reeved], friction: float = 1.0,
-        time: float | None = None,
-    ) -> float:  # fmt: skip
-        """What drives, N m, with so many times the friction of the pulleys; at a time (s) only of
-        the winches that are switched on; ``over`` is how the cables are ``reeved`` now.
+    def pulls(self, state: Condition, over: Sequence[Reeved], friction: float = 1.0) -> Array:
+        """What each cable drives, N m, shape (cables,), with so many times the friction of the
+        pulleys; ``over`` is how they are ``reeved``.
         """
         if friction not in self._laws:  # the same few factors at every angle
             self._laws[friction] = [cable.friction.factored(friction) for cable in self.cables]
-        found = 0.0
-        for cable, law, reeved in zip(self.cables, self._laws[friction], over, strict=True):
+        found = np.zeros(len(self._paths))
+        each = zip(self.cables, self._laws[friction], over, strict=True)
+        for number, (cable, law, reeved) in enumerate(each):
             steps = law.bound_decay(reeved.angles, cable.pulley_radius)
             tensions = np.zeros(len(reeved.shortening))
-            for winch, way in zip(cable.winches, _ways(cable), strict=True):
-                on = time is None or winch.turns(time)
-                pull = winch.winding.available_tension(at_speed=self._at_speed) if on else 0.0
+            for end, (winch, way) in enumerate(zip(cable.winches, _ways(cable), strict=True)):
+                if (reach := state.reach.get((number, end))) is None:
+                    continue
+                pull = winch.winding.available_tension(at_speed=self._at_speed)
                 shares = np.exp(np.append(0.0, np.cumsum(steps[::way])))[::way]
-                tensions = np.maximum(tensions, pull * shares)
-            found += float(tensions @ reeved.shortening)
-        if not self._loaded:
-            return found
-        loads, places = self._loads
-        # Along z in the ring's own axes, as the loads of the rigid ring are.
-        return found - 0.5 * float(np.sum(loads * now.velocities(places)))
+                tensions = np.maximum(tensions, pull * shares * reach)
+            found[number] = tensions @ reeved.shortening
+        return found
 
 
 def _ways(cable: Cable) -> tuple[int, ...]:

@@ -19,7 +19,7 @@ from ringsim.parts.net.hub import SpringNet
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained, substituted
-from ringsim.theory.drive_margin import with_margin
+from ringsim.theory.margin_along import with_margin
 from ringsim.threads import one_thread
 from ringsim.variables import PLANES, Cause, Outcome, Status
 

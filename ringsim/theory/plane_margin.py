@@ -14,44 +14,29 @@ from ringsim.theory.drive_margin import DriveMargin, Margin
 class PlaneMargin(DriveMargin):
     """Of the plane 0 (upper) or 1 (lower) of a scene with cables in both.
 
-    With Q_p what the cable of the plane p gives, L what loads and springs give, and R what all
-    resistances ask for, with a standard's factors,
+    With Q_p what the cable of the plane p gives, Q_o the other's, L what loads and springs give,
+    Q = Q_p + Q_o + L, and R what all resistances ask for, with a standard's factors,
 
-        margin_p = (Q_p + L / 2) / (R / 2) - 1
-                 = margin of both + margin with p's cable alone - that with the other's alone,
+        margin_p = (Q_p + L / 2) / (R / 2) - 1 = (Q + Q_p - Q_o) / R - 1,
 
     so that the mean of both planes is the margin of the whole.
     """
 
     def __init__(self, scene: Scene, standard: MarginStandard, plane: int) -> None:
         super().__init__(scene, standard)
-        names = scene.structure.planes
-        self._own, self._other = (
-            DriveMargin(_without(scene, name), standard)
-            for name in (names[1 - plane], names[plane])
-        )
+        self._plane = plane
 
     whole = DriveMargin.at
     """Of both planes."""
 
-    def at(
-        self, angle: float, rate: float | None = None, acceleration: float = 0.0,
-        time: float | None = None,
-    ) -> Margin:  # fmt: skip
+    def at(self, angle: float, time: float = 0.0) -> Margin:
         """See ``DriveMargin``; ``available`` is that of the plane."""
-        whole = self.whole(angle, rate, acceleration, time)
-        own, other = (
-            drive.at(angle, whole.rate, acceleration, time) for drive in (self._own, self._other)
-        )
-        available = 0.5 * (whole.available + own.available - other.available)
-        if math.isfinite(whole.margin):
-            margin = whole.margin + own.margin - other.margin
-            return whole._replace(available=available, margin=margin)
-        return whole._replace(available=available)
-
-
-def _without(scene: Scene, plane: str) -> Scene:
-    """The scene without the cable of a plane; faults, which may be of that cable, do not count."""
-    assert scene.cables is not None
-    cables = scene.cables.model_copy(update={plane: None})
-    return scene.model_copy(update={"cables": cables, "faults": ()})
+        whole = self.whole(angle, time)
+        ideal, factored = whole.pulls[:, self._plane] - whole.pulls[:, 1 - self._plane]
+        available = 0.5 * (whole.available + float(ideal))
+        if whole.required == 0.0 or not math.isfinite(whole.margin):
+            return whole._replace(available=available)
+        if self.conditions.at(time).stuck:
+            return whole._replace(available=available)
+        margin = whole.margin + float(factored) / whole.required
+        return whole._replace(available=available, margin=margin)

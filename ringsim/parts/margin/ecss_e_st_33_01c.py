@@ -24,6 +24,9 @@ class EcssMechanisms(MarginStandard):
     """1.5 for friction that was measured on the part in its environment."""
     gravity: Factor = 1.1
     """Inferred: the clause is for flight; weight is known as well as inertia is."""
+    load: Factor = 1.1
+    """Inferred: the clause has no such line on the resisting side; a prescribed force is known as
+    well as inertia is."""
     latch: Factor = 3.0
     """Inferred: taken like friction."""
     driving_spring: Factor = 0.8

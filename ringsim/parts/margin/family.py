@@ -7,7 +7,7 @@ from pydantic import Field
 from ringsim.units import Model, Unit
 
 Factor = Annotated[float, Field(ge=0.0, le=100.0), Unit("1")]
-Category = Literal["inertia", "spring", "friction", "gravity", "latch"]
+Category = Literal["inertia", "spring", "friction", "gravity", "load", "latch"]
 """What a standard tells apart; every kind of resistance belongs to one."""
 
 
@@ -30,6 +30,8 @@ class MarginStandard(Model):
     """Dry and viscous friction in joints; the coefficients of the pulleys."""
     gravity: Factor
     """Weight that the drive lifts, on ground."""
+    load: Factor
+    """Forces on the V-joints that fold the ring."""
     latch: Factor
     """What latches take until they catch."""
     driving_spring: Factor

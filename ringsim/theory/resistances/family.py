@@ -6,6 +6,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ringsim.choice import load_package
+from ringsim.layout.pose import Array
 from ringsim.parts.margin.family import Category
 from ringsim.scene import Scene
 from ringsim.theory.carried import Carried
@@ -16,13 +17,15 @@ from ringsim.theory.ideal_mechanism import Mechanism
 class Opening(NamedTuple):
     """The ring at an opening angle (rad) while it opens at a rate (rad/s) and an acceleration.
 
-    ``now`` is the mechanism folding at the unit rate of its coordinate q = (pi - angle) / 2.
+    ``now`` is the mechanism folding at the unit rate of its coordinate q = (pi - angle) / 2;
+    ``sprung`` is 1 where the spring of a V-joint is whole, one for all or shape (planes, sections).
     """
 
     angle: float
     rate: float
     acceleration: float
     now: Configuration
+    sprung: Array | float = 1.0
 
 
 def folding(mechanism: Mechanism, q: float) -> Configuration:

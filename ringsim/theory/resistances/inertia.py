@@ -10,7 +10,7 @@ _STEP = 1e-4
 
 
 class InertiaResistance(Resistance):
-    """I a'' + I' a'^2 / 2 along a run, nothing where that drives: speed must not help."""
+    """I a'' + I' a'^2 / 2, nothing at rest nor where that drives: speed must not help."""
 
     kind = "inertia"
     category = "inertia"

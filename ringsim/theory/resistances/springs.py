@@ -7,7 +7,7 @@ from ringsim.theory.spring_energy import SpringEnergy
 
 
 class SpringResistance(Resistance):
-    """Their torque, which drives where it opens the joints."""
+    """Torque of those that are whole, which drives where it opens the joints."""
 
     kind = "springs"
     category = "spring"
@@ -20,5 +20,6 @@ class SpringResistance(Resistance):
     def force(self, opening: Opening) -> float:
         """See ``Resistance``."""
         springs = SpringEnergy(self.scene)
+        springs.alive = springs.alive * opening.sprung
         # One radian of every joint's angle for one of the opening angle.
         return -springs.springs(math.pi - opening.angle)[0]
