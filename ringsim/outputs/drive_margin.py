@@ -1,4 +1,4 @@
-"""Drive and resistance by kind along a run, and the margin between them by a standard."""
+"""Drive and resistance by kind along a run, and the static margin between them by a standard."""
 
 import math
 
@@ -9,9 +9,9 @@ LAST_LOCK = "deployment_time"
 
 
 class DriveMargins(Output):
-    """Generalised forces on the mean opening angle of the ideal ring at that of the run.
+    """Static generalised forces on the opening angle of the ideal ring at the mean one of the run.
 
-    See ``ringsim.theory.drive_margin``.
+    See ``ringsim.theory.margin_along``.
     """
 
     rank = 46
@@ -22,22 +22,25 @@ class DriveMargins(Output):
     variables = (
         Variable(
             "drive_available", ("time",), "N m",
-            "what winches and loads could drive without friction in the pulleys",
+            "what winches that stall and loads drive without friction in the pulleys",
             until=LAST_LOCK,
         ),
         Variable(
-            "drive_resistance", ("resistance", "time"), "N m", "resistance to opening by its kind",
+            "drive_resistance", ("resistance", "time"), "N m",
+            "static resistance to opening by its kind, without factors",
             until=LAST_LOCK,
         ),
         Variable(
-            "drive_margin", ("time",), "1", "margin of the drive with the factors of the standard",
+            "drive_margin", ("time",), "1",
+            "static margin of the drive by the standard on the ideal ring at the run's mean opening "
+            "angle, with the faults so far, as check --margin tells it",
             until=LAST_LOCK,
         ),
         Variable(
-            "least_drive_margin", (), "1", "smallest margin of the drive at any output time",
+            "least_drive_margin", (), "1", "smallest drive_margin at any angle that the run passed",
             summary=("least drive margin", "10.3f"),
         ),
-        Variable("least_drive_margin_time", (), "s", "time of the smallest margin of the drive"),
+        Variable("least_drive_margin_time", (), "s", "time of least_drive_margin"),
         Variable("least_drive_margin_angle", (), "degree", "mean opening angle then"),
     )  # fmt: skip
 
@@ -49,5 +52,5 @@ class DriveMargins(Output):
         return f"at {angle:.4g} deg and {time:.4g} s: {word}"
 
     def reduce(self, run: Run, series: Series) -> Values:
-        """Nothing: ``ringsim.theory.drive_margin`` knows them."""
+        """Nothing: ``ringsim.theory.margin_along`` knows them."""
         return {}

@@ -13,7 +13,8 @@ _COLOURS = (
 
 @style.styled
 def drive(dataset: xr.Dataset) -> Figure:
-    """``drive_available``, ``drive_resistance`` and ``drive_margin`` (time) of a run.
+    """``drive_available``, ``drive_resistance`` and ``drive_margin`` (time) of a run, and
+    ``least_drive_margin``.
 
     Drawn over the mean opening angle of all V-joints, as long as it grows; resistances that drive
     are left out.
@@ -41,13 +42,14 @@ def drive(dataset: xr.Dataset) -> Figure:
     margin = known["drive_margin"].values
     lower.plot(angle, margin, color=style.BLUE)
     lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
-    least = int(np.argmin(margin))
-    lower.plot(angle[least], margin[least], "o", color=style.VERMILLION, markersize=6, zorder=4)
+    names = ("least_drive_margin_angle", "least_drive_margin")
+    where, least = (float(dataset[name]) for name in names)
+    lower.plot(where, least, "o", color=style.VERMILLION, markersize=6, zorder=4)
     lower.annotate(
-        f"least margin {margin[least]:.2f} at {angle[least]:.0f} deg", (0.98, 0.95),
+        f"least margin {least:.2f} at {where:.0f} deg", (0.98, 0.95),
         xycoords="axes fraction", ha="right", va="top",
     )  # fmt: skip
-    lower.set_ylim(min(-0.2, 1.1 * float(margin[least])), _roof(margin))
+    lower.set_ylim(min(-0.2, 1.1 * least), _roof(margin))
     lower.set_ylabel("Margin by the standard")
     lower.set_xlabel("Mean opening angle (deg)")
     style.head(figure, upper, dataset, "Drive and resistance")

@@ -31,8 +31,9 @@ class Reeved(NamedTuple):
 
 
 class Drive:
-    """Cables of a scene, whose winches wind at all, or ``at_speed`` as commanded; ``conditions`` are
-    what faults and switches leave of them.
+    """Cables of a scene, whose winches wind at all, or ``at_speed`` as commanded.
+
+    ``conditions`` are what faults and switches leave of them.
 
     Raises
     ------
@@ -82,16 +83,17 @@ class Drive:
         slows down until it has the torque.  Winches that are off, or have no rope, do not count.
         """
         rates = [] if self._at_speed else [0.0]
+        winches = self.conditions.winches
         for (number, _), reach in state.reach.items():
+            # Winches on one rope share what the ring releases of it.
+            own = [
+                winches[place].winding.commanded_speed()
+                for place, other in state.reach.items()
+                if place[0] == number and np.array_equal(other, reach)
+            ]
             if reach.any():
-                commands = sum(
-                    winch.winding.commanded_speed()
-                    for (cable, end), winch in self.conditions.winches.items()
-                    # Winches on one rope share what the ring releases of it.
-                    if cable == number and np.array_equal(state.reach.get((cable, end)), reach)
-                )
                 released = float(reach @ over[number].shortening)
-                rates.append(commands / max(released, 1e-300))
+                rates.append(sum(own) / max(released, 1e-300))
         return min(rates, default=0.0)
 
     def pulls(self, state: Condition, over: Sequence[Reeved], friction: float = 1.0) -> Array:

@@ -67,8 +67,8 @@ def least_along(
 ) -> Least:  # fmt: skip
     """The smallest margin over all angles that a run passed, by the search of ``check --margin``.
 
-    Each angle counts with what is whole and on while it is passed.  Where a ring turned back between
-    two output times is not seen.  Some margins may be ``known``, with their times (s).
+    Each angle counts with what is whole and on while it is passed.  Where a ring turned back
+    between two output times is not seen.  Some margins may be ``known``, with their times (s).
     """
     found = []
     marks = [-math.inf, *drive.conditions.changes, math.inf]
@@ -106,13 +106,14 @@ def with_margin(
     for until, drive in drives:
         at = (way.times >= begin - AT_ONCE) & (way.times < until - AT_ONCE)
         if drive is not None and at.any():
-            own, rows = np.isin(times, way.times[at]), []
-            for time in times[own].tolist():
-                rows.append((time, drive.at(float(np.interp(time, *way)), time)))
-            available[own] = [one.available for _, one in rows]
-            margin[own] = [min(one.margin, MOST) for _, one in rows]
-            resisting[:, own] = [[one.resisting.get(kind, 0.0) for _, one in rows] for kind in kinds]
-            leasts.append(least_along(drive, way.between(begin, until), rows))
+            own = np.isin(times, way.times[at])
+            clock = times[own].tolist()
+            rows = [drive.at(float(np.interp(time, *way)), time) for time in clock]
+            available[own] = [one.available for one in rows]
+            margin[own] = [min(one.margin, MOST) for one in rows]
+            resisting[:, own] = [[one.resisting.get(kind, 0.0) for one in rows] for kind in kinds]
+            known = list(zip(clock, rows, strict=True))
+            leasts.append(least_along(drive, way.between(begin, until), known))
         begin = until
     values = {"drive_available": available, "drive_resistance": resisting, "drive_margin": margin}
     if leasts:

@@ -25,4 +25,4 @@ class SectionLoads:
             return np.zeros(1)
         # The angle opens by two for one that the coordinate falls.
         power = -0.5 * np.sum(self._forces * now.velocities(self._places), axis=1)
-        return np.bincount(self._sections, power)
+        return np.asarray(np.bincount(self._sections, power), dtype=float)

@@ -149,7 +149,7 @@ def test_each_plane_has_its_own_cable_against_half_of_all_that_resists() -> None
 def test_the_least_margin_is_least() -> None:
     scene = ring(joints__vjoint={"coulomb": 0.01}, net__stiffness=40.0, net__neutral_length=0.4)
     drive = DriveMargin(scene, PLAIN)
-    least = drive.least(drive.course())
+    least = drive.least()
     fine = min(drive.course(400), key=lambda each: each.margin)
     assert least.margin <= fine.margin
     assert least.angle == pytest.approx(fine.angle, abs=math.radians(120.0 / 400))

@@ -18,7 +18,8 @@ from ringsim.plots.campaign import figures
 from ringsim.refusal import InputError
 from ringsim.report import tables
 from ringsim.report.page import page
-from ringsim.theory.drive_margin import MOST, DriveMargin, with_margin
+from ringsim.theory.drive_margin import MOST, DriveMargin
+from ringsim.theory.margin_along import with_margin
 from ringsim.variables import PLANES, Fate, Outcome, Status
 
 REQUIRED = {
@@ -95,7 +96,7 @@ def test_the_report_shows_them(campaign: xr.Dataset, monkeypatch: pytest.MonkeyP
     text = page(campaign, "runs/made", analyse(campaign))
     for name in names:
         assert f'id="figure-{name}"' in text
-    assert "<td>smallest margin of the drive at any output time</td>" in text
+    assert "<td>smallest drive_margin at any angle that the run passed</td>" in text
     assert '<th scope="col">Mean</th>' in text
 
 
