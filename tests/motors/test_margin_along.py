@@ -1,0 +1,178 @@
+"""The margin along a run is the static one of ``check --margin`` at the run's angles: whatever the
+rates and the output times, with what is broken so far, of the scene that the ring then had.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from motor_rings import PLAIN, ring
+from ringsim.cli import cli
+from ringsim.dataset import save
+from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.scene import Scene
+from ringsim.simulation import simulate
+from ringsim.stored_state import read_state
+from ringsim.theory import margin_along
+from ringsim.theory.drive_margin import DriveMargin
+from ringsim.theory.margin_along import Passed, least_along, passed, with_margin
+from ringsim.variables import PLANES, Outcome, Status
+
+ECSS = {"kind": "ecss-e-st-33-01c"}
+CUT = {"kind": "cut-cable", "cable": "lower", "span": 1}
+
+
+def netted(**values: object) -> Scene:
+    """Whose margin is least where its net is nearly tight, in the middle of the travel."""
+    plain = {
+        "joints__vjoint": {"coulomb": 0.01, "viscous": 0.5}, "net__stiffness": 40.0,
+        "net__neutral_length": 0.4, "margin": ECSS,
+    }  # fmt: skip
+    return ring(**plain | values)
+
+
+def opened(interval: float, last: float = 180.0, lock: float = 1.0) -> Outcome:
+    """From 60 to 180 deg within 1 s, the rate growing; then until 1.3 s as it is."""
+    times = interval * np.arange(round(1.3 / interval) + 1)
+    angles = np.minimum(60.0 + (last - 60.0) * times**2, last)
+    values = {
+        "opening_angle": np.broadcast_to(angles, (2, 6, len(times))).copy(),
+        "deployment_time": np.array(lock),
+    }
+    places = {"plane": np.array(PLANES), "section": np.arange(1, 7)}
+    return Outcome(Status.OK, "made", {"time": times, **places}, values)
+
+
+def test_at_every_output_time_it_is_the_static_margin_of_that_angle() -> None:
+    scene = netted()
+    found, drive = with_margin(opened(0.1), scene), DriveMargin(scene, EcssMechanisms())
+    for k, time in enumerate(found.coordinates["time"][:10].tolist()):
+        now = drive.at(math.radians(60.0 + 120.0 * time**2))
+        assert found.values["drive_margin"][k] == pytest.approx(now.margin, rel=1e-12)
+        assert found.values["drive_available"][k] == pytest.approx(now.available, rel=1e-12)
+        resisting = found.values["drive_resistance"][:, k]
+        np.testing.assert_allclose(resisting, list(now.resisting.values()), rtol=1e-12)
+    assert np.isnan(found.values["drive_margin"][11:]).all()
+
+
+@pytest.mark.parametrize("interval", [0.01, 0.1, 0.26])
+def test_the_least_is_that_of_check_at_any_output_interval(interval: float) -> None:
+    scene = netted()
+    truth = DriveMargin(scene, EcssMechanisms()).least()
+    assert 62.0 < math.degrees(truth.angle) < 178.0
+    found = with_margin(opened(interval), scene).values
+    assert found["least_drive_margin"] == pytest.approx(truth.margin, rel=1e-9)
+    assert found["least_drive_margin_angle"] == pytest.approx(math.degrees(truth.angle), abs=1e-4)
+    when = math.sqrt((math.degrees(truth.angle) - 60.0) / 120.0)
+    assert found["least_drive_margin_time"] == pytest.approx(when, abs=0.13 * interval)
+
+
+def test_a_ring_that_stops_counts_only_what_it_passed() -> None:
+    scene = netted()
+    drive = DriveMargin(scene, EcssMechanisms())
+    last = math.degrees(drive.least().angle) - 20.0
+    found = with_margin(opened(0.1, last, math.nan), scene).values
+    assert found["least_drive_margin_angle"] == pytest.approx(last, abs=1e-6)
+    assert found["least_drive_margin"] == pytest.approx(drive.at(math.radians(last)).margin)
+    assert found["least_drive_margin_time"] == pytest.approx(1.0, abs=0.06)
+
+
+def test_faults_and_switches_count_from_their_time_on() -> None:
+    """The lower cable parts at 0.5 s, at 90 deg, and the upper winch stops at 0.9 s."""
+    scene = netted(faults=[CUT | {"time": 0.5}], cables__upper__winch__stop_time=0.9)
+    found = with_margin(opened(0.05), scene).values
+    sound = DriveMargin(netted(), EcssMechanisms())
+    upper = DriveMargin(netted(cables__lower="none"), EcssMechanisms())
+    angles = np.radians(60.0 + 120.0 * (0.05 * np.arange(21)) ** 2)
+    expected = [
+        *(sound.at(angle).margin for angle in angles[:10]),
+        *(upper.at(angle).margin for angle in angles[10:18]), -1.0, -1.0, -1.0,
+    ]  # fmt: skip
+    np.testing.assert_allclose(found["drive_margin"][:21], expected, rtol=1e-9)
+    assert found["least_drive_margin"] == -1.0
+    assert found["least_drive_margin_time"] == pytest.approx(0.9)
+    assert found["least_drive_margin_angle"] == pytest.approx(60.0 + 120.0 * 0.81, abs=0.1)
+
+
+@pytest.mark.parametrize("interval", [0.02, 0.13])
+def test_the_least_between_output_times_knows_what_is_broken(interval: float) -> None:
+    scene = netted(
+        faults=[CUT | {"time": 0.5}, {"kind": "stuck-vjoint", "section": 1, "time": 2.0}]
+    )
+    upper = DriveMargin(netted(cables__lower="none"), EcssMechanisms())
+    truth = upper.least()
+    assert truth.angle > math.radians(95.0)
+    found = with_margin(opened(interval), scene).values
+    assert found["least_drive_margin"] == pytest.approx(truth.margin, rel=1e-9)
+
+
+def test_before_a_restart_the_margin_is_that_of_the_scene_before() -> None:
+    old, new = netted(joints__vjoint={"coulomb": 0.2}), netted()
+    found = with_margin(opened(0.05), new, [(0.5, old)]).values["drive_margin"]
+    alone = [with_margin(opened(0.05), scene).values["drive_margin"] for scene in (old, new)]
+    assert found[:10].tolist() == alone[0][:10].tolist()
+    assert found[10:21].tolist() == alone[1][10:21].tolist()
+    assert (alone[0][:10] < alone[1][:10]).all()
+    unlimited = {"cables.upper.winch.winding": {"kind": "constant", "speed": 0.1}}
+    before = old.with_values({"margin": "none"}).with_values(unlimited)
+    later = with_margin(opened(0.05), new, [(0.5, before)])
+    assert np.isnan(later.values["drive_margin"][:10]).all()
+    assert later.values["drive_margin"][10:21].tolist() == alone[1][10:21].tolist()
+
+
+def test_a_run_that_went_on_keeps_the_margin_of_its_file(tmp_path: Path) -> None:
+    scene = ring(
+        structure__sections=3, joints__vjoint={"coulomb": 0.01}, margin=PLAIN.model_dump(),
+        solver__end_time=0.12, record__interval=0.02, record__state_interval=0.06,
+    )  # fmt: skip
+    first, path = simulate(scene, "frame"), tmp_path / "first.nc"
+    save(first, path)
+    changed = scene.with_values({"joints.vjoint.coulomb": 0.02})
+    found = simulate(changed, start=read_state(path, 0.06))
+    before = found.time.values < 0.06 - 1e-9
+    assert before.sum() == 3
+    np.testing.assert_array_equal(found.drive_margin[before], first.drive_margin[before])
+    dry = found.drive_resistance.sel(resistance="joint friction")
+    np.testing.assert_allclose(dry[before], 6 * 0.01, rtol=1e-9)
+    np.testing.assert_allclose(dry[~before], 6 * 0.02, rtol=1e-9)
+    start = DriveMargin(scene, PLAIN).at(math.radians(60.0))
+    assert float(first.drive_margin[0]) == pytest.approx(start.margin, rel=1e-6)
+
+
+def test_a_run_tells_of_faults_that_its_margin_does_not_know(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(margin_along, "is_unknown", lambda fault: fault.kind == "cut-cable")
+    found = with_margin(opened(0.1), netted(faults=[CUT | {"time": 0.5}]))
+    assert found.reason == "made; the margin of the drive does not know faults[1]"
+
+
+def test_the_least_of_a_campaign_follows_from_angles_alone() -> None:
+    """With a mechanism shared by samples that differ in their laws."""
+    scene = netted()
+    shared = DriveMargin(scene, EcssMechanisms()).mechanism
+    for coulomb in (0.01, 0.03):
+        own = scene.with_values({"joints.vjoint.coulomb": coulomb})
+        run = with_margin(opened(0.1), own)
+        way = passed(run.coordinates["time"], run.values["opening_angle"], 1.0)
+        least = least_along(DriveMargin(own, EcssMechanisms(), shared), way)
+        assert least.margin == pytest.approx(float(run.values["least_drive_margin"]), rel=1e-9)
+
+
+def test_times_are_those_at_which_an_angle_was_passed_first() -> None:
+    way = Passed(np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 2.0, 1.5, 3.0]))
+    assert [way.time_at(angle) for angle in (1.0, 1.25, 1.75, 3.0)] == [0.0, 0.25, 0.75, 3.0]
+    part = way.between(0.5, 1.5)
+    assert part.times.tolist() == [0.5, 1.0, 1.5]
+    assert part.angles.tolist() == [1.5, 2.0, 1.75]
+
+
+def test_explain_says_what_it_is() -> None:
+    told = CliRunner().invoke(cli, ["explain", "drive_margin"]).stdout
+    for words in ("static margin", "mean opening angle", "check --margin"):
+        assert words in told
