@@ -32,8 +32,8 @@ class DriveMargins(Output):
         ),
         Variable(
             "drive_margin", ("time",), "1",
-            "static margin of the drive by the standard on the ideal ring at the mean opening angle, "
-            "with the faults so far, as check --margin tells it",
+            "static margin of the drive by the standard on the ideal ring at the mean opening "
+            "angle, with the faults so far, as check --margin tells it",
             until=LAST_LOCK,
         ),
         Variable(
