@@ -93,7 +93,7 @@ def run_frame(
     from ringsim.frame.storing import solve as solve_storing
 
     storing = partial(solve_storing, start=start)
-    before = [] if start is None else [(start.time, start.scene)]
+    before = [] if start is None else start.scenes
     outcome = _run(storing, Fidelity.FRAME, scene, watch, (InputError,), before)
     return outcome if start is None else replace(outcome, began=start.told(scene))
 

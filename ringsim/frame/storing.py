@@ -101,7 +101,7 @@ class Storing(Integration):
         self.recall(memory)
         state = self._now
         go_on(self._control, self._scene.solver, memory["stepping"], changed, start.name)
-        self.history.take_over(start.history, memory["recorder"], start.scene, start.name)
+        self.history.take_over(start.history, memory["recorder"], start.scenes, start.name)
         gone = cleared(self._scene, start)
         self._strike_again(start, gone)
         if model.cables is not None:

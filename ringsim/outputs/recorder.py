@@ -1,6 +1,6 @@
 """Recording a run step by step, and reducing it to its outcome at the end."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -81,9 +81,11 @@ class Recorder(Remembering):
             "energies": np.array(self.energies), "readings": readings, "before": before
         }  # fmt: skip
 
-    def take_over(self, history: Memory, memory: Memory, scene: Scene, where: str) -> None:
-        """Go on behind the steps of another one, up to where it had the memory, and the scene;
-        ``where`` is what messages call that.
+    def take_over(
+        self, history: Memory, memory: Memory, before: Sequence[tuple[float, Scene]], where: str
+    ) -> None:  # fmt: skip
+        """Go on behind the steps of another one, up to where it had the memory; it had scenes
+        ``before``, each up to a time (s), and ``where`` is what messages call that.
 
         Raises
         ------
@@ -107,9 +109,7 @@ class Recorder(Remembering):
             own[:] = values.tolist() if values.ndim == 1 else list(values)
         self.energies[:] = [Energies(*row.tolist()) for row in history["energies"][:steps]]
         # What a scene was made of decides about readings that were made with it, ever after.
-        older = [(time, Scene.model_validate(table)) for time, table in history.get("before", [])]
-        now = self.times[-1]
-        self._before = [*((time, one) for time, one in older if time < now), (now, scene)]
+        self._before = list(before)
 
     def _lists(self) -> dict[str, list[Any]]:
         return {name: getattr(self, name) for name in ("times", "angles", "rates", "gaps")}

@@ -51,6 +51,15 @@ class StoredState:
         """The steps of the run, also those behind the state."""
         return dict(unpack(*self.packed_history))
 
+    @property
+    def scenes(self) -> list[tuple[float, Scene]]:
+        """What the run was made of up to here: scenes, each with the time up to which it had it, s;
+        its own is the last.
+        """
+        told = self.history.get("before", [])
+        older = [(time, Scene.model_validate(table)) for time, table in told if time < self.time]
+        return [*older, (self.time, self.scene)]
+
     def changes_in(self, scene: Scene) -> dict[str, tuple[Any, Any]]:
         """Paths at which a scene differs, with the values before and now; None where one is left
         out.

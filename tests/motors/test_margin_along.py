@@ -133,13 +133,20 @@ def test_a_run_that_went_on_keeps_the_margin_of_its_file(tmp_path: Path) -> None
     first, path = simulate(scene, "frame"), tmp_path / "first.nc"
     save(first, path)
     changed = scene.with_values({"joints.vjoint.coulomb": 0.02})
-    found = simulate(changed, start=read_state(path, 0.06))
+    found, again = simulate(changed, start=read_state(path, 0.06)), tmp_path / "again.nc"
     before = found.time.values < 0.06 - 1e-9
     assert before.sum() == 3
     np.testing.assert_array_equal(found.drive_margin[before], first.drive_margin[before])
     dry = found.drive_resistance.sel(resistance="joint friction")
     np.testing.assert_allclose(dry[before], 6 * 0.01, rtol=1e-9)
     np.testing.assert_allclose(dry[~before], 6 * 0.02, rtol=1e-9)
+    # Once more, at the end, to a third scene: each keeps what was told of it.
+    save(found, again)
+    third = scene.with_values({"joints.vjoint.coulomb": 0.03, "solver.end_time": 0.16})
+    last = simulate(third, start=read_state(again, 0.12))
+    dry = last.drive_resistance.sel(resistance="joint friction").values
+    coulomb = np.repeat([0.01, 0.02, 0.03], 3)
+    np.testing.assert_allclose(dry, 6 * coulomb, rtol=1e-9)
     start = DriveMargin(scene, PLAIN).at(math.radians(60.0))
     assert float(first.drive_margin[0]) == pytest.approx(start.margin, rel=1e-6)
 
