@@ -110,6 +110,8 @@ class Recorder(Remembering):
         self.energies[:] = [Energies(*row.tolist()) for row in history["energies"][:steps]]
         # What a scene was made of decides about readings that were made with it, ever after.
         self._before = list(before)
+        while self._before and self._before[-1][1] == self._scene:  # nothing has changed since
+            self._before.pop()
 
     def _lists(self) -> dict[str, list[Any]]:
         return {name: getattr(self, name) for name in ("times", "angles", "rates", "gaps")}
