@@ -76,7 +76,7 @@ class Fate(Code):
     NONE = 0
     """The numbers do not hold: nothing is said."""
     DEPLOYED = 1
-    """Every V-joint has reached 180 deg, whatever it did afterwards."""
+    """Every V-joint has reached 180 deg, and all latches that there are have caught."""
     PARTLY_DEPLOYED = 2
     """At rest, with some V-joints locked; nothing drives the others any more."""
     STALLED = 3
@@ -89,6 +89,8 @@ class Fate(Code):
     """Still moving or driven at ``solver.end_time``."""
     FINISHED = 7
     """A structure that does not lock, driven until ``solver.end_time``."""
+    NOT_LATCHED = 8
+    """Every V-joint has reached 180 deg, but latches did not catch up to the run's end."""
 
 
 GOALS = (Fate.DEPLOYED, Fate.FOLDED, Fate.FINISHED)
@@ -193,4 +195,5 @@ class Outcome:
     def reached_goal(self) -> bool:
         """Whether the run did what runs are made for; limits that were passed do not matter."""
         deployed = np.isfinite(float(self.values.get("deployment_time", np.nan)))
+        deployed &= np.all(self.values.get("latched", 1))
         return self.fate in GOALS or (self.fate == Fate.OVERLOADED and bool(deployed))

@@ -49,7 +49,7 @@ def _check(requirements: dict[str, Requirement]) -> dict[str, Requirement]:
         if name not in known:
             why = f"is no output that can be required ({known_or_nearest(name, known)})"
             if name in VARIABLES and (dims := VARIABLES[name].dims):
-                ends = (f"least_{name}", f"peak_{name}")
+                ends = tuple(f"{most}_{name}" for most in ("least", "peak", "total"))
                 near = [n for n in quantities() if n in ends or n.startswith(f"{name}_")]
                 hint = near[0] if near else known_or_nearest(name, known)
                 why = f"has a value for each {' and '.join(dims)}: require a number, like {hint}"

@@ -103,14 +103,14 @@ def command(
     require_file(target)
     for engine in ("frame", "full") if fidelity == "both" else (fidelity,):
         require_fit(start, chosen, engine)
-    if start is not None:
-        click.echo(start.told(chosen))
     # The frame engine first: it refuses what it cannot represent.
     engines = {"frame": run_frame, "full": run}
     outcomes = {
         name: watched(partial(engine, start=start), chosen)
         for name, engine in engines.items() if fidelity in (name, "both")
     }  # fmt: skip
+    if start is not None:  # told once nothing has refused it
+        click.echo(outcomes[fidelity].began)
     # Solved in seconds, the ideal ring needs no bar.
     outcomes = outcomes or {"ideal": run_ideal(chosen)}
     datasets = [to_dataset(outcome, chosen) for outcome in outcomes.values()]

@@ -78,10 +78,9 @@ class Integration:
         self._gaps = joint_groups(model)
         angles = self._openings.read(self._state)[0]
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
-        self._locks = (
-            Locks(angles, stowed, scene.structure.planes) if scene.structure.locks else None
-        )
         self._latches = Latches(scene)
+        locks = Locks(angles, stowed, scene.structure.planes, self._latches)
+        self._locks = locks if scene.structure.locks else None
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
@@ -133,7 +132,7 @@ class Integration:
         control.conclude()
         history.status, history.fate = control.status, control.fate
         history.reason = control.reason + self._energy.note()
-        history.repeats = control.repeats
+        history.repeats, history.caught = control.repeats, self._latches.caught
         history.newton_iterations = int(solver.it.newtonStepsCount)
         history.jacobians = int(solver.it.newtonJacobiCount)
         # exudyn keeps the callbacks, and they keep the system that they were given to.  Such a
@@ -188,23 +187,21 @@ class Integration:
             self._control.diverge(Reason(Cause.NOT_FINITE, text))
             return False
         found = self._weighed or self._measure(time)
-        before = self._control.now
         goes_on = self._control.accept(found, self._read(found))
         if self._watch is not None:
             self._watch(self._control.now)
         if self._locks is not None:
-            self._latches.note(self._locks.deployed, before, found)
-            self._lock(self._locks.deployed, time)
+            self._lock(self._latches.locked(self._locks.deployed), time)
         return goes_on
 
-    def _lock(self, deployed: Flags, time: float) -> None:
+    def _lock(self, locked: Flags, time: float) -> None:
         """Latch the V-joints that have locked, and let winches know whose plane has."""
         if self._built.stops is not None:
             self._built.stops.latch(self._latches.caught)
         cables = self._built.cables
         if cables is not None and self._chain is not None:
             for number, (plane, _) in enumerate(cables.present):
-                if deployed[plane].all():
+                if locked[plane].all():
                     cables.winches.lock(number, time, self._chain)
 
     def _read(self, now: Instant) -> Instant:

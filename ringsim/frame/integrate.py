@@ -72,10 +72,9 @@ class Integration(Remembering):
         self._readings = Readings(model)
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
         first = self._measure(0.0, self._now)
-        self._locks = (
-            Locks(first.angles, stowed, scene.structure.planes) if scene.structure.locks else None
-        )
         self._latches = Latches(scene)
+        locks = Locks(first.angles, stowed, scene.structure.planes, self._latches)
+        self._locks = locks if scene.structure.locks else None
         self.history = Recorder(scene, self._readings.coordinates)
         ropes = None if model.cables is None else model.cables.ropes.content
         self._control = RunControl(
@@ -109,6 +108,7 @@ class Integration(Remembering):
         control.conclude()
         history.status, history.fate = control.status, control.fate
         history.reason, history.repeats = control.reason, control.repeats
+        history.caught = self._latches.caught
         return history
 
     def _next_event(self) -> float:
@@ -192,7 +192,6 @@ class Integration(Remembering):
     def _accept(self, step: float, after: State, found: Instant) -> None:
         """Go on from a state."""
         control, before = self._control, self._now
-        last = control.now
         moved = self._between(before, after) / step
         # Before rest it came as it leaves: the even motion through the first state.
         self._moves = [*(self._moves[-2:] or [(step, -moved)]), (step, moved)]
@@ -202,8 +201,6 @@ class Integration(Remembering):
         control.accept(found, self._read(found))
         if self._watch is not None:
             self._watch(control.now)
-        if self._locks is not None:
-            self._latches.note(self._locks.deployed, last, found)
         self._latch(found.time)
 
     def _latch(self, time: float) -> None:
@@ -211,11 +208,11 @@ class Integration(Remembering):
         model, chain = self._model, self._now.chain
         if self._locks is None:
             return
-        deployed = self._locks.deployed
+        locked = self._latches.locked(self._locks.deployed)
         model.laws.latch(self._latches.caught)
         if model.cables is not None and chain is not None:
             for number, (plane, _) in enumerate(model.cables.present):
-                if deployed[plane].all():
+                if locked[plane].all():
                     model.cables.winches.lock(number, time, chain)
 
     def _between(self, before: State, after: State) -> Array:

@@ -19,6 +19,10 @@ class PeakAcceleration(Output):
             "peak_acceleration", ("plane", "corner"), "m/s^2",
             "largest acceleration of the corner at any step",
         ),
+        Variable(
+            "peak_acceleration_max", (), "m/s^2", "largest acceleration of any corner at any step",
+            summary=("largest acceleration", "10.3g"),
+        ),
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
@@ -27,4 +31,5 @@ class PeakAcceleration(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Of all steps."""
-        return {"peak_acceleration": np.linalg.norm(series.values, axis=3).max(axis=0)}
+        peaks = np.linalg.norm(series.values, axis=3).max(axis=0)
+        return {"peak_acceleration": peaks, "peak_acceleration_max": peaks.max()}

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ringsim.outputs.family import Output, Run, Series, Values, Variable
-from ringsim.stepping.latches import Latches, meetings
+from ringsim.stepping.latches import history
 from ringsim.variables import PLANES
 
 
@@ -20,19 +20,25 @@ class Latching(Output):
             "latch_rate", ("plane", "section"), "rad/s",
             "opening rate at which the V-joint first met its latch; missing if it did not",
         ),
+        Variable(
+            "least_latch_rate", (), "rad/s",
+            "smallest opening rate at which a V-joint first met its latch; missing if one did not",
+            summary=("least latch rate", "10.3g"),
+        ),
         Variable("latched", ("plane", "section"), "1", "1 if the latch of the V-joint holds", "i4"),
         Variable("latched_joints", (), "1", "V-joints that are held by their latches", "i4"),
     )  # fmt: skip
 
     def reduce(self, run: Run, series: Series) -> Values:
         """From the steps, as the engines do while they run."""
-        found, latches = np.full(run.locks.shape, np.nan), Latches(run.scene)
-        met = list(meetings(run.angles.times, run.angles.values, run.rates.values))
-        for one in reversed(met):
-            found[one.place] = one.rate
-        latches.meet(met)
-        caught = latches.caught.astype(np.int32)
-        return {"latch_rate": found, "latched": caught, "latched_joints": caught.sum()}
+        rates = history(run.scene, run.angles.times, run.angles.values, run.rates.values).rates
+        caught = np.isfinite(run.held).astype(np.int32)
+        return {
+            "latch_rate": rates,
+            "least_latch_rate": rates.min(),
+            "latched": caught,
+            "latched_joints": caught.sum(),
+        }
 
 
 def missed(values: Values) -> str:

@@ -20,6 +20,11 @@ class LockImpulse(Output):
             "lock_impulse", ("plane", "section"), "N m s",
             "angular impulse of the stop on the V-joint at its lock; missing if it did not lock",
         ),
+        Variable(
+            "peak_lock_impulse", (), "N m s",
+            "largest angular impulse of a stop at a lock; missing if no V-joint has locked",
+            summary=("largest lock impulse", "10.3g"),
+        ),
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
@@ -32,7 +37,8 @@ class LockImpulse(Output):
         for place in np.argwhere(np.isfinite(run.locks)):
             where = tuple(place)
             found[where] = first_impulse(series.times, series.values[:, *where], run.locks[where])
-        return {"lock_impulse": found}
+        peak = np.fmax.reduce(found, axis=None)  # without a lock NaN
+        return {"lock_impulse": found, "peak_lock_impulse": peak}
 
 
 def first_impulse(times: Array, torques: Array, lock: float) -> float:

@@ -26,6 +26,18 @@ class Motors(Output):
         Variable(
             "motor_energy", ("plane", "winch", "time"), "J", "energy that a motor's shaft gave"
         ),
+        Variable(
+            "peak_motor_torque", (), "N m", "largest torque of any motor's shaft at any step",
+            summary=("largest motor torque", "10.3g"),
+        ),
+        Variable(
+            "peak_motor_power", (), "W", "largest power of any motor's shaft at any step",
+            summary=("largest motor power", "10.3g"),
+        ),
+        Variable(
+            "total_motor_energy", (), "J", "energy that the shafts of all motors gave by the end",
+            summary=("energy of all motors", "10.3g"),
+        ),
     )
 
     def read(self, now: Reading) -> Array | None:
@@ -41,6 +53,7 @@ class Motors(Output):
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Of the tensions and speeds at the steps; energies are sums of mean torque times turn."""
+        held = run.held
         times, winches = series.times, len(run.coordinates["winch"])
         found = np.full((4, len(times), len(run.locks), winches), np.nan)
         torque, shaft, power, energy = found
@@ -50,7 +63,7 @@ class Motors(Output):
             tension, speed, wound = series.values[:, plane, end].T
             on = np.array([winch.turns(time) for time in times[steps]], dtype=bool)
             if winch.after_lock == "stop":
-                on &= times[steps] <= np.nan_to_num(run.locks[plane].max(), nan=math.inf)
+                on &= times[steps] <= np.nan_to_num(held[plane].max(), nan=math.inf)
             found[:, :, plane, end] = np.nan_to_num(found[:, :, plane, end])
             place, before = (steps, plane, end), np.maximum(steps - 1, 0)
             torque[place] = np.where(on, motor.torque(tension[steps], speed[steps]), 0.0)
@@ -59,10 +72,14 @@ class Motors(Output):
         power[:] = torque * shaft
         energy[:] = 0.0 * torque
         energy[1:] += np.cumsum(0.5 * (torque[1:] + torque[:-1]) * turned[1:], axis=0)
-        return {
-            variable.name: Series(series.times, values, series.grid).on_grid()
-            for variable, values in zip(self.variables, found, strict=True)
+        values: Values = {
+            variable.name: Series(series.times, own, series.grid).on_grid()
+            for variable, own in zip(self.variables[:4], found, strict=True)
         }
+        values["peak_motor_torque"] = np.nanmax(torque)
+        values["peak_motor_power"] = np.nanmax(power)
+        values["total_motor_energy"] = np.nansum(energy[-1])
+        return values
 
 
 def _motors(

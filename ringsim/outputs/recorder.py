@@ -22,8 +22,8 @@ from ringsim.variables import Fate, Outcome, Reason, Status
 class Recorder(Remembering):
     """A run of a scene: ``times``, ``angles``, ... of all accepted steps (see ``Instant``).
 
-    An engine sets ``status``, ``fate`` and ``reason``, how and why it has ended, and what its
-    solver took.
+    An engine sets ``status``, ``fate`` and ``reason``, how and why it has ended, which latches have
+    ``caught``, and what its solver took.
     """
 
     changing = ("newton_iterations", "jacobians", "_lost", "_driven")
@@ -40,6 +40,7 @@ class Recorder(Remembering):
         self.energies: list[Energies] = []
         self.gaps: list[float] = []
         self.status, self.fate, self.reason = Status.OK, Fate.NONE, Reason()
+        self.caught: NDArray[np.bool_] | None = None
         self.repeats = self.newton_iterations = self.jacobians = 0
 
     def note(self, now: Reading) -> None:
@@ -129,7 +130,7 @@ class Recorder(Remembering):
         known = axes(self._scene) | dict(self._coordinates)
         run = Run(
             self._scene, Series(times, angles, grid), Series(times, rates, grid),
-            lock_times(times, angles, rates), counts, known, tuple(self._before),
+            lock_times(times, angles, rates), counts, known, tuple(self._before), self.caught,
         )  # fmt: skip
 
         def series_of(output: Output) -> Series | None:

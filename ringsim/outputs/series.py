@@ -13,6 +13,7 @@ from ringsim.cable.state import ChainState
 from ringsim.hermite import cubic, monotone_slopes
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Array, Instant
+from ringsim.stepping.latches import history
 
 _SAME = 1.0 + 1e-12
 """Times that differ by round-off alone are the same."""
@@ -134,6 +135,8 @@ class Run:
     """Values of all dimensions."""
     before: tuple[tuple[float, Scene], ...] = ()
     """Scenes that it had before its own, each with the time up to which it did, s."""
+    caught: NDArray[np.bool_] | None = None
+    """Which latches hold at its end, shape (planes, sections); None if it did not tell."""
 
     def stretches(self) -> list[tuple[NDArray[np.intp], Scene]]:
         """Numbers of the steps that a scene held for, and this scene, one after the other.
@@ -148,6 +151,21 @@ class Run:
             (np.arange(begin, end), scene)
             for (begin, end), scene in zip(bounds, scenes, strict=True)
         ]
+
+    @property
+    def held(self) -> Array:
+        """When each V-joint locked, shape (planes, sections), s: when its latch caught, or, without
+        latches, when it reached 180 deg; NaN if it did not.
+        """
+        if self.scene.stop is None or not self.scene.stop.latch:
+            return self.locks
+        series = self.angles.times, self.angles.values, self.rates.values
+        caught_at = history(self.scene, *series).caught_at
+        if self.caught is None:
+            return caught_at
+        # A run that went on may have had other latches before.
+        known = np.where(np.isnan(caught_at), self.locks, caught_at)
+        return np.where(self.caught, known, np.nan)
 
     @property
     def until(self) -> float:

@@ -25,6 +25,7 @@ _LOOKS: dict[str, tuple[str, str]] = {
     "overloaded": (style.PURPLE, "P"),
     "stalled": ("#bdbdbd", "s"),
     "partly deployed": ("#b3cde3", "p"),
+    "not latched": ("#8c96c6", "l"),
     "few steps": ("#fddbc7", "F"),
     "tension bends": ("#f4a582", "W"),
     "joint gap": ("#9970ab", "J"),

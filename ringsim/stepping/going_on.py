@@ -6,6 +6,9 @@ from ringsim.stepping.memory import Memory
 from ringsim.stepping.run_control import RunControl
 from ringsim.variables import Fate, Reason
 
+_UNFINISHED = (Fate.CUT_OFF, Fate.FINISHED, Fate.DEPLOYED, Fate.NOT_LATCHED)
+"""What runs may go on from without a change: the end time, or the settling time, is later now."""
+
 
 def go_on(control: RunControl, solver: Solver, memory: Memory, changed: bool, where: str) -> None:
     """Let a control that has just begun go on from the memory of another one.
@@ -30,7 +33,7 @@ def go_on(control: RunControl, solver: Solver, memory: Memory, changed: bool, wh
         )
     if control.goes_on:
         return
-    if not changed and control.fate not in (Fate.CUT_OFF, Fate.FINISHED, Fate.DEPLOYED):
+    if not changed and control.fate not in _UNFINISHED:
         raise InputError(
             f"{where}: the run had ended there ({control.reason}) and the scene is the same: take "
             "an earlier state (--at), or change the scene (--set)"

@@ -13,6 +13,8 @@ from ringsim.stepping.instant import Array, Instant
 from ringsim.stepping.locks import crossing
 from ringsim.stepping.memory import Remembering
 
+Flags = NDArray[np.bool_]
+"""A truth for each V-joint."""
 ON_STOP = 1e-9
 """Angle past 180 deg at which a stop has hardly begun to push, rad."""
 
@@ -25,8 +27,20 @@ class Meeting(NamedTuple):
     rate: float
 
 
+class History(NamedTuple):
+    """Opening rate (rad/s) at which each V-joint first came to 180 deg, and when (s) its latch
+    caught, both of shape (planes, sections); NaN if that did not happen.
+    """
+
+    rates: Array
+    caught_at: Array
+
+
 class Latches(Remembering):
-    """The latches of a scene; ``caught`` is whether each holds, shape (planes, sections)."""
+    """The latches of a scene; ``caught`` is whether each holds, shape (planes, sections).
+
+    ``deployed`` are everywhere the V-joints that have reached 180 deg, of the same shape.
+    """
 
     changing = ("caught", "_earlier")
 
@@ -43,12 +57,20 @@ class Latches(Remembering):
         self._earlier: Instant | None = None
         self._sure = not (np.isfinite(self._least).any() or np.isfinite(self._fails).any())
 
-    def note(self, deployed: NDArray[np.bool_], before: Instant, now: Instant) -> None:
-        """Go on by a step; ``deployed`` are the V-joints that have reached 180 deg by its end."""
+    def missing(self, deployed: Flags) -> Flags:
+        """V-joints that have come to their latches, which have not caught."""
+        return deployed & ~self.caught & self._present
+
+    def locked(self, deployed: Flags) -> Flags:
+        """V-joints that have locked: that their latches hold; without latches the deployed ones."""
+        return self.caught if self._present else deployed
+
+    def note(self, before: Instant, now: Instant) -> None:
+        """Go on by a step."""
         if not self._present:
             return
         if self._sure:
-            self.caught = deployed.copy()
+            self.caught = self.caught | (now.angles >= math.pi)
             return
         known = [before, now] if self._earlier is None else [self._earlier, before, now]
         self._earlier = before
@@ -61,6 +83,18 @@ class Latches(Remembering):
         for place, time, rate in met:
             if self._present and rate >= self._least[place] and time < self._fails[place]:
                 self.caught[place] = True
+
+
+def history(scene: Any, times: Array, angles: Array, rates: Array) -> History:
+    """What became of the latches of a scene in a run; see ``meetings``."""
+    latches, found = Latches(scene), History(*np.full((2, *angles.shape[1:]), np.nan))
+    for one in meetings(times, angles, rates):
+        if np.isnan(found.rates[one.place]):
+            found.rates[one.place] = one.rate
+        latches.meet([one])
+        if latches.caught[one.place] and np.isnan(found.caught_at[one.place]):
+            found.caught_at[one.place] = one.time
+    return found
 
 
 def meetings(times: Array, angles: Array, rates: Array) -> Iterator[Meeting]:

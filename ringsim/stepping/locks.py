@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from ringsim.hermite import first_zero
 from ringsim.stepping.instant import Array, Instant
 from ringsim.stepping.memory import Remembering
 from ringsim.variables import PLANES
+
+if TYPE_CHECKING:
+    from ringsim.stepping.latches import Latches
 
 _NEAR = 0.1
 """A V-joint that has reached a stop counts as resting on it within this angle of it, rad."""
@@ -50,13 +53,15 @@ class Locks(Remembering):
     changing = ("deployed", "stowed", "_away")
 
     def __init__(
-        self, angles: Array, stowed_angle: float | None, planes: Sequence[str] = PLANES
-    ) -> None:
+        self, angles: Array, stowed_angle: float | None, planes: Sequence[str] = PLANES,
+        latches: "Latches | None" = None,
+    ) -> None:  # fmt: skip
         """Begin with these opening angles (rad); the stowed stop's is None without stops.
 
-        ``planes`` are the names by which sentences call the rows of the angles.
+        ``planes`` are the names by which sentences call the rows of the angles, ``latches`` what
+        shall hold the V-joints at 180 deg.
         """
-        self._planes = planes
+        self._planes, self._latches = planes, latches
         self.stops = stowed_angle is not None
         self._stowed_angle = stowed_angle or 0.0
         self.deployed, self.stowed = np.zeros((2, *angles.shape), dtype=bool)
@@ -67,6 +72,17 @@ class Locks(Remembering):
         self.deployed |= angles >= math.pi
         self.stowed |= self._away & (angles <= self._stowed_angle)
         self._away |= angles > self._stowed_angle + _NEAR
+
+    def latch(self, before: Instant, now: Instant) -> None:
+        """Let latches catch in a step."""
+        if self._latches is not None:
+            self._latches.note(before, now)
+
+    @property
+    def unlatched(self) -> bool:
+        """Whether all V-joints have reached 180 deg, and latches of some have not caught."""
+        missing = None if self._latches is None else self._latches.missing(self.deployed)
+        return missing is not None and bool(self.deployed.all() and missing.any())
 
     def ahead(self, angles: Array, moved: Array) -> Array:
         """Way (rad) to the stop in the direction of each V-joint's motion; infinite behind it."""
@@ -96,11 +112,17 @@ class Locks(Remembering):
         return f"{count}, not {', '.join(open_[:_NAMED])}{more}"
 
     def contact(self, now: Instant) -> StopContact:
-        """V-joints that are about to meet a stop, and those that rest on one."""
+        """V-joints that are about to meet a stop, and those that rest on one.
+
+        Those that latches have let go may come to 180 deg again.
+        """
         angles, rates, low, high = now.angles, now.rates, self._stowed_angle, math.pi
+        away = ~self.deployed
+        if self._latches is not None:
+            away |= self._latches.missing(self.deployed) & (angles <= high - _NEAR)
         folding = (rates < 0.0) & self._away & ~self.stowed & (angles > low)
         with np.errstate(divide="ignore", invalid="ignore"):
-            opening = np.where((rates > 0.0) & ~self.deployed, (high - angles) / rates, math.inf)
+            opening = np.where((rates > 0.0) & away, (high - angles) / rates, math.inf)
             waiting = np.minimum(opening, np.where(folding, (low - angles) / rates, math.inf))
         first = np.unravel_index(int(np.argmin(waiting)), waiting.shape)
         resting = self.deployed & (angles > high - _NEAR)

@@ -1,5 +1,6 @@
 """Whether a structure has come to rest for good."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -21,6 +22,14 @@ ring that dry friction holds creeps by its smooth part, faster by a few per cent
 drive grows with the angle.  What loads set in motion from rest has four times as much."""
 _STILL = 1e-12
 """Kinetic energy that is round-off, over the structure's reference energy."""
+
+
+def resting(missing: str, window: float) -> str:
+    """Why a run ends at rest, by who has locked and the window (s) that was watched."""
+    return (
+        f"came to rest with {missing}: no winch turns, and within {window:.3g} s no V-joint has "
+        f"moved by more than {math.degrees(MOVED):.2g} deg"
+    )
 
 
 class Rest(Remembering):

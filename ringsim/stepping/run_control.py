@@ -17,12 +17,13 @@ from ringsim.stepping.locks import Locks, Overrun, StopContact, lock_times
 from ringsim.stepping.memory import Memory, Remembering
 from ringsim.stepping.motion_steps import DeviationSteps, MotionSteps
 from ringsim.stepping.repeats import EnergyImbalance, Indicator, TensionBend
-from ringsim.stepping.rest import MOVED, Rest
+from ringsim.stepping.rest import Rest, resting
 from ringsim.variables import Cause, Fate, Reason, Status
 
 TOLD = math.radians(2.0)
 """Angle from which on a run tells how far a V-joint was past its stop: sound rings go 0.1 to
 0.2 deg deep into the default stop, 7 N m hold it at 2 deg."""
+_ALL_DEPLOYED = "all V-joints have reached 180 deg"
 _ROUND_OFF = 1e-12
 """Relative difference of two times that are the same."""
 
@@ -57,9 +58,10 @@ class RunControl(Remembering):
         limits: Limits = Limits(),  # noqa: B008  frozen
         follow_deviations: bool = False,
     ) -> None:
-        """Begin a run, which ends when the V-joints of ``locks`` have all reached the same stop, or
-        one is past it by more than ``limits``, or all are at rest, else at ``solver.end_time``;
-        with ``follow_deviations`` steps resolve how the joints deviate from their mean angle.
+        """Begin a run, which ends when the V-joints of ``locks`` have all reached the same stop and
+        their latches have caught, or one is past it by more than ``limits``, or all are at rest,
+        else at ``solver.end_time``; with ``follow_deviations`` steps resolve how the joints deviate
+        from their mean angle.
         """
         self.now, self._solver, self._locks, self._limits = start, solver, locks, limits
         self._rest = Rest(start, solver.end_time, scales.energy)
@@ -150,6 +152,7 @@ class RunControl(Remembering):
         self._watch()
         if self.goes_on and self._locks is not None:
             self._locks.note(self.now.angles)
+            self._locks.latch(before, found)
             if math.isinf(self._settled_at):
                 self._note_lock(self._locks, before)
             self._note_overrun(self._locks)
@@ -215,12 +218,14 @@ class RunControl(Remembering):
             self.diverge(refused)
 
     def _note_lock(self, locks: Locks, before: Instant) -> None:
-        """Let the run settle once all V-joints have reached the same stop."""
-        if not (locks.deployed.all() or locks.stowed.all()):
+        """Let the run settle once all V-joints have reached the same stop, and are held there if
+        latches shall hold them: what is not comes back, stays pressed to its stop, or leaves it.
+        """
+        if not (locks.deployed.all() or locks.stowed.all()) or locks.unlatched:
             return
         self.fate = Fate.DEPLOYED if locks.deployed.all() else Fate.FOLDED
-        where = "180 deg" if locks.deployed.all() else "the stowed stop"
-        self.reason = Reason(text=f"all V-joints have reached {where}")
+        stowed = "all V-joints have reached the stowed stop"
+        self.reason = Reason(text=_ALL_DEPLOYED if locks.deployed.all() else stowed)
         # Settling counts from the last lock within this step: what happens after it must not
         # depend on where steps end.
         time = self.now.time
@@ -242,19 +247,18 @@ class RunControl(Remembering):
                 words = "the cable was wound" if self._roped else "the run lasted"
                 self._end(Fate.FINISHED, f"{words} until {end}")
             elif math.isinf(self._settled_at):
-                self._end(Fate.CUT_OFF, f"{end} was reached with {locks.missing()}")
+                fate = Fate.NOT_LATCHED if locks.unlatched else Fate.CUT_OFF
+                self._end(fate, f"{end} was reached with {locks.missing()}")
             self.goes_on = False
         elif (
             locks is not None
             and math.isinf(self._settled_at)
             and self._rest.reached(self.now, locks.ahead)
         ):
-            some = locks.deployed.any()
+            fate = Fate.PARTLY_DEPLOYED if locks.deployed.any() else Fate.STALLED
             self._end(
-                Fate.PARTLY_DEPLOYED if some else Fate.STALLED,
-                f"came to rest with {locks.missing()}: no winch turns, and within "
-                f"{self._rest.window:.3g} s no V-joint has moved by more than "
-                f"{math.degrees(MOVED):.2g} deg",
+                Fate.NOT_LATCHED if locks.unlatched else fate,
+                resting(locks.missing(), self._rest.window),
             )
         elif self._count >= solver.step_limit:
             self._give_up(
@@ -287,9 +291,12 @@ class RunControl(Remembering):
         self.fate, self.reason, self.goes_on = fate, Reason(text=words), False
 
     def _give_up(self, cause: Cause, words: str) -> None:
-        """End a run early; one that has reached its goal only settles less."""
+        """End a run early; one whose V-joints have all reached 180 deg only settles less."""
         self.goes_on = False
-        if math.isfinite(self._settled_at):
+        unlatched = self._locks is not None and self._locks.unlatched
+        if unlatched:
+            self.fate, self.reason = Fate.NOT_LATCHED, Reason(text=_ALL_DEPLOYED)
+        if unlatched or math.isfinite(self._settled_at):
             self.reason += f"; settling was cut short at {self.now.time:.6g} s"
         else:
             self.status, self.reason = Status.SOLVER_FAILED, Reason(cause, words)

@@ -15,7 +15,7 @@ from ringsim.cable.ropes import Ropes
 from ringsim.layout.pose import Array
 from ringsim.parts.limits import Limits
 from ringsim.scene import Scene
-from ringsim.stepping.rest import GROWTH, MOVED, WINDOW
+from ringsim.stepping.rest import GROWTH, MOVED, WINDOW, resting
 from ringsim.stepping.run_control import TOLD, overstrained
 from ringsim.theory.ideal_motion import IdealMotion, IdealState
 from ringsim.variables import Cause, Fate, Reason, Status
@@ -100,6 +100,7 @@ class Course:
         self._time, self._state = 0.0, self.motion.start()
         self.motion.instant(self._time, self._state)  # refuses what has no answer at the start
         self._end, self._contacts = scene.solver.end_time, 0
+        self._window = WINDOW * scene.solver.end_time
         roped = self.motion.cables is not None
         self._strained = [_Strained(self.motion, scene.limits.rope_strain)] if roped else []
         self._stowed = 0.5 * (math.pi if scene.stop is None else scene.stop.most_folded)
@@ -113,7 +114,9 @@ class Course:
                 self.motion.under(until=mark)
                 self._begin()
                 while self._time < min(mark, self._end) * (1.0 - _ALIKE):
-                    self._advance(min(mark, self._end))
+                    # Joints that are not latched are looked at twice a window.
+                    look = self._time + 0.5 * self._window if self._unlatched else math.inf
+                    self._advance(min(mark, self._end, look))
                     self._judge()
                 if self._time >= self._end * (1.0 - _ALIKE):
                     break
@@ -124,12 +127,15 @@ class Course:
             self.status, self.fate = Status.SOLVER_FAILED, Fate.NONE
             words = f"the ideal ring's solver gave up at {self._time:.6g} s: {error}"
             self.reason = Reason(Cause.STEP_LIMIT if too_long else Cause.NEWTON, words)
+        if self._unlatched:
+            self.fate = Fate.NOT_LATCHED
         if not self.reason:
-            self.fate = Fate.STALLED if self._rests() else Fate.CUT_OFF
-            resting = ", at rest" if self.fate == Fate.STALLED else ""
+            rests = self._rests()
+            if not self._unlatched:
+                self.fate = Fate.STALLED if rests else Fate.CUT_OFF
             self.reason = Reason(
-                text=f"solver.end_time = {self._scene.solver.end_time:g} s was reached with 0 of "
-                f"{2 * self._scene.structure.sections} V-joints locked{resting}"
+                text=f"solver.end_time = {self._scene.solver.end_time:g} s was reached with "
+                f"{self._missing()}{', at rest' if rests else ''}"
             )
         if self._scene.stop is not None and not self.status.failed:
             self._note_overrun(self._scene.limits)
@@ -144,7 +150,7 @@ class Course:
         # From the step's end at or before the window's begin on: a step may be longer than it.
         times = np.concatenate([piece.times for piece in self.pieces])
         states = [state for piece in self.pieces for state in piece.states]
-        begun = np.searchsorted(times, (1.0 - WINDOW) * self._time, side="right") - 1
+        begun = np.searchsorted(times, self._time - self._window, side="right") - 1
         last = states[begun:]
         moved = max(2.0 * abs(float(state[0] - self._state[0])) for state in last)
         now, then = (abs(float(state[rate])) for state in (self._state, last[0]))
@@ -231,28 +237,48 @@ class Course:
 
     def _judge(self) -> None:
         if any(event(self._time, self._state) > -_ROUND_OFF for event in self._strained):
-            count = 2 * self._scene.structure.sections
-            missing = f"{0 if math.isnan(self.lock_time) else count} of {count} V-joints locked"
             strain = self.motion.instant(self._time, self._state).stretch
-            words = overstrained(strain, self._time, self._scene.limits, missing)
+            words = overstrained(strain, self._time, self._scene.limits, self._missing())
             self.fate, self.reason, self._end = Fate.OVERLOADED, Reason(text=words), self._time
             return
         phi, rate = float(self._state[0]), float(self._state[self.motion.mechanism.freedom])
         if math.isnan(self.lock_time) and phi <= 0.0 and rate < 0.0:
             self.lock_time = self._time - phi / rate
-            self.fate = Fate.DEPLOYED
-            self.reason = Reason(text="all V-joints have reached 180 deg")
-            self._settle(self.lock_time)
-            self.motion.under(latched=self._catches(-2.0 * rate))
-            self.motion.lock(self._time)
-            self._begin()
+            self._lock(self.lock_time, -2.0 * rate)
         elif phi <= 0.0 and not self.motion.latched and self._catches(-2.0 * rate):
-            self.motion.under(latched=True)
-            self._begin()
-        elif not self.reason and phi >= self._stowed:
+            self._lock(self._time, -2.0 * rate)
+        elif not self.reason and math.isnan(self.lock_time) and phi >= self._stowed:
             self.fate = Fate.FOLDED
             self.reason = Reason(text="all V-joints have reached the stowed stop")
             self._settle(self._time)
+        elif self._unlatched and self._time >= self.lock_time + self._window:
+            coming = any(fault.time > self._time for fault in self._scene.faults)
+            if not coming and self._rests():
+                self.fate, self._end = Fate.NOT_LATCHED, self._time
+                self.reason = Reason(text=resting(self._missing(), self._window))
+
+    @property
+    def _unlatched(self) -> bool:
+        """Whether the V-joints have come to their latches, and these have not caught."""
+        return math.isfinite(self.lock_time) and not self.reason
+
+    def _missing(self) -> str:
+        count = 2 * self._scene.structure.sections
+        return f"{0 if math.isnan(self.lock_time) else count} of {count} V-joints locked"
+
+    def _lock(self, time: float, rate: float) -> None:
+        """The V-joints are at 180 deg at a time (s), which they came to at an opening rate (rad/s).
+
+        They have locked, unless there are latches, which have not caught.
+        """
+        caught, stop = self._catches(rate), self._scene.stop
+        if caught or stop is None or not stop.latch:
+            self.fate = Fate.DEPLOYED
+            self.reason = Reason(text="all V-joints have reached 180 deg")
+            self._settle(time)
+            self.motion.lock(self._time)
+        self.motion.under(latched=caught)
+        self._begin()
 
     def _catches(self, rate: float) -> bool:
         """Whether latches catch that joints meet at an opening rate (rad/s)."""

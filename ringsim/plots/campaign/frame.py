@@ -17,6 +17,7 @@ LOOKS = {
     "ok": (style.BLUE, "o"),
     "finished": (style.BLUE, "o"),
     "folded": (style.SKY, "o"),
+    "not latched": ("#8c6d31", "P"),
     "partly deployed": (style.ORANGE, "D"),
     "stalled": (style.VERMILLION, "s"),
     "overloaded": (style.PURPLE, "^"),
