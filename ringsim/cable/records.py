@@ -45,8 +45,9 @@ class Winch(Model):
     stop_time: SecondOrZero | None = None
     """The drum stands still from here on."""
     after_lock: Literal["stop", "hold", "pull"] = "stop"
-    """What the winch does once all V-joints of its plane have locked: stand still, keep the tension
-    that it has then (by winding alone where rope cannot turn it back), or go on with its law."""
+    """What the winch does once all V-joints of its plane have locked, with latches once these hold:
+    stand still, keep the tension that it has then (by winding alone where rope cannot turn it
+    back), or go on with its law."""
 
     @model_validator(mode="after")
     def _in_order(self) -> "Winch":

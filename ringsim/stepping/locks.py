@@ -114,7 +114,7 @@ class Locks(Remembering):
     def contact(self, now: Instant) -> StopContact:
         """V-joints that are about to meet a stop, and those that rest on one.
 
-        Those that latches have let go may come to 180 deg again.
+        Those that came to 180 deg and that no latch holds may come there again.
         """
         angles, rates, low, high = now.angles, now.rates, self._stowed_angle, math.pi
         away = ~self.deployed

@@ -23,7 +23,6 @@ from ringsim.variables import Cause, Fate, Reason, Status
 TOLD = math.radians(2.0)
 """Angle from which on a run tells how far a V-joint was past its stop: sound rings go 0.1 to
 0.2 deg deep into the default stop, 7 N m hold it at 2 deg."""
-_ALL_DEPLOYED = "all V-joints have reached 180 deg"
 _ROUND_OFF = 1e-12
 """Relative difference of two times that are the same."""
 
@@ -218,14 +217,12 @@ class RunControl(Remembering):
             self.diverge(refused)
 
     def _note_lock(self, locks: Locks, before: Instant) -> None:
-        """Let the run settle once all V-joints have reached the same stop, and are held there if
-        latches shall hold them: what is not comes back, stays pressed to its stop, or leaves it.
-        """
+        """Let the run settle once all V-joints have reached the same stop, and latches hold."""
         if not (locks.deployed.all() or locks.stowed.all()) or locks.unlatched:
             return
         self.fate = Fate.DEPLOYED if locks.deployed.all() else Fate.FOLDED
-        stowed = "all V-joints have reached the stowed stop"
-        self.reason = Reason(text=_ALL_DEPLOYED if locks.deployed.all() else stowed)
+        where = "180 deg" if locks.deployed.all() else "the stowed stop"
+        self.reason = Reason(text=f"all V-joints have reached {where}")
         # Settling counts from the last lock within this step: what happens after it must not
         # depend on where steps end.
         time = self.now.time
@@ -293,10 +290,9 @@ class RunControl(Remembering):
     def _give_up(self, cause: Cause, words: str) -> None:
         """End a run early; one whose V-joints have all reached 180 deg only settles less."""
         self.goes_on = False
-        unlatched = self._locks is not None and self._locks.unlatched
-        if unlatched:
-            self.fate, self.reason = Fate.NOT_LATCHED, Reason(text=_ALL_DEPLOYED)
-        if unlatched or math.isfinite(self._settled_at):
+        if self._locks is not None and self._locks.unlatched:
+            self.fate, self.reason = Fate.NOT_LATCHED, Reason(text=self._locks.missing())
+        if self.fate != Fate.NONE:
             self.reason += f"; settling was cut short at {self.now.time:.6g} s"
         else:
             self.status, self.reason = Status.SOLVER_FAILED, Reason(cause, words)

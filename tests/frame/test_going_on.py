@@ -259,3 +259,7 @@ def test_the_command_goes_on(tmp_path: Path) -> None:
         lines = called(*words, *short[:6], "--out", again, code=2).strip().splitlines()
         assert len(lines) == 1
         assert told in lines[0]
+    # What is refused has not gone on from anywhere.
+    refused = called("--from", first, "--at", "0.02", *short, "--out", again, code=2)
+    assert "must be after 0.02 s" in refused
+    assert "went on from" not in refused

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from pydantic import ValidationError
 from scipy.integrate import quad
 
-from motor_rings import ring
+from motor_rings import MOTOR, STALL, ring
+from ringsim.analysis.campaign_samples import endings
+from ringsim.analysis.quantities import quantities
+from ringsim.analysis.requirements import Requirement
+from ringsim.analysis.verdicts import violations
+from ringsim.outputs.series import Run, Series
 from ringsim.parts.latch import Latch
 from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
 from ringsim.refusal import InputError
@@ -17,6 +24,7 @@ from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
 from ringsim.theory.drive_margin import DriveMargin
 from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.variables import Fate, Outcome, Status
 
 LATCH = {"peak_torque": 0.3, "reach": 8.0}
 REACH = math.radians(8.0)
@@ -98,12 +106,17 @@ def test_joints_that_come_too_slowly_leave_again(fidelity: str) -> None:
     found = simulate(scene, fidelity)
     assert float(found.latch_rate.max()) < 100.0
     assert int(found.latched_joints) == 0
+    assert int(found.outcome) == Fate.NOT_LATCHED
     assert int(found.locked_joints) == 6
     assert "6 of 6 latches did not catch: upper 1, upper 2, upper 3" in found.attrs["reason"]
     after = found.opening_angle.where(found.time > float(found.deployment_time)).min()
     caught = simulate(scene.with_values({"latch.min_rate": 0.0}), fidelity)
     held = caught.opening_angle.where(caught.time > float(caught.deployment_time)).min()
     assert float(after) < float(held) < 180.0
+    assert int(caught.outcome) == Fate.DEPLOYED
+    assert float(caught.final_time) == pytest.approx(float(caught.deployment_time) + 0.05)
+    # It is followed until it rests, for a tenth of the time that there is.
+    assert float(found.final_time) > float(found.deployment_time) + 0.1
 
 
 @pytest.mark.parametrize("fidelity", ["frame", "full"])
@@ -117,6 +130,80 @@ def test_a_latch_that_has_failed_does_not_catch(fidelity: str) -> None:
     found = simulate(latched(faults=faults, latch={"min_rate": [0.0, 0.0, 100.0]}), fidelity)
     assert found.latched.values.tolist() == [[1, 0, 0], [1, 1, 0]]
     assert "3 of 6 latches did not catch: upper 2, upper 3, lower 3" in found.attrs["reason"]
+    assert int(found.outcome) == Fate.NOT_LATCHED
+
+
+def driven(**values: object) -> Scene:
+    """Motors in place of the springs; the latch of lower 2 has failed."""
+    fault = {"kind": "failed-latch", "plane": "lower", "section": 2, "time": 0.0}
+    return ring(
+        structure__sections=3, structure__opening_angle=170.0, stop__latch=True, faults=[fault],
+        solver__end_time=20.0, record__reactions=True, record__accelerations=True, **values,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def pressed() -> xr.Dataset:
+    return simulate(driven(), "frame")
+
+
+def test_a_winch_pulls_until_the_latches_of_its_plane_hold(pressed: xr.Dataset) -> None:
+    """The motor of the other plane stalls, and the ring rests in its stops."""
+    assert int(pressed.outcome) == Fate.NOT_LATCHED
+    assert pressed.latched.values.tolist() == [[1, 1, 1], [1, 0, 1]]
+    reason = pressed.attrs["reason"]
+    assert reason.startswith("came to rest with 6 of 6 V-joints locked: no winch turns")
+    assert reason.endswith("; 1 of 6 latches did not catch: lower 2")
+    assert float(pressed.final_time) > float(pressed.deployment_time) + 0.1 * 20.0
+    # At rest a motor turns with up to 1 % of half its speed without a load.
+    last = pressed.motor_torque.dropna("time", how="all").isel(time=-1, winch=0)
+    assert last.values.tolist() == [0.0, pytest.approx(MOTOR["stall_torque"], rel=5e-3)]
+    tension = pressed.cable_tension.dropna("time", how="all").isel(time=-1, span=0)
+    assert float(tension.sel(plane="lower")) == pytest.approx(STALL, rel=5e-3)
+
+
+def test_numbers_of_a_run_are_the_extremes_of_its_places(pressed: xr.Dataset) -> None:
+    for name, value in {
+        "least_latch_rate": pressed.latch_rate.min(),
+        "peak_lock_impulse": pressed.lock_impulse.max(),
+        "peak_acceleration_max": pressed.peak_acceleration.max(),
+        "peak_motor_torque": pressed.motor_torque.max(),
+        "total_motor_energy": pressed.motor_energy.max("time").sum(),
+    }.items():
+        assert float(pressed[name]) == pytest.approx(float(value), rel=1e-5), name
+        assert float(pressed[name]) > 0.0
+    # Of all steps, between which output times lie; energies grow a little after the last of these.
+    most = MOTOR["stall_torque"] * MOTOR["no_load_speed"] / 4.0
+    assert float(pressed.motor_power.max()) <= float(pressed.peak_motor_power) <= most
+    assert {"least_latch_rate", "total_motor_energy"} < set(quantities())
+
+
+def test_a_ring_that_is_not_latched_falls_short(pressed: xr.Dataset) -> None:
+    campaign = xr.Dataset({
+        "status": ("sample", [0, 0]),
+        "outcome": ("sample", [int(Fate.DEPLOYED), int(pressed.outcome)]),
+    })  # fmt: skip
+    wanted = Requirement.model_validate({"is": "deployed", "probability": 0.9, "confidence": 0.9})
+    assert violations(campaign, "outcome", wanted).tolist() == [False, True]
+    assert endings(campaign).tolist() == ["deployed", "not latched"]
+    for fate, reached in ((Fate.NOT_LATCHED, False), (Fate.OVERLOADED, False), (1, True)):
+        values = {name: pressed[name].values for name in ("deployment_time", "latched")}
+        found = Outcome(Status.OK, "", values=values | {"outcome": np.array(int(fate))})
+        assert found.reached_goal is reached
+
+
+def test_the_latest_latch_tells_when_a_motor_stops() -> None:
+    """Of joints that come again and catch then; see ``Run.held``."""
+    times = np.linspace(0.0, 4.0, 401)
+    past = np.poly1d([1.0, 1.5, 3.0], r=True) * 0.1
+    angles, rates = (
+        np.tile(each(times)[:, None, None], (1, 2, 3)) for each in (past, past.deriv())
+    )
+    series = [Series(times, each, times) for each in (angles + math.pi, rates)]
+    run = Run(latched(latch={"min_rate": [0.05, 0.2, 0.4]}), *series, np.full((2, 3), 1.0), {}, {})
+    np.testing.assert_allclose(run.held, [[1.0, 3.0, np.nan]] * 2, rtol=1e-6)
+    again = replace(run, caught=np.array([[True, True, True], [False, False, False]]))
+    np.testing.assert_allclose(again.held, [[1.0, 3.0, 1.0], [np.nan] * 3], rtol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from ringsim.parts.limits import Limits
 from ringsim.parts.solver import Solver
 from ringsim.stepping.instant import Energies, Instant, Scales
+from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.memory import pack, unpack
 from ringsim.stepping.run_control import RunControl
@@ -296,6 +298,37 @@ def test_a_joint_past_its_limit_ends_a_sound_run_and_is_named() -> None:
     assert control.reason.endswith(
         "more than limits.overrun = 10 deg, with 5 of 6 V-joints locked, not lower 3"
     )
+
+
+def coming_twice(time: float) -> tuple[float, float]:
+    """At 180 deg with 0.5 rad/s after 1 s, leaving it at 1.5 s, and with 1.5 rad/s after 3 s."""
+    past = np.poly1d([1.0, 1.5, 3.0], r=True) * 0.5
+    return math.pi + float(past(time)), float(past.deriv()(time))
+
+
+@pytest.mark.parametrize(
+    ("least", "end", "fate", "words"),
+    [
+        (0.3, 1.05, Fate.DEPLOYED, "all V-joints have reached 180 deg"),
+        (1.0, 3.05, Fate.DEPLOYED, "all V-joints have reached 180 deg"),
+        (2.0, 3.1, Fate.NOT_LATCHED, "solver.end_time = 3.1 s was reached with 6 of 6 V-joints"),
+    ],
+)
+def test_the_run_settles_once_latches_hold(
+    least: float, end: float, fate: Fate, words: str
+) -> None:
+    motion, solver = Motion(coming_twice), Solver(end_time=3.1, settling_time=0.05)
+    places = SimpleNamespace(planes=("upper", "lower"), sections=3)
+    stop, latch = SimpleNamespace(latch=True), SimpleNamespace(min_rate=least)
+    latches = Latches(SimpleNamespace(structure=places, stop=stop, latch=latch, faults=[]))
+    start = motion.at(0.0)
+    locks = Locks(start.angles, 0.1, latches=latches)
+    control = RunControl(solver, SCALES, start, locks, limits=Limits(overrun=30.0))
+    times = follow(motion, control)
+    assert (control.status, control.fate) == (Status.OK, fate)
+    assert control.reason.startswith(words)
+    assert times[-1] == pytest.approx(end, abs=1e-6)
+    assert latches.caught.all() == (fate is Fate.DEPLOYED)
 
 
 def test_joints_go_past_180_deg_where_there_is_no_stop() -> None:
