@@ -51,8 +51,8 @@ def _check(requirements: dict[str, Requirement]) -> dict[str, Requirement]:
             if name in VARIABLES and (dims := VARIABLES[name].dims):
                 ends = tuple(f"{most}_{name}" for most in ("least", "peak", "total"))
                 near = [n for n in quantities() if n in ends or n.startswith(f"{name}_")]
-                hint = near[0] if near else known_or_nearest(name, known)
-                why = f"has a value for each {' and '.join(dims)}: require a number, like {hint}"
+                hint = f", like {near[0]}" if near else f" ({known_or_nearest(name, known)})"
+                why = f"has a value for each {' and '.join(dims)}: require a number{hint}"
             raise ValueError(f"{name} {why}")
         if name == OUTCOME:
             if each.is_ not in _WORDS or each.max is not None or each.min is not None:
