@@ -173,7 +173,10 @@ def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Fold
     what = " and ".join(word for word in wanted if wanted[word] != held[word])
     if what:
         scenes = [flat(scene.to_table()) for scene in (campaign.scene, old.scene)]
-        what = f"{what} differs{_first_change(*scenes) or _first_change(wanted, held)}"
+        change = _first_change(*scenes) or _first_change(wanted, held)
+        if what == "its scene" and campaign.scene == old.scene:
+            change = ": an older ringsim wrote it without a key of today, and can end it"
+        what = f"{what} differs{change}"
     elif not table.starts_with(old.table):
         what = (
             f"its {old.table.samples} samples are not the first of the {table.samples} that "

@@ -142,7 +142,8 @@ class Recorder(Remembering):
         coordinates = spanned(values, known)
         passed = overloads(self._scene, self._readings, series_of)
         found = ended(self.status, self.fate, self.reason, passed, coordinates, values)
-        return replace(found, reason=found.reason + unresolved(run))
+        told = "" if self.status.failed else unresolved(run)
+        return replace(found, reason=found.reason + told)
 
 
 def outputs_of(scene: Scene) -> list[Output]:

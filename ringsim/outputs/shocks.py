@@ -15,12 +15,10 @@ to 1, 8 and 2 %, with 0.9 to 12, 78 and 30 %; exudyn with 3 lacks a third, 70 % 
 
 def unresolved(run: Run) -> str:
     """What a reason says of shocks that last no longer than steps; empty if none was asked for."""
-    record, locks = run.scene.record, run.locks[np.isfinite(run.locks)]
-    if (
-        not (record.reactions or record.accelerations)
-        or not len(locks)
-        or len(run.angles.times) < 2
-    ):
+    record, solver = run.scene.record, run.scene.solver
+    locks = run.locks[np.isfinite(run.locks)]
+    asked = run.scene.stop is not None and (record.reactions or record.accelerations)
+    if not asked or not len(locks) or len(run.angles.times) < 2:
         return ""
     times, period = run.angles.times, slowest_period(run)
     first = np.clip(np.searchsorted(times, locks) - 1, 0, len(times) - 2)
@@ -30,9 +28,9 @@ def unresolved(run: Run) -> str:
     if longest[k] <= period / STEPS:
         return ""
     return (
-        f"; steps of {1e3 * longest[k]:.2g} ms at the lock at {locks[k]:.6g} s pass over shocks in "
-        f"the rods (period {1e3 * period:.2g} ms): for peaks at base and corners reduce "
-        "solver.tolerance"
+        f"; steps of {1e3 * longest[k]:.3g} ms at the lock at {locks[k]:.6g} s pass over shocks in "
+        f"the rods (period {1e3 * period:.3g} ms): for peaks at base and corners reduce "
+        f"{'solver.step' if solver.step_control == 'constant' else 'solver.tolerance'}"
     )
 
 

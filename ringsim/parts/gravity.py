@@ -45,7 +45,7 @@ class Gravity(Model):
         if scene.spacecraft is not None:
             raise ValueError(
                 f"{where} with a spacecraft of {scene.spacecraft.mass:g} kg: the lines of "
-                '[offload] would carry it: hold it (boom.base = "fixed"), or leave [spacecraft] out'
+                "[offload] would carry it: leave [spacecraft] out, or leave gravity out"
             )
         residual = scene.offload.mean_residual
         if abs(residual) > 1e-12 and scene.offload.stiffness == 0.0:

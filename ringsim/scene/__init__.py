@@ -101,7 +101,7 @@ class Scene(Model):
                 )
         check_parts(self)
         self.structure.check(self)
-        for part in (self.spacecraft, self.gravity, self.offload, self.temperature):
+        for part in (self.spacecraft, self.offload, self.gravity, self.temperature):
             if part is not None:
                 part.check(self)
         if self.record.stress and isinstance(self.rods, AncfRods):

@@ -7,7 +7,8 @@ from ringsim.stepping.run_control import RunControl
 from ringsim.variables import Fate, Reason
 
 _UNFINISHED = (Fate.CUT_OFF, Fate.FINISHED, Fate.DEPLOYED, Fate.NOT_LATCHED)
-"""What runs may go on from without a change: the end time, or the settling time, is later now."""
+"""What runs may go on from without a change: the end time, or the settling time, is later now, or
+joints lean on latches that have not caught."""
 
 
 def go_on(control: RunControl, solver: Solver, memory: Memory, changed: bool, where: str) -> None:

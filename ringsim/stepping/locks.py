@@ -103,9 +103,10 @@ class Locks(Remembering):
         return f"{self._planes[plane]} {section + 1}"
 
     def missing(self) -> str:
-        """How many V-joints have locked, and which have not."""
+        """How many V-joints have locked, or only come to their latches, and which have not."""
         open_ = [self._name(*place) for place in np.argwhere(~self.deployed)]
-        count = f"{int(self.deployed.sum())} of {self.deployed.size} V-joints locked"
+        word = "at 180 deg" if self.unlatched else "locked"
+        count = f"{int(self.deployed.sum())} of {self.deployed.size} V-joints {word}"
         if not open_ or len(open_) == self.deployed.size:
             return count
         more = f" and {len(open_) - _NAMED} more" if len(open_) > _NAMED else ""

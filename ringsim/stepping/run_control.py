@@ -288,11 +288,9 @@ class RunControl(Remembering):
         self.fate, self.reason, self.goes_on = fate, Reason(text=words), False
 
     def _give_up(self, cause: Cause, words: str) -> None:
-        """End a run early; one whose V-joints have all reached 180 deg only settles less."""
+        """End a run early; one that has reached its goal only settles less."""
         self.goes_on = False
-        if self._locks is not None and self._locks.unlatched:
-            self.fate, self.reason = Fate.NOT_LATCHED, Reason(text=self._locks.missing())
-        if self.fate != Fate.NONE:
+        if math.isfinite(self._settled_at):
             self.reason += f"; settling was cut short at {self.now.time:.6g} s"
         else:
             self.status, self.reason = Status.SOLVER_FAILED, Reason(cause, words)

@@ -50,24 +50,19 @@ class Margin(NamedTuple):
 class DriveMargin:
     """The drive of a scene by a standard; ``kinds`` are the names of what resists.
 
-    A ``mechanism`` may be given, of a scene that differs in the laws of its cables, joints and
-    springs alone: most of the time goes into it.
-
     Raises
     ------
     InputError
         If the scene is no ring, or its drive has no limit.
     """
 
-    def __init__(
-        self, scene: Scene, standard: MarginStandard, mechanism: Mechanism | None = None
-    ) -> None:
+    def __init__(self, scene: Scene, standard: MarginStandard) -> None:
         if (kind := kind_of(scene.structure)) != "pantograph-ring":
             raise InputError(
                 f'structure.kind = "{kind}": only the pantograph ring has a margin of its drive '
                 "(leave margin out)"
             )
-        self.mechanism, self.standard = mechanism or Mechanism(scene), standard
+        self.mechanism, self.standard = Mechanism(scene), standard
         self._drive = Drive(scene, self.mechanism, at_speed=standard.keep_speed)
         self.conditions = self._drive.conditions
         self._loads = SectionLoads(self.mechanism)
@@ -118,6 +113,9 @@ class DriveMargin:
         wanted = np.unique([low, *inside, high])
         course = [*(known or []), *(self.at(float(angle), time) for angle in wanted)]
         course.sort(key=lambda each: each.angle)
+        # A known angle that is wanted, too, would be its own neighbour.
+        apart = np.diff([each.angle for each in course], prepend=-math.inf) > _APART
+        course = [each for each, own in zip(course, apart, strict=True) if own]
         k = int(np.argmin([each.margin for each in course]))
         bounds = course[max(k - 1, 0)].angle, course[min(k + 1, len(course) - 1)].angle
         if not math.isfinite(course[k].margin) or bounds[1] - bounds[0] < _APART:

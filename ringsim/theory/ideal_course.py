@@ -264,7 +264,8 @@ class Course:
 
     def _missing(self) -> str:
         count = 2 * self._scene.structure.sections
-        return f"{0 if math.isnan(self.lock_time) else count} of {count} V-joints locked"
+        word = "at 180 deg" if self._unlatched else "locked"
+        return f"{0 if math.isnan(self.lock_time) else count} of {count} V-joints {word}"
 
     def _lock(self, time: float, rate: float) -> None:
         """The V-joints are at 180 deg at a time (s), which they came to at an opening rate (rad/s).

@@ -105,7 +105,8 @@ def with_margin(
     begin, leasts = -math.inf, []
     for until, drive in drives:
         at = (way.times >= begin - AT_ONCE) & (way.times < until - AT_ONCE)
-        if drive is not None and at.any():
+        passes = len(way.times) and begin <= way.times[-1] and until > way.times[0]
+        if drive is not None and passes:
             own = np.isin(times, way.times[at])
             clock = times[own].tolist()
             rows = [drive.at(float(np.interp(time, *way)), time) for time in clock]

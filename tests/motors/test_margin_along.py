@@ -160,14 +160,13 @@ def test_a_run_tells_of_faults_that_its_margin_does_not_know(
 
 
 def test_the_least_of_a_campaign_follows_from_angles_alone() -> None:
-    """With a mechanism shared by samples that differ in their laws."""
+    """As it is computed anew from the file of a campaign."""
     scene = netted()
-    shared = DriveMargin(scene, EcssMechanisms()).mechanism
     for coulomb in (0.01, 0.03):
         own = scene.with_values({"joints.vjoint.coulomb": coulomb})
         run = with_margin(opened(0.1), own)
         way = passed(run.coordinates["time"], run.values["opening_angle"], 1.0)
-        least = least_along(DriveMargin(own, EcssMechanisms(), shared), way)
+        least = least_along(DriveMargin(own, EcssMechanisms()), way)
         assert least.margin == pytest.approx(float(run.values["least_drive_margin"]), rel=1e-9)
 
 
@@ -183,3 +182,21 @@ def test_explain_says_what_it_is() -> None:
     told = CliRunner().invoke(cli, ["explain", "drive_margin"]).stdout
     for words in ("static margin", "mean opening angle", "check --margin"):
         assert words in told
+
+
+def test_an_angle_that_is_known_does_not_hide_the_way_behind_it() -> None:
+    """The least margin lies half a degree behind the first angle, known from its output."""
+    drive = DriveMargin(netted(), EcssMechanisms())
+    best = drive.least()
+    low = best.angle - math.radians(0.5)
+    assert drive.at(low).margin > best.margin + 1e-6
+    assert drive.least(low, known=[drive.at(low)]).margin == pytest.approx(best.margin, abs=1e-9)
+
+
+def test_a_stretch_between_two_output_times_counts() -> None:
+    """Of three scenes the middle one, in which the ring is held, lasted from 0.42 to 0.48 s."""
+    stuck = {"kind": "stuck-vjoint", "plane": "upper", "section": 1, "time": 0.0}
+    whole, held = netted(), netted(faults=[stuck])
+    found = with_margin(opened(0.1), whole, [(0.42, whole), (0.48, held)])
+    assert float(found.values["least_drive_margin"]) == -1.0
+    assert 0.42 - 1e-9 <= float(found.values["least_drive_margin_time"]) <= 0.48 + 1e-9

@@ -15,9 +15,12 @@ PERIOD = 2.0 * 0.855**2 / math.pi * 4.0 * math.sqrt(1800.0 / 120e9 / (0.01**2 + 
 """Of the diagonals of ring18, 2 x 0.4275 m: rho A / (E I) = 16 rho / (E (D^2 + d^2))."""
 
 
-def run(steps: float, *, lock: float = 1.0, **record: bool) -> Run:
+def run(
+    steps: float, *, lock: float = 1.0, also: dict[str, str] | None = None, **record: bool
+) -> Run:
     """Steps of 50 ms until 0.9 s, then of so many periods of the slowest rod until 2 s."""
-    scene = load_scene("ring18").with_values({f"record.{k}": v for k, v in record.items()})
+    wanted = (also or {}) | {f"record.{k}": v for k, v in record.items()}
+    scene = load_scene("ring18").with_values(wanted)
     times = np.concatenate([np.arange(0.0, 0.9, 0.05), np.arange(0.9, 2.0, steps * PERIOD)])
     nothing = Series(times, np.zeros((len(times), 2, 18)), times)
     locks = np.full((2, 18), np.nan)
@@ -33,7 +36,7 @@ def test_the_slowest_rod_is_a_pinned_diagonal() -> None:
 def test_steps_longer_than_an_eighth_of_its_period_are_told(record: str) -> None:
     told = unresolved(run(0.2, **{record: True}))
     assert told.startswith(
-        f"; steps of {200.0 * PERIOD:.2g} ms at the lock at 1 s pass over shocks"
+        f"; steps of {200.0 * PERIOD:.3g} ms at the lock at 1 s pass over shocks"
     )
     assert told.endswith("reduce solver.tolerance")
     assert unresolved(run(0.12, **{record: True})) == ""
@@ -44,6 +47,12 @@ def test_steps_count_at_locks_alone_and_where_shocks_are_recorded() -> None:
     assert unresolved(run(0.05, lock=1.9, reactions=True)) == ""
     assert unresolved(run(0.2)) == ""
     assert unresolved(run(0.2, lock=math.nan, reactions=True)) == ""
+
+
+def test_rings_without_stops_have_no_shocks_and_constant_steps_another_cure() -> None:
+    assert unresolved(run(0.2, also={"stop": "none"}, reactions=True)) == ""
+    constant = run(0.2, also={"solver.step_control": "constant"}, reactions=True)
+    assert unresolved(constant).endswith("reduce solver.step")
 
 
 def test_a_lock_in_the_last_step_counts_that_step() -> None:

@@ -139,6 +139,9 @@ IMPOSSIBLE = [
            "gravity.vector = [0.0, 0.0, -9.81]\n[offload]\n"
            "[spacecraft]\nmass = 9.0\ninertia = [1.0, 1.0, 1.0]\n[boom]\nkind = 'rigid'",
            "gravity.vector", "spacecraft of 9 kg", "would carry it", "leave [spacecraft] out"),
+    _scene("a corner that no residual has",
+           "gravity.vector = [0.0, 0.0, -9.81]\n[offload]\ncorners = [1, 19]\nresidual = ["
+           + "0.0, " * 17 + "0.1]", "offload.corners[2] = 19", "at most 18"),
     _scene("lines that leave some weight",
            "gravity.vector = [0.0, 0.0, -9.81]\n[offload]\ncorners = [1, 2]\nresidual = 0.01",
            "offload.residual = 0.01", "would fall", "offload.stiffness"),

@@ -331,6 +331,23 @@ def test_the_run_settles_once_latches_hold(
     assert latches.caught.all() == (fate is Fate.DEPLOYED)
 
 
+def test_a_solver_that_gives_up_before_latches_catch_has_failed() -> None:
+    motion, solver = Motion(coming_twice), Solver(end_time=1.1, settling_time=0.05)
+    places = SimpleNamespace(planes=("upper", "lower"), sections=3)
+    stop, latch = SimpleNamespace(latch=True), SimpleNamespace(min_rate=1.0)
+    latches = Latches(SimpleNamespace(structure=places, stop=stop, latch=latch, faults=[]))
+    start = motion.at(0.0)
+    locks = Locks(start.angles, 0.1, latches=latches)
+    control = RunControl(solver, SCALES, start, locks, limits=Limits(overrun=30.0))
+    follow(motion, control)
+    assert (control.fate, locks.unlatched) == (Fate.NOT_LATCHED, True)
+    assert "6 of 6 V-joints at 180 deg" in control.reason
+    control.fate = Fate.NONE
+    control.fail("Newton")
+    assert (control.status, control.fate) == (Status.SOLVER_FAILED, Fate.NONE)
+    assert "the solver gave up" in control.reason
+
+
 def test_joints_go_past_180_deg_where_there_is_no_stop() -> None:
     motion = spread(Motion(parted), left=1)
     locks = Locks(motion.at(0.0).angles, None)
