@@ -37,7 +37,8 @@ class DriveMargins(Output):
             until=LAST_LOCK,
         ),
         Variable(
-            "least_drive_margin", (), "1", "smallest drive_margin at any angle that the run passed",
+            "least_drive_margin", (), "1",
+            "smallest static margin of the drive at any angle that the run passed",
             summary=("least drive margin", "10.3f"),
         ),
         Variable("least_drive_margin_time", (), "s", "time of least_drive_margin"),

@@ -96,7 +96,7 @@ def test_the_report_shows_them(campaign: xr.Dataset, monkeypatch: pytest.MonkeyP
     text = page(campaign, "runs/made", analyse(campaign))
     for name in names:
         assert f'id="figure-{name}"' in text
-    assert "<td>smallest drive_margin at any angle that the run passed</td>" in text
+    assert "<td>smallest static margin of the drive at any angle that the run passed</td>" in text
     assert '<th scope="col">Mean</th>' in text
 
 
