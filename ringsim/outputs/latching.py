@@ -22,7 +22,7 @@ class Latching(Output):
         ),
         Variable(
             "least_latch_rate", (), "rad/s",
-            "smallest opening rate at which a V-joint first met its latch; missing if one did not",
+            "smallest opening rate at which a V-joint first met its latch",
             summary=("least latch rate", "10.3g"),
         ),
         Variable("latched", ("plane", "section"), "1", "1 if the latch of the V-joint holds", "i4"),

@@ -27,27 +27,18 @@ class Motors(Output):
             "motor_energy", ("plane", "winch", "time"), "J", "energy that a motor's shaft gave"
         ),
         Variable(
-            "peak_motor_torque",
-            (),
-            "N m",
-            "largest torque of any motor's shaft at any step",
+            "peak_motor_torque", (), "N m", "largest torque of any motor's shaft at any step",
             summary=("largest motor torque", "10.3g"),
         ),
         Variable(
-            "peak_motor_power",
-            (),
-            "W",
-            "largest power of any motor's shaft at any step",
+            "peak_motor_power", (), "W", "largest power of any motor's shaft at any step",
             summary=("largest motor power", "10.3g"),
         ),
         Variable(
-            "total_motor_energy",
-            (),
-            "J",
-            "energy that the shafts of all motors gave by the end",
+            "total_motor_energy", (), "J", "energy that the shafts of all motors gave by the end",
             summary=("energy of all motors", "10.3g"),
         ),
-    )
+    )  # fmt: skip
 
     def read(self, now: Reading) -> Array | None:
         """Tension (N), speed (m/s) and rope wound (m) of every winch, (planes, 2, 3)."""

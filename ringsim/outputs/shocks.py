@@ -9,8 +9,9 @@ from ringsim.outputs.series import Run
 
 STEPS = 8.0
 """Steps in the lowest period of the slowest rod that shocks need.  Measured on `ring18-ground` with
-four sections (17 ms): frames with 22 give base force, base torque and acceleration to 1 %, with 4
-to 1, 8 and 2 %, with 0.9 to 12, 78 and 30 %; exudyn with 3 lacks a third, 70 % and 87 % of them."""
+four sections (17 ms) against frames at a tolerance of 1e-6: frames with 22 give base force, base
+torque and acceleration to 0.5, 9 and 9 %, with 4 to 0.1, 2 and 8 %, with 2.2 to 4, 27 and 4 %, with
+0.9 to 11, 62 and 18 %; exudyn with 2 lacks 34, 73 and 88 % of them."""
 
 
 def unresolved(run: Run) -> str:

@@ -47,7 +47,7 @@ class Gravity(Model):
                 f"{where} with a spacecraft of {scene.spacecraft.mass:g} kg: the lines of "
                 "[offload] would carry it: leave [spacecraft] out, or leave gravity out"
             )
-        residual = scene.offload.mean_residual
+        residual = scene.offload.mean_residual  # of values that sum to zero round-off is left
         if abs(residual) > 1e-12 and scene.offload.stiffness == 0.0:
             raise ValueError(
                 f"offload.residual = {residual:g} (mean) on a free base: lines of constant force "

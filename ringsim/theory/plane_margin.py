@@ -34,9 +34,8 @@ class PlaneMargin(DriveMargin):
         whole = self.whole(angle, time)
         ideal, factored = whole.pulls[:, self._plane] - whole.pulls[:, 1 - self._plane]
         available = 0.5 * (whole.available + float(ideal))
-        if whole.required == 0.0 or not math.isfinite(whole.margin):
-            return whole._replace(available=available)
-        if self.conditions.at(time).stuck:
+        held = self.conditions.at(time).stuck
+        if held or whole.required == 0.0 or not math.isfinite(whole.margin):
             return whole._replace(available=available)
         margin = whole.margin + float(factored) / whole.required
         return whole._replace(available=available, margin=margin)

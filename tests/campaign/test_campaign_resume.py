@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import netCDF4
 import pytest
 import xarray as xr
 
@@ -122,6 +123,17 @@ def test_design_that_is_none_is_refused_in_one_line(copied):
             open_folder(out)
     printed = copied.run("status", "out", code=2)
     assert len(printed.splitlines()) == 1
+
+
+def test_a_folder_from_before_a_key_came_says_so(bench):
+    start = ("campaign", bench.write(4), "--out", "out")
+    bench.run(*start)
+    with netCDF4.Dataset(bench.folder / "out" / "design.nc", "a") as file:
+        scene = file.getncattr("scene")
+        assert "restarts = 2\n" in scene
+        file.setncattr("scene", scene.replace("restarts = 2\n", ""))
+    printed = bench.run(*start, code=2)
+    assert "its scene differs: an older ringsim wrote it without a key of today" in printed
 
 
 def test_changed_scene_file_is_another_campaign(bench):
