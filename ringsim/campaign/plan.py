@@ -119,12 +119,12 @@ def _predicted(
 
 def _extent(column: Column) -> str:
     values = column.values
+    unit = column.units if column.has_numbers and column.units != "1" else ""
     if values.dtype.kind in "iuf":
-        unit = "" if column.units == "1" else f" {column.units}"
-        extent = f"{values.min():.6g} to {values.max():.6g}{unit}"
+        extent = f"{values.min():.6g} to {values.max():.6g} {unit}".rstrip()
     else:
         words = sorted(set(labels_of(values).ravel().tolist()))
         more = [f"and {len(words) - _MOST_SHOWN} more"] if len(words) > _MOST_SHOWN else []
-        extent = ", ".join(words[:_MOST_SHOWN] + more)
+        extent = ", ".join(words[:_MOST_SHOWN] + more) + (unit and f", in {unit}")
     each = f", for each {column.dim.partition('_')[0]}" if column.dim else ""
     return f"  {column.path or f'label {column.name}'}: {extent}{each}"

@@ -113,8 +113,7 @@ def drawn(campaign: xr.Dataset) -> Rows:
         else:
             extent = f"{number(float(values.min()))} to {number(float(values.max()))}"
         places = variable.shape[1] if variable.ndim > 1 else 1
-        # Values of which some are words have no unit in the file.
-        unit = "-" if values.dtype.kind in "OU" else str(variable.attrs.get("units", "1"))
+        unit = str(variable.attrs.get("units", "-"))
         rows.append([", ".join(paths), unit, str(places), law, extent])
     return rows
 

@@ -39,6 +39,12 @@ class Column:
         """Whether files hold the values as text: words, tables, lists, or these beside numbers."""
         return self.values.dtype.kind in "UO"
 
+    @property
+    def has_numbers(self) -> bool:
+        """Whether any value is a number, so that the unit says something."""
+        kind = self.values.dtype.kind
+        return kind != "U" and (kind != "O" or any(map(_is_number, self.values.ravel())))
+
 
 @dataclass(frozen=True)
 class Table:
@@ -98,7 +104,7 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
         variable = file.createVariable(column.name, kind, dims, **options)
         role = "input" if column.path else "label"
         variable.long_name = f"{role} {column.path or column.name}"
-        if not text:
+        if column.has_numbers:
             variable.units = column.units
         variable.setncatts(
             {"path": column.path, "role": role, "distribution": column.origin}
@@ -114,6 +120,10 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
     seeds.long_name = "seed of the sample, from the campaign's seed and the sample's index"
     seeds.units = "1"
     seeds[:] = table.seeds
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _add_names(file: Any, column: Column, table: Table) -> str:

@@ -86,9 +86,13 @@ def test_the_files_hold_labels_and_give_the_same_scenes_back(tmp_path: Path) -> 
     with xr.open_dataset(tmp_path / "design.nc") as file:
         groups = {name: len(found) for name, found in file.groupby("faults").groups.items()}
         words = set(file.cables_lower_winch_stop_time.values)
+        units = {name: file[name].attrs.get("units") for name in file if "path" in file[name].attrs}
     assert set(groups) == {"none", "stuck-vjoint(section=2, time=0.2)"}
     assert groups["none"] == sum(not scene.faults for scene in scenes(table))
     assert words == {"5.0", "none"}
+    # Numbers beside words have their unit; tables and words alone have none.
+    assert units["cables_lower_winch_stop_time"] == "s"
+    assert units["faults"] is units["cables_lower_winch_winding"] is None
 
 
 def test_a_grid_crosses_tables_and_faults() -> None:
