@@ -3,10 +3,12 @@
 Run: python benchmarks/frame_cost.py ratio [SCENE ...]     both engines in turn, twice each
      python benchmarks/frame_cost.py growth [sections ...]  the frame engine alone
      python benchmarks/frame_cost.py profile [SCENE]        its time by what it is spent on
+     python benchmarks/frame_cost.py energy [SCENE ...]     energy errors of both at nine tolerances
 
 Every run has a process of its own, which compiles and loads before the clock starts.  Times are
 processor time with one thread; what is compared holds all outputs and energies.  Errors are against
-the frame engine with steps a quarter as long.
+the frame engine with steps a quarter as long.  One run's energy error is partly chance, that of
+where steps meet an impact: "energy" repeats runs at tolerances around the scene's own.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import json
 import math
 import os
 import resource
+import statistics
 import subprocess
 import sys
 import time
@@ -22,6 +25,8 @@ from collections import Counter
 from typing import Any
 
 SCENES = ("ring18-cable", "ring18", "72")
+NEAR = (0.92, 0.94, 0.96, 0.98, 1.0, 1.02, 1.04, 1.06, 1.08)
+"""Factors of the tolerance, too near to each other for the error to differ but by chance."""
 COMPARED = ("deployment_time", "asynchrony_max", "peak_tension")
 
 
@@ -100,6 +105,19 @@ def ratio(names: list[str]) -> None:
             )
 
 
+def energy(names: list[str]) -> None:
+    """Means over the tolerances with their standard errors, both engines."""
+    print("| scene | exudyn | frames | smallest, largest: exudyn | frames |\n|---|---|---|---|---|")
+    for name in names:
+        means, ranges = [], []
+        for fidelity in ("full", "frame"):
+            errors = [run(name, fidelity, factor)["energy"] for factor in NEAR]
+            spread = statistics.stdev(errors) / math.sqrt(len(errors))
+            means.append(f"{statistics.mean(errors):.2e} +- {spread:.1e}")
+            ranges.append(f"{min(errors):.1e}, {max(errors):.1e}")
+        print(f"| {name} | {' | '.join(means + ranges)} |", flush=True)
+
+
 def growth(counts: list[int]) -> None:
     print("| sections | steps | processor time | a step | exponent | memory |")
     print("|---|---|---|---|---|---|")
@@ -167,6 +185,8 @@ if __name__ == "__main__":
         child(words[0], words[1], float(words[2]))
     elif verb == "growth":
         growth([int(word) for word in words] or [6, 12, 18, 36, 72])
+    elif verb == "energy":
+        energy(words or ["truss2", "ring18-ground", "ring18", "ring18-cable"])
     elif verb == "profile":
         profile((words or ["ring18-cable"])[0])
     else:
