@@ -149,9 +149,11 @@ def _watched(
     missing = again if choices.overrides else open_
     missing, mine = missing[share.holds(missing)], int(share.holds(failed).sum())
     done, total = (int(share.holds(each).sum()) for each in (np.setdiff1d(every, open_), every))
+    checks = [check_of(sample) for sample in _checks(campaign, choices)]
     progress = Progress(
         campaign.path / f"progress-{share.writer}.json", campaign.attributes["campaign_name"],
         total=total, done=done, failed=mine, workers=choices.scheduler.workers,
+        checks=len(checks),
     )  # fmt: skip
 
     watch = Watch(campaign, again)
@@ -171,9 +173,7 @@ def _watched(
         return stop.reason
 
     samples = longest_first(missing, relative_cost(campaign.table, campaign.scene))
-    # First, since the full engine takes longest.
-    samples = [check_of(sample) for sample in _checks(campaign, choices)] + samples
-    samples = watch.in_order(samples)
+    samples = watch.in_order(checks + samples)  # checks first: the full engine takes longest
     work = replace(work, started=progress.started, finished=finished, stop=asked)
     return samples, progress, work
 

@@ -76,10 +76,13 @@ class Progress:
     failed: int
     """Samples of this process's share: all, finished, failed among the finished."""
     workers: int
+    checks: int = 0
+    """Repetitions of samples by the full engine that are to run; they do not count as samples."""
     running: dict[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._before, self._news, self._written = self.done, False, -_FILE_SECONDS
+        self._checked = 0
         self._begin = self._told = time.monotonic()
         notebook = "ipykernel" in sys.modules
         if notebook:
@@ -88,10 +91,15 @@ class Progress:
             from tqdm import tqdm
         self._bar = tqdm(
             total=self.total, initial=self.done, desc=self.name, unit="sample", smoothing=0.1,
-            postfix={"failed": self.failed}, disable=not (notebook or sys.stderr.isatty()),
+            postfix=self._counts(), disable=not (notebook or sys.stderr.isatty()),
         )  # fmt: skip
         if self._bar.disable:
-            self._tell(f"{self.done} of {self.total} samples done, {self.workers} workers")
+            checks = f", {self.checks} checks to run" if self.checks else ""
+            self._tell(f"{self.done} of {self.total} samples done, {self.workers} workers{checks}")
+
+    def _counts(self) -> dict[str, Any]:
+        checks = {"checks": f"{self._checked}/{self.checks}"} if self.checks else {}
+        return {"failed": self.failed} | checks
 
     def _tell(self, text: str) -> None:
         print(f"{self.name}: {text}", file=sys.stderr, flush=True)
@@ -105,15 +113,18 @@ class Progress:
         """Note that it has ended."""
         self.running.pop(result.sample, None)
         self._news = True
-        if sample_of(result.sample) != result.sample:  # a check
-            return
-        self.done += 1
-        self.failed += result.status.failed
-        self._bar.set_postfix(refresh=False, failed=self.failed)
-        self._bar.update()
+        if sample_of(result.sample) != result.sample:
+            self._checked += 1
+            self._bar.set_postfix(self._counts())
+        else:
+            self.done += 1
+            self.failed += result.status.failed
+            self._bar.set_postfix(self._counts(), refresh=False)
+            self._bar.update()
         if self._bar.disable and time.monotonic() - self._told > _PLAIN_SECONDS:
             self._told = time.monotonic()
-            self._tell(f"{self.done} of {self.total} done, {self.failed} failed")
+            checks = f", {self._checked} of {self.checks} checks" if self.checks else ""
+            self._tell(f"{self.done} of {self.total} done, {self.failed} failed{checks}")
 
     def refresh(self) -> None:
         """Write the progress file if there are news, not more often than each second."""

@@ -86,6 +86,7 @@ def test_campaign_merge_and_status_tell_of_the_checks(checked, finished):
         assert float(worst) == pytest.approx(0.001 * times[k], rel=0.05)
         assert (int(sample), float(share), bars) == (k, pytest.approx(0.001, rel=0.01), "-")
         assert float(error) == pytest.approx(times.std(ddof=1) / np.sqrt(5), rel=0.05)
+    assert "0 of 5 samples done, 2 workers, 3 checks to run" in finished[1]
     assert "checked        3 of 3" in checked.run("status", "out")
     assert "3 samples with the full engine, too, 0 to run" in checked.run(*START, "--dry-run")
 
