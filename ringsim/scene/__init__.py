@@ -286,6 +286,6 @@ def load_scene(name_or_path: str | Path, *, beside: Path = Path()) -> Scene:
     if key := next((key for key in ("design", "inputs") if key in table), ""):
         raise InputError(
             f"{path.name}: {key}: this is a campaign file, not a scene: run it with ringsim "
-            "campaign, or give the scene that it names"
+            "campaign (--dry-run only checks it), or give the scene that it names"
         )
     return scene_from_table(table, source=path.name)
