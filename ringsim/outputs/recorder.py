@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ringsim.outputs.family import COORDINATES, OUTPUTS, VARIABLES, Array, Output, axes, holds
 from ringsim.outputs.latching import missed
 from ringsim.outputs.series import Reading, Run, Series, output_times
-from ringsim.outputs.shocks import unresolved
+from ringsim.outputs.shocks import jerked, unresolved
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Energies
@@ -142,7 +142,7 @@ class Recorder(Remembering):
         coordinates = spanned(values, known)
         passed = overloads(self._scene, self._readings, series_of)
         found = ended(self.status, self.fate, self.reason, passed, coordinates, values)
-        told = "" if self.status.failed else unresolved(run)
+        told = "" if self.status.failed else unresolved(run) + jerked(run)
         return replace(found, reason=found.reason + told)
 
 

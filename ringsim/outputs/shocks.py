@@ -1,4 +1,7 @@
-"""Whether the steps of a run were short enough for the shocks of its locks."""
+"""Whether the steps of a run were short enough for the shocks of its locks.
+
+One function a consequence: peaks at base and corners, and rates at which latches are met.
+"""
 
 import math
 
@@ -6,6 +9,10 @@ import numpy as np
 
 from ringsim.layout.layout import layout_of
 from ringsim.outputs.series import Run
+from ringsim.variables import PLANES
+
+_NAMED = 6
+"""V-joints that a sentence names at most."""
 
 STEPS = 8.0
 """Steps in the lowest period of the slowest rod that shocks need.  Measured on `ring18-ground` with
@@ -16,7 +23,7 @@ torque and acceleration to 0.5, 9 and 9 %, with 4 to 0.1, 2 and 8 %, with 2.2 to
 
 def unresolved(run: Run) -> str:
     """What a reason says of shocks that last no longer than steps; empty if none was asked for."""
-    record, solver = run.scene.record, run.scene.solver
+    record = run.scene.record
     locks = run.locks[np.isfinite(run.locks)]
     asked = run.scene.stop is not None and (record.reactions or record.accelerations)
     if not asked or not len(locks) or len(run.angles.times) < 2:
@@ -31,8 +38,38 @@ def unresolved(run: Run) -> str:
     return (
         f"; steps of {1e3 * longest[k]:.3g} ms at the lock at {locks[k]:.6g} s pass over shocks in "
         f"the rods (period {1e3 * period:.3g} ms): for peaks at base and corners reduce "
-        f"{'solver.step' if solver.step_control == 'constant' else 'solver.tolerance'}"
+        f"{_cure(run)}"
     )
+
+
+def jerked(run: Run) -> str:
+    """What a reason says of latches that a lock in the same step may have driven or braked.
+
+    Rates are those of the step's begin: where the shock of an earlier lock had a quarter of a
+    period to arrive, the joint met its latch with another one (on `truss2` with half of it).  Empty
+    where no latch asks for a rate.
+    """
+    latch, locks = run.scene.latch, run.locks
+    if latch is None or not np.any(np.asarray(latch.min_rate) > 0.0):
+        return ""
+    first = np.searchsorted(run.angles.times, locks) - 1
+    ahead = (first[..., None, None] == first) & (
+        locks[..., None, None] - locks > 0.25 * slowest_period(run)
+    )
+    late = np.argwhere(ahead.any(axis=(-2, -1)) & np.isfinite(locks)).tolist()
+    if not late:
+        return ""
+    names = ", ".join(f"{PLANES[plane]} {section + 1}" for plane, section in late[:_NAMED])
+    more = f" and {len(late) - _NAMED} more" if len(late) > _NAMED else ""
+    return (
+        f"; {names}{more}: another joint locked in the step that met the latch, whose rate is that "
+        f"before: reduce {_cure(run)}"
+    )
+
+
+def _cure(run: Run) -> str:
+    constant = run.scene.solver.step_control == "constant"
+    return "solver.step" if constant else "solver.tolerance"
 
 
 def slowest_period(run: Run) -> float:

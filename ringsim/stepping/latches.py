@@ -42,7 +42,7 @@ class Latches(Remembering):
     ``deployed`` are everywhere the V-joints that have reached 180 deg, of the same shape.
     """
 
-    changing = ("caught", "_earlier")
+    changing = ("caught", "_past")
 
     def __init__(self, scene: Any) -> None:
         shape = len(scene.structure.planes), scene.structure.sections
@@ -54,7 +54,7 @@ class Latches(Remembering):
         for fault in (one for one in scene.faults if isinstance(one, FailedLatch)):
             place = scene.structure.planes.index(fault.plane), fault.section - 1
             self._fails[place] = min(self._fails[place], fault.time)
-        self._earlier: Instant | None = None
+        self._past: list[Instant] = []
         self._sure = not (np.isfinite(self._least).any() or np.isfinite(self._fails).any())
 
     def missing(self, deployed: Flags) -> Flags:
@@ -72,8 +72,8 @@ class Latches(Remembering):
         if self._sure:
             self.caught = self.caught | (now.angles >= math.pi)
             return
-        known = [before, now] if self._earlier is None else [self._earlier, before, now]
-        self._earlier = before
+        known = [*self._past, before, now]
+        self._past = known[-3:-1]
         times = np.array([each.time for each in known])
         angles, rates = (np.array([getattr(one, k) for one in known]) for k in ("angles", "rates"))
         self.meet(one for one in meetings(times, angles, rates) if one.time > before.time)
@@ -102,17 +102,30 @@ def meetings(times: Array, angles: Array, rates: Array) -> Iterator[Meeting]:
     times (s).
 
     The step that meets a stop brakes, so that the rate is that of its begin, with the acceleration
-    of the step before; unless it ends on the stop, whose rate is then that of its end.
+    of the steps before over the angle that is left; unless it ends on the stop, whose rate is then
+    that of its end.
     """
     past = angles - math.pi
     for step, plane, section in np.argwhere((past[:-1] < 0.0) & (past[1:] >= 0.0)).tolist():
         ends, place = slice(step, step + 2), (plane, section)
         own, speed = past[:, plane, section], rates[:, plane, section]
         time = crossing(times[ends], own[ends], speed[ends])
-        met = float(speed[step])
         if own[step + 1] < ON_STOP:
             met = float(speed[step + 1])
-        elif step > 0 and own[step - 1] < 0.0:
-            bend = (speed[step] - speed[step - 1]) / (times[step] - times[step - 1])
-            met += float(bend) * (time - float(times[step]))
+        else:
+            bend = _acceleration(times, own, speed, step)
+            met = math.sqrt(max(max(speed[step], 0.0) ** 2 - 2.0 * bend * own[step], 0.0))
         yield Meeting(place, time, met)
+
+
+def _acceleration(times: Array, past: Array, rates: Array, step: int) -> float:
+    """That of the two steps before, the smaller one; none where they differ in sign, or one touched
+    the stop.
+
+    A lock of another joint jerks all rates within one step: foretold from that step alone, rates
+    of coarse runs were off by half, or negative.
+    """
+    if step < 2 or (past[step - 2 : step] >= 0.0).any():
+        return 0.0
+    one, two = np.diff(rates[step - 2 : step + 1]) / np.diff(times[step - 2 : step + 1])
+    return float(min(one, two, key=abs)) if one * two > 0.0 else 0.0
