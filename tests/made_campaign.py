@@ -20,6 +20,7 @@ TIMES = np.linspace(0.0, 10.0, 21)
 TEXT = """
 name = "made"
 title = "Made by hand <&> quoted"
+question = "Does it open & is it <3 deg?"
 seed = 3
 scene = "ring18-cable"
 design = {{ kind = "{kind}", samples = {samples} }}
@@ -95,7 +96,7 @@ def made_campaign(
     for name, values, units in (
         ("rods_young_modulus", 1e11 + 1e9 * np.arange(samples), "Pa"),
         ("cables_upper_friction_coefficient", np.arange(samples)[:, None] + np.ones((1, 3)), "m"),
-        ("cables_lower_winch_stop_time", np.where(np.arange(samples) % 2, "none", "3.0"), "1"),
+        ("cables_lower_winch_stop_time", np.where(np.arange(samples) % 2, "none", "3.0"), "s"),
     ):
         dims = ("sample", "pulley")[: values.ndim]
         law = json.dumps({"kind": "uniform", "low": 0.0, "high": 9.0})

@@ -71,6 +71,8 @@ class Specification(Model):
     """Word for the campaign, and for the folder of its results below ``runs``."""
     title: Annotated[str, Field(max_length=300)] = ""
     """One line for figures and reports."""
+    question: Annotated[str, Field(max_length=1000)] = ""
+    """What the campaign is to answer, and for which decision; its report begins with it."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     """With its number, all that the inputs of a sample depend on."""
     scene: str

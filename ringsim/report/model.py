@@ -6,10 +6,16 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from ringsim.analysis.campaign_samples import campaign_file, inputs
+from ringsim.analysis.campaign_samples import campaign_file, distribution_of, inputs
 from ringsim.campaign.specification import flat
 from ringsim.refusal import show
 from ringsim.scene import builtin_scenes
+
+
+def paths_of(variable: xr.DataArray) -> list[str]:
+    """The scene's paths that take the values of an input: one, or all that share it."""
+    shared = distribution_of(variable).get("shared")
+    return shared or [str(variable.attrs.get("path") or variable.name)]
 
 
 class Value(NamedTuple):
@@ -18,7 +24,7 @@ class Value(NamedTuple):
     path: str
     value: str
     origin: str
-    """drawn, campaign, inferred, scene or default."""
+    """drawn, drawn in part, campaign, inferred, scene or default."""
     comment: str
 
 
@@ -32,7 +38,7 @@ def values(campaign: xr.Dataset) -> tuple[list[Value], str]:
     settings = flat(wanted.get("set", {}))
     called = str(campaign.attrs.get("campaign", ""))
     settings |= dict.fromkeys(re.findall(r"^# called with --set (\S+) =", called, re.MULTILINE))
-    drawn = [str(campaign[name].attrs.get("path", "")) for name in inputs(campaign)]
+    drawn = [path for name in inputs(campaign) for path in paths_of(campaign[name])]
     text = builtin_scenes().get(str(wanted.get("scene", "")), "")
     written, comments = flat(tomllib.loads(text)), _comments(text)
     rows = []
@@ -40,6 +46,8 @@ def values(campaign: xr.Dataset) -> tuple[list[Value], str]:
         comment, origin = comments.get(path, ""), "scene"
         if _under(path, drawn):
             origin = "drawn"
+        elif _holds(path, drawn):
+            origin = "drawn in part"
         elif _under(path, settings):
             origin, comment = "campaign", ""
         elif "inferred" in comment:
@@ -47,12 +55,19 @@ def values(campaign: xr.Dataset) -> tuple[list[Value], str]:
         elif text and path not in written:
             origin = "default"
         rows.append(Value(path, show(value), origin, comment))
+    known = [row.path for row in rows]
+    unset = [path for path in drawn if not _under(path, known) and not _holds(path, known)]
+    rows += [Value(path, "-", "drawn", "") for path in unset]
     head = re.match(r"(?:#.*\n)+", text)
     return rows, " ".join(re.sub(r"^# ?", "", head[0], flags=re.MULTILINE).split()) if head else ""
 
 
 def _under(path: str, others: Any) -> bool:
     return any(path == each or path.startswith((f"{each}.", f"{each}[")) for each in others)
+
+
+def _holds(path: str, others: Any) -> bool:
+    return any(_under(each, [path]) for each in others)
 
 
 def _comments(text: str) -> dict[str, str]:

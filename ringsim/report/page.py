@@ -61,7 +61,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     design.pop("samples", None)  # a call with --samples changes it
     context: dict[str, Any] = {
         "title": campaign.attrs.get("title", "Campaign"),
-        "name": campaign.attrs.get("campaign_name", ""),
+        "name": campaign.attrs.get("campaign_name", ""), "question": wanted.get("question", ""),
         "samples": campaign.sizes["sample"], "used": int(good(campaign).sum()),
         "not_run": int((endings(campaign) == "not run").sum()),
         "design": design.pop("kind", "unknown"), "design_more": design,

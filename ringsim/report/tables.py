@@ -19,6 +19,7 @@ from ringsim.analysis.campaign_samples import (
 )
 from ringsim.analysis.quantities import CHECKED
 from ringsim.refusal import show
+from ringsim.report.model import paths_of
 from ringsim.tables import Table, interval_text, number_text
 from ringsim.variables import GOALS, Cause
 
@@ -103,7 +104,8 @@ def drawn(campaign: xr.Dataset) -> Rows:
     for name in inputs(campaign):
         variable = campaign[name]
         says, values = distribution_of(variable), variable.to_numpy()
-        paths = says.pop("shared", None) or [str(variable.attrs.get("path") or name)]
+        paths = paths_of(variable)
+        says.pop("shared", None)
         says.pop("each_section", None)
         kind = says.pop("kind", says.pop("text", ""))
         law = ", ".join([kind, *(f"{key} {_short(value)}" for key, value in says.items())])

@@ -70,7 +70,7 @@ def test_tables(
     assert samples["rods_young_modulus (Pa)"].astype(float).tolist() == [
         1e11 + 1e9 * k for k in range(4)
     ]
-    assert samples["cables_lower_winch_stop_time"].tolist() == ["3.0", "none"] * 2
+    assert samples["cables_lower_winch_stop_time (s)"].tolist() == ["3.0", "none"] * 2
     courses = pd.read_csv(file.parent / "tables" / "campaign-sample-plane-section-time.csv")
     assert list(courses) == ["sample", "plane", "section", "time (s)", "opening_angle (degree)"]
     found = courses.set_index(["sample", "plane", "section", "time (s)"]).iloc[:, 0].to_xarray()

@@ -22,7 +22,7 @@ from ringsim.dataset import save
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.plots.campaign import figures as of_campaigns
 from ringsim.plots.ring import lines_at
-from ringsim.report import tables
+from ringsim.report import model, tables
 from ringsim.report.page import LARGEST, page
 from ringsim.report.player import player
 from ringsim.shapes import COMPUTED, FROM_ANGLES
@@ -144,6 +144,8 @@ def test_samples_that_ended_alike_share_a_row_and_words_have_no_unit() -> None:
     assert [row[1] for row in rows] == ["failed: timeout", "stalled"]
     assert rows[1][0] == ", ".join(map(str, range(5, 25))) + " and 5 more"
     assert (rows[1][-1], more) == ("ringsim replay made 5", 0)
+    assert {row[0]: row[1] for row in tables.drawn(campaign)}["cables.lower_winch_stop_time"] == "s"
+    campaign["cables_lower_winch_stop_time"].attrs.pop("units")  # as of words alone
     assert {row[0]: row[1] for row in tables.drawn(campaign)}["cables.lower_winch_stop_time"] == "-"
 
 
@@ -155,9 +157,33 @@ def test_every_value_of_the_scene_has_its_origin(made: tuple[str, xr.Dataset, st
         ("structure.half_bar", "0.2889", "scene"),
         ("rods.elements", "1", "default"),
         ("rods.young_modulus", "120000000000.0", "drawn"),
+        # Drawn, and not in the scene, which leaves it out.
+        ("cables.lower_winch_stop_time", "-", "drawn"),
     ):
         at = cells.index(path, cells.index("Origin"))
         assert cells[at + 1 : at + 3] == [value, origin]
+
+
+def test_inputs_of_one_place_and_of_several_paths_have_their_origin() -> None:
+    campaign = made_campaign(4)
+    law = {"kind": "uniform", "shared": ["rods.young_modulus", "rods.density"]}
+    campaign["rods_young_modulus"].attrs["distribution"] = json.dumps(law)
+    one = 'cables.upper.friction.coefficient["section 3 V"]'
+    campaign["cables_upper_friction_coefficient"].attrs["path"] = one
+    found = {each.path: each.origin for each in model.values(campaign)[0]}
+    assert found["rods.young_modulus"] == found["rods.density"] == "drawn"
+    assert found["cables.upper.friction.coefficient"] == "drawn in part"
+    assert found["cables.lower.friction.coefficient"] == "inferred"
+    assert one not in found
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_the_page_begins_with_the_question() -> None:
+    campaign = made_campaign(3)
+    asked, text = '<p id="question">Does it open &amp; is it &lt;3 deg?</p>', page(campaign, "here")
+    assert text.index("</h1>") < text.index(asked) < text.index("<main>")
+    campaign.attrs["campaign"] = campaign.attrs["campaign"].replace("question", "# question")
+    assert 'id="question"' not in page(campaign, "here")
 
 
 def test_the_player_holds_what_was_computed(made: tuple[str, xr.Dataset, str]) -> None:
