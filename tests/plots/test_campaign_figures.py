@@ -31,6 +31,7 @@ from ringsim.plots.campaign.margin import margin
 from ringsim.plots.campaign.motors import motors
 from ringsim.plots.campaign.one_by_one import moves, one_by_one
 from ringsim.plots.campaign.tension import tension
+from ringsim.variables import Fate
 
 GOOD = [0, 1, 3, 4, 6]
 
@@ -154,6 +155,32 @@ def test_distributions_are_steps_with_limits(mixed: xr.Dataset) -> None:
     np.testing.assert_allclose(dots.get_xdata(), told)
     one = distributions(made_campaign(1)).axes[0]
     assert not [line for line in one.lines if line.get_marker() == "o"]
+
+
+def test_what_did_not_happen_keeps_a_distribution_below_its_verdict() -> None:
+    campaign = made_campaign(20, stalled=(1, 4, 7), failed=(2,), not_run=(5,))
+    deployed = np.isfinite(campaign["deployment_time"].values)
+    times = 30.0 + np.arange(20.0)
+    campaign["deployment_time"][:] = np.where(deployed, times, np.nan)
+    (panel,) = (
+        a for a in distributions(campaign).axes if a.get_xlabel().startswith("Time at which")
+    )
+    step, dots, limit = panel.lines
+    assert step.get_ydata()[-1] == pytest.approx(15 / 18)
+    at = step.get_ydata()[step.get_xdata() <= limit.get_xdata()[0]][-1]
+    found = analyse(campaign).sel(requirement="deployment_time")
+    assert at == pytest.approx(float(found["probability"]))
+    # By numpy, with what never deployed beyond all times.
+    ran = np.append(times[deployed], np.full(3, 1e9))
+    np.testing.assert_allclose(dots.get_xdata(), np.quantile(ran, [0.05, 0.5]))
+    assert dots.get_ydata().tolist() == [0.05, 0.5]
+    assert "did not happen in the other samples" in words(distributions(campaign))
+    # A model that tells no time of what deployed is not an antenna that fails.
+    campaign["outcome"][:] = int(Fate.DEPLOYED)
+    (panel,) = (
+        a for a in distributions(campaign).axes if a.get_xlabel().startswith("Time at which")
+    )
+    assert panel.lines[0].get_ydata()[-1] == pytest.approx(1.0)
 
 
 def test_convergence_ends_at_mean_and_quantile(mixed: xr.Dataset) -> None:
