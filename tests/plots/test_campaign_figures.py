@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from made_campaign import SECTIONS, TIMES, lags, made_campaign, with_motors
+from made_campaign import made_campaign, with_motors
 from matplotlib.figure import Figure
 
-from ringsim.analysis import courses as courses_module
 from ringsim.analysis import reading as blocks_module
 from ringsim.analysis.campaign_samples import median_and_worst
-from ringsim.analysis.courses import course, courses
 from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
@@ -23,9 +21,7 @@ from ringsim.plots.campaign.base import base_load
 from ringsim.plots.campaign.by_input import by_input, drawn
 from ringsim.plots.campaign.convergence import convergence
 from ringsim.plots.campaign.distributions import distributions
-from ringsim.plots.campaign.fan import fan
 from ringsim.plots.campaign.figures import PICTURES, draw_campaign, figures_of
-from ringsim.plots.campaign.lag_map import lag_map
 from ringsim.plots.campaign.lock_order import lock_order, shares
 from ringsim.plots.campaign.margin import margin
 from ringsim.plots.campaign.motors import motors
@@ -51,78 +47,6 @@ def words(figure: Figure) -> str:
     texts = [figure.get_supxlabel(), *(each.get_title().get_text() for each in figure.legends)]
     labels = [t.get_text() for legend in figure.legends for t in legend.get_texts()]
     return " ".join(" ".join([*texts, *labels]).split())
-
-
-def deviation(campaign: xr.Dataset) -> np.ndarray:
-    """By numpy alone, of the samples that count; every run ends at the last record."""
-    angle = campaign["opening_angle"].transpose("sample", "plane", "section", "time").values[GOOD]
-    return angle - angle.mean(axis=(1, 2), keepdims=True)
-
-
-def test_the_fan_shows_quantiles_of_the_deviation(mixed: xr.Dataset) -> None:
-    figure, wanted = fan(mixed), deviation(mixed)
-    for section, axes in enumerate(figure.axes):
-        middles = [line for line in axes.lines if line.get_label() == "median"]
-        assert len(middles) == 2
-        for plane, line in enumerate(middles):
-            np.testing.assert_allclose(line.get_xdata(), TIMES / 10.0, atol=1e-12)
-            expected = np.median(wanted[:, plane, section], axis=0)
-            np.testing.assert_allclose(line.get_ydata(), expected, atol=1e-5)
-            every, most = axes.collections[2 * plane : 2 * plane + 2]
-            for band, levels in ((every, (0.0, 1.0)), (most, (0.05, 0.95))):
-                low, high = np.quantile(wanted[:, plane, section], levels, axis=0)
-                drawn_at = band.get_paths()[0].vertices[:, 1]
-                assert drawn_at.min() == pytest.approx(low.min(), abs=1e-5)
-                assert drawn_at.max() == pytest.approx(high.max(), abs=1e-5)
-        worst = [line for line in axes.lines if line.get_label() != "median"]
-        assert [np.abs(w.get_ydata()).max() for w in worst] == pytest.approx(
-            np.abs(lags(6)[:, section]), abs=1e-5
-        )
-    assert "worst: sample 6" in words(figure)
-    assert figure.axes[0].get_xlabel().startswith("Share of the run")
-    figure.draw_without_rendering()
-    box = figure.legends[0].get_window_extent()
-    assert 0 <= box.x0 < box.x1 <= figure.bbox.width  # few sections make a narrow figure
-
-
-def test_runs_of_different_length_are_laid_over_each_other() -> None:
-    campaign = made_campaign(3)
-    campaign["opening_angle"][:] = 0.0
-    slope = xr.DataArray([[1.0, 2.0, 3.0, 4.0]] * 2, dims=("plane", "section"))
-    campaign["opening_angle"][:] = (campaign.time * slope).transpose("plane", "section", "time")
-    campaign["deployment_time"][:] = [3.3, 5.0, 10.0]
-    share = np.linspace(0.0, 1.0, 7)
-    for sample, end in enumerate((3.3, 5.0, 10.0)):
-        np.testing.assert_allclose(
-            course(campaign, sample, share).isel(share=-1), end * (slope - 2.5), rtol=1e-6
-        )
-    np.testing.assert_allclose(courses(campaign).median.isel(share=-1), 5.0 * (slope - 2.5))
-
-
-def test_quantiles_do_not_depend_on_how_the_file_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A sample at a time and a point of the axis at a time, with a record lost in one sample."""
-    campaign = made_campaign(9, failed=(2,), not_run=(5,))
-    campaign["opening_angle"][3, :, 1, 4] = np.nan
-    campaign["opening_angle"][4, :, :, 1:] = np.nan  # one record is no course
-    whole = courses(campaign)
-    monkeypatch.setattr(blocks_module, "BLOCK_BYTES", 1)
-    monkeypatch.setattr(courses_module, "_PASSES", 1000)
-    monkeypatch.setattr(courses_module, "HELD_BYTES", 4 * 8 * 8)
-    parts = courses(campaign)
-    xr.testing.assert_allclose(whole.bands, parts.bands, rtol=0.0, atol=1e-6)  # sums of floats
-    assert whole.samples.tolist() == parts.samples.tolist() == [0, 1, 3, 6, 7, 8]
-    single = [course(campaign, k, whole.bands["share"].values) for k in parts.samples]
-    expected = np.quantile(np.array(single), (0.0, 0.05, 0.5, 0.95, 1.0), axis=0)
-    np.testing.assert_allclose(parts.bands, expected, atol=1e-5)
-
-
-def test_the_map_shows_the_median_and_the_worst(mixed: xr.Dataset) -> None:
-    figure, wanted = lag_map(mixed), deviation(mixed)
-    upper, lower = figure.axes[:2], figure.axes[2:4]
-    for plane, pair in enumerate((upper, lower)):
-        for axes, values in zip(pair, (np.median(wanted, axis=0), wanted[-1]), strict=True):
-            image = axes.collections[0].get_array().reshape(SECTIONS, -1)
-            np.testing.assert_allclose(image, values[plane], atol=1e-5)
 
 
 def test_lock_order_counts_ties_by_halves_and_what_stays_open() -> None:
