@@ -37,6 +37,11 @@ def numbers(campaign: xr.Dataset, name: str) -> Array:
     return np.where(values < 0, np.nan, values) if counts else values
 
 
+def run(campaign: xr.Dataset) -> Mask:
+    """Which samples have run, whatever came of it."""
+    return np.asarray(campaign["status"].to_numpy() >= 0)
+
+
 def good(campaign: xr.Dataset) -> Mask:
     """Which samples have numbers that hold."""
     return np.asarray(campaign["status"].to_numpy() == Status.OK)

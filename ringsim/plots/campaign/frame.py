@@ -22,7 +22,6 @@ LOOKS = {
     "stalled": (style.VERMILLION, "s"),
     "overloaded": (style.PURPLE, "^"),
     "cut off": (style.GREEN, "v"),
-    "not run": (style.GREY, "|"),
 }
 """Colour and marker of an ending; the marker tells what the colour may not."""
 FAILED = tuple((style.INK, marker) for marker in "x+1234")
