@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 from made_campaign import made_campaign, with_motors
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ringsim.analysis import reading as blocks_module
@@ -16,6 +17,7 @@ from ringsim.analysis.campaign_samples import median_and_worst
 from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
+from ringsim.plots import style
 from ringsim.plots.campaign import by_ending
 from ringsim.plots.campaign.base import base_load
 from ringsim.plots.campaign.by_input import by_input, drawn
@@ -25,7 +27,7 @@ from ringsim.plots.campaign.figures import PICTURES, draw_campaign, figures_of
 from ringsim.plots.campaign.lock_order import lock_order, shares
 from ringsim.plots.campaign.margin import margin
 from ringsim.plots.campaign.motors import motors
-from ringsim.plots.campaign.one_by_one import moves, one_by_one
+from ringsim.plots.campaign.one_by_one import moves, named, one_by_one
 from ringsim.plots.campaign.tension import tension
 from ringsim.variables import Fate
 
@@ -248,6 +250,52 @@ def test_of_many_samples_some_of_every_ending_are_drawn(monkeypatch: pytest.Monk
     assert "4 of them are drawn" in words(motors(campaign))
 
 
+def joined(panel: Axes) -> list[list[float]]:
+    """Samples that a line joins, without that of the base case across the panel."""
+    lines = [line.get_xdata() for line in panel.lines if line.get_color() == style.PALE]
+    return [list(each) for each in lines if len(each) > 1]
+
+
+def test_lines_join_values_of_one_scale_alone() -> None:
+    """Not places, words, nor what is on both sides of a sample without a value."""
+    campaign = made_campaign(13, failed=(3,), not_run=(12,))
+    campaign.attrs["design"] = '{"kind": "one-at-a-time"}'
+    campaign["rods_young_modulus"][:] = [1e11, 2e11, 3e11, 4e11, 5e11, 6e11, *[1e11] * 7]
+    friction = np.ones((13, 3))
+    friction[[6, 7], [0, 1]] = 2.0
+    campaign["cables_upper_friction_coefficient"][:] = friction
+    laws = ["none"] * 8 + ["3.0", "4.0", "never", "later", "none"]
+    campaign["cables_lower_winch_stop_time"][:] = laws
+    figure = one_by_one(campaign)
+    assert joined(figure.axes[-1]) == [[1, 2], [4, 5]]
+    assert "not run" not in " ".join(t.get_text() for t in figure.legends[0].get_texts())
+    campaign["cables_lower_winch_stop_time"][10:12] = ["5.0", "6.0"]
+    assert joined(one_by_one(campaign).axes[-1]) == [[1, 2], [4, 5], [8, 9, 10, 11]]
+
+
+@pytest.mark.parametrize("count", [1, 2, 54, 72, 73, 100, 501])
+def test_places_are_named_at_equal_steps_and_at_both_ends(count: int) -> None:
+    places = np.array(named(count))
+    assert (places[0], places[-1]) == (0, count - 1)
+    assert len(places) <= 73
+    steps = np.diff(places)
+    assert (steps[:-1] == steps[:1]).all()
+    if count <= 72:
+        assert places.tolist() == list(range(count))
+    elif len(steps):
+        assert 0.5 * steps[0] < steps[-1] <= 1.5 * steps[0]
+
+
+def test_labels_of_inputs_break_between_their_parts() -> None:
+    campaign = made_campaign(3)
+    campaign["rods_young_modulus"].attrs["path"] = (
+        'cables.upper.friction.coefficient["section 3 V"]'
+    )
+    labels = [axes.get_xlabel() for axes in by_input(campaign).axes]
+    assert labels[0] == 'cables.upper.friction.coefficient\n["section 3 V"] (Pa)'
+    assert labels[1] == "cables.upper_friction_coefficient\nmean (m)"
+
+
 def test_one_at_a_time_names_every_change() -> None:
     campaign = made_campaign(6, stalled=(5,))
     campaign.attrs["design"] = '{"kind": "one-at-a-time"}'
@@ -264,6 +312,7 @@ def test_one_at_a_time_names_every_change() -> None:
     (panel,) = (a for a in figure.axes if a.get_title(loc="left").startswith("largest tension"))
     points = np.concatenate([c.get_offsets() for c in panel.collections])
     np.testing.assert_allclose(points, np.stack([np.arange(6), 20.0 + np.arange(6)], axis=1))
+    assert not joined(panel)
     names = {picture.name for picture, _ in figures_of(campaign)}
     assert "one_by_one" in names
     assert not {"distributions", "convergence"} & names

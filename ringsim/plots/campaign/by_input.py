@@ -15,6 +15,7 @@ from ringsim.analysis.campaign_samples import endings, inputs, judged_by
 from ringsim.analysis.quantities import good, numbers, run
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, head
+from ringsim.plots.campaign.names import WIDE, in_lines
 
 _MANY = 500
 """Samples from which on marks are drawn as dots: as shapes they would make a page too large."""
@@ -94,5 +95,9 @@ def _scatter(axes: Axes, x: Any, y: Any, words: NDArray[np.str_]) -> None:
 def _label(variable: xr.DataArray) -> str:
     units = str(variable.attrs.get("units", "1"))
     words = str(variable.attrs.get("path") or variable.name)
-    words = f"{words}, mean" if variable.ndim > 1 else words
-    return textwrap.fill(words if units == "1" else f"{words} ({units})", 38)
+    what = ", mean" if variable.ndim > 1 else ""
+    what += "" if units == "1" else f" ({units})"
+    words = in_lines(words)
+    if len(words.rpartition("\n")[2]) + len(what) > WIDE:
+        what = "\n" + what.lstrip(", ")
+    return words + what
