@@ -109,34 +109,6 @@ def test_what_did_not_happen_keeps_a_distribution_below_its_verdict() -> None:
     assert panel.lines[0].get_ydata()[-1] == pytest.approx(1.0)
 
 
-def test_convergence_ends_at_mean_and_quantile(mixed: xr.Dataset) -> None:
-    figure = convergence(mixed)
-    values = mixed["peak_tension"].values[GOOD]
-    panel = figure.axes[-1]
-    mean, quantile = panel.lines
-    assert mean.get_ydata()[-1] == pytest.approx(values.mean())
-    assert mean.get_ydata()[1] == pytest.approx(values[:2].mean())
-    assert quantile.get_ydata()[-1] == pytest.approx(np.quantile(values, 0.95))
-    assert not panel.collections  # five samples have no interval
-    assert not convergence(made_campaign(9, kind="sobol")).axes[-1].collections
-
-
-def test_the_band_of_convergence_is_the_interval_of_the_analysis() -> None:
-    campaign = made_campaign(12)
-    figure = convergence(campaign)
-    (band,) = figure.axes[-1].collections
-    drawn_at = band.get_paths()[0].vertices
-    assert drawn_at[:, 0].min() == 8
-    ends = np.unique(drawn_at[drawn_at[:, 0] == 12, 1])
-    known = analyse(campaign)["peak_tension_interval"].sel(statistic="mean")
-    np.testing.assert_allclose(ends, np.sort(known))
-    assert "95 % interval of the mean" in words(figure)
-    one = convergence(made_campaign(1))
-    assert one.axes[-1].get_title(loc="left").endswith("n = 1")
-    assert all(float(tick).is_integer() for tick in one.axes[-1].get_xticks())
-    assert "interval" not in words(one)
-
-
 def test_tension_by_span(mixed: xr.Dataset) -> None:
     figure = tension(mixed)
     spans = mixed["span"].values
@@ -294,6 +266,23 @@ def test_labels_of_inputs_break_between_their_parts() -> None:
     labels = [axes.get_xlabel() for axes in by_input(campaign).axes]
     assert labels[0] == 'cables.upper.friction.coefficient\n["section 3 V"] (Pa)'
     assert labels[1] == "cables.upper_friction_coefficient\nmean (m)"
+
+
+def test_of_blocks_figures_show_the_samples_that_the_analysis_takes() -> None:
+    campaign = made_campaign(40)
+    campaign.attrs["design"] = '{"kind": "saltelli", "samples": 8, "replicates": 2}'
+    rows = np.array(["A", "AB: modulus", "AB: friction", "AB: stop", "B"] * 8)
+    campaign["block_row"] = "sample", rows
+    own = np.isin(rows, ["A", "B"])
+    (axes,) = (
+        a for a in distributions(campaign).axes if a.get_xlabel().startswith("Largest tension")
+    )
+    np.testing.assert_allclose(axes.lines[0].get_xdata()[1:], 20.0 + np.flatnonzero(own))
+    figure = convergence(campaign)
+    (axes,) = (a for a in figure.axes if a.get_title(loc="left").startswith("Largest tension"))
+    told = analyse(campaign)["peak_tension"].sel(statistic="mean")
+    assert axes.lines[0].get_ydata()[-1] == pytest.approx(float(told))
+    assert "16 of 16 samples; none lost. Of blocks the samples A and B" in words(figure)
 
 
 def test_one_at_a_time_names_every_change() -> None:

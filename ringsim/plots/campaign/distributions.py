@@ -10,7 +10,7 @@ from ringsim.analysis.intervals import quantile
 from ringsim.analysis.quantities import tells_of
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import head
+from ringsim.plots.campaign.frame import head, standing
 
 _LEVELS = [0.05, 0.5, 0.95]
 """Where dots are."""
@@ -42,6 +42,7 @@ def distributions(campaign: xr.Dataset) -> Figure:
     Samples whose run ended before what a number is about happened count, too, as they do in
     verdicts: their curve ends below 100 %.
     """
+    campaign, blocks = standing(campaign)
     names = scalars(campaign)
     figure, panels, columns = style.new_panels(len(names), 3.7, 3.0, 0.9)
     short, limited = False, any(limits(campaign, name) for name in names)
@@ -72,6 +73,7 @@ def distributions(campaign: xr.Dataset) -> Figure:
         if number % columns == 0:
             axes.set_ylabel("Samples at or below")
     most = max((int(tells_of(campaign, name).sum()) for name in names), default=0)
+    notes = f" Dots: quantiles of 5, 50 and 95 %.{blocks}"
     ends = (
         " Where a curve ends below 100 %, it did not happen in the other samples: they count in "
         "shares and dots, and violate limits."
@@ -80,6 +82,6 @@ def distributions(campaign: xr.Dataset) -> Figure:
         figure,
         campaign,
         "Distributions",
-        f"{told(campaign, most)}. Dots: quantiles of 5, 50 and 95 %.{ends if short else ''}",
+        f"{told(campaign, most)}.{notes}{ends if short else ''}",
     )
     return figure

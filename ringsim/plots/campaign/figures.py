@@ -97,7 +97,9 @@ PICTURES = (
         of=explained,
     ),
     Picture(
-        "convergence", convergence, "Mean and 95 % quantile as samples come in", of=_converges,
+        "convergence", convergence,
+        "Mean, 95 % quantile and probability of each requirement as samples come in",
+        of=_converges,
     ),
     Picture(
         "motors", motors, "Torque and speed of the motors over time, by ending",
