@@ -90,7 +90,7 @@ def sensitivity(
     # What has not run is not lost, nor is it missing by its inputs.
     ran = ran_whole = run(campaign)
     if blocks is not None:
-        ran_whole = ran.reshape(blocks.rows.shape).all(axis=1)
+        ran_whole = np.asarray(ran.reshape(blocks.rows.shape).all(axis=1))
         ran = np.repeat(ran_whole, blocks.size)
     count = int(ran.sum())
     tested: dict[bytes, tuple[float, list[given_data.Bins]]] = {}
