@@ -1,6 +1,8 @@
-"""What pictures of studies are drawn from, where it is computed for them alone."""
+"""Pictures of the documentation: what some are drawn from, and where they stand."""
 
 from __future__ import annotations
+
+import re
 
 import numpy as np
 import pytest
@@ -20,3 +22,15 @@ def test_no_sample_is_left_out_above_a_limit(monkeypatch: pytest.MonkeyPatch) ->
         drawn = above[np.searchsorted(places, limit, side="right") - 1]
         assert drawn == sum(value > limit for value in values.tolist())
     assert above[-3:].tolist() == [1, 0, 0]
+
+
+def test_examples_stand_beside_pictures_that_exist(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    from made_pages import gallery
+
+    shown = re.findall(r"^## `(\w+)`|^!\[.+\]\((\S+)\)$", gallery(), re.MULTILINE)
+    names = [picture for _, picture in shown if picture]
+    assert len(names) == 3
+    assert all((ROOT / "docs" / name).is_file() for name in names)
+    before = [shown[k - 1][0] for k, (_, picture) in enumerate(shown) if picture]
+    assert before == ["analysis", "campaign", "first_run"]
