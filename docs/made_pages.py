@@ -25,6 +25,12 @@ from ringsim.units import Model
 from ringsim.variables import Variable
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
+PICTURES = {
+    "first_run": ("ring_opening.png", "A ring opens; this one has 18 sections and two cables"),
+    "campaign": ("fan.png", "Fan of a larger campaign: how far each section is ahead or behind"),
+    "analysis": ("friction_scatter_matters.png", "What matters in a larger campaign"),
+}
+"""Of the folder images, beside the example that leads to such a picture."""
 MARK = re.compile(r"^<!-- made: ([a-z]+)(?: (\w+))? -->$", re.MULTILINE)
 
 
@@ -144,9 +150,11 @@ def gallery() -> str:
         words = ast.get_docstring(ast.parse(text)) or ""
         title, _, rest = words.partition("\n\n")
         code = text.split('"""', 2)[2].strip()
+        name, shows = PICTURES.get(path.stem, ("", ""))
+        picture = f"![{shows}](images/{name})\n\n*{shows}.*\n\n" if name else ""
         parts.append(
             f"## `{path.stem}`\n\n{_markdown(title)}\n\n{_markdown(rest)}\n\n"
-            f"```sh\npython examples/{path.name}\n```\n\n```python\n{code}\n```"
+            f"{picture}```sh\npython examples/{path.name}\n```\n\n```python\n{code}\n```"
         )
     return "\n\n".join(parts)
 

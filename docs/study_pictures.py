@@ -211,6 +211,14 @@ def fitted(plain: xr.Dataset, limits: np.ndarray, most: int = 60) -> np.ndarray:
     return found
 
 
+def exceeded(values: np.ndarray, until: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places where the number of values above changes, in order and up to a last one, and how many
+    are above each: none from the largest value on.
+    """
+    places = np.append(np.sort(values), until)
+    return places, (values > places[:, None]).sum(axis=1)
+
+
 @style.styled
 def rare_asynchrony(runs: Path) -> Figure:
     """Probability to be above a limit: plain samples with their exact band, a fit to them, and the
@@ -218,15 +226,15 @@ def rare_asynchrony(runs: Path) -> Figure:
     """
     with xr.open_dataset(runs / "plain" / "campaign.nc") as file:
         plain = file.isel(sample=good(file)).load()  # a campaign that was ended early has gaps
-    values = np.sort(plain["asynchrony_max"].to_numpy())
+    values = plain["asynchrony_max"].to_numpy()
     limits = np.array([3.2, 3.6, 3.9, 4.2, 4.6, 5.0, 5.3])
     figure = Figure(figsize=(8.0, 4.6))
     axes = figure.subplots()
-    above = np.arange(len(values) - 1, 0, -1)
+    places, above = exceeded(values, 5.6)
     band = np.array([share_interval(count, len(values)) for count in above.tolist()])
-    axes.fill_between(values[:-1], *band.T, step="post", color=style.BLUE, alpha=0.2, linewidth=0.0,
+    axes.fill_between(places, *band.T, step="post", color=style.BLUE, alpha=0.2, linewidth=0.0,
                       label=f"{len(values)} plain samples, 95 %, exact")  # fmt: skip
-    axes.step(values[:-1], above / len(values), where="post", color=style.BLUE, linewidth=1.2)
+    axes.step(places, above / len(values), where="post", color=style.BLUE, linewidth=1.2)
     grid = np.linspace(2.5, 5.6, 32)
     fit = fitted(plain, np.append(grid, limits))
     axes.plot(grid, fit[: len(grid)], color=style.INK, linewidth=1.0, linestyle=(0, (4, 3)),
@@ -246,11 +254,13 @@ def rare_asynchrony(runs: Path) -> Figure:
             f"| {limit:g} | {count} | {count / len(values):.2g} | {exact[0]:.2g} .. {exact[1]:.2g} "
             f"| {each.mean():.2g} | {low:.2g} .. {high:.2g} | {fits:.2g} | {each}"
         )
+        label = "" if limit > limits[0] else "mean of the replicates, 95 %"
         axes.errorbar(limit, each.mean(), [[each.mean() - low], [high - each.mean()]], capsize=3,
-                      color=style.VERMILLION, marker="s", markersize=4, linewidth=1.0)  # fmt: skip
+                      color=style.VERMILLION, marker="s", markersize=4, linestyle="none",
+                      elinewidth=1.0, label=label)  # fmt: skip
     axes.set(yscale="log", xlabel="Largest asynchrony (degree)", ylabel="Probability of more")
     axes.set(xlim=(2.5, 5.6), ylim=(1e-6, 1.0))
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
 

@@ -57,8 +57,8 @@ class Ring:
     def fan(self, quantiles: tuple[float, ...] = (0.0, 0.05, 0.5, 0.95, 1.0)) -> xr.DataArray:
         """Quantiles over the samples of each V-joint's deviation from the mean opening angle.
 
-        Along (quantile, plane, section, share), degree; ``share`` is that of the run until its last
-        lock or its end, as runs last differently long.
+        Along (quantile, plane, section, time), degree.  Runs that are over count on: deployed rings
+        have no deviation, others that of their last record.
 
         InputError if it is no campaign, or no sample has recorded opening angles.
         """

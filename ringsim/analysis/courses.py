@@ -1,7 +1,7 @@
-"""Courses of all samples on one axis, the share of each run that has passed, and their quantiles.
+"""Courses of all samples over time, and their quantiles.
 
-Angles of all samples are never in memory together: blocks of samples are read and laid on the axis,
-for a part of the axis at a time, over which the quantiles of all samples are then exact.
+Angles of all samples are never in memory together: blocks of samples are read for a part of the
+time at a time, over which the quantiles of all samples are then exact.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,20 +12,21 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.quantities import good
+from ringsim.analysis.quantities import Mask, good
 from ringsim.analysis.reading import blocks
 from ringsim.outputs.family import Array
 
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 """What bands show: all samples, nine in ten, the median."""
 MOST, FEWER = 401, 101
-"""Points along the axis at most: more than a figure resolves; fewer where samples are many."""
+"""Records that are shown at most: more than a figure resolves; fewer where samples are many."""
 HELD_BYTES = 200 << 20
 """Angles that are held at once."""
 _ANGLE = "opening_angle"
 _PASSES = 4
-"""Times that the file is read for MOST points, at most."""
+"""Times that the file is read for MOST records, at most."""
 Numbers = NDArray[np.float32]
+Places = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -33,13 +34,13 @@ class Courses:
     """Quantiles over the samples of each section's deviation from the mean opening angle."""
 
     bands: xr.DataArray
-    """Shape (quantile, plane, section, share), degree."""
-    samples: NDArray[np.int64]
+    """Shape (quantile, plane, section, time), degree."""
+    samples: Places
     """Samples whose numbers hold and that were recorded."""
 
     @property
     def median(self) -> xr.DataArray:
-        """The middle one, (plane, section, share)."""
+        """The middle one, (plane, section, time)."""
         return self.bands.sel(quantile=0.5)
 
 
@@ -54,15 +55,15 @@ def ends(campaign: xr.Dataset) -> Array:
 def courses(campaign: xr.Dataset, quantiles: Sequence[float] = QUANTILES) -> Courses:
     """Quantiles of the deviations of a campaign that is in memory, or opened.
 
-    Of the samples whose numbers hold and that were recorded; linear between records, which is
-    what the file knows.  Runs last differently long, so that at one time some would have ended,
-    and what a fan shows there would be the slow ones alone.
+    Of the samples whose numbers hold and that were recorded, until the last of them is over;
+    between records linear.  A run that is over counts on, so that what is told of late times is not
+    of the slow ones alone: deployed rings have no deviation, others that of their last record.
     """
     places = campaign.sizes["plane"] * campaign.sizes["section"]
     each = 4 * places * max(1, int(good(campaign).sum()))
     most = MOST if each * MOST <= _PASSES * HELD_BYTES else FEWER
-    share = np.linspace(0.0, 1.0, int(np.clip(campaign.sizes["time"], 2, most)))
-    parts = np.array_split(share, min(len(share), -(-each * len(share) // HELD_BYTES)))
+    at = np.unique(np.linspace(0, _last(campaign), most).round().astype(int))
+    parts = np.array_split(at, min(len(at), -(-each * len(at) // HELD_BYTES)))
     found, kept = [], np.empty(0, dtype=np.int64)
     for part in parts:
         held, kept = _held(campaign, part)
@@ -74,61 +75,75 @@ def courses(campaign: xr.Dataset, quantiles: Sequence[float] = QUANTILES) -> Cou
         found.append(bands)
         del held
     every = np.concatenate(found, axis=-1)
-    return Courses(_labelled(campaign, every, share, quantile=list(quantiles)), kept)
+    return Courses(_labelled(campaign, every, at, quantile=list(quantiles)), kept)
 
 
-def course(campaign: xr.Dataset, sample: int, share: Array) -> xr.DataArray:
-    """The deviations of one sample, (plane, section, share), degree."""
-    (rows, _), *_ = _rows(campaign.sel(sample=[sample]), share)
-    return _labelled(campaign, rows[0], share)
+def course(campaign: xr.Dataset, sample: int, like: xr.DataArray) -> xr.DataArray:
+    """The deviations of one sample at the times of ``like``, (plane, section, time), degree."""
+    at = np.searchsorted(campaign["time"].to_numpy(), like["time"].to_numpy())
+    (rows, _), *_ = _rows(campaign.sel(sample=[sample]), at)
+    return _labelled(campaign, rows[0], at)
 
 
-def _labelled(campaign: xr.Dataset, values: Any, share: Array, **more: Any) -> xr.DataArray:
-    axis = ("share", share, {"long_name": "share of the run until its last lock or end"})
-    coords = more | {"plane": campaign["plane"], "section": campaign["section"], "share": axis}
+def _last(campaign: xr.Dataset) -> int:
+    """The first record at which all runs are over."""
+    time, until = campaign["time"].to_numpy(), ends(campaign)[good(campaign)]
+    return int(np.clip(np.searchsorted(time, until.max(initial=0.0)), 0, len(time) - 1))
+
+
+def _labelled(campaign: xr.Dataset, values: Any, at: Places, **more: Any) -> xr.DataArray:
+    time = campaign["time"].isel(time=at)
+    coords = more | {"plane": campaign["plane"], "section": campaign["section"], "time": time}
     says = campaign[_ANGLE].attrs
     attrs = {"units": says.get("units", "1"), "long_name": "deviation from the mean opening angle"}
     return xr.DataArray(values, dims=list(coords), coords=coords, attrs=attrs)
 
 
-def _held(campaign: xr.Dataset, share: Array) -> tuple[Numbers, NDArray[np.int64]]:
-    """The deviations of all samples there, (plane, section, share, sample), and which they are."""
-    wide = campaign.sizes["plane"], campaign.sizes["section"], len(share)
+def _held(campaign: xr.Dataset, at: Places) -> tuple[Numbers, Places]:
+    """The deviations of all samples there, (plane, section, time, sample), and which they are."""
+    wide = campaign.sizes["plane"], campaign.sizes["section"], len(at)
     held, kept = np.empty((*wide, int(good(campaign).sum())), dtype="f4"), []
     count = 0
-    for rows, samples in _rows(campaign, share):
+    for rows, samples in _rows(campaign, at):
         held[..., count : count + len(rows)] = np.moveaxis(rows, 0, -1)
         count += len(rows)
         kept.append(samples)
     return held[..., :count], np.concatenate([np.empty(0, dtype=np.int64), *kept])
 
 
-def _rows(campaign: xr.Dataset, share: Array) -> Iterator[tuple[Numbers, NDArray[np.int64]]]:
-    """Deviations of the samples of each block, (sample, plane, section, share), and which."""
-    for block in blocks(campaign, [_ANGLE, "status", "final_time", "deployment_time"]):
+def _rows(campaign: xr.Dataset, at: Places) -> Iterator[tuple[Numbers, Places]]:
+    """Deviations of the samples of each block at these records, (sample, plane, section, time),
+    and which samples they are.
+    """
+    time = campaign["time"].to_numpy()
+    for block in blocks(campaign, [_ANGLE, "status", "deployment_time"]):
         block = block.isel(sample=np.flatnonzero(good(block)))
         angles = block[_ANGLE].transpose("sample", "plane", "section", "time").to_numpy()
         known = np.isfinite(angles).all(axis=(1, 2))
-        counts = known.sum(axis=1)
-        # Records are there from the start on up to an end; what has gaps is laid out by itself.
-        whole = (known == (np.arange(known.shape[1]) < counts[:, None])).all(axis=1)
-        time, end = block["time"].to_numpy(), ends(block)
-        rows = np.empty((len(angles), *angles.shape[1:3], len(share)))
-        fit = whole & (counts >= 2)
-        rows[fit] = _laid(angles[fit], time, counts[fit], end[fit], share)
-        for k in np.flatnonzero(~whole & (counts >= 2)):
-            one = angles[k : k + 1, ..., known[k]]
-            rows[k] = _laid(one, time[known[k]], counts[[k]], end[[k]], share)[0]
-        rows = rows[counts >= 2]
+        recorded = known.sum(axis=1) >= 2
+        angles, known = angles[recorded], known[recorded]
+        rows = _laid(angles, time, known, at)
         rows -= rows.mean(axis=(1, 2), keepdims=True)
-        yield rows.astype("f4"), block["sample"].to_numpy()[counts >= 2]
+        deployed = np.isfinite(block["deployment_time"].to_numpy()[recorded])
+        last = known.shape[1] - 1 - known[:, ::-1].argmax(axis=1)
+        # The last record may be before the last lock, when joints are still apart.
+        locked = deployed[:, None] & (at > last[:, None])
+        rows = np.where(locked[:, None, None, :], 0.0, rows)
+        yield rows.astype("f4"), block["sample"].to_numpy()[recorded]
 
 
-def _laid(angles: Array, time: Array, counts: NDArray[np.int64], end: Array, share: Array) -> Array:
-    """Angles at shares of runs with so many records each, (sample, plane, section, share)."""
-    at = np.clip(share * end[:, None], time[0], time[counts - 1][:, None])
-    after = np.clip(np.searchsorted(time, at), 1, (counts - 1)[:, None])
-    weight = ((at - time[after - 1]) / (time[after] - time[after - 1]))[:, None, None]
-    after = after[:, None, None]
-    first = np.take_along_axis(angles, after - 1, axis=-1)
-    return np.asarray(first + weight * (np.take_along_axis(angles, after, axis=-1) - first))
+def _laid(angles: Array, time: Array, known: Mask, at: Places) -> Array:
+    """Angles at some records, from the known ones (sample, time) before and after each."""
+    place = np.arange(known.shape[1])
+    before = np.maximum.accumulate(np.where(known, place, -1), axis=1)
+    after = np.minimum.accumulate(np.where(known, place, len(place))[:, ::-1], axis=1)[:, ::-1]
+    before, after = before[:, at], after[:, at]
+    before, after = (
+        np.where(before < 0, after, before), np.where(after == len(place), before, after),
+    )  # fmt: skip
+    apart = np.where(after > before, time[after] - time[before], 1.0)
+    weight = ((time[at] - time[before]) / apart * (after > before))[:, None, None]
+    first, second = (
+        np.take_along_axis(angles, each[:, None, None], axis=-1) for each in (before, after)
+    )
+    return np.asarray(first + weight * (second - first))

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from ringsim.outputs import COORDINATES, OUTPUTS
 from ringsim.outputs.family import Array
-from ringsim.variables import Status, Variable
+from ringsim.variables import GOALS, Status, Variable
 
 Mask = NDArray[np.bool_]
 """One truth for each sample."""
@@ -37,9 +37,24 @@ def numbers(campaign: xr.Dataset, name: str) -> Array:
     return np.where(values < 0, np.nan, values) if counts else values
 
 
+def run(campaign: xr.Dataset) -> Mask:
+    """Which samples have run, whatever came of it."""
+    return np.asarray(campaign["status"].to_numpy() >= 0)
+
+
 def good(campaign: xr.Dataset) -> Mask:
     """Which samples have numbers that hold."""
     return np.asarray(campaign["status"].to_numpy() == Status.OK)
+
+
+def tells_of(campaign: xr.Dataset, name: str) -> Mask:
+    """Which samples tell of a variable: they have a value of it, or ended before what it is about
+    happened.  The others reached their goal with a model that does not compute it.
+    """
+    done = np.zeros(campaign.sizes["sample"], dtype=bool)
+    if "outcome" in campaign:
+        done = np.isin(campaign["outcome"].to_numpy(), GOALS)
+    return np.asarray(good(campaign) & ~(done & np.isnan(numbers(campaign, name))))
 
 
 def lost(campaign: xr.Dataset) -> Mask:

@@ -18,7 +18,7 @@ from ringsim.analysis.design import Placement
 from ringsim.analysis.drawn import drawn
 from ringsim.analysis.influence import groups_of
 from ringsim.analysis.intervals import Array
-from ringsim.analysis.quantities import good, lost, numbers, quantities
+from ringsim.analysis.quantities import good, lost, numbers, quantities, run
 from ringsim.analysis.requirements import Requirement
 
 _LEAST_OF_A_KIND = 10
@@ -71,11 +71,11 @@ def sensitivity(
     Designs of kind saltelli have ``first_order_index`` and ``total_index`` (and
     ``second_order_index``) along ``factor``, those of kind morris ``mean_absolute_effect``,
     ``mean_effect`` and ``effect_deviation``, plain ones ``given_data_index`` and ``chance_level``
-    along ``input``; each with its ``..._interval``.  ``index_used`` and ``index_lost`` count blocks
-    or samples, ``missing`` the samples without the output, ``missing_lost`` those of failed runs
-    among them, and ``missing_by_inputs`` is the probability that samples missing at random would
-    go with inputs as much: below 0.05 there is no index.  ``names`` are the outputs to tell of
-    beside failures, by default all.
+    along ``input``; each with its ``..._interval``.  Of blocks or samples that have run,
+    ``index_used`` and ``index_lost`` count those used and left out, ``missing`` the samples without
+    the output, ``missing_lost`` those of failed runs among them, and ``missing_by_inputs`` is the
+    probability that samples missing at random would go with inputs as much: below 0.05 there is no
+    index.  ``names`` are the outputs to tell of beside failures, by default all.
     """
     blocks, inputs = blocks_of(campaign), drawn(campaign)
     outputs = {
@@ -86,21 +86,28 @@ def sensitivity(
     if not outputs or not inputs.names or (blocks is None and not _plain(placed)):
         return xr.Dataset()
     index = campaign["sample"].to_numpy()
-    count = len(index)
     block = None if blocks is None else np.repeat(np.arange(len(blocks.rows)), blocks.size)
+    # What has not run is not lost, nor is it missing by its inputs.
+    ran = ran_whole = run(campaign)
+    if blocks is not None:
+        ran_whole = np.asarray(ran.reshape(blocks.rows.shape).all(axis=1))
+        ran = np.repeat(ran_whole, blocks.size)
+    count = int(ran.sum())
     tested: dict[bytes, tuple[float, list[given_data.Bins]]] = {}
     found: dict[str, Found] = {}
     counts, gone = np.zeros((len(outputs), 4), dtype=np.int64), lost(campaign)
     chance = np.full(len(outputs), np.nan)
     for k, (name, (values, _)) in enumerate(outputs.items()):
-        missing = np.isnan(values)
+        missing = np.isnan(values) & ran
         by_block = missing[:, None] if blocks is None else missing.reshape(blocks.rows.shape)
-        whole = np.asarray(~by_block.any(axis=1))
+        whole = np.asarray(~by_block.any(axis=1) & ran_whole)
         # Outputs that lack the same samples share the test, and the bins.
         if (key := missing.tobytes()) not in tested:
-            tested[key] = dependence(missing, inputs.values, block), []
+            of = None if block is None else block[ran]
+            tested[key] = dependence(missing[ran], inputs.values[ran], of), []
         chance[k], bins = tested[key]
-        counts[k] = whole.sum(), len(whole) - whole.sum(), missing.sum(), (missing & gone).sum()
+        left = ran_whole.sum() - whole.sum()
+        counts[k] = whole.sum(), left, missing.sum(), (missing & gone).sum()
         if chance[k] < LEVEL:
             continue
         if blocks is None:
@@ -118,10 +125,10 @@ def sensitivity(
             )
     coords = {"input": inputs.names} if blocks is None else {"factor": blocks.groups}
     made = _dataset(outputs, found, coords, block is not None)
-    of = "samples" if block is None else "blocks"
+    each = "samples" if block is None else "blocks"
     for k, (name, about) in enumerate({
-        "index_used": f"{of} that indices are from",
-        "index_lost": f"{of} that are left out, because a sample of them has no value",
+        "index_used": f"{each} that indices are from",
+        "index_lost": f"{each} that are left out, because a sample of them has no value",
         "missing": f"samples of {count} without a value",
         "missing_lost": "of these, samples whose run failed",
     }.items()):  # fmt: skip

@@ -11,10 +11,10 @@ from ringsim.analysis.binomial import samples_needed, share_bounds
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import Interval, standard_error
 from ringsim.analysis.looks import Levels, Rule, rule_of
-from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
+from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities, tells_of
 from ringsim.analysis.requirements import OUTCOME, Requirement
 from ringsim.refusal import InputError, known_or_nearest
-from ringsim.variables import GOALS, Code, Fate, flags_of
+from ringsim.variables import Code, Fate, flags_of
 
 
 class Verdict(Code):
@@ -119,15 +119,14 @@ def _require_values(campaign: xr.Dataset, name: str) -> None:
         raise InputError(
             f"requirement on {name}: the file has no such output ({known_or_nearest(name, known)})"
         )
-    if name != OUTCOME and OUTCOME in campaign:
-        done = good(campaign) & np.isin(campaign[OUTCOME].to_numpy(), GOALS)
-        if len(none := np.flatnonzero(done & np.isnan(numbers(campaign, name)))):
-            raise InputError(
-                f"requirement on {name}: {len(none)} samples reached their goal without a value of "
-                f"it, the first is {campaign['sample'].to_numpy()[none[0]]}: their model does not "
-                "compute it, or an older ringsim ran them; require another output, use the full "
-                "fidelity, or run them again"
-            )
+    none = np.flatnonzero(good(campaign) & ~tells_of(campaign, name))
+    if name != OUTCOME and len(none):
+        raise InputError(
+            f"requirement on {name}: {len(none)} samples reached their goal without a value of "
+            f"it, the first is {campaign['sample'].to_numpy()[none[0]]}: their model does not "
+            "compute it, or an older ringsim ran them; require another output, use the full "
+            "fidelity, or run them again"
+        )
 
 
 def _judged(

@@ -54,16 +54,15 @@ def test_outcomes_are_counted_with_exact_intervals(campaign: xr.Dataset) -> None
 
 def test_a_fan_is_of_the_samples_that_count(campaign: xr.Dataset) -> None:
     found = campaign.ring.fan()
-    assert found.dims == ("quantile", "plane", "section", "share")
+    assert found.dims == ("quantile", "plane", "section", "time")
     assert found.attrs["units"] == "degree"
     known = courses(campaign)
     assert known.samples.tolist() == [0, 1, 3, 4, 5, 6, 7]
-    share = found["share"].to_numpy()
-    each = [course(campaign, sample, share) for sample in known.samples]
+    each = [course(campaign, sample, found) for sample in known.samples]
     np.testing.assert_allclose(found.sel(quantile=0.5), np.median(each, axis=0), atol=1e-5)
     np.testing.assert_allclose(found.sel(quantile=1.0), np.max(each, axis=0), atol=1e-5)
     # Half-way through, 4 * 1/4 * (1 + k / 4) degree at the last section: sample 5 is the fourth.
-    middle = found.sel(plane="upper", section=SECTIONS, quantile=0.5).sel(share=0.5)
+    middle = found.sel(plane="upper", section=SECTIONS, quantile=0.5).sel(time=5.0)
     assert float(middle) == pytest.approx(1.0 + 4 / 4, abs=1e-3)
 
 

@@ -138,6 +138,25 @@ def test_samples_lost_at_random_cost_whole_blocks_and_are_told():
     assert any("whatever their inputs are" in line for line in told(analyse(made)))
 
 
+def test_samples_that_have_not_run_are_not_lost():
+    """Also where those that have run first have small inputs."""
+    whole = drawn_campaign(RandomDesign(samples=400), ishigami, 3, 2)
+    late = np.flatnonzero(whole["x1"].values > np.quantile(whole["x1"].values, 0.75))
+    part = whole.copy(deep=True)
+    part["status"][late], part["asynchrony_max"][late] = -1, np.nan
+    found, alone = analyse(part), analyse(whole.drop_isel(sample=late))
+    assert found.index_used.values.tolist() == [300]
+    assert found.index_lost.values.tolist() == found.missing.values.tolist() == [0]
+    np.testing.assert_allclose(found.given_data_index, alone.given_data_index)
+    blocks = drawn_campaign(Saltelli(samples=64), ishigami, 3, 2)
+    blocks["status"][52:], blocks["asynchrony_max"][52:] = -1, np.nan
+    blocks["status"][7], blocks["asynchrony_max"][7] = Status.TIMEOUT, np.nan
+    found = analyse(blocks).sel(output="asynchrony_max")
+    # Blocks of five; the eleventh is not complete.
+    assert [int(found[f"index_{word}"]) for word in ("used", "lost")] == [9, 1]
+    assert (int(found.missing), int(found.missing_lost)) == (1, 1)
+
+
 @pytest.mark.parametrize("design", [Saltelli(samples=512), RandomDesign(samples=2000)])
 def test_samples_lost_by_an_input_close_the_gate_and_are_analysed_themselves(design):
     """Lost beyond a value of x2: a function of x2 alone, whose indices are 1."""

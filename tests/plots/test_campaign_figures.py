@@ -8,29 +8,28 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from made_campaign import SECTIONS, TIMES, lags, made_campaign, with_motors
+from made_campaign import made_campaign, with_motors
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ringsim.analysis import courses as courses_module
 from ringsim.analysis import reading as blocks_module
 from ringsim.analysis.campaign_samples import median_and_worst
-from ringsim.analysis.courses import course, courses
 from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
+from ringsim.plots import style
 from ringsim.plots.campaign import by_ending
 from ringsim.plots.campaign.base import base_load
 from ringsim.plots.campaign.by_input import by_input, drawn
 from ringsim.plots.campaign.convergence import convergence
 from ringsim.plots.campaign.distributions import distributions
-from ringsim.plots.campaign.fan import fan
 from ringsim.plots.campaign.figures import PICTURES, draw_campaign, figures_of
-from ringsim.plots.campaign.lag_map import lag_map
 from ringsim.plots.campaign.lock_order import lock_order, shares
 from ringsim.plots.campaign.margin import margin
 from ringsim.plots.campaign.motors import motors
-from ringsim.plots.campaign.one_by_one import moves, one_by_one
+from ringsim.plots.campaign.one_by_one import moves, named, one_by_one
 from ringsim.plots.campaign.tension import tension
+from ringsim.variables import Fate
 
 GOOD = [0, 1, 3, 4, 6]
 
@@ -50,78 +49,6 @@ def words(figure: Figure) -> str:
     texts = [figure.get_supxlabel(), *(each.get_title().get_text() for each in figure.legends)]
     labels = [t.get_text() for legend in figure.legends for t in legend.get_texts()]
     return " ".join(" ".join([*texts, *labels]).split())
-
-
-def deviation(campaign: xr.Dataset) -> np.ndarray:
-    """By numpy alone, of the samples that count; every run ends at the last record."""
-    angle = campaign["opening_angle"].transpose("sample", "plane", "section", "time").values[GOOD]
-    return angle - angle.mean(axis=(1, 2), keepdims=True)
-
-
-def test_the_fan_shows_quantiles_of_the_deviation(mixed: xr.Dataset) -> None:
-    figure, wanted = fan(mixed), deviation(mixed)
-    for section, axes in enumerate(figure.axes):
-        middles = [line for line in axes.lines if line.get_label() == "median"]
-        assert len(middles) == 2
-        for plane, line in enumerate(middles):
-            np.testing.assert_allclose(line.get_xdata(), TIMES / 10.0, atol=1e-12)
-            expected = np.median(wanted[:, plane, section], axis=0)
-            np.testing.assert_allclose(line.get_ydata(), expected, atol=1e-5)
-            every, most = axes.collections[2 * plane : 2 * plane + 2]
-            for band, levels in ((every, (0.0, 1.0)), (most, (0.05, 0.95))):
-                low, high = np.quantile(wanted[:, plane, section], levels, axis=0)
-                drawn_at = band.get_paths()[0].vertices[:, 1]
-                assert drawn_at.min() == pytest.approx(low.min(), abs=1e-5)
-                assert drawn_at.max() == pytest.approx(high.max(), abs=1e-5)
-        worst = [line for line in axes.lines if line.get_label() != "median"]
-        assert [np.abs(w.get_ydata()).max() for w in worst] == pytest.approx(
-            np.abs(lags(6)[:, section]), abs=1e-5
-        )
-    assert "worst: sample 6" in words(figure)
-    assert figure.axes[0].get_xlabel().startswith("Share of the run")
-    figure.draw_without_rendering()
-    box = figure.legends[0].get_window_extent()
-    assert 0 <= box.x0 < box.x1 <= figure.bbox.width  # few sections make a narrow figure
-
-
-def test_runs_of_different_length_are_laid_over_each_other() -> None:
-    campaign = made_campaign(3)
-    campaign["opening_angle"][:] = 0.0
-    slope = xr.DataArray([[1.0, 2.0, 3.0, 4.0]] * 2, dims=("plane", "section"))
-    campaign["opening_angle"][:] = (campaign.time * slope).transpose("plane", "section", "time")
-    campaign["deployment_time"][:] = [3.3, 5.0, 10.0]
-    share = np.linspace(0.0, 1.0, 7)
-    for sample, end in enumerate((3.3, 5.0, 10.0)):
-        np.testing.assert_allclose(
-            course(campaign, sample, share).isel(share=-1), end * (slope - 2.5), rtol=1e-6
-        )
-    np.testing.assert_allclose(courses(campaign).median.isel(share=-1), 5.0 * (slope - 2.5))
-
-
-def test_quantiles_do_not_depend_on_how_the_file_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A sample at a time and a point of the axis at a time, with a record lost in one sample."""
-    campaign = made_campaign(9, failed=(2,), not_run=(5,))
-    campaign["opening_angle"][3, :, 1, 4] = np.nan
-    campaign["opening_angle"][4, :, :, 1:] = np.nan  # one record is no course
-    whole = courses(campaign)
-    monkeypatch.setattr(blocks_module, "BLOCK_BYTES", 1)
-    monkeypatch.setattr(courses_module, "_PASSES", 1000)
-    monkeypatch.setattr(courses_module, "HELD_BYTES", 4 * 8 * 8)
-    parts = courses(campaign)
-    xr.testing.assert_allclose(whole.bands, parts.bands, rtol=0.0, atol=1e-6)  # sums of floats
-    assert whole.samples.tolist() == parts.samples.tolist() == [0, 1, 3, 6, 7, 8]
-    single = [course(campaign, k, whole.bands["share"].values) for k in parts.samples]
-    expected = np.quantile(np.array(single), (0.0, 0.05, 0.5, 0.95, 1.0), axis=0)
-    np.testing.assert_allclose(parts.bands, expected, atol=1e-5)
-
-
-def test_the_map_shows_the_median_and_the_worst(mixed: xr.Dataset) -> None:
-    figure, wanted = lag_map(mixed), deviation(mixed)
-    upper, lower = figure.axes[:2], figure.axes[2:4]
-    for plane, pair in enumerate((upper, lower)):
-        for axes, values in zip(pair, (np.median(wanted, axis=0), wanted[-1]), strict=True):
-            image = axes.collections[0].get_array().reshape(SECTIONS, -1)
-            np.testing.assert_allclose(image, values[plane], atol=1e-5)
 
 
 def test_lock_order_counts_ties_by_halves_and_what_stays_open() -> None:
@@ -156,32 +83,30 @@ def test_distributions_are_steps_with_limits(mixed: xr.Dataset) -> None:
     assert not [line for line in one.lines if line.get_marker() == "o"]
 
 
-def test_convergence_ends_at_mean_and_quantile(mixed: xr.Dataset) -> None:
-    figure = convergence(mixed)
-    values = mixed["peak_tension"].values[GOOD]
-    panel = figure.axes[-1]
-    mean, quantile = panel.lines
-    assert mean.get_ydata()[-1] == pytest.approx(values.mean())
-    assert mean.get_ydata()[1] == pytest.approx(values[:2].mean())
-    assert quantile.get_ydata()[-1] == pytest.approx(np.quantile(values, 0.95))
-    assert not panel.collections  # five samples have no interval
-    assert not convergence(made_campaign(9, kind="sobol")).axes[-1].collections
-
-
-def test_the_band_of_convergence_is_the_interval_of_the_analysis() -> None:
-    campaign = made_campaign(12)
-    figure = convergence(campaign)
-    (band,) = figure.axes[-1].collections
-    drawn_at = band.get_paths()[0].vertices
-    assert drawn_at[:, 0].min() == 8
-    ends = np.unique(drawn_at[drawn_at[:, 0] == 12, 1])
-    known = analyse(campaign)["peak_tension_interval"].sel(statistic="mean")
-    np.testing.assert_allclose(ends, np.sort(known))
-    assert "95 % interval of the mean" in words(figure)
-    one = convergence(made_campaign(1))
-    assert one.axes[-1].get_title(loc="left").endswith("n = 1")
-    assert all(float(tick).is_integer() for tick in one.axes[-1].get_xticks())
-    assert "interval" not in words(one)
+def test_what_did_not_happen_keeps_a_distribution_below_its_verdict() -> None:
+    campaign = made_campaign(20, stalled=(1, 4, 7), failed=(2,), not_run=(5,))
+    deployed = np.isfinite(campaign["deployment_time"].values)
+    times = 30.0 + np.arange(20.0)
+    campaign["deployment_time"][:] = np.where(deployed, times, np.nan)
+    (panel,) = (
+        a for a in distributions(campaign).axes if a.get_xlabel().startswith("Time at which")
+    )
+    step, dots, limit = panel.lines
+    assert step.get_ydata()[-1] == pytest.approx(15 / 18)
+    at = step.get_ydata()[step.get_xdata() <= limit.get_xdata()[0]][-1]
+    found = analyse(campaign).sel(requirement="deployment_time")
+    assert at == pytest.approx(float(found["probability"]))
+    # By numpy, with what never deployed beyond all times.
+    ran = np.append(times[deployed], np.full(3, 1e9))
+    np.testing.assert_allclose(dots.get_xdata(), np.quantile(ran, [0.05, 0.5]))
+    assert dots.get_ydata().tolist() == [0.05, 0.5]
+    assert "did not happen in the other samples" in words(distributions(campaign))
+    # A model that tells no time of what deployed is not an antenna that fails.
+    campaign["outcome"][:] = int(Fate.DEPLOYED)
+    (panel,) = (
+        a for a in distributions(campaign).axes if a.get_xlabel().startswith("Time at which")
+    )
+    assert panel.lines[0].get_ydata()[-1] == pytest.approx(1.0)
 
 
 def test_tension_by_span(mixed: xr.Dataset) -> None:
@@ -198,7 +123,7 @@ def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     figure = by_input(mixed)
     points = {c.get_label(): c.get_offsets() for c in figure.axes[1].collections}
     assert {name: len(at) for name, at in points.items()} == {
-        "deployed (5)": 5, "failed: timeout (2)": 2, "not run (1)": 1,
+        "deployed (5)": 5, "failed: timeout (2)": 2,
     }  # fmt: skip
     np.testing.assert_allclose(points["deployed (5)"][:, 0], np.array(GOOD) + 1.0)
     np.testing.assert_allclose(points["deployed (5)"][:, 1], mixed["asynchrony_max"].values[GOOD])
@@ -212,7 +137,7 @@ def test_no_figure_drops_a_sample_in_silence(mixed: xr.Dataset) -> None:
     for picture, figure in figures_of(with_motors(mixed)):
         told = words(figure)
         if picture.name == "by_input":
-            assert "All 8 samples; 3 without" in told
+            assert "7 of 8 samples run; 2 without" in told
         else:
             assert "5 of 8 samples; left out: 2 failed: timeout, 1 not run" in told, picture.name
 
@@ -240,7 +165,7 @@ def test_campaigns_in_which_nothing_deployed(
 ) -> None:
     names = {path.stem for path in draw_campaign(made_campaign(2, **choice), tmp_path)}
     stalled = {"distributions", "convergence", "fan", "lag_map", "tension", "by_input"}
-    expected = stalled if "stalled" in choice else {"by_input"}
+    expected = stalled if "stalled" in choice else {"by_input"} if "failed" in choice else set()
     assert names == {f"campaign-fig-{name}" for name in expected}
 
 
@@ -297,6 +222,69 @@ def test_of_many_samples_some_of_every_ending_are_drawn(monkeypatch: pytest.Monk
     assert "4 of them are drawn" in words(motors(campaign))
 
 
+def joined(panel: Axes) -> list[list[float]]:
+    """Samples that a line joins, without that of the base case across the panel."""
+    lines = [line.get_xdata() for line in panel.lines if line.get_color() == style.PALE]
+    return [list(each) for each in lines if len(each) > 1]
+
+
+def test_lines_join_values_of_one_scale_alone() -> None:
+    """Not places, words, nor what is on both sides of a sample without a value."""
+    campaign = made_campaign(13, failed=(3,), not_run=(12,))
+    campaign.attrs["design"] = '{"kind": "one-at-a-time"}'
+    campaign["rods_young_modulus"][:] = [1e11, 2e11, 3e11, 4e11, 5e11, 6e11, *[1e11] * 7]
+    friction = np.ones((13, 3))
+    friction[[6, 7], [0, 1]] = 2.0
+    campaign["cables_upper_friction_coefficient"][:] = friction
+    laws = ["none"] * 8 + ["3.0", "4.0", "never", "later", "none"]
+    campaign["cables_lower_winch_stop_time"][:] = laws
+    figure = one_by_one(campaign)
+    assert joined(figure.axes[-1]) == [[1, 2], [4, 5]]
+    assert "not run" not in " ".join(t.get_text() for t in figure.legends[0].get_texts())
+    campaign["cables_lower_winch_stop_time"][10:12] = ["5.0", "6.0"]
+    assert joined(one_by_one(campaign).axes[-1]) == [[1, 2], [4, 5], [8, 9, 10, 11]]
+
+
+@pytest.mark.parametrize("count", [1, 2, 54, 72, 73, 100, 501])
+def test_places_are_named_at_equal_steps_and_at_both_ends(count: int) -> None:
+    places = np.array(named(count))
+    assert (places[0], places[-1]) == (0, count - 1)
+    assert len(places) <= 73
+    steps = np.diff(places)
+    assert (steps[:-1] == steps[:1]).all()
+    if count <= 72:
+        assert places.tolist() == list(range(count))
+    elif len(steps):
+        assert 0.5 * steps[0] < steps[-1] <= 1.5 * steps[0]
+
+
+def test_labels_of_inputs_break_between_their_parts() -> None:
+    campaign = made_campaign(3)
+    campaign["rods_young_modulus"].attrs["path"] = (
+        'cables.upper.friction.coefficient["section 3 V"]'
+    )
+    labels = [axes.get_xlabel() for axes in by_input(campaign).axes]
+    assert labels[0] == 'cables.upper.friction.coefficient\n["section 3 V"] (Pa)'
+    assert labels[1] == "cables.upper_friction_coefficient\nmean (m)"
+
+
+def test_of_blocks_figures_show_the_samples_that_the_analysis_takes() -> None:
+    campaign = made_campaign(40)
+    campaign.attrs["design"] = '{"kind": "saltelli", "samples": 8, "replicates": 2}'
+    rows = np.array(["A", "AB: modulus", "AB: friction", "AB: stop", "B"] * 8)
+    campaign["block_row"] = "sample", rows
+    own = np.isin(rows, ["A", "B"])
+    (axes,) = (
+        a for a in distributions(campaign).axes if a.get_xlabel().startswith("Largest tension")
+    )
+    np.testing.assert_allclose(axes.lines[0].get_xdata()[1:], 20.0 + np.flatnonzero(own))
+    figure = convergence(campaign)
+    (axes,) = (a for a in figure.axes if a.get_title(loc="left").startswith("Largest tension"))
+    told = analyse(campaign)["peak_tension"].sel(statistic="mean")
+    assert axes.lines[0].get_ydata()[-1] == pytest.approx(float(told))
+    assert "16 of 16 samples; none lost. Of blocks the samples A and B" in words(figure)
+
+
 def test_one_at_a_time_names_every_change() -> None:
     campaign = made_campaign(6, stalled=(5,))
     campaign.attrs["design"] = '{"kind": "one-at-a-time"}'
@@ -313,6 +301,7 @@ def test_one_at_a_time_names_every_change() -> None:
     (panel,) = (a for a in figure.axes if a.get_title(loc="left").startswith("largest tension"))
     points = np.concatenate([c.get_offsets() for c in panel.collections])
     np.testing.assert_allclose(points, np.stack([np.arange(6), 20.0 + np.arange(6)], axis=1))
+    assert not joined(panel)
     names = {picture.name for picture, _ in figures_of(campaign)}
     assert "one_by_one" in names
     assert not {"distributions", "convergence"} & names

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from ringsim.analysis.design import placement
 from ringsim.analysis.sensitivity import sensitivity
+from ringsim.plots.campaign.names import in_lines
 from ringsim.plots.campaign.tornado import (
-    _short,
     bars_of,
     explained,
     tornado,
@@ -97,10 +97,29 @@ def test_a_shut_gate_is_told_with_what_is_known_beside_it() -> None:
     assert "left out: " in figure.legends[0].get_title().get_text()
 
 
+def test_what_has_no_interval_is_told_and_measures_differ_in_colour() -> None:
+    campaign = made(RandomDesign(samples=60))
+    # A perfect correlation has no known error; where an input decides there is no index.
+    campaign["deployment_time"] = campaign["force"].where(campaign["force"] < 0.7)
+    campaign["deployment_time"].attrs = {"long_name": "time of deployment", "units": "s"}
+    measures = [bars.measure for _, bars in bars_of(campaign)]
+    assert measures == ["rank_correlation", "given_data_index"]
+    figure = tornado(campaign)
+    told = " ".join(figure.legends[0].get_title().get_text().split())
+    assert "Bars without: the interval is not known" in told
+    colours = {axes.patches[0].get_facecolor() for axes in figure.axes}
+    assert len(colours) == 2
+    whole = tornado(made(RandomDesign(samples=60)))
+    assert "Bars without" not in whole.get_supxlabel() + "".join(
+        each.get_title().get_text() for each in whole.legends
+    )
+
+
 def test_long_paths_are_broken_between_their_parts() -> None:
-    assert _short("cables.upper.winch.winding.derating") == "cables.upper.winch.winding.\nderating"
+    winding = "cables.upper.winch.winding."
+    assert in_lines(f"{winding}derating") == f"{winding}\nderating"
     place = "cables.upper.friction.coefficient[section 1 first hinge]"
-    assert _short(place) == place.replace("[", "\n[")
+    assert in_lines(place) == place.replace("[", "\n[")
 
 
 def test_each_main_number_has_the_measure_that_it_allows_and_no_panel_is_empty() -> None:

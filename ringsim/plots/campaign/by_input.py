@@ -12,9 +12,10 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsim.analysis.campaign_samples import endings, inputs, judged_by
-from ringsim.analysis.quantities import used
+from ringsim.analysis.quantities import good, numbers, run
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, head
+from ringsim.plots.campaign.names import WIDE, in_lines
 
 _MANY = 500
 """Samples from which on marks are drawn as dots: as shapes they would make a page too large."""
@@ -36,17 +37,16 @@ def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
 
 @style.styled
 def by_input(campaign: xr.Dataset) -> Figure:
-    """A panel an input: the main number of each sample over the value drawn for it.
+    """A panel an input: the main number of each sample that has run over the value drawn for it.
 
     Colour and marker say how the sample ended; samples without the number stand below the line at
     the foot of each panel.
     """
+    every = campaign.sizes["sample"]
+    campaign = campaign.isel(sample=np.flatnonzero(run(campaign)))
     names, name = inputs(campaign), judged_by(campaign)
     words = endings(campaign)
-    height = np.full(len(words), np.nan)
-    if name:
-        good = np.isin(campaign["sample"].values, used(campaign)["sample"].values)
-        height[good] = campaign[name].to_numpy().astype(float)[good]
+    height = np.where(good(campaign), numbers(campaign, name), np.nan)
     known = height[np.isfinite(height)]
     low, high = (known.min(), known.max()) if known.size else (0.0, 1.0)
     size = high - low or max(abs(high), 1.0)
@@ -75,7 +75,8 @@ def by_input(campaign: xr.Dataset) -> Figure:
     note = (
         " Inputs of many places by their mean." if any(campaign[n].ndim > 1 for n in names) else ""
     )
-    head(figure, campaign, "Outcome by input", f"All {len(words)} samples{below}.{note}")
+    count = f"{len(words)} of {every} samples run" if len(words) < every else f"All {every} samples"
+    head(figure, campaign, "Outcome by input", f"{count}{below}.{note}")
     return figure
 
 
@@ -94,5 +95,9 @@ def _scatter(axes: Axes, x: Any, y: Any, words: NDArray[np.str_]) -> None:
 def _label(variable: xr.DataArray) -> str:
     units = str(variable.attrs.get("units", "1"))
     words = str(variable.attrs.get("path") or variable.name)
-    words = f"{words}, mean" if variable.ndim > 1 else words
-    return textwrap.fill(words if units == "1" else f"{words} ({units})", 38)
+    what = ", mean" if variable.ndim > 1 else ""
+    what += "" if units == "1" else f" ({units})"
+    words = in_lines(words)
+    if len(words.rpartition("\n")[2]) + len(what) > WIDE:
+        what = "\n" + what.lstrip(", ")
+    return words + what

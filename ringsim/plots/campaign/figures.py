@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from ringsim.analysis.campaign_samples import inputs, judged_by, scalars
 from ringsim.analysis.courses import courses
 from ringsim.analysis.design import placement
+from ringsim.analysis.quantities import run
 from ringsim.analysis.reading import any_finite
 from ringsim.files import writing
 from ringsim.plots import style
@@ -36,6 +37,11 @@ def _spread(campaign: xr.Dataset) -> bool:
 def _converges(campaign: xr.Dataset) -> bool:
     """Whether more samples make means and quantiles more certain."""
     return bool(scalars(campaign)) and placement(campaign).population
+
+
+def _has_run(campaign: xr.Dataset) -> bool:
+    """Whether something became of drawn inputs."""
+    return bool(inputs(campaign)) and bool(run(campaign).any())
 
 
 class Picture(NamedTuple):
@@ -83,13 +89,17 @@ PICTURES = (
         "lock_order", lock_order, "How often each V-joint locks first, last and not at all",
         ("lock_time",),
     ),
-    Picture("by_input", by_input, "What became of each sample, by each drawn input", of=inputs),
+    Picture(
+        "by_input", by_input, "What became of each sample, by each drawn input", of=_has_run,
+    ),
     Picture(
         "tornado", tornado, "Which inputs matter for each main number, with intervals",
         of=explained,
     ),
     Picture(
-        "convergence", convergence, "Mean and 95 % quantile as samples come in", of=_converges,
+        "convergence", convergence,
+        "Mean, 95 % quantile and probability of each requirement as samples come in",
+        of=_converges,
     ),
     Picture(
         "motors", motors, "Torque and speed of the motors over time, by ending",

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ringsim.analysis.blocks import population_of
 from ringsim.analysis.courses import QUANTILES
 from ringsim.plots import style
 
@@ -22,7 +23,6 @@ LOOKS = {
     "stalled": (style.VERMILLION, "s"),
     "overloaded": (style.PURPLE, "^"),
     "cut off": (style.GREEN, "v"),
-    "not run": (style.GREY, "|"),
 }
 """Colour and marker of an ending; the marker tells what the colour may not."""
 FAILED = tuple((style.INK, marker) for marker in "x+1234")
@@ -41,6 +41,13 @@ def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> No
         legend.get_title().set_color(style.GREY)
     else:
         figure.supxlabel(words, x=0.012, ha="left", fontsize=9, color=style.GREY)
+
+
+def standing(campaign: xr.Dataset) -> tuple[xr.Dataset, str]:
+    """The samples that stand for the population, as statistics take them, and a word on others."""
+    found = population_of(campaign)
+    left = found.sizes["sample"] < campaign.sizes["sample"]
+    return found, " Of blocks the samples A and B, which stand for the population." if left else ""
 
 
 def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:

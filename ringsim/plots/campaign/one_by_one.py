@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from ringsim.analysis.campaign_samples import (
     distribution_of,
@@ -18,10 +19,11 @@ from ringsim.analysis.campaign_samples import (
     values_of,
 )
 from ringsim.analysis.design import placement
+from ringsim.analysis.quantities import run
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, head
 
-_MOST_NAMED = 24
+_MOST_NAMED = 72
 """Moves up to which each has its name on the axis."""
 _WIDEST = 26
 
@@ -53,6 +55,23 @@ def moves(campaign: xr.Dataset) -> tuple[list[str], list[str]]:
     return [", ".join(words) or "base" for words in found], moved
 
 
+def _scaled(campaign: xr.Dataset, name: str, samples: NDArray[np.int64]) -> bool:
+    """Whether an input moved along a scale in these samples, so that a line may join them."""
+    if campaign[name].ndim > 1:
+        return False
+    try:
+        campaign[name].to_numpy()[samples].astype(float)
+    except ValueError:
+        return False
+    return True
+
+
+def named(count: int) -> list[int]:
+    """Places of so many that have their names on the axis: at equal steps, and the last one."""
+    step = -(-(count - 1) // (_MOST_NAMED - 1)) or 1
+    return [*range(0, count - 1 - step // 2, step), count - 1]
+
+
 def _word(variable: xr.DataArray, value: object, base: object, place: int) -> str:
     """The place of an input of many; of a single one the last part of its path with the value, of
     a table with what in it is new.
@@ -79,7 +98,7 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
     """
     names, ends = scalars(campaign), endings(campaign)
     words, moved = moves(campaign)
-    samples = campaign["sample"].to_numpy()
+    samples, has_run = campaign["sample"].to_numpy(), run(campaign)
     figure = Figure(figsize=(9.6, 1.75 * len(names) + 2.4))
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     others = sorted(set(ends.tolist()) - LOOKS.keys())
@@ -89,10 +108,13 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
         at = np.searchsorted(samples, known)
         if 0 in at:
             axes.axhline(values[0], color=style.GREY, linewidth=0.9)
-        for _, run in itertools.groupby(range(len(at)), key=lambda k: moved[at[k]]):
-            line = list(run)
-            axes.plot(at[line], values[line], color=style.PALE, linewidth=1.0, zorder=1)
-        for word in dict.fromkeys(ends.tolist()):
+        # A sample without a value leaves a gap.
+        lines = itertools.groupby(range(len(at)), key=lambda k: (moved[at[k]], at[k] - k))
+        for (name_moved, _), found in lines:
+            line = list(found)
+            if name_moved and _scaled(campaign, name_moved, at[line]):
+                axes.plot(at[line], values[line], color=style.PALE, linewidth=1.0, zorder=1)
+        for word in dict.fromkeys(ends[has_run].tolist()):
             own = ends[at] == word
             colour, marker = looks.get(word, FAILED[0])
             axes.scatter(at[own], values[own], s=22, color=colour, marker=marker, zorder=3,
@@ -102,11 +124,9 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
         text = str(campaign[name].attrs.get("long_name", name))
         units = str(campaign[name].attrs.get("units", "1"))
         axes.set_title(text + ("" if units == "1" else f" ({units})"), fontsize=9.5)
-    places = np.arange(len(samples))
-    if len(samples) > _MOST_NAMED:
-        places = np.unique(np.linspace(0, len(samples) - 1, _MOST_NAMED).round().astype(int))
+    places = named(len(samples))
     names_shown = [textwrap.shorten(words[k], _WIDEST, placeholder=" ...") for k in places]
-    panels[-1].set_xticks(places, names_shown, rotation=90, fontsize=8)
+    panels[-1].set_xticks(places, names_shown, rotation=90, fontsize=8 if len(places) < 60 else 7)
     panels[-1].set_xlim(-0.7, len(samples) - 0.3)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)))

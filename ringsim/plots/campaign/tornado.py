@@ -1,6 +1,5 @@
 """Which inputs matter for the main numbers: bars with intervals, the longest on top."""
 
-import textwrap
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -19,6 +18,7 @@ from ringsim.analysis.influence import LEAST, influence
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import head, legend
+from ringsim.plots.campaign.names import in_lines
 
 MEASURES = {
     "total_index": "Total Sobol' index",
@@ -28,11 +28,12 @@ MEASURES = {
     "rank_correlation": "Rank correlation",
 }
 """What bars can show, the most telling first; a design allows some of them."""
+_COLOURS = {"partial_rank_correlation": style.GREEN, "rank_correlation": style.PURPLE}
+"""Of measures that stand beside indices, which are of another colour."""
 _INSIDE = {"total_index": ("first_order_index", "first-order index")}
 """What a second, thinner bar shows beside it."""
 _MOST = 8
 _MOST_PANELS = 9
-_WIDE = 34
 _NONE = np.empty(0), np.empty((0, 2)), np.empty(0), np.empty((0, 2))
 
 
@@ -149,10 +150,11 @@ def tornado(campaign: xr.Dataset) -> Figure:
     found = found or [("", Bars("", [], *_NONE, np.nan, "no measure is known"))]
     rows = max(len(bars.names) for _, bars in found)
     figure, panels, _ = style.new_panels(len(found), 5.2, 0.9 + 0.34 * rows, 1.1, most=2)
-    certain = False
+    certain, uncertain = False, False
     for axes, (output, bars) in zip(panels, found, strict=True):
         _draw(axes, bars)
-        certain = certain or bool(np.isfinite(bars.ends).any())
+        known = np.isfinite(bars.ends).all(axis=1)
+        certain, uncertain = certain or bool(known.any()), uncertain or not known.all()
         words = style.label(campaign[output], width=42) if output in campaign else output
         axes.set_title(words, fontsize=9.5, color=style.INK)
         units = campaign[output].attrs.get("units", "1") if output in campaign else "1"
@@ -162,6 +164,8 @@ def tornado(campaign: xr.Dataset) -> Figure:
     if any(len(axes.get_legend_handles_labels()[1]) > 1 for axes in panels):
         legend(figure, panels)
     whiskers = "Whiskers: intervals of 95 %." if certain else "The design allows no intervals."
+    if certain and uncertain:
+        whiskers += " Bars without: the interval is not known, as of a perfect correlation."
     most = max((len(values_of(campaign, name)[0]) for name in scalars(campaign)), default=0)
     caption = f"{told(campaign, most)}. {whiskers} The longest {_MOST} bars at most."
     head(figure, campaign, "What matters", caption)
@@ -179,7 +183,8 @@ def _draw(axes: Axes, bars: Bars) -> None:
     word = MEASURES[measure][0].lower() + MEASURES[measure][1:]
     second = bool(np.isfinite(bars.inside).any())
     shift = 0.17 if second else 0.0
-    _row(axes, height + shift, bars.values, bars.ends, style.SKY, word, 0.34 if second else 0.6)
+    colour = _COLOURS.get(measure, style.SKY)
+    _row(axes, height + shift, bars.values, bars.ends, colour, word, 0.34 if second else 0.6)
     if second:
         _row(axes, height - shift, bars.inside, bars.inside_ends, style.ORANGE,
              _INSIDE[measure][1], 0.34)  # fmt: skip
@@ -188,24 +193,8 @@ def _draw(axes: Axes, bars: Bars) -> None:
                      label="by chance in one case of 20")  # fmt: skip
     axes.axvline(0.0, color=style.INK, linewidth=0.8)
     axes.locator_params(axis="x", nbins=5)
-    axes.set_yticks(height, [_short(name) for name in bars.names], fontsize=8)
+    axes.set_yticks(height, [in_lines(name) for name in bars.names], fontsize=8)
     axes.grid(axis="y", visible=False)
-
-
-def _short(name: str) -> str:
-    """A name on two lines of bearable length, the path on one of its own; three would overlap."""
-    if len(name) <= _WIDE:
-        return name
-    mean, path = (
-        ("mean of", name.removeprefix("mean of ")) if name.startswith("mean") else ("", name)
-    )
-    path, bracket, place = path.partition("[")
-    if not mean:
-        # Between the parts of a path rather than within a word.
-        apart = textwrap.fill(path.replace(".", ". "), _WIDE).replace(". ", ".")
-        return (apart if len(path) > _WIDE else path) + ("\n" if bracket else "") + bracket + place
-    part = f" {bracket}{place} of" if bracket else ""
-    return f"{mean}{part}\n{path}"
 
 
 def _row(

@@ -1,0 +1,156 @@
+"""Courses of the samples of a campaign, in the fan and in the map of lags."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from made_campaign import SECTIONS, TIMES, lags, made_campaign
+from matplotlib.figure import Figure
+
+from ringsim.analysis import courses as courses_module
+from ringsim.analysis import reading as blocks_module
+from ringsim.analysis.courses import course, courses
+from ringsim.plots.campaign.fan import fan
+from ringsim.plots.campaign.lag_map import lag_map
+
+GOOD = [0, 1, 3, 4, 6]
+
+
+@pytest.fixture(scope="module")
+def mixed() -> xr.Dataset:
+    return made_campaign(8, failed=(2, 5), not_run=(7,))
+
+
+def legend_of(figure: Figure) -> str:
+    return " ".join(text.get_text() for each in figure.legends for text in each.get_texts())
+
+
+def deviation(campaign: xr.Dataset) -> np.ndarray:
+    """By numpy alone, of the samples that count; every run ends at the last record."""
+    angle = campaign["opening_angle"].transpose("sample", "plane", "section", "time").values[GOOD]
+    return angle - angle.mean(axis=(1, 2), keepdims=True)
+
+
+def test_the_fan_shows_quantiles_of_the_deviation(mixed: xr.Dataset) -> None:
+    figure, wanted = fan(mixed), deviation(mixed)
+    for section, axes in enumerate(figure.axes):
+        middles = [line for line in axes.lines if line.get_label() == "median"]
+        assert len(middles) == 2
+        for plane, line in enumerate(middles):
+            np.testing.assert_allclose(line.get_xdata(), TIMES, atol=1e-12)
+            expected = np.median(wanted[:, plane, section], axis=0)
+            np.testing.assert_allclose(line.get_ydata(), expected, atol=1e-5)
+            every, most = axes.collections[2 * plane : 2 * plane + 2]
+            for band, levels in ((every, (0.0, 1.0)), (most, (0.05, 0.95))):
+                low, high = np.quantile(wanted[:, plane, section], levels, axis=0)
+                drawn_at = band.get_paths()[0].vertices[:, 1]
+                assert drawn_at.min() == pytest.approx(low.min(), abs=1e-5)
+                assert drawn_at.max() == pytest.approx(high.max(), abs=1e-5)
+        worst = [line for line in axes.lines if line.get_label() != "median"]
+        assert [np.abs(w.get_ydata()).max() for w in worst] == pytest.approx(
+            np.abs(lags(6)[:, section]), abs=1e-5
+        )
+    assert "worst: sample 6" in legend_of(figure)
+    assert figure.axes[0].get_xlabel().startswith("Time since")
+    figure.draw_without_rendering()
+    box = figure.legends[0].get_window_extent()
+    assert 0 <= box.x0 < box.x1 <= figure.bbox.width  # few sections make a narrow figure
+
+
+def over_time(campaign: xr.Dataset, until: list[float]) -> None:
+    """Section k opens by k degree a second; nothing is recorded after a sample's end."""
+    slope = xr.DataArray([[1.0, 2.0, 3.0, 4.0]] * 2, dims=("plane", "section"))
+    angles = (campaign.time * slope).transpose("plane", "section", "time")
+    end = xr.DataArray(until, dims="sample")
+    campaign["opening_angle"][:] = angles.where(campaign.time <= end).transpose(
+        *campaign["opening_angle"].dims
+    )
+
+
+def test_what_is_over_counts_on_at_the_time_when_it_happened() -> None:
+    """Rings that lock at 3.3 s and 5 s, one that stops at 8 s: records are half a second apart."""
+    campaign = made_campaign(3, stalled=(2,))
+    over_time(campaign, [3.3, 5.0, 8.0])
+    campaign["deployment_time"][:] = [3.3, 5.0, np.nan]
+    campaign["final_time"][:] = [3.4, 5.0, 8.0]
+    found = courses(campaign)
+    assert found.bands["time"].values.tolist() == TIMES[TIMES <= 8.0].tolist()
+    last = found.bands.sel(section=4, plane="upper")
+    by_hand = {  # 1.5 degree a second ahead of the mean
+        3.0: [4.5, 4.5, 4.5],
+        3.5: [0.0, 5.25, 5.25],
+        5.0: [0.0, 7.5, 7.5],
+        5.5: [0.0, 0.0, 8.25],
+        8.0: [0.0, 0.0, 12.0],
+    }
+    for time, values in by_hand.items():
+        at = last.sel(time=time)
+        np.testing.assert_allclose(at.sel(quantile=[0.0, 0.5, 1.0]), values, atol=1e-5)
+    # A ring that was stopped keeps what it had.
+    over_time(campaign, [3.3, 5.0, 6.0])
+    campaign["final_time"][2] = 6.2
+    campaign["final_time"][0] = 10.0
+    campaign["deployment_time"][0] = np.nan
+    stopped = courses(campaign).bands.sel(section=4, plane="lower", time=6.5)
+    np.testing.assert_allclose(stopped.sel(quantile=[0.0, 0.5, 1.0]), [0.0, 4.5, 9.0], atol=1e-5)
+
+
+def test_a_record_that_is_lost_lies_on_the_line_between_its_neighbours() -> None:
+    campaign = made_campaign(2)
+    whole = course(campaign, 1, campaign["time"])
+    campaign["opening_angle"][1, :, 2, 7:9] = np.nan
+    found = course(campaign, 1, campaign["time"])
+    known = np.delete(np.arange(len(TIMES)), [7, 8])
+    for place in np.ndindex(2, SECTIONS):
+        expected = np.interp(TIMES, TIMES[known], whole.values[place][known])
+        np.testing.assert_allclose(found.values[place], expected, atol=1e-5)
+
+
+def test_planes_that_are_alike_are_both_seen_and_a_row_has_the_scale_that_it_needs() -> None:
+    campaign = made_campaign(5)
+    campaign["opening_angle"][:, 1] = campaign["opening_angle"][:, 0]
+    figure = fan(campaign)
+    low, high = figure.axes[0].get_ylim()
+    angle = campaign["opening_angle"].transpose("sample", "plane", "section", "time").values
+    values = angle - angle.mean(axis=(1, 2), keepdims=True)
+    air = 0.06 * np.ptp(values)
+    assert (low, high) == pytest.approx((values.min() - air, values.max() + air), rel=1e-4)
+    for axes in figure.axes:
+        upper, lower = (line for line in axes.lines if line.get_label() == "median")
+        np.testing.assert_allclose(upper.get_ydata(), lower.get_ydata(), atol=1e-6)
+        assert upper.get_linestyle() == "-" != lower.get_linestyle()
+        assert upper.get_linewidth() > lower.get_linewidth()
+        assert all(band.get_facecolor()[0, 3] <= 0.2 for band in axes.collections)
+        assert min(line.get_zorder() for line in (upper, lower)) > max(
+            band.get_zorder() for band in axes.collections
+        )
+
+
+def test_quantiles_do_not_depend_on_how_the_file_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sample at a time and a point of the axis at a time, with a record lost in one sample."""
+    campaign = made_campaign(9, failed=(2,), not_run=(5,))
+    campaign["opening_angle"][3, :, 1, 4] = np.nan
+    campaign["opening_angle"][4, :, :, 1:] = np.nan  # one record is no course
+    whole = courses(campaign)
+    monkeypatch.setattr(blocks_module, "BLOCK_BYTES", 1)
+    monkeypatch.setattr(courses_module, "_PASSES", 1000)
+    monkeypatch.setattr(courses_module, "HELD_BYTES", 4 * 8 * 8)
+    parts = courses(campaign)
+    xr.testing.assert_allclose(whole.bands, parts.bands, rtol=0.0, atol=1e-6)  # sums of floats
+    assert whole.samples.tolist() == parts.samples.tolist() == [0, 1, 3, 6, 7, 8]
+    single = [course(campaign, k, whole.bands) for k in parts.samples]
+    expected = np.quantile(np.array(single), (0.0, 0.05, 0.5, 0.95, 1.0), axis=0)
+    np.testing.assert_allclose(parts.bands, expected, atol=1e-5)
+
+
+def test_the_map_shows_the_median_and_the_worst(mixed: xr.Dataset) -> None:
+    figure, wanted = lag_map(mixed), deviation(mixed)
+    upper, lower = figure.axes[:2], figure.axes[2:4]
+    for plane, pair in enumerate((upper, lower)):
+        for axes, values in zip(pair, (np.median(wanted, axis=0), wanted[-1]), strict=True):
+            image = axes.collections[0].get_array().reshape(SECTIONS, -1)
+            np.testing.assert_allclose(image, values[plane], atol=1e-5)
+    scales = [axes.collections[0].get_clim() for axes in (*upper, *lower)]
+    assert scales == [scales[0]] * 4
+    assert scales[0][1] == pytest.approx(np.abs(wanted[-1]).max(), abs=1e-5)

@@ -1,0 +1,113 @@
+"""Convergence shows what the analysis tells of so many first samples."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from made_campaign import made_campaign
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.stats import binomtest, t
+
+from ringsim.analysis.study import analyse
+from ringsim.plots.campaign.convergence import convergence
+
+GOOD = [0, 1, 3, 4, 6]
+
+
+def words(figure: Figure) -> str:
+    (legend,) = figure.legends
+    texts = [legend.get_title().get_text(), *(each.get_text() for each in legend.get_texts())]
+    return " ".join(" ".join(texts).split())
+
+
+def panel(figure: Figure, start: str) -> Axes:
+    (found,) = (a for a in figure.axes if a.get_title(loc="left").startswith(start))
+    return found
+
+
+def ends_at(axes: Axes, count: int) -> np.ndarray:
+    """The ends of a panel's band there, the lower one first."""
+    (band,) = axes.collections
+    drawn_at = band.get_paths()[0].vertices
+    return np.sort(np.unique(drawn_at[drawn_at[:, 0] == count, 1]))
+
+
+def replicated(samples: int, replicates: int) -> xr.Dataset:
+    campaign = made_campaign(samples, kind="sobol")
+    table = {"kind": "sobol", "samples": samples, "replicates": replicates}
+    campaign.attrs["design"] = json.dumps(table)
+    campaign["peak_tension"][:] = np.random.default_rng(3).normal(20.0, 1.0, samples)
+    return campaign
+
+
+def test_convergence_ends_at_mean_and_quantile() -> None:
+    campaign = made_campaign(8, failed=(2, 5), not_run=(7,))
+    figure = convergence(campaign)
+    values = campaign["peak_tension"].values[GOOD]
+    axes = panel(figure, "Largest tension")
+    mean, quantile = axes.lines
+    assert mean.get_ydata()[-1] == pytest.approx(values.mean())
+    assert mean.get_ydata()[1] == pytest.approx(values[:2].mean())
+    assert quantile.get_ydata()[-1] == pytest.approx(np.quantile(values, 0.95))
+    assert not axes.collections  # five samples have no interval
+    assert all(each.get_xlabel() == "Samples" for each in figure.axes if each.get_visible())
+    alone = convergence(made_campaign(9, kind="sobol"))
+    assert not panel(alone, "Largest tension").collections
+    assert "are not independent" in words(alone)
+
+
+def test_the_band_of_convergence_is_the_interval_of_the_analysis() -> None:
+    campaign = made_campaign(12)
+    figure = convergence(campaign)
+    axes = panel(figure, "Largest tension")
+    assert axes.collections[0].get_paths()[0].vertices[:, 0].min() == 8
+    known = analyse(campaign)["peak_tension_interval"].sel(statistic="mean")
+    np.testing.assert_allclose(ends_at(axes, 12), np.sort(known))
+    assert "95 % interval of the mean" in words(figure)
+    one = convergence(made_campaign(1))
+    axes = panel(one, "Largest tension")
+    assert axes.get_title(loc="left").endswith("n = 1")
+    assert all(float(tick).is_integer() for tick in axes.get_xticks())
+    assert "interval" not in words(one)
+
+
+def test_replicates_of_a_design_give_the_mean_its_interval() -> None:
+    campaign = replicated(40, 4)
+    figure = convergence(campaign)
+    axes = panel(figure, "Largest tension")
+    known = analyse(campaign)["peak_tension_interval"].sel(statistic="mean")
+    np.testing.assert_allclose(ends_at(axes, 40), np.sort(known))
+    # Replicates of one size: Student's t of their four means.
+    means = campaign["peak_tension"].values.reshape(10, 4).mean(axis=0)
+    half = t.ppf(0.975, 3) * means.std(ddof=1) / 2.0
+    np.testing.assert_allclose(ends_at(axes, 40), [means.mean() - half, means.mean() + half])
+    drawn_at = axes.collections[0].get_paths()[0].vertices[:, 0]
+    assert drawn_at.min() >= 8  # two samples of each
+    assert "not independent" not in words(figure)
+
+
+def test_a_requirement_has_its_probability_with_the_bounds_of_its_verdict() -> None:
+    campaign = made_campaign(30, stalled=(4, 11, 25), failed=(6,))
+    figure = convergence(campaign)
+    found = analyse(campaign).sel(requirement="outcome")
+    axes = panel(figure, "outcome is deployed")
+    share, required = axes.lines
+    assert required.get_ydata()[0] == 0.9
+    assert share.get_ydata()[-1] == pytest.approx(26 / 29) == pytest.approx(found.probability)
+    ends = [float(found.probability_lower), float(found.probability_upper)]
+    np.testing.assert_allclose(ends_at(axes, 29), ends)
+    (band,) = axes.collections
+    for count in np.unique(band.get_paths()[0].vertices[:, 0]).astype(int):
+        kept = np.isin(np.delete(np.arange(30), 6)[:count], [4, 11, 25], invert=True)
+        assert share.get_ydata()[count - 1] == pytest.approx(kept.mean())
+        # One-sided bounds of 90 %: a two-sided interval of 80 %.
+        exact = binomtest(int(kept.sum()), count).proportion_ci(0.8, "exact")
+        sides = [exact.low, exact.high]
+        drawn_at = ends_at(axes, count)
+        np.testing.assert_allclose(drawn_at[[0, -1]], sides)
+    titles = [a.get_title(loc="left") for a in figure.axes]
+    assert "asynchrony_max <= 3 degree\nn = 29" in titles
