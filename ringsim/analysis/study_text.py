@@ -32,6 +32,11 @@ def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
     counts += f", design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
+    if "tail_probability" in analysis:
+        lines.append(
+            "no input is told to matter: samples of a chain repeat each other, and levels lie "
+            "beyond different thresholds"
+        )
     if not full:
         lines.append("all statistics with intervals and convergence, and all inputs: --full")
     lines += [*filter(None, [analysis.attrs["stopping"]]), *tail_lines(analysis)]
