@@ -76,7 +76,7 @@ def judge(
     rule = rule_of(campaign.attrs)
     columns: dict[str, list[float]] = {name: [] for name in _MEANING}
     for name, wanted in requirements.items():
-        _require_values(campaign, name)
+        require_values(campaign, name)
         for key, value in _judged(campaign, name, wanted, placed, rule).items():
             columns[key].append(value)
     known = {
@@ -112,7 +112,7 @@ _MEANING = {
 }  # fmt: skip
 
 
-def _require_values(campaign: xr.Dataset, name: str) -> None:
+def require_values(campaign: xr.Dataset, name: str) -> None:
     """Refuse (InputError) an output that the runs do not compute: it would seem violated."""
     if name not in campaign:
         known = [OUTCOME, *(each for each in quantities() if each in campaign)]
