@@ -11,7 +11,7 @@ from ringsim.analysis.brief import digits_of, output_table, what_matters, what_s
 from ringsim.analysis.design import placement
 from ringsim.analysis.influence_text import influence_tables
 from ringsim.analysis.quantities import quantities
-from ringsim.analysis.requirements import read_requirements
+from ringsim.analysis.requirements import OUTCOME, read_requirements
 from ringsim.analysis.reweighting_text import reweighting_lines
 from ringsim.analysis.sensitivity_text import refusals, sensitivity_tables
 from ringsim.analysis.stopping import stopping_lines
@@ -20,6 +20,10 @@ from ringsim.analysis.tails import tail, tail_lines
 from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.refusal import InputError
 from ringsim.tables import Table, counted, interval_text, number_text, slim
+
+_HINT = (
+    '; require the outcome, too, as outcome = { is = "deployed", probability = P, confidence = C }'
+)
 
 
 def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
@@ -91,8 +95,18 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             _words(worst) if one["samples_lost"] else "-", str(further) if further > 0 else "-",
         ))  # fmt: skip
         if further > 0:
+            lost = counted(one["samples_lost"], "lost sample")
+            kept = f", if {lost} would not have violated it" * bool(one["samples_lost"])
+            more = counted(further, "further sample")
+            notes.append(f"{name}: {more} without a violation would show it{kept}")
+        if not one["samples_used"]:
+            notes.append(f"{name}: no sample has numbers that tell of it")
+        if short := one.get("samples_short"):
+            held = one["samples_used"] - one["samples_violating"]
+            hint = "" if OUTCOME in analysis["requirement"] else _HINT
             notes.append(
-                f"{name}: {counted(further, 'further sample')} without a violation would show it"
+                f"{name}: {short} of the {held} that keep to it ended short of their goal, and might"
+                f" not have kept to it further on{hint}"
             )
         if missing := one["samples_without_value"]:
             notes.append(

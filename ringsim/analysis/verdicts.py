@@ -108,6 +108,7 @@ _MEANING = {
     "samples_lost": ("samples whose run failed", "i8"),
     "samples_violating": ("samples used that violate the requirement", "i8"),
     "samples_without_value": ("of these, samples without a value", "i8"),
+    "samples_short": ("samples that keep to it and ended short of their goal", "i8"),
     "further_samples": ("further samples, none violating, that would show it; -1: none", "i8"),
 }  # fmt: skip
 
@@ -137,6 +138,7 @@ def _judged(
     broken = violations(campaign, name, wanted)
     absent = used & np.isnan(numbers(campaign, name)) if name != OUTCOME else ~used & used
     count, bad, missing = (int(each.sum()) for each in (used, broken, gone))
+    short = used & ~broken & _ended_short(campaign)
     place = campaign["sample"].to_numpy()
     levels = wanted.confidence, wanted.confidence
     looked = int((campaign["status"].to_numpy() >= 0).sum())
@@ -152,7 +154,7 @@ def _judged(
         ends = bounds(~(broken | gone)[run], place[run], levels, placed)
         worst = _verdict(*ends, wanted.probability)
     further = -1
-    if verdict == Verdict.NOT_YET_SHOWN:
+    if count and verdict == Verdict.NOT_YET_SHOWN:
         if rule is not None and rule.judges(name):
             further = rule.further_samples(name, wanted, looked, bad, placed.replicates)
         else:
@@ -168,8 +170,17 @@ def _judged(
         "probability": 1.0 - bad / count if count else np.nan,
         "probability_lower": low, "probability_upper": high,
         "samples_used": count, "samples_lost": missing, "samples_violating": bad,
-        "samples_without_value": int(absent.sum()), "further_samples": further,
+        "samples_without_value": int(absent.sum()),
+        "samples_short": int(short.sum()) if name != OUTCOME else 0,
+        "further_samples": further,
     }  # fmt: skip
+
+
+def _ended_short(campaign: xr.Dataset) -> Mask:
+    """Which runs ended before their goal: what they never came to cannot exceed a limit."""
+    if OUTCOME not in campaign:
+        return np.zeros(campaign.sizes["sample"], dtype=bool)
+    return ~np.isin(campaign[OUTCOME].to_numpy(), [-1, Fate.NONE, *GOALS])
 
 
 def _verdict(low: float, high: float, probability: float) -> Verdict:
