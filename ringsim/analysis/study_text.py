@@ -52,7 +52,7 @@ def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
         tables += [output_table(analysis, outputs_in(analysis)), _known_errors(analysis)]
         tables += [what_matters(analysis), *refusals(analysis), what_separates(analysis)]
     parts = [table.lines() if full else slim(table).lines() for table in tables]
-    parts += [list(reweighting_lines(analysis)), slim(verdict_table(analysis)).lines()]
+    parts += [slim(verdict_table(analysis)).lines(), list(reweighting_lines(analysis))]
     for more in filter(None, parts):
         lines += ["", *more]
     return lines
@@ -105,15 +105,15 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             held = one["samples_used"] - one["samples_violating"]
             hint = "" if OUTCOME in analysis["requirement"] else _HINT
             notes.append(
-                f"{name}: {short} of the {held} that keep to it ended short of their goal, and might"
-                f" not have kept to it further on{hint}"
+                f"{name}: {short} of the {held} that keep to it ended short of their goal, and "
+                f"might not have kept to it further on{hint}"
             )
         if missing := one["samples_without_value"]:
             notes.append(
                 f"{name}: violations without a value, as the antenna did not get so far: {missing}"
             )
     head = (
-        "requirement", "probability", "confidence", "verdict", "estimate", "one-sided bounds",
+        f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence", "verdict", "estimate", "one-sided bounds",
         "used", "violating", "lost", "if lost ones violate", "further",
     )  # fmt: skip
     return Table(head, rows, notes)

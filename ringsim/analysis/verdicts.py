@@ -148,11 +148,11 @@ def _judged(
     verdict = worst = Verdict.NOT_YET_SHOWN
     if count:
         low, high = bounds(~broken[used], place[used], levels, placed)
-        verdict = _verdict(low, high, wanted.probability)
+        verdict = verdict_of(low, high, wanted.probability)
     if count + missing:
         run = used | gone
         ends = bounds(~(broken | gone)[run], place[run], levels, placed)
-        worst = _verdict(*ends, wanted.probability)
+        worst = verdict_of(*ends, wanted.probability)
     further = -1
     if count and verdict == Verdict.NOT_YET_SHOWN:
         if rule is not None and rule.judges(name):
@@ -183,7 +183,8 @@ def _ended_short(campaign: xr.Dataset) -> Mask:
     return ~np.isin(campaign[OUTCOME].to_numpy(), [-1, Fate.NONE, *GOALS])
 
 
-def _verdict(low: float, high: float, probability: float) -> Verdict:
+def verdict_of(low: float, high: float, probability: float) -> Verdict:
+    """The verdict by the one-sided bounds of a probability; not yet shown where they are NaN."""
     if low >= probability:
         return Verdict.MET
     return Verdict.NOT_MET if high < probability else Verdict.NOT_YET_SHOWN
