@@ -113,8 +113,9 @@ def verdict_table(analysis: xr.Dataset) -> Table:
                 f"{name}: violations without a value, as the antenna did not get so far: {missing}"
             )
     head = (
-        f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence", "verdict", "estimate", "one-sided bounds",
-        "used", "violating", "lost", "if lost ones violate", "further",
+        f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
+        "verdict", "estimate", "one-sided bounds", "used", "violating", "lost",
+        "if lost ones violate", "further",
     )  # fmt: skip
     return Table(head, rows, notes)
 
