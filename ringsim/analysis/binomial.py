@@ -69,10 +69,10 @@ def difference_of_pairs(both: int, first: int, second: int, neither: int) -> Int
 
     Source: Newcombe, Statistics in Medicine 17 (1998) 2635, method 10.
     """
-    count, product = both + first + second + neither, both * neither - first * second
+    count, product = both + first + second + neither, float(both * neither - first * second)
     margins = (both + first) * (second + neither) * (both + second) * (first + neither)
     if product > 0:  # corrected for continuity
-        product = max(product - count / 2, 0)
+        product = max(product - count / 2, 0.0)
     one, other = both + first, both + second
     return _apart(
         one / count, other / count, _score(one, count), _score(other, count),

@@ -31,11 +31,12 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> list[str]:
     for name in found[dim].values:
         one = {str(n): v.values for n, v in found.sel({dim: name}).items()}
         counts = one[f"{word}_compared"].tolist()
+        low, high = one[f"{word}_share_difference_interval"].tolist()
         rows.append((
             str(name), *map(str, one[f"{word}_samples"]),
             *(number_text(share, 3) for share in one[f"{word}_share"]),
             number_text(one[f"{word}_share_difference"].item(), 3),
-            interval_text(*one[f"{word}_share_difference_interval"].tolist(), 3),
+            interval_text(low, high, 3),
             str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
         ))  # fmt: skip
     names = (

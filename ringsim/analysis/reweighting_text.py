@@ -51,8 +51,13 @@ def reweighting_lines(analysis: xr.Dataset) -> Iterator[str]:
         if analysis.attrs["design"] in SOBOL and not known:
             yield f"intervals of shares and quantiles need design.replicates = {LEAST_REPLICATES}"
         yield from text_table(("probability of", "reweighted", "95 % interval"), shares)
-    if "reweighted_verdict" not in analysis:
-        return
+    if "reweighted_verdict" in analysis:
+        yield ""
+        yield from slim(_verdicts(analysis)).lines()
+
+
+def _verdicts(analysis: xr.Dataset) -> Table:
+    """The verdicts for the other distributions, a row a requirement."""
     rows = []
     for name in analysis["requirement"].values:
         one = analysis.sel(requirement=name)
@@ -65,5 +70,4 @@ def reweighting_lines(analysis: xr.Dataset) -> Iterator[str]:
         ))  # fmt: skip
     head = ("requirement, reweighted", "probability", "confidence", "verdict", "estimate",
             "one-sided bounds")  # fmt: skip
-    yield ""
-    yield from slim(Table(head, rows)).lines()
+    return Table(head, rows)

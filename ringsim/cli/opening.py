@@ -18,8 +18,10 @@ def opened(path: Path) -> xr.Dataset:
         from ringsim.campaign.folder import open_folder
         from ringsim.campaign.merging import is_behind, merge
         from ringsim.storage.locks import runs_in
+        from ringsim.tables import counted
 
         if is_behind(path) and not runs_in(path):
             left, _, _ = merge(open_folder(path), execution="merged on its own", partly=True)
-            click.echo(f"{path}: results were not merged yet: wrote {MERGED}, {left} samples left")
+            told = f", {counted(left, 'sample')} not run" if left else ""
+            click.echo(f"{path}: merged its results into {MERGED} first{told}")
     return open_stored(path)

@@ -142,7 +142,7 @@ def test_verbs_merge_what_was_interrupted_but_not_what_runs(
         assert done.exit_code == EXIT_BAD_INPUT
         assert "not merged yet: give ringsim merge runs/small first" in done.output
         assert not (folder / "campaign.nc").exists()
-    line = f"{folder}: results were not merged yet: wrote campaign.nc, 2 samples left"
+    line = f"{folder}: merged its results into campaign.nc first, 2 samples not run"
     for verb in ("analyse", "export", "report", "plot", "compare"):
         (folder / "campaign.nc").unlink(missing_ok=True)
         others = [str(folder)] if verb == "compare" else []
