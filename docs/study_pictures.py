@@ -242,7 +242,7 @@ def rare_asynchrony(runs: Path) -> Figure:
     with xr.open_dataset(runs / "rare-asynchrony" / "campaign.nc") as file:
         rare = file.load()
     for number, one in enumerate(repetitions(rare, float(limits[-1]))):
-        axes.plot(grid, [one.beyond(x) for x in grid], color=style.VERMILLION, linewidth=0.9,
+        axes.plot(grid, [one.beyond(x)[0] for x in grid], color=style.VERMILLION, linewidth=0.9,
                   label="" if number else "subset simulation, a line a replicate")  # fmt: skip
     for limit, fits in zip(limits.tolist(), fit[len(grid) :], strict=True):
         found = repetitions(rare, limit)

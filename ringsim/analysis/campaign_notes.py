@@ -8,6 +8,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.analysis.blocks import population_of
+from ringsim.analysis.design import placement
 from ringsim.analysis.quantities import used
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.summary import summary
@@ -82,28 +84,32 @@ def latch_lines(campaign: xr.Dataset) -> list[str]:
 def budget_lines(campaign: xr.Dataset) -> list[str]:
     """Whether numerical or sampling error dominates the mean, a line for each output with bars.
 
+    Where the design does not tell the standard error, the line has the numerical one alone.
+
     The numerical error is the root mean square of the error bars, each of which bounds the error
     of one sample.  Those of neighbouring samples are alike, so they do not average out: it is
     compared with the standard error as it is.  Samples that did not end well are left out.
     """
-    sound, lines = used(campaign), []
+    sound, placed, lines = used(population_of(campaign)), placement(campaign), []
     for name in map(str, sound.data_vars):
         of = name.removesuffix("_error")
         if of == name or of not in sound or sound[of].dims != ("sample",):
             continue
+        known = sound[of].dropna("sample")
         values, bars = (
-            sound[each].dropna("sample").to_numpy().astype(float) for each in (of, name)
+            each.to_numpy().astype(float) for each in (known, sound[name].dropna("sample"))
         )
         if len(values) >= 2 and len(bars):
             spread, numerical = values.std(ddof=1), np.sqrt(np.mean(bars**2))
-            standard_error = spread / len(values) ** 0.5
+            sampling = placed.error_of_mean(values, known["sample"].to_numpy())
+            larger = "numerical" if numerical > sampling else "sampling"
             units = sound[of].attrs.get("units", "1")
             lines.append(
                 f"{of}: mean {values.mean():.6g}{'' if units == '1' else f' {units}'}, spread "
-                f"{spread:.2g}, standard error {standard_error:.2g}, numerical error at most "
-                f"{numerical:.2g} ({len(bars)} of {len(values)} samples): "
-                f"{'numerical' if numerical > standard_error else 'sampling'} error dominates "
-                "the mean"
+                f"{spread:.2g}, "
+                + (f"standard error {sampling:.2g}, " if np.isfinite(sampling) else "")
+                + f"numerical error at most {numerical:.2g} ({len(bars)} of {len(values)} samples)"
+                + (f": {larger} error dominates the mean" if np.isfinite(sampling) else "")
             )
     return lines
 

@@ -8,12 +8,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
+from ringsim.analysis.blocks import population_of
+from ringsim.analysis.comparison_shares import differences_of_shares, ends, has_means
 from ringsim.analysis.design import Placement, placement
 from ringsim.analysis.intervals import NONE, Array
 from ringsim.analysis.quantities import good, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME
+from ringsim.analysis.tails import subset_simulation
 from ringsim.refusal import InputError
-from ringsim.variables import Fate, Status
 
 SIDES = ("first", "second")
 Indices = NDArray[np.int64]
@@ -36,8 +38,11 @@ def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
     Returns for every output NAME that both have ``NAME_mean`` (side), ``NAME_difference``,
     ``NAME_difference_interval`` (bound), ``NAME_samples`` (side) in its unit, and for pairs
     ``NAME_largest_difference`` with ``NAME_largest_difference_sample``; the pairs whose outcome
-    differs along ``change``, how many samples had which along ``kind``.  ``pairing`` among the
-    attributes says what is paired.  InputError if one holds a run and the other a campaign.
+    differs along ``change``; shares of outcomes along ``kind`` and of samples that keep to a
+    requirement along ``requirement``, see ``differences_of_shares``.  Samples are those that
+    ``analyse`` counts; means and shares are those of populations, and of pairs of grids and lists.
+    ``pairing`` among the attributes says what is paired.  InputError if one holds a run and the
+    other a campaign.
     """
     if ("sample" in first.dims) != ("sample" in second.dims):
         raise InputError(
@@ -47,6 +52,7 @@ def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
     single = "sample" not in first.dims
     one, other = (_numbered(each) for each in (first, second))
     placed = placement(one), placement(other)
+    one, other = population_of(one), population_of(other)
     pairs = _alone() if single else paired(one, other)
     found = xr.Dataset(
         coords={"side": list(SIDES), "bound": ["lower", "upper"]},
@@ -54,14 +60,15 @@ def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
             "first": str(one.attrs.get("title", "")), "second": str(other.attrs.get("title", "")),
             "pairing": pairs.told, "pairs": len(pairs.first),
             "intervals": next(
-                (each.told for each in placed if not each.has_intervals and not single), ""
+                (p.told for p in placed if not single and (not p.has_intervals or p.block > 1)), ""
             ),
         },
     )  # fmt: skip
     for name in quantities():
         if name in one and name in other:
             found = found.assign(_output(name, (one, other), placed, pairs))
-    return found.assign(_outcomes((one, other), pairs))
+    shares = differences_of_shares((one, other), placed, (pairs.first, pairs.second))
+    return found.assign(_changed((one, other), pairs)).assign(shares)
 
 
 def _numbered(dataset: xr.Dataset) -> xr.Dataset:
@@ -86,7 +93,7 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
     """Pairs of samples with equal seeds in equal designs, else of samples with equal inputs.
 
     Equal seeds are draws at the same place of the unit cube, also where the distribution of an
-    input is another; but only of one design.
+    input is another; but only of one design, whose samples do not depend on results.
     """
     inputs = [
         str(name)
@@ -96,7 +103,8 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
     ]  # fmt: skip
     designs = [(each.kind, each.replicates) for each in map(placement, (first, second))]
     seeds = "sample_seed"
-    if designs[0] == designs[1] and seeds in first and seeds in second:
+    grows = subset_simulation(first) is not None
+    if designs[0] == designs[1] and not grows and seeds in first and seeds in second:
         keys = [list(each[seeds].to_numpy().tolist()) for each in (first, second)]
         if (found := _matched(*keys))[0].size:
             other = [
@@ -173,6 +181,8 @@ def _output(
         return units | {"long_name": f"{words}: {about}"}
 
     means = np.array([each.mean() for each in used])
+    if not has_means(both, placed, len(pairs.first)):
+        means = means * np.nan
     found: dict[str, Any] = {
         f"{name}_mean": ("side", means, told("mean of the samples compared")),
         f"{name}_difference": ((), means[1] - means[0], told("second minus first")),
@@ -200,39 +210,17 @@ def _interval(apart: Array, replicate: Indices | None) -> tuple[Any, Any]:
     return intervals.of_replicates(apart, replicate, np.mean)
 
 
-def _outcomes(both: tuple[xr.Dataset, xr.Dataset], pairs: Pairs) -> dict[str, Any]:
-    """How many samples had which outcome, and the pairs in which it is another one."""
-    words = [_ends(each) for each in both]
-    kinds = sorted(set(words[0]) | set(words[1]))
-    counts = np.array([[int((each == kind).sum()) for each in words] for kind in kinds])
-    one, other = words[0][pairs.first], words[1][pairs.second]
-    changed = np.flatnonzero(one != other)
-    found: dict[str, Any] = {
-        "kind": ("kind", np.array(kinds, dtype=object), {"long_name": "how a sample ended"}),
-        "kind_samples": (
-            ("kind", "side"), counts.reshape(len(kinds), 2),
-            {"long_name": "samples that ended so", "units": "1"},
-        ),
-    }  # fmt: skip
-    for side, dataset, places, ends in zip(
-        SIDES, both, (pairs.first, pairs.second), (one, other), strict=True
-    ):
+def _changed(both: tuple[xr.Dataset, xr.Dataset], pairs: Pairs) -> dict[str, Any]:
+    """The pairs in which the outcome is another one."""
+    places = pairs.first, pairs.second
+    one, other = (ends(each)[k] for each, k in zip(both, places, strict=True))
+    changed, found = np.flatnonzero(one != other), dict[str, Any]()
+    for side, dataset, place, words in zip(SIDES, both, places, (one, other), strict=True):
         found[f"changed_sample_{side}"] = (
-            "change", dataset["sample"].to_numpy()[places[changed]],
+            "change", dataset["sample"].to_numpy()[place[changed]],
             {"long_name": f"sample of the {side} whose outcome is another", "units": "1"},
         )  # fmt: skip
         found[f"changed_outcome_{side}"] = (
-            "change", ends[changed], {"long_name": f"how the sample of the {side} ended"},
+            "change", words[changed], {"long_name": f"how the sample of the {side} ended"},
         )  # fmt: skip
     return found
-
-
-def _ends(campaign: xr.Dataset) -> NDArray[Any]:
-    """How each sample ended, in a word."""
-    fates, status = campaign[OUTCOME].to_numpy(), campaign["status"].to_numpy()
-    ends = [
-        Fate(max(int(fate), 0)).word.replace("none", "unknown") if code == Status.OK
-        else "not run" if code < 0 else f"lost: {Status(int(code)).word}"
-        for fate, code in zip(fates, status, strict=True)
-    ]  # fmt: skip
-    return np.array(ends, dtype=object)

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.quantities import quantities
-from ringsim.tables import interval_text, number_text, text_table
+from ringsim.tables import Table, interval_text, number_text, slim
 
 _NAMED = 20
 """Changed outcomes that are listed at most."""
@@ -19,18 +19,41 @@ def compared(found: xr.Dataset) -> list[str]:
     lines.append(f"{found.attrs['pairing']}{pairs}")
     if found.attrs["intervals"]:
         lines.append(found.attrs["intervals"])
-    for part in (_outcomes, _outputs):
+    for part in (_outcomes, _requirements, _outputs):
         if more := list(part(found)):
             lines += ["", *more]
     return lines
 
 
+def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> list[str]:
+    """Counts of all samples, shares of those compared, and their differences."""
+    rows = []
+    for name in found[dim].values:
+        one = {str(n): v.values for n, v in found.sel({dim: name}).items()}
+        counts = one[f"{word}_compared"].tolist()
+        low, high = one[f"{word}_share_difference_interval"].tolist()
+        rows.append((
+            str(name), *map(str, one[f"{word}_samples"]),
+            *(number_text(share, 3) for share in one[f"{word}_share"]),
+            number_text(one[f"{word}_share_difference"].item(), 3),
+            interval_text(low, high, 3),
+            str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
+        ))  # fmt: skip
+    names = (
+        head, "first", "second", "share in first", "in second", "difference", "95 % interval",
+        "samples",
+    )  # fmt: skip
+    columns = 3 if found.attrs["pairs"] == 1 else len(names)
+    return slim(Table(names[:columns], [row[:columns] for row in rows])).lines()
+
+
+def _requirements(found: xr.Dataset) -> Iterator[str]:
+    if "requirement" in found.dims:
+        yield from _shares(found, "kept", "requirement", "samples that keep to")
+
+
 def _outcomes(found: xr.Dataset) -> Iterator[str]:
-    rows = [
-        (str(kind), *map(str, counts))
-        for kind, counts in zip(found["kind"].values, found["kind_samples"].values, strict=True)
-    ]
-    yield from text_table(("outcome", "first", "second"), rows)
+    yield from _shares(found, "kind", "kind", "outcome")
     changed = found.sizes["change"]
     if not found.attrs["pairs"]:
         return
@@ -49,9 +72,11 @@ def _outputs(found: xr.Dataset) -> Iterator[str]:
         if f"{name}_difference" not in found:
             continue
         first, second = found[f"{name}_mean"].values
+        if np.isnan(first) and not found.attrs["pairs"]:
+            continue
         apart = found[f"{name}_difference"].item()
         scale = max(abs(first), abs(second))
-        fine = max(4, int(np.log10(scale / abs(apart))) + 4) if apart else 6
+        fine = max(4, int(np.log10(scale / abs(apart))) + 4) if abs(apart) > 0 else 6
         counts = found[f"{name}_samples"].values.tolist()
         largest, place = "-", "-"
         if f"{name}_largest_difference" in found:
@@ -70,4 +95,4 @@ def _outputs(found: xr.Dataset) -> Iterator[str]:
     )  # fmt: skip
     if rows:
         columns = 5 if found.attrs["pairs"] == 1 else len(head)
-        yield from text_table(head[:columns], [row[:columns] for row in rows])
+        yield from slim(Table(head[:columns], [row[:columns] for row in rows])).lines()

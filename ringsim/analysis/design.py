@@ -8,6 +8,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.analysis.blocks import blocks_of
+from ringsim.analysis.intervals import Array, standard_error
 from ringsim.choice import kind_of, kinds_of
 from ringsim.files import parse_toml
 from ringsim.refusal import InputError
@@ -37,6 +38,14 @@ class Placement:
     def replicate_of(self, samples: NDArray[np.int64]) -> NDArray[np.int64] | None:
         """The replicate of each sample; None if all samples are independent."""
         return None if self.independent else samples // self.block % self.replicates
+
+    def error_of_mean(self, values: Array, samples: NDArray[np.int64]) -> float:
+        """Standard error of the mean of these samples' values, in their unit, shapes (n,); NaN
+        where their scatter does not tell it.
+        """
+        if not self.has_intervals or not len(values):
+            return float("nan")
+        return float(standard_error(values, self.replicate_of(samples))[0])
 
     @property
     def told(self) -> str:

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.blocks import population_of
+from ringsim.analysis.design import placement
 from ringsim.analysis.quantities import CHECKED, good, numbers, quantities
 from ringsim.outputs.family import Array
-from ringsim.tables import text_table
+from ringsim.tables import counted, text_table
 from ringsim.variables import Fate, Outcome, Status
 
 _NOT_CHECKED = -1
@@ -37,7 +39,7 @@ class Difference:
     """Sum of the error bars that both state, or for one that states none the largest that its
     engine states in other samples, or that of the other engine; NaN without any."""
     standard_error: float
-    """Of the mean of all samples that ended well."""
+    """Of the mean of all samples that ended well, as the design tells it; NaN if it does not."""
 
     @property
     def worst(self) -> int:
@@ -49,7 +51,7 @@ def differences(campaign: xr.Dataset) -> list[Difference]:
     """All outputs of a merged campaign that was checked; none if no check ended well."""
     ok = good(campaign)
     both = np.flatnonzero(ok & (campaign[f"status{CHECKED}"].to_numpy() == Status.OK))
-    found = []
+    stand, placed, found = population_of(campaign), placement(campaign), []
     for name, variable in quantities().items():
         if name not in campaign or f"{name}{CHECKED}" not in campaign or not len(both):
             continue
@@ -60,12 +62,11 @@ def differences(campaign: xr.Dataset) -> list[Difference]:
         own, theirs = (numbers(campaign, f"{name}_error{end}") for end in ("", CHECKED))
         own, theirs = (np.where(np.isnan(x), _largest(x), x) for x in (own, theirs))
         bars = np.where(np.isnan(own), theirs, own) + np.where(np.isnan(theirs), own, theirs)
-        known = frame[ok & np.isfinite(frame)]
-        error = known.std(ddof=1) / len(known) ** 0.5 if len(known) > 1 else np.nan
+        every = numbers(stand, name)
+        known = good(stand) & np.isfinite(every)
+        error = placed.error_of_mean(every[known], stand["sample"].to_numpy()[known])
         samples = campaign["sample"].to_numpy()[both]
-        found.append(
-            Difference(name, variable.units, samples, apart, share, bars[both], float(error))
-        )
+        found.append(Difference(name, variable.units, samples, apart, share, bars[both], error))
     return found
 
 
@@ -91,8 +92,11 @@ def check_lines(campaign: xr.Dataset) -> list[str]:
     lines = [f"{len(done)} of {len(status)} samples were checked with the full engine"]
     if len(failed := np.flatnonzero(status >= Status.SOLVER_FAILED)):
         why = str(campaign[f"reason{CHECKED}"].to_numpy()[failed[0]])[:200]
-        lines.append(f"{len(failed)} checks failed, first sample {failed[0]}: {why}")
+        lines.append(f"{counted(len(failed), 'check')} failed, first sample {failed[0]}: {why}")
     found = differences(campaign)
+    if found:
+        both = counted(len(found[0].samples), "sample")
+        lines.append(f"median and worst are of the {both} that ended well with both engines")
     rows = [
         (
             each.name, each.units, f"{np.median(each.apart):.2g}", f"{each.apart[each.worst]:.2g}",

@@ -18,6 +18,7 @@ from ringsim.analysis.drawn import Drawn, drawn
 from ringsim.analysis.intervals import Array
 from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME, Requirement
+from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.verdicts import violations
 from ringsim.variables import GOALS, Fate
 
@@ -32,7 +33,9 @@ _LEVELS = ("place", "quarter", "mean")
 def influence(
     campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement
 ) -> xr.Dataset:
-    """Rank measures of all drawn inputs, along ``input``; without variables if none was drawn.
+    """Rank measures of all drawn inputs, along ``input``; without variables if none was drawn, and
+    of subset simulation: samples of a chain repeat each other, and each level is beyond a threshold
+    of its own.
 
     For every output NAME ``NAME_rank_correlation`` and ``NAME_partial_rank_correlation``; along
     ``group`` the ``separation`` of samples that were lost, ended in another way than planned, or
@@ -41,7 +44,7 @@ def influence(
     quarters by the means of these, and for its places by these.
     """
     inputs = drawn(campaign)
-    if not inputs.names:
+    if not inputs.names or subset_simulation(campaign) is not None:
         return xr.Dataset()
     found: dict[str, Any] = {}
     index, ok = campaign["sample"].to_numpy(), good(campaign)

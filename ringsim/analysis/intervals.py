@@ -145,9 +145,9 @@ def jackknife_error(left_out: Array) -> Array:
     return np.asarray(np.sqrt(squares * (len(left_out) - 1) / len(left_out)))
 
 
-def student(replicates: int) -> float:
+def student(replicates: int, level: float = LEVEL) -> float:
     """Half length of an interval over the standard error from so many replicates."""
-    return float(t.ppf(0.5 + LEVEL / 2, replicates - 1)) if replicates > 1 else np.nan
+    return float(t.ppf(0.5 + level / 2, replicates - 1)) if replicates > 1 else np.nan
 
 
 def quantile_of_replicates(

@@ -110,7 +110,7 @@ def area_interval(found: Array, inside: int, outside: int) -> tuple[Array, Array
 
 def replicate_interval(
     measure: Callable[[NDArray[np.bool_]], Array], replicate: NDArray[np.int64],
-    to: Callable[[Array], Array], back: Callable[[Array], Array],
+    to: Callable[[Array], Array], back: Callable[[Array], Array], level: float = LEVEL,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Intervals of a measure from independent replicates of a design, see ``of_replicates``.
 
@@ -122,5 +122,5 @@ def replicate_interval(
     if len(which) < 2:
         return centre + np.nan, centre + np.nan
     error = jackknife_error(np.array([to(measure(replicate != each)) for each in which]))
-    half = student(len(which)) * error
+    half = student(len(which), level) * error
     return back(centre - half), back(centre + half)

@@ -13,7 +13,7 @@ from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import NONE, Array
 from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME, Requirement
-from ringsim.analysis.verdicts import violations
+from ringsim.analysis.verdicts import Verdict, verdict_of, violations
 from ringsim.choice import kind_of
 from ringsim.files import parse_toml
 from ringsim.overrides import parse_value
@@ -22,7 +22,7 @@ from ringsim.sampling.distributions.discrete import Discrete
 from ringsim.sampling.distributions.family import Distribution, inside
 from ringsim.sampling.table import AnyDistribution
 from ringsim.units import Model
-from ringsim.variables import Fate
+from ringsim.variables import Fate, flags_of
 
 LEAST_EFFECTIVE = 10.0
 """Effective samples below which nothing is told."""
@@ -153,8 +153,9 @@ def reweight(
 
     For every output NAME ``NAME_reweighted`` along ``reweighted_statistic``, its ``_interval`` and
     ``NAME_effective_samples``; ``reweighted_share`` along ``event``: outcomes, lost runs, and
-    requirements that are kept to; ``effective_samples`` of all that ran.  InputError where the
-    design stands for no population, or below 10 effective samples.
+    requirements that are kept to; ``reweighted_verdict`` with its one-sided ``reweighted_bounds``
+    along ``requirement``; ``effective_samples`` of all that ran.  InputError where the design
+    stands for no population, or below 10 effective samples.
     """
     if not placed.population:
         raise InputError(f"--reweight: {placed.told}")
@@ -195,6 +196,8 @@ def reweight(
     about = {"long_name": "share if inputs had the other distributions", "units": "1"}
     found["reweighted_share"] = "event", told[:, 0], about
     found["reweighted_share_interval"] = ("event", "bound"), told[:, 1:], about
+    if requirements and ok.any():
+        found |= _verdicts(campaign, requirements, placed, weights)
     found["effective_samples"] = (
         (), count, {"long_name": "effective samples of all that ran", "units": "1"}
     )  # fmt: skip
@@ -209,6 +212,36 @@ def reweight(
         "bound": ["lower", "upper"],
     }  # fmt: skip
     return xr.Dataset(found, coords=coords)
+
+
+def _verdicts(
+    campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement, weights: Array
+) -> dict[str, Any]:
+    """Verdicts along ``requirement`` for the other distributions, by one-sided bounds."""
+    held, index = good(campaign) & (weights > 0), campaign["sample"].to_numpy()
+    rows = []
+    for name, wanted in requirements.items():
+        kept, ends = ~violations(campaign, name, wanted)[held], NONE
+        if has_share_intervals(placed):
+            ends = weighted.share_bounds(
+                kept, weights[held], placed.replicate_of(index[held]), wanted.confidence
+            )
+        verdict = verdict_of(*ends, wanted.probability)
+        rows.append((verdict, weighted.mean(kept.astype(float), weights[held]), *ends))
+    told = np.array(rows)
+    about = "probability to keep to it if inputs had the other distributions"
+    return {
+        "reweighted_verdict": (
+            "requirement", told[:, 0].astype("i1"),
+            {"long_name": "verdict if inputs had the other distributions", "units": "1"}
+            | flags_of(Verdict),
+        ),
+        "reweighted_probability": ("requirement", told[:, 1], {"long_name": about, "units": "1"}),
+        "reweighted_bounds": (
+            ("requirement", "bound"), told[:, 2:],
+            {"long_name": f"one-sided bounds of the {about}", "units": "1"},
+        ),
+    }  # fmt: skip
 
 
 def has_share_intervals(placed: Placement) -> bool:

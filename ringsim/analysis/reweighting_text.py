@@ -7,8 +7,9 @@ import xarray as xr
 
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.reweighting import LEAST_REPLICATES, SOBOL, STATISTICS
+from ringsim.analysis.verdicts import Verdict
 from ringsim.sampling.values import label_of
-from ringsim.tables import interval_text, number_text, text_table
+from ringsim.tables import Table, interval_text, number_text, slim, text_table
 
 
 def reweighting_lines(analysis: xr.Dataset) -> Iterator[str]:
@@ -50,3 +51,23 @@ def reweighting_lines(analysis: xr.Dataset) -> Iterator[str]:
         if analysis.attrs["design"] in SOBOL and not known:
             yield f"intervals of shares and quantiles need design.replicates = {LEAST_REPLICATES}"
         yield from text_table(("probability of", "reweighted", "95 % interval"), shares)
+    if "reweighted_verdict" in analysis:
+        yield ""
+        yield from slim(_verdicts(analysis)).lines()
+
+
+def _verdicts(analysis: xr.Dataset) -> Table:
+    """The verdicts for the other distributions, a row a requirement."""
+    rows = []
+    for name in analysis["requirement"].values:
+        one = analysis.sel(requirement=name)
+        rows.append((
+            one["requirement_text"].item(), f"{one['probability_required'].item():g}",
+            f"{one['confidence_required'].item():g}",
+            Verdict(one["reweighted_verdict"].item()).word.replace("_", " "),
+            number_text(one["reweighted_probability"].item()),
+            interval_text(*one["reweighted_bounds"].values.tolist()),
+        ))  # fmt: skip
+    head = ("requirement, reweighted", "probability", "confidence", "verdict", "estimate",
+            "one-sided bounds")  # fmt: skip
+    return Table(head, rows)

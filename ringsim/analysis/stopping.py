@@ -11,7 +11,7 @@ from ringsim.analysis.looks import Condition, Rule, rule_of
 from ringsim.analysis.quantities import good, numbers, quantities
 from ringsim.analysis.requirements import Requirement
 from ringsim.analysis.verdicts import Verdict, judge
-from ringsim.tables import number_text
+from ringsim.tables import counted, number_text
 
 
 def holds(
@@ -76,7 +76,7 @@ def stopping_lines(campaign: xr.Dataset, placed: Placement) -> list[str]:
     else:
         taken = rule.numbers(count, placed.replicates)
         first = f"stop_when did not end the campaign of {count} samples"
-    looks = f"{len(taken)} looks: {', '.join(map(str, taken))}" if taken else "no look"
+    looks = f"{counted(len(taken), 'look')}: {', '.join(map(str, taken))}" if taken else "no look"
     kept = []
     if any(each.requirement for each in rule.conditions):
         kept.append("bounds of its requirements hold at all looks at once")

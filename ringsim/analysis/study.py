@@ -187,9 +187,7 @@ def _errors(
     samples are alike, so that they do not average out.
     """
     values = numbers(campaign, name)
-    sampling = np.nan
-    if placed.has_intervals:
-        sampling = float(intervals.standard_error(values[known], placed.replicate_of(index))[0])
+    sampling = placed.error_of_mean(values[known], index)
     bars = numbers(campaign, f"{name}_error")[known]
     apart = np.full(0, np.nan)
     if f"status{CHECKED}" in campaign and f"{name}{CHECKED}" in campaign:

@@ -11,7 +11,7 @@ from ringsim.analysis.brief import digits_of, output_table, what_matters, what_s
 from ringsim.analysis.design import placement
 from ringsim.analysis.influence_text import influence_tables
 from ringsim.analysis.quantities import quantities
-from ringsim.analysis.requirements import read_requirements
+from ringsim.analysis.requirements import OUTCOME, read_requirements
 from ringsim.analysis.reweighting_text import reweighting_lines
 from ringsim.analysis.sensitivity_text import refusals, sensitivity_tables
 from ringsim.analysis.stopping import stopping_lines
@@ -20,6 +20,10 @@ from ringsim.analysis.tails import tail, tail_lines
 from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.refusal import InputError
 from ringsim.tables import Table, counted, interval_text, number_text, slim
+
+_HINT = (
+    '; require the outcome, too, as outcome = { is = "deployed", probability = P, confidence = C }'
+)
 
 
 def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
@@ -32,6 +36,11 @@ def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
     counts += f", design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
+    if "tail_probability" in analysis:
+        lines.append(
+            "no input is told to matter: samples of a chain repeat each other, and levels lie "
+            "beyond different thresholds"
+        )
     if not full:
         lines.append("all statistics with intervals and convergence, and all inputs: --full")
     lines += [*filter(None, [analysis.attrs["stopping"]]), *tail_lines(analysis)]
@@ -43,7 +52,7 @@ def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
         tables += [output_table(analysis, outputs_in(analysis)), _known_errors(analysis)]
         tables += [what_matters(analysis), *refusals(analysis), what_separates(analysis)]
     parts = [table.lines() if full else slim(table).lines() for table in tables]
-    parts += [list(reweighting_lines(analysis)), slim(verdict_table(analysis)).lines()]
+    parts += [slim(verdict_table(analysis)).lines(), list(reweighting_lines(analysis))]
     for more in filter(None, parts):
         lines += ["", *more]
     return lines
@@ -86,16 +95,27 @@ def verdict_table(analysis: xr.Dataset) -> Table:
             _words(worst) if one["samples_lost"] else "-", str(further) if further > 0 else "-",
         ))  # fmt: skip
         if further > 0:
+            lost = counted(one["samples_lost"], "lost sample")
+            kept = f", if {lost} would not have violated it" * bool(one["samples_lost"])
+            more = counted(further, "further sample")
+            notes.append(f"{name}: {more} without a violation would show it{kept}")
+        if not one["samples_used"]:
+            notes.append(f"{name}: no sample has numbers that tell of it")
+        if short := one.get("samples_short"):
+            held = one["samples_used"] - one["samples_violating"]
+            hint = "" if OUTCOME in analysis["requirement"] else _HINT
             notes.append(
-                f"{name}: {counted(further, 'further sample')} without a violation would show it"
+                f"{name}: {short} of the {held} that keep to it ended short of their goal, and "
+                f"might not have kept to it further on{hint}"
             )
         if missing := one["samples_without_value"]:
             notes.append(
                 f"{name}: violations without a value, as the antenna did not get so far: {missing}"
             )
     head = (
-        "requirement", "probability", "confidence", "verdict", "estimate", "one-sided bounds",
-        "used", "violating", "lost", "if lost ones violate", "further",
+        f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
+        "verdict", "estimate", "one-sided bounds", "used", "violating", "lost",
+        "if lost ones violate", "further",
     )  # fmt: skip
     return Table(head, rows, notes)
 

@@ -77,8 +77,7 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
     chains = np.array([one.variation for one in found.repetitions])
     ends, variation = replicated_interval(each, chains)
     units = campaign[design.of].attrs.get("units", "1")
-    sign, bound = (">", design.above) if design.above is not None else ("<", design.below)
-    event = f"{design.of} {sign} {bound:g}{'' if units == '1' else f' {units}'}"
+    event = _event(design, design.target, units)
 
     def told(words: str) -> dict[str, str]:
         return {"long_name": words, "units": "1"}
@@ -102,7 +101,43 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
         ),
         "tail_lost": ((), int(lost(campaign).sum()), told("runs that failed: taken as no event")),
         "tail_ended": ((), int(found.ended), told("whether all levels have run")),
+        **_short(design, known, found.repetitions, units),
         **_checks(campaign, design, known, found.repetitions, units),
+    }  # fmt: skip
+
+
+def _event(design: SubsetSimulation, response: float, units: str) -> str:
+    """That the output is beyond a response, in words."""
+    unit = "" if units == "1" else f" {units}"
+    return f"{design.of} {'>' if design.sign > 0 else '<'} {design.sign * response:.6g}{unit}"
+
+
+def _short(
+    design: SubsetSimulation, known: Array, found: list[Repetition], units: str
+) -> dict[str, Any]:
+    """If replicates ended short of the event: the value nearest to it whose probability all of them
+    tell, which bounds that of the event, and the value of the run nearest to it.
+    """
+    ends = [one.reached for one in found if one.probability == 0.0]
+    if not ends or any(np.isnan(one.probability) for one in found):
+        return {}
+    each, chains = np.array([one.beyond(min(ends)) for one in found]).T
+    ends_of_interval, _ = replicated_interval(each, chains)
+    event = _event(design, min(ends), units)
+    nearest = design.sign * float(np.max(known, where=np.isfinite(known), initial=-np.inf))
+    return {
+        "tail_reached_probability": (
+            (), float(each.mean()),
+            {"long_name": f"probability of {event}", "units": "1", "event": event},
+        ),
+        "tail_reached_probability_interval": (
+            "bound", ends_of_interval,
+            {"long_name": "interval of 95 % of that probability", "units": "1"},
+        ),
+        "tail_nearest": (
+            (), nearest,
+            {"long_name": f"{design.of} of the run nearest to the event", "units": units},
+        ),
     }  # fmt: skip
 
 
@@ -125,7 +160,7 @@ def _checks(
         again, pairs = full > design.target, both & np.isfinite(full) & np.isfinite(known)
         apart = float(np.max(np.abs(full - known), where=pairs, initial=0.0))
     moved = [
-        float(np.mean([one.beyond(design.target + step) for one in found]))
+        float(np.mean([one.beyond(design.target + step)[0] for one in found]))
         for step in (apart, -apart)
     ]
     counts = {
@@ -150,6 +185,29 @@ def _checks(
     }  # fmt: skip
 
 
+def short_of(found: xr.Dataset) -> list[str]:
+    """Why a rare event has no interval, and by what its probability is bounded; none if it has."""
+    each = found["tail_replicate_probability"].to_numpy()
+    if (each > 0.0).all():
+        return []
+    if "tail_reached_probability" not in found:
+        none = int(np.isnan(each).sum())
+        return [f"unknown, as {none} of {len(each)} replicates have too few runs with a value"]
+    reached, nearest = found["tail_reached_probability"], found["tail_nearest"]
+    low, high = found["tail_reached_probability_interval"].to_numpy()
+    short = int((each == 0.0).sum())
+    words = [f"below {high:.2g}, since {short} of {len(each)} replicates did not reach it"]
+    if short < len(each):
+        words.append(f"their mean is {each.mean():.2g}")
+    unit = "" if nearest.attrs["units"] == "1" else f" {nearest.attrs['units']}"
+    return [
+        *words,
+        f"the bound is that of {reached.attrs['event']}, which all reached: probability "
+        f"{float(reached):.3g} (95 % {low:.2g} .. {high:.2g})",
+        f"the nearest run has {float(nearest):.6g}{unit}",
+    ]
+
+
 def tail_lines(analysis: xr.Dataset) -> list[str]:
     """The same as sentences; none without it."""
     if "tail_probability" not in analysis:
@@ -162,12 +220,7 @@ def tail_lines(analysis: xr.Dataset) -> list[str]:
     count, probability = len(one["tail_levels"]), float(one["tail_probability"])
     low, high = one["tail_probability_interval"]
     if np.isnan(low):
-        empty = int((one["tail_replicate_probability"] == 0.0).sum())
-        return [
-            f"probability of {event}: {probability:.3g}, without an interval: {empty} of {count} "
-            f"replicates did not reach it, and {int(np.isnan(probability))} have no probability"
-            f"; {runs}"
-        ]
+        return [f"probability of {event}: {'; '.join([*short_of(analysis), runs])}"]
     by_chains = f"{float(one['tail_variation_of_chains']):.2g} from the correlation of chains"
     variation = f"{float(one['tail_variation']):.2g} from {count} replicates, " if count > 1 else ""
     lines = [

@@ -76,7 +76,7 @@ def judge(
     rule = rule_of(campaign.attrs)
     columns: dict[str, list[float]] = {name: [] for name in _MEANING}
     for name, wanted in requirements.items():
-        _require_values(campaign, name)
+        require_values(campaign, name)
         for key, value in _judged(campaign, name, wanted, placed, rule).items():
             columns[key].append(value)
     known = {
@@ -108,11 +108,12 @@ _MEANING = {
     "samples_lost": ("samples whose run failed", "i8"),
     "samples_violating": ("samples used that violate the requirement", "i8"),
     "samples_without_value": ("of these, samples without a value", "i8"),
+    "samples_short": ("samples that keep to it and ended short of their goal", "i8"),
     "further_samples": ("further samples, none violating, that would show it; -1: none", "i8"),
 }  # fmt: skip
 
 
-def _require_values(campaign: xr.Dataset, name: str) -> None:
+def require_values(campaign: xr.Dataset, name: str) -> None:
     """Refuse (InputError) an output that the runs do not compute: it would seem violated."""
     if name not in campaign:
         known = [OUTCOME, *(each for each in quantities() if each in campaign)]
@@ -136,6 +137,7 @@ def _judged(
     broken = violations(campaign, name, wanted)
     absent = used & np.isnan(numbers(campaign, name)) if name != OUTCOME else ~used & used
     count, bad, missing = (int(each.sum()) for each in (used, broken, gone))
+    short = used & ~broken & _ended_short(campaign)
     place = campaign["sample"].to_numpy()
     levels = wanted.confidence, wanted.confidence
     looked = int((campaign["status"].to_numpy() >= 0).sum())
@@ -145,13 +147,13 @@ def _judged(
     verdict = worst = Verdict.NOT_YET_SHOWN
     if count:
         low, high = bounds(~broken[used], place[used], levels, placed)
-        verdict = _verdict(low, high, wanted.probability)
+        verdict = verdict_of(low, high, wanted.probability)
     if count + missing:
         run = used | gone
         ends = bounds(~(broken | gone)[run], place[run], levels, placed)
-        worst = _verdict(*ends, wanted.probability)
+        worst = verdict_of(*ends, wanted.probability)
     further = -1
-    if verdict == Verdict.NOT_YET_SHOWN:
+    if count and verdict == Verdict.NOT_YET_SHOWN:
         if rule is not None and rule.judges(name):
             further = rule.further_samples(name, wanted, looked, bad, placed.replicates)
         else:
@@ -167,11 +169,21 @@ def _judged(
         "probability": 1.0 - bad / count if count else np.nan,
         "probability_lower": low, "probability_upper": high,
         "samples_used": count, "samples_lost": missing, "samples_violating": bad,
-        "samples_without_value": int(absent.sum()), "further_samples": further,
+        "samples_without_value": int(absent.sum()),
+        "samples_short": int(short.sum()) if name != OUTCOME else 0,
+        "further_samples": further,
     }  # fmt: skip
 
 
-def _verdict(low: float, high: float, probability: float) -> Verdict:
+def _ended_short(campaign: xr.Dataset) -> Mask:
+    """Which runs ended before their goal: what they never came to cannot exceed a limit."""
+    if OUTCOME not in campaign:
+        return np.zeros(campaign.sizes["sample"], dtype=bool)
+    return ~np.isin(campaign[OUTCOME].to_numpy(), [-1, Fate.NONE, *GOALS])
+
+
+def verdict_of(low: float, high: float, probability: float) -> Verdict:
+    """The verdict by the one-sided bounds of a probability; not yet shown where they are NaN."""
     if low >= probability:
         return Verdict.MET
     return Verdict.NOT_MET if high < probability else Verdict.NOT_YET_SHOWN

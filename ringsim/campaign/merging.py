@@ -1,16 +1,17 @@
 """Merging a campaign's folder into one file."""
 
+import os
 from pathlib import Path
 
 from ringsim.campaign.folder import Folder
 from ringsim.campaign.stopping import decided
 from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError
-from ringsim.storage.journal import DamagedError
+from ringsim.storage.journal import FOLDER, DamagedError
 from ringsim.storage.locks import GO_ON, locked
 from ringsim.storage.merge import NAME as MERGED
 from ringsim.storage.merge import write_merged
-from ringsim.storage.netcdf import OutputTable, provenance
+from ringsim.storage.netcdf import DESIGN, OutputTable, provenance
 from ringsim.variables import Fidelity
 
 _KEPT = (
@@ -64,3 +65,14 @@ def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, 
                 if whole:
                     raise
     return left, failed, path
+
+
+def is_behind(folder: Path) -> bool:
+    """Whether there are results that the merged file cannot have."""
+    if not (folder / DESIGN).exists():
+        return False
+    merged = folder / MERGED
+    if not merged.exists():
+        return True
+    newest = max((f.stat().st_mtime for f in (folder / FOLDER).glob("*.journal")), default=0.0)
+    return newest > merged.stat().st_mtime and os.access(folder, os.W_OK)

@@ -1,6 +1,5 @@
 """Campaigns from Python: the tables of a campaign file as arguments, the same way from there."""
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import xarray as xr
 from ringsim.analysis.engines import too_far
 from ringsim.analysis.stored import MERGED, open_stored
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.merging import merge
+from ringsim.campaign.merging import is_behind, merge
 from ringsim.campaign.plan import plan
 from ringsim.campaign.run import Share
 from ringsim.campaign.specification import campaign_of, load_campaign
@@ -21,8 +20,6 @@ from ringsim.execution.mpi import launched_size
 from ringsim.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.storage.journal import FOLDER
-from ringsim.storage.netcdf import DESIGN
 from ringsim.units import Model
 
 IN_MEMORY = 200e6
@@ -169,7 +166,7 @@ def open_campaign(path: str | Path) -> xr.Dataset:
         If there is no campaign, or none of its samples has run.
     """
     path = Path(path)
-    if path.is_dir() and _is_behind(path):
+    if path.is_dir() and is_behind(path):
         merge(open_folder(path), execution="merged on its own", partly=True)
     found = open_stored(path)
     if "sample" not in found.dims or "status" not in found:
@@ -183,17 +180,6 @@ def open_campaign(path: str | Path) -> xr.Dataset:
         return found
     with found:
         return found.load()
-
-
-def _is_behind(folder: Path) -> bool:
-    """Whether there are results that the merged file cannot have."""
-    if not (folder / DESIGN).exists():
-        return False
-    merged = folder / MERGED
-    if not merged.exists():
-        return True
-    newest = max((f.stat().st_mtime for f in (folder / FOLDER).glob("*.journal")), default=0.0)
-    return newest > merged.stat().st_mtime and os.access(folder, os.W_OK)
 
 
 def _plain(value: Any) -> Any:

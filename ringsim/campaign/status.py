@@ -12,6 +12,7 @@ from ringsim.campaign.stopping import End, decided, looks_of
 from ringsim.storage.locks import in_use
 from ringsim.storage.netcdf import NOT_RUN
 from ringsim.storage.result import sample_of
+from ringsim.tables import counted
 from ringsim.variables import Status
 
 _TOLD = {"state", "host", "pid", "workers", "elapsed", "updated", "done", "done_before", "running"}
@@ -66,7 +67,7 @@ def status_lines(campaign: Folder) -> list[str]:
             running |= {int(number): lasts + since for number, lasts in told["running"].items()}
             rate += (told["done"] - told["done_before"]) / max(told["elapsed"] + since, 1e-9)
         lines.append(
-            f"  {writer:<14} {state}, {told['workers']} workers, "
+            f"  {writer:<14} {state}, {counted(told['workers'], 'worker')}, "
             f"process {told['pid']} on {told['host']}, {since:.0f} s ago"
         )
     checks = campaign.survey(checks=True)

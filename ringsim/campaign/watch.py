@@ -15,6 +15,7 @@ from typing import Any
 
 from ringsim.files import whole
 from ringsim.storage.result import Result, sample_of
+from ringsim.tables import counted
 
 _STOPPERS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 _PLAIN_SECONDS = 30.0
@@ -94,8 +95,9 @@ class Progress:
             postfix=self._counts(), disable=not (notebook or sys.stderr.isatty()),
         )  # fmt: skip
         if self._bar.disable:
-            checks = f", {self.checks} checks to run" if self.checks else ""
-            self._tell(f"{self.done} of {self.total} samples done, {self.workers} workers{checks}")
+            checks = f", {counted(self.checks, 'check')} to run" if self.checks else ""
+            workers = counted(self.workers, "worker")
+            self._tell(f"{self.done} of {self.total} samples done, {workers}{checks}")
 
     def _counts(self) -> dict[str, Any]:
         checks = {"checks": f"{self._checked}/{self.checks}"} if self.checks else {}

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from ringsim.cli.opening import opened
 from ringsim.cli.options import PATH
 from ringsim.refusal import InputError
 
@@ -39,7 +40,6 @@ def command(
     """
     from ringsim.analysis.requirements import parse_requirements, read_requirements
     from ringsim.analysis.reweighting import parse_reweighted
-    from ringsim.analysis.stored import open_stored
     from ringsim.analysis.study import analyse
     from ringsim.analysis.study_text import told
     from ringsim.dataset import require_file, save
@@ -48,7 +48,7 @@ def command(
     wanted = parse_requirements(required)
     if out is not None:
         require_file(out)
-    with open_stored(source) as campaign:
+    with opened(source) as campaign:
         own = json.loads(campaign.attrs.get("requirements", "{}"))
         try:
             judged = {**read_requirements(own, "requirements"), **wanted}

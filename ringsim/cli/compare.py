@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from ringsim.cli.opening import opened
 from ringsim.cli.options import PATH
 from ringsim.refusal import InputError
 
@@ -19,12 +20,11 @@ def command(first: Path, second: Path, out: Path | None) -> None:
     """
     from ringsim.analysis.comparison import compare
     from ringsim.analysis.comparison_text import compared
-    from ringsim.analysis.stored import open_stored
     from ringsim.dataset import require_file, save
 
     if out is not None:
         require_file(out)
-    with open_stored(first) as one, open_stored(second) as other:
+    with opened(first) as one, opened(second) as other:
         try:
             found = compare(one, other)
         except InputError as error:

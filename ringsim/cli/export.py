@@ -5,15 +5,20 @@ from typing import Any
 
 import click
 
+from ringsim.cli.opening import opened
 from ringsim.cli.options import PATH, listed
 from ringsim.files import writing
-from ringsim.refusal import InputError
+from ringsim.refusal import InputError, known_or_nearest
 
 FORMATS = ("csv", "mat", "pvd")
 
 
 def _formats(_context: Any, _option: Any, text: str) -> tuple[str, ...]:
     return listed("--format", text, FORMATS, "is no format to export to")
+
+
+def _names(_context: Any, _option: Any, text: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(filter(None, (word.strip() for word in text.split(",")))))
 
 
 @click.command()
@@ -26,17 +31,21 @@ def _formats(_context: Any, _option: Any, text: str) -> tuple[str, ...]:
     "--sample", "samples", metavar="N", type=int, multiple=True,
     help="Only this sample of a campaign; may be given more than once.",
 )  # fmt: skip
+@click.option(
+    "--variables", "names", metavar="NAME,NAME", default="", callback=_names,
+    help="Only these variables, in csv and mat (default: all; FILE-variables.csv lists them).",
+)  # fmt: skip
 @click.option("--out", metavar="DIR", type=PATH, help="Folder (default: FILE's).")
 def command(
-    file: Path, formats: tuple[str, ...], samples: tuple[int, ...], out: Path | None
-) -> None:
+    file: Path, formats: tuple[str, ...], samples: tuple[int, ...], names: tuple[str, ...],
+    out: Path | None,
+) -> None:  # fmt: skip
     """Write a run, or a campaign, from its FILE or folder in the formats of other programs."""
-    from ringsim.analysis.stored import open_stored
-    from ringsim.export.csv import write_csv
+    from ringsim.export.csv import MANY, most_rows, write_csv
     from ringsim.export.matlab import write_mat
     from ringsim.export.paraview import write_pvd
 
-    with open_stored(file) as dataset:
+    with opened(file) as dataset:
         campaign = "sample" in dataset.dims
         if "status" not in dataset or "scene" not in dataset.attrs:
             raise InputError(
@@ -57,6 +66,14 @@ def command(
         chosen = dataset.sel(sample=list(samples)) if samples else dataset
         # Stored states mean nothing to other programs.
         chosen = chosen.drop_dims(["state_entry", "state_time"], errors="ignore")
+        if names:
+            chosen = _only(chosen, names, formats)
+        if "csv" in formats and (rows := most_rows(chosen)) > MANY:
+            click.echo(
+                f"the longest table has up to {rows:,} rows: choose variables with --variables, or "
+                "samples with --sample, unless you need all",
+                err=True,
+            )
         folder = out or (file if file.is_dir() else file.parent)
         stem = "campaign" if file.is_dir() else file.stem
         with writing(folder):
@@ -69,3 +86,15 @@ def command(
                     written += write_pvd(run, folder, name)
     for path in written:
         click.echo(f"wrote {path}")
+
+
+def _only(dataset: Any, names: tuple[str, ...], formats: tuple[str, ...]) -> Any:
+    """The dataset with some of its variables; InputError if it has not all of them."""
+    if not {"csv", "mat"} & set(formats):
+        raise InputError("--variables: says nothing to --format pvd: leave it out")
+    known = [str(name) for name in dataset.data_vars]
+    for name in names:
+        if name not in known:
+            hint = known_or_nearest(name, known)
+            raise InputError(f"--variables {name}: is no variable of this file ({hint})")
+    return dataset[list(names)]

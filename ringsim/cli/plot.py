@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from ringsim.cli.opening import opened
 from ringsim.cli.options import ANIMATE, COLOUR, PATH, PLOT_FORMAT, require_animate
 from ringsim.refusal import InputError
 
@@ -30,11 +31,11 @@ def command(
     require_animate(colour, animate=animate)
     if sample is not None and not animate:
         raise InputError(f"--sample {sample}: says nothing without --animate; give both")
-    from ringsim.analysis.stored import MERGED, open_stored
+    from ringsim.analysis.stored import MERGED
     from ringsim.plots.campaign.figures import draw_campaign
     from ringsim.plots.run import draw_run
 
-    with open_stored(file) as dataset:
+    with opened(file) as dataset:
         file = file / MERGED if file.is_dir() else file
         campaign = "sample" in dataset.dims
         needed = {"scene", "campaign"} if campaign else {"scene", "reason"}

@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from ringsim.cli.opening import opened
 from ringsim.cli.options import PATH
 from ringsim.files import require_place
 from ringsim.refusal import InputError
@@ -18,24 +19,17 @@ from ringsim.refusal import InputError
     help="File of ringsim analyse --out with what to show instead of an analysis of today.",
 )  # fmt: skip
 def command(folder: Path, out: Path, analysis: Path | None) -> None:
-    """Write one page about the campaign in DIR, which holds campaign.nc, or about such a file.
+    """Write one page about the campaign in DIR, or in a file campaign.nc.
 
     The page holds all that it shows, and loads nothing: it can be mailed, printed and kept.
     """
-    from ringsim.storage.merge import NAME
+    from ringsim.analysis.stored import MERGED
 
     require_place(out)
     if out.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"--out {out}: the page is HTML: write {out.stem}.html")
-    file = folder / NAME if folder.is_dir() else folder
-    if not file.exists():
-        what = f"holds no {NAME}: merge its results with ringsim merge {folder}"
-        what = what if folder.is_dir() else "there is no such folder: give that of a campaign"
-        raise InputError(f"{folder}: {what}")
-    from ringsim.analysis.stored import open_stored
-
-    with open_stored(file) as campaign:
-        _write(campaign, file, out, analysis)
+    with opened(folder) as campaign:
+        _write(campaign, folder / MERGED if folder.is_dir() else folder, out, analysis)
 
 
 def _write(campaign: Any, file: Path, out: Path, analysis: Path | None) -> None:

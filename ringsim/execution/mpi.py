@@ -18,6 +18,7 @@ from typing import Any, TypeVar, cast
 from ringsim.execution.slot import Slot, without_mpi
 from ringsim.execution.work import Scheduler, Work
 from ringsim.refusal import InputError
+from ringsim.tables import counted
 
 _TO_WORKER, _TO_RANK_0 = 11, 12
 _SHORTEST, _LONGEST = 1e-4, 2e-2
@@ -100,7 +101,7 @@ class Mpi(Scheduler):
         self.rank: int = communicator.Get_rank()
         self.workers: int = communicator.Get_size()
         library = " ".join(MPI.Get_library_version().split("\n")[0].split())
-        self.description = f"MPI, {self.workers} ranks, {library}"
+        self.description = f"MPI, {counted(self.workers, 'rank')}, {library}"
 
     def from_first(self, value: _T) -> _T:
         """See :meth:`Scheduler.from_first`."""

@@ -12,6 +12,8 @@ from ringsim.files import whole
 
 BLOCK = 1 << 22
 """Rows, about, that are held at once."""
+MANY = 5_000_000
+"""Rows of a table above which few programs open it, and it takes minutes to write."""
 
 
 def write_csv(dataset: xr.Dataset, folder: Path, stem: str) -> list[Path]:
@@ -41,6 +43,15 @@ def write_csv(dataset: xr.Dataset, folder: Path, stem: str) -> list[Path]:
     return [*written, path]
 
 
+def most_rows(dataset: xr.Dataset) -> int:
+    """Rows of the longest table that ``write_csv`` would write, at most."""
+    return max((_rows(dataset, dims) for dims in _tables(dataset)), default=0)
+
+
+def _rows(dataset: xr.Dataset, dims: tuple[str, ...]) -> int:
+    return int(np.prod([dataset.sizes[dim] for dim in dims], dtype=np.int64))
+
+
 def _tables(dataset: xr.Dataset) -> dict[tuple[str, ...], list[str]]:
     """Names of variables by their dimensions."""
     found: dict[tuple[str, ...], list[str]] = {}
@@ -51,7 +62,7 @@ def _tables(dataset: xr.Dataset) -> dict[tuple[str, ...], list[str]]:
 
 def _blocks(dataset: xr.Dataset, dims: tuple[str, ...]) -> Iterator[xr.Dataset]:
     """The dataset in pieces along its first dimension, so that any campaign fits into memory."""
-    rows = int(np.prod([dataset.sizes[dim] for dim in dims], dtype=np.int64))
+    rows = _rows(dataset, dims)
     if rows <= BLOCK or not dims:
         yield dataset
         return

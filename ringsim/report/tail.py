@@ -2,11 +2,10 @@
 
 from typing import NamedTuple
 
-import numpy as np
 import xarray as xr
 
 from ringsim.analysis.binomial import share_interval
-from ringsim.analysis.tails import tail
+from ringsim.analysis.tails import short_of, tail
 from ringsim.report.tables import Rows
 
 
@@ -32,17 +31,22 @@ def rare_event(campaign: xr.Dataset) -> RareEvent | None:
     each = ", ".join(f"{p:.2g}" for p in found["tail_replicate_probability"].to_numpy())
     by_chains = f"{float(found['tail_variation_of_chains']):.2g} by the chains alone"
     scatter = f"{float(found['tail_variation']):.2g} by the replicates, "
+    if why := short_of(found):
+        rows += [["probability", why[0]]]
+    else:
+        rows += [
+            ["probability", f"{float(found['tail_probability']):.3g}"],
+            ["95 % interval", f"{low:.2g} to {high:.2g}"],
+            ["coefficient of variation", f"{scatter if replicates > 1 else ''}{by_chains}"],
+            ["by each replicate", each],
+        ]
     rows += [
-        ["probability", f"{float(found['tail_probability']):.3g}"],
-        ["95 % interval", "none" if np.isnan(low) else f"{low:.2g} to {high:.2g}"],
-        ["coefficient of variation", f"{scatter if replicates > 1 else ''}{by_chains}"],
-        ["by each replicate", each],
         ["levels", f"{levels} at most, in {replicates} replicates"],
         ["runs", f"{runs}, {lost} lost and taken as no event"],
     ]
-    notes = []
-    if np.isnan(low):
-        notes.append("Not every replicate reached the event: raise samples or most_levels")
+    notes = [each[0].upper() + each[1:] for each in why[1:]]
+    if why:
+        notes.append("Raise samples or most_levels, so that every replicate reaches the event")
     if checked := int(found["tail_checked"]):
         confirmed = int(found["tail_confirmed"])
         low, high = share_interval(confirmed, checked)
@@ -55,7 +59,7 @@ def rare_event(campaign: xr.Dataset) -> RareEvent | None:
             "in the event by the full engine alone",
             f"{int(found['tail_missed'])} of the {outside} nearest runs outside it",
         ])  # fmt: skip
-    if checked or outside:
+    if (checked or outside) and not why:
         apart = found["tail_difference"]
         farther, nearer = found["tail_probability_moved"].to_numpy()
         rows.append([

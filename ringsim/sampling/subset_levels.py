@@ -54,16 +54,33 @@ class Repetition:
     """Of the levels passed."""
     shares: list[float] = field(default_factory=list)
     """Probability of a response beyond each of them."""
+    squares: list[float] = field(default_factory=list)
+    """Of these probabilities the squares of their coefficients of variation, as ``variation``."""
+    chains: int = 0
+    """Of every level but the first, whose samples are independent."""
     states: list[Array] = field(default_factory=list)
     """Responses of every level, the first without a threshold; those of a chain may be equal."""
 
-    def beyond(self, response: float) -> float:
-        """Probability of a response beyond this one; NaN if there is none yet."""
+    @property
+    def reached(self) -> float:
+        """The response from which a further level would start: the farthest whose probability is
+        known as well as that of any level.
+        """
+        bound = float(np.sort(self.states[-1])[-self.chains - 1])
+        told = bound > -np.inf and (self.states[-1] > bound).any()
+        return bound if told or not self.thresholds else self.thresholds[-1]
+
+    def beyond(self, response: float) -> tuple[float, float]:
+        """Probability of a response beyond this one, and its coefficient of variation, as
+        ``variation``; NaN if there is none yet.
+        """
         if np.isnan(self.probability):
-            return np.nan
+            return np.nan, np.nan
         passed = int(np.searchsorted(self.thresholds, response, side="right"))
-        before = self.shares[passed - 1] if passed else 1.0
-        return before * float((self.states[passed] > response).mean())
+        before, square = (self.shares[passed - 1], self.squares[passed - 1]) if passed else (1, 0)
+        inside = self.states[passed] > response
+        square += _variance(inside, self.chains if passed else len(inside))
+        return before * float(inside.mean()), float(np.sqrt(square))
 
 
 @dataclass
@@ -128,7 +145,7 @@ def _simulation(
 ) -> Generator[Batch, Answer, None]:
     """One simulation, which asks for batches and is sent their responses."""
     length = round(1.0 / share)
-    chains = samples // length
+    chains = found.chains = samples // length
     here, response = yield Batch(np.full(samples, -1), 1.0, 0)
     probability, squares, anew, before = 1.0, 0.0, _FIRST, -np.inf
     for level in range(most + 1):
@@ -151,6 +168,7 @@ def _simulation(
             return
         found.thresholds.append(bound)
         found.shares.append(probability)
+        found.squares.append(squares)
         before = bound
         seeds = np.resize(np.flatnonzero(inside), chains)
         states, values = here[seeds], response[seeds]

@@ -70,6 +70,15 @@ def tries(folder: Path) -> Iterator[int]:
     )
 
 
+def runs_in(folder: Path) -> bool:
+    """Whether any process runs a campaign in a folder just now."""
+    path = folder / "lock"
+    if not path.exists():
+        return False
+    with locked(path) as free:
+        return not free
+
+
 def in_use(folder: Path, writer: str) -> bool:
     """Whether a process runs a share of a campaign just now."""
     path = folder / f"lock-{writer}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -233,7 +235,9 @@ def test_budget_says_which_error_dominates() -> None:
             "asynchrony_max": ("sample", 5.0 + 1e-3 * values, {"units": "degree"}),
             "asynchrony_max_error": ("sample", bars, {"units": "degree"}),
             "energy_error": ("sample", values),
-        }
+        },
+        coords={"sample": np.arange(100)},
+        attrs={"design": json.dumps({"kind": "random", "samples": 100})},
     )
     campaign.status[0] = 2
     first, second = budget_lines(campaign)
@@ -245,6 +249,16 @@ def test_budget_says_which_error_dominates() -> None:
     )
     assert second.startswith("asynchrony_max: ")
     assert "numerical error dominates" in second
+    # One Sobol design has no standard error, and a few replicates that of their means.
+    one = {"kind": "sobol", "samples": 100}
+    assert budget_lines(campaign.assign_attrs(design=json.dumps(one)))[0].endswith(
+        f"spread {spread:.2g}, numerical error at most 0.02 (9 of 99 samples)"
+    )
+    campaign.status[0] = 0
+    apart = campaign.assign(deployment_time=campaign.deployment_time + np.arange(100) % 4)
+    told = budget_lines(apart.assign_attrs(design=json.dumps(one | {"replicates": 4})))[0]
+    means = apart.deployment_time.to_numpy().reshape(25, 4).mean(axis=0)
+    assert f"standard error {means.std(ddof=1) / 2:.2g}, " in told
 
 
 def test_cases_run_as_a_campaign_with_bars_and_steps_as_inputs(tmp_path, capfd) -> None:
@@ -259,6 +273,6 @@ def test_cases_run_as_a_campaign_with_bars_and_steps_as_inputs(tmp_path, capfd) 
         np.testing.assert_array_equal(found.solver_step, [0.2, 0.1])
         errors = found.deployment_time_error.values
     assert errors[1] < errors[0]
-    assert "dominates the mean" in capfd.readouterr().err
+    assert "numerical error at most" in capfd.readouterr().err
     with pytest.raises(InputError, match="case 1"):
         run_cases(tmp_path / "b", "x", scene, [{"a": 1}, {"b": 2}], workers=1)

@@ -98,7 +98,7 @@ def test_a_requirement_of_the_command_line_replaces_the_file_s(study):
                 (folder / "design.nc").touch(),
                 (folder / "journals/all.journal").touch(),
             ),
-            "ringsim merge",
+            "design.nc: cannot be read",
         ),
         (lambda folder: folder.write_text("text"), "cannot be read as a netCDF file"),
         (lambda folder: xr.Dataset({"status": 0}).to_netcdf(folder), "holds no samples"),

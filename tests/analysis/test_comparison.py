@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from scipy.stats import multinomial, ttest_ind
 
-from made import campaign, response
+from made import campaign, drawn_campaign, ishigami, response
 from ringsim.analysis import intervals
+from ringsim.analysis.binomial import difference_of_pairs, difference_of_shares
+from ringsim.analysis.blocks import population_of
 from ringsim.analysis.comparison import compare
 from ringsim.analysis.comparison_text import compared
 from ringsim.cli.compare import command
 from ringsim.refusal import InputError
+from ringsim.sampling.designs.saltelli import Saltelli
 from ringsim.variables import Fate, Status
 
 RANDOM = np.random.default_rng(0)
@@ -105,6 +112,108 @@ def test_outcomes_that_changed_are_told_by_sample():
     assert found.asynchrony_max_samples.values.tolist() == [29, 29]
     counts = dict(zip(found.kind.values, found.kind_samples.values.tolist(), strict=True))
     assert counts == {"deployed": [30, 28], "lost: timeout": [0, 1], "stalled": [0, 1]}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "ends"),
+    [
+        ((48, 80), (56, 70), (0.0524, 0.3339)),
+        ((3, 10), (9, 10), (0.1705, 0.8090)),
+        ((2, 7), (6, 7), (0.0582, 0.8062)),
+        ((0, 29), (5, 56), (-0.0381, 0.1926)),
+        ((0, 20), (0, 10), (-0.1611, 0.2775)),
+        ((0, 10), (10, 10), (0.6075, 1.0000)),
+    ],
+)
+def test_differences_of_shares_are_those_of_the_source(first, second, ends):
+    """Newcombe, Statistics in Medicine 17 (1998) 873, table II, method 10."""
+    assert difference_of_shares(first, second) == pytest.approx(ends, abs=6e-5)
+
+
+@pytest.mark.parametrize(
+    "kinds",
+    [(0.5, 0.2, 0.1, 0.2), (0.9, 0.05, 0.03, 0.02), (0.85, 0.0, 0.1, 0.05), (0, 0.4, 0.4, 0.2)],
+)
+def test_differences_of_paired_shares_hold_the_truth(kinds):
+    """In 92 to 99.9 of 100 campaigns of 20 pairs, by the probability of all their outcomes."""
+    pairs, held = 20, 0.0
+    for both, first, second in itertools.product(range(pairs + 1), repeat=3):
+        if (neither := pairs - both - first - second) >= 0:
+            counts = both, first, second, neither
+            if probability := multinomial.pmf(counts, pairs, kinds):
+                low, high = difference_of_pairs(*counts)
+                held += probability * (low <= kinds[2] - kinds[1] <= high)
+    assert 0.92 <= held <= 0.999
+
+
+def test_paired_shares_know_more_than_independent_ones_and_turn_with_their_order():
+    low, high = difference_of_pairs(40, 2, 12, 6)
+    assert difference_of_pairs(40, 12, 2, 6) == pytest.approx((-high, -low))
+    alone = difference_of_shares((42, 60), (52, 60))
+    assert alone[0] < low < 10 / 60 < high < alone[1]
+
+
+REQUIRED = {"asynchrony_max": {"max": 1.5, "probability": 0.9, "confidence": 0.9}}
+
+
+def test_shares_of_outcomes_and_of_requirements_differ_by_an_interval():
+    other = np.where(np.arange(COUNT) % 8 == 0, Fate.STALLED, Fate.DEPLOYED)
+    told = {"requirements": json.dumps(REQUIRED)}
+    one, two = seeded(VALUES).assign_attrs(told), seeded(SHIFTED, outcome=other).assign_attrs(told)
+    found = compare(one, two).sel(kind="stalled", requirement="asynchrony_max <= 1.5 degree")
+    assert found.kind_share.values.tolist() == [0.0, 0.125]
+    expected = difference_of_pairs(0, 0, COUNT // 8, COUNT - COUNT // 8)
+    assert found.kind_share_difference_interval.values == pytest.approx(expected)
+    kept = VALUES <= 1.5, SHIFTED <= 1.5
+    apart = kept[1].mean() - kept[0].mean()
+    assert found.kept_share_difference.item() == pytest.approx(apart)
+    kinds = (kept[0] & kept[1]), (kept[0] & ~kept[1]), (~kept[0] & kept[1]), (~kept[0] & ~kept[1])
+    expected = difference_of_pairs(*(int(each.sum()) for each in kinds))
+    assert found.kept_share_difference_interval.values == pytest.approx(expected)
+    assert "samples that keep to" in "\n".join(compared(compare(one, two)))
+    # Without pairs, and with another limit in one of them.
+    found = compare(one, seeded(SHIFTED, 1, outcome=other)).sel(kind="stalled")
+    expected = difference_of_shares((0, COUNT), (COUNT // 8, COUNT))
+    assert found.kind_share_difference_interval.values == pytest.approx(expected)
+    assert "requirement" not in found.dims
+
+
+def test_shares_of_replicates_scatter_as_these_do():
+    """Welch's interval of the shares in the replicates."""
+    design = {"kind": "sobol", "samples": COUNT, "replicates": 8}
+    shares = [0.4 + 0.02 * (np.arange(COUNT) % 8), 0.6 + 0.02 * (np.arange(COUNT) % 8)]
+    fates = [
+        np.where(np.arange(COUNT) // 8 < 25 * each, Fate.STALLED, Fate.DEPLOYED) for each in shares
+    ]
+    one, two = (seeded(VALUES, k, design=design, outcome=fates[k]) for k in (0, 1))
+    found = compare(one, two).sel(kind="stalled")
+    means = [(each == Fate.STALLED).reshape(25, 8).mean(axis=0) for each in fates]
+    welch = ttest_ind(means[1], means[0], equal_var=False).confidence_interval()
+    assert found.kind_share_difference_interval.values == pytest.approx([welch.low, welch.high])
+
+
+def test_of_blocks_the_samples_that_stand_for_the_population_are_compared():
+    design = Saltelli(samples=16, replicates=8)
+    made = drawn_campaign(design, ishigami, 3, 1)
+    found = compare(made, made)
+    assert found.kind_samples.values.tolist() == [[32, 32]]
+    stand = population_of(made).asynchrony_max
+    assert found.asynchrony_max_mean.values == pytest.approx(float(stand.mean()))
+
+
+def test_samples_of_subset_simulation_have_no_means():
+    made = seeded(
+        VALUES, design={"kind": "subset-simulation", "of": "asynchrony_max", "above": 3.0}
+    )
+    found = compare(made, seeded(SHIFTED))
+    assert np.isnan(found.asynchrony_max_mean).all()
+    assert np.isnan(found.kind_share).all()
+    assert not [line for line in compared(found) if line.startswith("asynchrony_max")]
+    # Equal seeds are not equal points there: these depend on results.
+    moved = seeded(
+        SHIFTED, design={"kind": "subset-simulation", "of": "asynchrony_max", "above": 3.0}
+    )
+    assert compare(made, moved).attrs["pairs"] == 0
 
 
 def test_two_runs_are_compared(tmp_path):

@@ -72,6 +72,8 @@ def test_the_further_samples_of_a_rule_are_at_a_look_that_ends_it():
     wanted = {"asynchrony_max": {"max": 1.0, "probability": 0.99, "confidence": 0.9}}
     found = analyse(made, wanted)
     assert found.further_samples.item() == 324 - 216
+    once = made.isel(sample=slice(90))
+    assert "(1 look: 64)" in analyse(once, wanted).attrs["stopping"]
     more = campaign(np.full(324, 0.5))
     more.attrs |= made.attrs
     assert analyse(more, wanted).verdict.item() == 2

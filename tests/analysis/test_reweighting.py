@@ -10,10 +10,11 @@ from click.testing import CliRunner
 from scipy.stats import norm, truncnorm
 
 from made import UNIT, drawn_campaign, points
-from ringsim.analysis import weighted
+from ringsim.analysis import binomial, weighted
 from ringsim.analysis.reweighting import parse_reweighted, read_distributions, weights_of
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
+from ringsim.analysis.verdicts import Verdict
 from ringsim.cli.analyse import command
 from ringsim.refusal import InputError
 from ringsim.sampling.designs.morris import Morris
@@ -44,6 +45,36 @@ def test_a_reweighted_campaign_tells_the_exact_mean_quantiles_and_probabilities(
     share = found.reweighted_share.sel(event="asynchrony_max <= 6 degree").item()
     assert share == pytest.approx(TRUE.cdf(0.6), abs=0.03)
     assert found.reweighted_share.sel(event="deployed").item() == pytest.approx(1.0)
+
+
+def test_verdicts_are_those_of_the_other_distribution():
+    """As drawn it is 0.6, reweighted 0.7977."""
+    made = drawn_campaign(RandomDesign(samples=4000), linear, 2, 1)
+    exact = TRUE.cdf(0.6)
+    for probability, drawn, other in (
+        (0.7, Verdict.NOT_MET, Verdict.MET),
+        (0.8, Verdict.NOT_MET, Verdict.NOT_YET_SHOWN),
+        (0.9, Verdict.NOT_MET, Verdict.NOT_MET),
+    ):
+        wanted = {"asynchrony_max": {"max": 6.0, "probability": probability, "confidence": 0.95}}
+        found = analyse(made, wanted, {"x1": NARROW})
+        assert (found.verdict.item(), found.reweighted_verdict.item()) == (drawn, other)
+        low, high = found.reweighted_bounds.values[0]
+        assert low < exact < high
+        text = "\n".join(told(found))
+        assert text.index("requirement, as drawn ") < text.index("requirement, reweighted ")
+        assert (
+            text.splitlines()[-1].split("  0.95  ")[1].strip().startswith(other.word.split("_")[0])
+        )
+    assert "as drawn " not in "\n".join(told(analyse(made, wanted)))
+
+
+def test_equal_weights_have_the_bounds_of_plain_samples():
+    own, weights = np.arange(100) < 80, np.full(100, 0.3)
+    for confidence in (0.5, 0.9, 0.999):
+        expected = binomial.share_bounds(80, 100, confidence)
+        found = weighted.share_bounds(own, weights, None, confidence)
+        assert found == pytest.approx(expected, abs=0.005)
 
 
 def test_an_input_that_is_not_reweighted_keeps_its_distribution():

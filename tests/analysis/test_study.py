@@ -86,6 +86,39 @@ def test_lost_samples_count_neither_way_and_the_worst_case_is_told():
     assert found.outcome_share.sel(kind="deployed").item() == 1.0
 
 
+def test_further_samples_would_show_only_what_lost_ones_leave_open():
+    status = np.where(np.arange(100) < 10, Status.TIMEOUT, Status.OK)
+    made = campaign(np.full(100, 9.0), status=status, outcome=np.where(status, 0, 1))
+    assert (
+        "asynchrony_max: 140 further samples without a violation would show it, if 10 lost samples "
+        "would not have violated it"
+    ) in text_of(analyse(made, MOST_TEN))
+    status[:] = Status.TIMEOUT
+    found = analyse(made.assign(status=("sample", status)), MOST_TEN)
+    assert found.further_samples.item() == -1
+    assert "further sample" not in text_of(found)
+    assert "asynchrony_max: no sample has numbers that tell of it" in text_of(found)
+
+
+def test_rings_that_never_opened_are_counted_beside_the_limit_that_they_keep_to():
+    outcome = np.where(np.arange(240) < 5, Fate.STALLED, Fate.DEPLOYED)
+    outcome[5] = Fate.FINISHED
+    values = np.where(outcome == Fate.STALLED, 0.0, 9.0)
+    values[:2] = 11.0
+    made = campaign(values, outcome=outcome)
+    found = analyse(made, MOST_TEN)
+    assert found.samples_short.item() == 3
+    line = "asynchrony_max: 3 of the 238 that keep to it ended short of their goal"
+    assert line in text_of(found)
+    assert 'require the outcome, too, as outcome = { is = "deployed"' in text_of(found)
+    outcome_too = {"outcome": {"is": "deployed", "probability": 0.9, "confidence": 0.9}}
+    found = analyse(made, MOST_TEN | outcome_too)
+    assert line in text_of(found)
+    assert "require the outcome" not in text_of(found)
+    assert found.samples_short.values.tolist() == [3, 0]
+    assert "short of their goal" not in text_of(analyse(campaign(np.full(240, 9.0)), MOST_TEN))
+
+
 def test_an_antenna_that_never_deploys_violates_a_deployment_time():
     outcome = np.where(np.arange(50) < 5, Fate.STALLED, Fate.DEPLOYED)
     times = np.where(outcome == Fate.DEPLOYED, 8.0, np.nan)

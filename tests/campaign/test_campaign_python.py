@@ -22,7 +22,9 @@ from campaign_bench import comparable
 from ringsim import Campaign, CampaignError, InputError, open_campaign
 from ringsim.campaign.specification import SOLVERS
 from ringsim.cli import cli
+from ringsim.exit_codes import EXIT_BAD_INPUT
 from ringsim.sampling.distributions.uniform import Uniform
+from ringsim.storage.locks import locked
 
 TABLE: dict[str, Any] = {
     "name": "small", "seed": 5, "scene": "ring18", "fidelity": "ideal",
@@ -125,6 +127,29 @@ def test_ctrl_c_stops_it_and_the_same_call_goes_on(
     found = small().run(workers=0)
     assert len(runs) == 4
     assert (found["status"] == 0).all()
+
+
+def test_verbs_merge_what_was_interrupted_but_not_what_runs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    interrupting(monkeypatch, at=2)
+    with pytest.raises(KeyboardInterrupt):
+        small().run(workers=0)
+    folder = Path("runs/small")
+    with locked(folder / "lock", shared=True) as held:  # as any process that runs it
+        assert held
+        done = CliRunner().invoke(cli, ["analyse", str(folder)])
+        assert done.exit_code == EXIT_BAD_INPUT
+        assert "not merged yet: give ringsim merge runs/small first" in done.output
+        assert not (folder / "campaign.nc").exists()
+    line = f"{folder}: merged its results into campaign.nc first, 2 samples not run"
+    for verb in ("analyse", "export", "report", "plot", "compare"):
+        (folder / "campaign.nc").unlink(missing_ok=True)
+        others = [str(folder)] if verb == "compare" else []
+        done = CliRunner().invoke(cli, [verb, str(folder), *others])
+        assert done.exit_code == 0, done.output
+        assert done.output.splitlines().count(line) == 1
+    assert line not in CliRunner().invoke(cli, ["analyse", str(folder)]).output
 
 
 def test_too_many_failures_are_an_error_and_some_are_not(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -83,6 +83,35 @@ def test_tables(
     assert about.loc["opening_angle", "dimensions"] == "sample plane section time"
 
 
+def test_chosen_variables_alone_are_written(file: Path, campaign: xr.Dataset) -> None:
+    out = file.parent / "few"
+    chosen = ("--variables", "asynchrony_max, status", "--out", out)
+    export(file, "--format", "csv,mat", *chosen)
+    assert {path.name for path in out.iterdir()} == {
+        "campaign-sample.csv", "campaign-variables.csv", "campaign.mat"
+    }  # fmt: skip
+    table = pd.read_csv(out / "campaign-sample.csv")
+    assert list(table) == ["sample", "asynchrony_max (degree)", "status"]
+    np.testing.assert_allclose(table.iloc[:, 1], campaign["asynchrony_max"], rtol=1e-12)
+    assert "opening_angle" not in loadmat(out / "campaign.mat")
+    told = export(file, "--variables", "asynchrony_mx", code=2)
+    assert "asynchrony_mx: is no variable of this file (did you mean asynchrony" in told
+    assert "says nothing to --format pvd" in export(
+        file, "--format", "pvd", "--sample", 0, *chosen, code=2
+    )
+
+
+def test_long_tables_are_told_before_they_are_written(
+    file: Path, campaign: xr.Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = campaign["position"].size
+    assert rows > campaign["opening_angle"].size
+    monkeypatch.setattr(csv, "MANY", rows - 1)
+    assert f"the longest table has up to {rows:,} rows: choose variables" in export(file)
+    monkeypatch.setattr(csv, "MANY", rows)
+    assert "rows" not in export(file)
+
+
 def test_matlab(file: Path, run_file: Path, campaign: xr.Dataset) -> None:
     for where in (file, run_file):
         export(where, "--format", "mat")

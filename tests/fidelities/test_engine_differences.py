@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -27,7 +29,8 @@ def campaign(**changed: list[float]) -> xr.Dataset:
     } | changed
     columns = {name: ("sample", np.array(column)) for name, column in values.items()}
     reasons = ("sample", ["", "", "", "too stiff"])
-    return xr.Dataset({**columns, "reason_checked": reasons}, {"sample": np.arange(4)})
+    design = {"design": json.dumps({"kind": "random", "samples": 4})}
+    return xr.Dataset({**columns, "reason_checked": reasons}, {"sample": np.arange(4)}, design)
 
 
 def test_numbers_of_the_antenna_are_quantities() -> None:
@@ -50,10 +53,22 @@ def test_only_samples_that_ended_well_with_both_count() -> None:
     assert found.standard_error == pytest.approx(np.std([10, 11, 12, 13], ddof=1) / 2.0)
 
 
+def test_standard_errors_are_those_of_the_design() -> None:
+    def of(**design: object) -> float:
+        return differences(campaign().assign_attrs(design=json.dumps(design)))[0].standard_error
+
+    # Replicates 0 and 1 have the means 11 and 12.
+    halves = of(kind="sobol", samples=4, replicates=2)
+    assert halves == pytest.approx(np.std([11, 12], ddof=1) / 2**0.5)
+    assert np.isnan(of(kind="sobol", samples=4))
+    assert np.isnan(of(kind="grid"))
+
+
 def test_the_last_line_says_whether_bars_cover_the_differences() -> None:
     lines = check_lines(campaign())
     assert lines[0] == "3 of 4 samples were checked with the full engine"
-    assert lines[1] == "1 checks failed, first sample 3: too stiff"
+    assert lines[1] == "1 check failed, first sample 3: too stiff"
+    assert lines[2] == "median and worst are of the 2 samples that ended well with both engines"
     assert lines[-1] == (
         "the engines differ by more than their error bars in deployment_time (sample 1: 0.03 s, "
         "error bars 0.025)"

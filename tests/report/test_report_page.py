@@ -271,8 +271,8 @@ def test_the_verb(tmp_path: Path) -> None:
     (tmp_path / "text.nc").write_text("no netCDF")
     save(made_campaign(3).isel(sample=0), tmp_path / "run.nc")
     for where, words in (
-        (tmp_path / "none", "holds no campaign.nc: merge its results with ringsim merge"),
-        (tmp_path / "gone", "there is no such folder"),
+        (tmp_path / "none", "this folder holds no campaign.nc: there is no campaign in it"),
+        (tmp_path / "gone", "there is no such file or folder"),
         (tmp_path / "run.nc", "holds no campaign: give the folder"),
         (tmp_path / "text.nc", "cannot be read as a netCDF file"),
     ):

@@ -18,10 +18,10 @@ from ringsim.theory.resistances.family import folding
 AXES = 18
 
 
-def simulated(response, rng, *, target, samples, share=0.1, axes=AXES):
+def simulated(response, rng, *, target, samples, share=0.1, axes=AXES, most=12):
     """One simulation of a response of points in standard normal space, shape (n, axes)."""
     found, points = Repetition(), np.empty((0, axes))
-    simulation = _simulation(found, samples, share, target, 12)
+    simulation = _simulation(found, samples, share, target, most)
     batch = next(simulation)
     while True:
         new = batch.anew * rng.standard_normal((len(batch.parents), axes))
@@ -81,8 +81,8 @@ def test_equal_responses_at_a_threshold_go_on_together():
     each = np.array([one.probability for one in found])
     assert abs(each.mean() - 1e-3) < 4.0 * each.std() / 40**0.5
     for one in found:
-        assert one.beyond(2.5) == one.probability
-        assert one.beyond(-1.0) == 1.0
+        assert one.beyond(2.5) == (one.probability, one.variation)
+        assert one.beyond(-np.inf) == (1.0, 0.0)
         assert (np.diff(one.thresholds) >= 0.0).all()
 
 
@@ -92,6 +92,21 @@ def test_no_interval_unless_every_replicate_came_to_the_event():
     ends, variation = replicated_interval(np.array([1e-3]), np.array([0.5]))
     assert ends[0] < 1e-3 < ends[1]
     assert np.isnan(variation)
+
+
+def test_the_nearest_value_that_all_replicates_reached_bounds_an_event_that_none_did():
+    """Its own exact probability lies in its interval, and that of the event below the upper end."""
+    rng, held, campaigns = np.random.default_rng(2), 0, 200
+    for _ in range(campaigns):
+        found = [simulated(linear, rng, target=7.0, samples=100, most=2) for _ in range(4)]
+        assert [one.probability for one in found] == [0.0] * 4
+        reached = min(one.reached for one in found)
+        assert all(one.thresholds[-1] < one.reached < one.states[-1].max() for one in found)
+        each, chains = np.array([one.beyond(reached) for one in found]).T
+        low, high = replicated_interval(each, chains)[0]
+        held += bool(low <= norm.sf(reached) <= high)
+        assert high > norm.sf(7.0)
+    assert held >= binom.ppf(1e-3, campaigns, 0.92), held
 
 
 def test_replicates_that_agree_by_chance_are_no_surer_than_their_chains():

@@ -16,6 +16,7 @@ from ringsim.analysis.design import placement
 from ringsim.analysis.drawn import drawn
 from ringsim.analysis.influence import LEAST, influence
 from ringsim.analysis.sensitivity import sensitivity
+from ringsim.analysis.tails import subset_simulation
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import head, legend
 from ringsim.plots.campaign.names import in_lines
@@ -134,13 +135,14 @@ def _bars(analysis: xr.Dataset, measure: str, output: str, told: str) -> Bars:
 
 
 def explained(campaign: xr.Dataset) -> bool:
-    """Whether there is something to draw: drawn inputs, and enough samples for a correlation.
+    """Whether there is something to draw: drawn inputs, enough samples for a correlation, and no
+    chains of them.
 
     Told without the analysis itself, which takes a while for many samples.
     """
     known = [values_of(campaign, name)[1] for name in scalars(campaign)]
     varied = any(len(values) >= LEAST and np.ptp(values) > 0 for values in known)
-    return varied and bool(drawn(campaign).names)
+    return varied and bool(drawn(campaign).names) and subset_simulation(campaign) is None
 
 
 @style.styled

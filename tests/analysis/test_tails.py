@@ -1,0 +1,67 @@
+"""A campaign of subset simulation that ends short of its event says so, and bounds it."""
+
+from __future__ import annotations
+
+import pytest
+from scipy.stats import norm
+
+from made import drawn_campaign
+from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import told
+from ringsim.plots.campaign.tornado import explained
+from ringsim.report.tail import rare_event
+from ringsim.sampling.designs.subset_simulation import SubsetSimulation
+
+FACTORS = dict.fromkeys(("x1", "x2"))
+
+
+def linear(points):
+    """Standard normal if the inputs are uniform in the unit interval."""
+    return norm.ppf(points).sum(axis=1) / 2**0.5
+
+
+def campaign(above, most_levels):
+    """A campaign that has grown as far as its levels go."""
+    design = SubsetSimulation(
+        of="asynchrony_max", above=above, samples=100, share=0.1, replicates=4,
+        most_levels=most_levels,
+    )  # fmt: skip
+    while not design.ended:
+        design = design.knowing(linear(design.points(FACTORS, 3)))
+    made = drawn_campaign(design, linear, 2, 3)
+    made["asynchrony_max"].attrs["units"] = "degree"
+    return made
+
+
+@pytest.mark.parametrize(("above", "short"), [(7.0, 4), (3.2, 2)])
+def test_an_event_that_is_not_reached_is_bounded_and_never_told_as_zero(above, short):
+    made = campaign(above, 1)
+    found = analyse(made)
+    each = found.tail_replicate_probability.values
+    assert (each == 0.0).sum() == short
+    high = found.tail_reached_probability_interval.values[1]
+    assert norm.sf(above) < high < 0.5
+    (line,) = [each for each in told(found) if each.startswith("probability of")]
+    assert f"degree: below {high:.2g}, since {short} of 4 replicates did not reach it;" in line
+    assert f"the nearest run has {made.asynchrony_max.values.max():.6g} degree" in line
+    assert ": 0" not in line.replace(": 0.", "")
+    rows = dict(rare_event(made).rows)
+    assert rows["probability"].startswith(f"below {high:.2g}")
+
+
+def test_an_event_that_all_reached_has_its_probability():
+    found = analyse(campaign(2.5, 8))
+    assert "tail_reached_probability" not in found
+    assert found.tail_probability_interval.values[0] < norm.sf(2.5)
+    assert "below" not in told(found)[1]
+
+
+def test_samples_of_chains_are_not_judged_as_independent():
+    made = campaign(2.5, 8)
+    found = analyse(made)
+    assert not [name for name in found if "correlation" in str(name)]
+    assert "no input is told to matter: samples of a chain" in "\n".join(told(found))
+    assert not explained(made)
+    # The same samples of a list of values have correlations.
+    listed = analyse(made.assign_attrs(design='{"kind": "list"}'))
+    assert "asynchrony_max_rank_correlation" in listed
