@@ -73,6 +73,10 @@ def influence(
         "input", np.isin(inputs.level, ["place", "quarter"]),
         {"long_name": "whether it is of one place, or a quarter, of many", "units": "1"},
     )  # fmt: skip
+    found["inputs_held"] = (
+        "input", _held(np.array(inputs.level)),
+        {"long_name": "other inputs that its partial correlations hold", "units": "1"},
+    )  # fmt: skip
     coords: dict[str, Any] = {"input": np.array(inputs.names, dtype=object)}
     if groups:
         coords["group"] = np.array([*groups], dtype=object)
@@ -108,10 +112,7 @@ def _correlated(
             found[held] = ranks.partial_correlations(columns[rows][:, held], output[rows])
         return found
 
-    every = np.ones(len(output), dtype=bool)
-    held = np.zeros(len(level), dtype=int)
-    for each in _LEVELS:
-        held[own | (level == each)] = (own | (level == each)).sum() - 1
+    every, held = np.ones(len(output), dtype=bool), _held(level)
     results = []
     for measure, others in ((plain, 0), (partial, held)):
         middle, ends = measure(every), np.full((len(level), 2), np.nan)
@@ -125,6 +126,14 @@ def _correlated(
             ends = np.stack(both, axis=1)
         results.append((middle, ends))
     return results[0], results[1]
+
+
+def _held(level: NDArray[np.str_]) -> NDArray[np.int64]:
+    """How many other inputs the partial correlation of each one holds, shape (input,)."""
+    found, own = np.zeros(len(level), dtype=np.int64), level == "input"
+    for each in _LEVELS:
+        found[own | (level == each)] = (own | (level == each)).sum() - 1
+    return found
 
 
 def groups_of(

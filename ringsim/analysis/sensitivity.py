@@ -39,7 +39,7 @@ ABOUT = {
     "mean_effect": "mean change of the output by a move upwards (mu)",
     "effect_deviation": "standard deviation of the change by a move upwards (sigma)",
     "given_data_index": "share of the variance by the input alone, from plain samples",
-    "chance_level": "index that one in 20 outputs without any influence would reach",
+    "chance_level": "largest index of all inputs that one in 20 outputs of chance would reach",
 }  # fmt: skip
 
 
@@ -174,15 +174,11 @@ def _given(
     part = np.unique(part, return_inverse=True)[1]
     certain = placed.has_intervals and placed.kind != "sobol" and part.max() > 0
     told, chance = np.full((len(bins), 3), np.nan), np.full((len(bins), 1), np.nan)
-    levels: dict[bytes, float] = {}
+    chance[:] = given_data.chance_level(bins, values)
     for k, each in enumerate(bins):
         told[k, 0], left_out = given_data.index(each, values, part)
         if certain:
             told[k, 1:] = given_data.interval(told[k, 0], left_out)
-        key = bytes([each.lined]) + np.bincount(each.bin).tobytes()
-        if key not in levels:
-            levels[key] = given_data.chance_level(each, values)
-        chance[k] = levels[key]
     return {"given_data_index": (("input",), told), "chance_level": (("input",), chance)}
 
 
