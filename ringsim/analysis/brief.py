@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from ringsim.analysis import ranks
+from ringsim.analysis.confounded import confounding_notes, partners
 from ringsim.analysis.intervals import Array
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.sensitivity_text import HEADS, SETS, measure_notes
@@ -59,12 +60,14 @@ def what_matters(analysis: xr.Dataset) -> Table:
     measure = next((first for first, _ in SETS if first in analysis), None)
     if measure is None and "input_is_place" not in analysis:
         return Table((), ())
-    rows, quiet = [], []
+    rows, quiet, doubtful = [], [], list[str]()
     told = dict(_indexed(analysis, measure)) if measure else {}
     known = _correlated(analysis)
     groups = [name for name in told if name not in quantities()]
     for output in [n for n in quantities() if n in told or n in known] + groups:
-        found = told.get(output) or list(_ranked(analysis, output))
+        found = told[output] if output in told else list(_ranked(analysis, output))
+        found, others = _cleared(analysis, output, found)
+        doubtful += [f"{output} by {name}" for name in others[:_MOST]]
         rows += [(output if k == 0 else "", *row) for k, row in enumerate(found[:_MOST])]
         if not found:
             quiet.append(output)
@@ -73,6 +76,12 @@ def what_matters(analysis: xr.Dataset) -> Table:
         notes.append(
             f"told is what the largest of all {analysis.sizes['input']} inputs would reach by "
             "chance in fewer than one output of 20"
+        )
+        notes += confounding_notes(analysis, {row[1] for row in rows})
+    if doubtful:
+        notes.append(
+            "not told, because an input of larger index that goes with it explains it (its partial "
+            f"rank correlation is within chance): {', '.join(doubtful)}"
         )
     if quiet:
         notes.append(f"nothing that chance would not explain: {', '.join(quiet)}")
@@ -104,6 +113,29 @@ def _indexed(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, list[tup
                 )
                 for k in chosen
             ]  # fmt: skip
+
+
+def _cleared(
+    analysis: xr.Dataset, output: str, found: list[tuple[str, ...]]
+) -> tuple[list[tuple[str, ...]], list[str]]:
+    """The rows, the largest first, of inputs whose index cannot be that of another one, and the
+    names of the others: they go with an input of a larger index, and their partial rank
+    correlation, which holds that, is within chance.
+    """
+    paired = partners(analysis)
+    if not paired or output not in _correlated(analysis):
+        return found, []
+    partial = analysis[f"{output}_partial_rank_correlation"].values
+    clear = np.isnan(partial) | standing_out(analysis, output)[1]
+    stands = dict(zip(analysis["input"].values.tolist(), clear.tolist(), strict=True))
+    kept, others = list[tuple[str, ...]](), list[str]()
+    for row in found:
+        larger = {each[0] for each in kept}
+        if stands[row[0]] or paired.get(row[0], set()).isdisjoint(larger):
+            kept.append(row)
+        else:
+            others.append(row[0])
+    return kept, others
 
 
 def _correlated(analysis: xr.Dataset) -> list[str]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
-from scipy.stats import rankdata
+from scipy.stats import f, rankdata
 
 from ringsim.analysis.intervals import Array, jackknife_error, student
 
@@ -95,6 +95,19 @@ def interval(estimate: float, left_out: Array) -> tuple[float, float]:
     return estimate - half, estimate + half
 
 
+def indices(bins: Bins, outputs: Array) -> Array:
+    """Indices of a column with many outputs, shape (samples, outputs), which have none missing."""
+    count, samples = len(outputs), np.arange(len(outputs))
+    y = outputs - outputs.mean(axis=0)
+
+    def by_bin(weight: Array) -> csr_array:
+        return csr_array((weight, (bins.bin, samples)), shape=(bins.count, count))
+
+    one, along = by_bin(np.ones(count)), by_bin(bins.place)
+    sums = one.sum(axis=1), along.sum(axis=1), by_bin(bins.place**2).sum(axis=1)
+    return _adjusted(bins.lined, sums, (one @ y).T, (along @ y).T, (y**2).sum(axis=0))
+
+
 def chance_level(columns: Sequence[Bins], output: Array) -> float:
     """The largest index of all columns that an output of chance reaches in one case of 20.
 
@@ -102,19 +115,23 @@ def chance_level(columns: Sequence[Bins], output: Array) -> float:
     in common counts; NaN if no column has an index.
     Source: Westfall and Young, Resampling-Based Multiple Testing (1993), the largest statistic.
     """
-    random, count = np.random.default_rng(0), len(output)
-    shuffles = int(np.clip(_NUMBERS // count, 39, _SHUFFLES))
-    y = output - output.mean()
-    shuffled = np.stack([random.permutation(y) for _ in range(shuffles)], axis=1)
-    syy, samples = np.full(shuffles, y @ y), np.arange(count)
+    random = np.random.default_rng(0)
+    shuffles = int(np.clip(_NUMBERS // len(output), 39, _SHUFFLES))
+    shuffled = np.stack([random.permutation(output) for _ in range(shuffles)], axis=1)
     largest = np.full(shuffles, np.nan)
     for bins in columns:
-
-        def by_bin(weight: Array, bins: Bins = bins) -> csr_array:
-            return csr_array((weight, (bins.bin, samples)), shape=(bins.count, count))
-
-        one, along = by_bin(np.ones(count)), by_bin(bins.place)
-        sums = one.sum(axis=1), along.sum(axis=1), by_bin(bins.place**2).sum(axis=1)
-        found = _adjusted(bins.lined, sums, (one @ shuffled).T, (along @ shuffled).T, syy)
-        largest = np.fmax(largest, found)
+        largest = np.fmax(largest, indices(bins, shuffled))
     return float(np.quantile(largest, _LEVEL))
+
+
+def level_of_normal(bins: Bins, chance: float) -> float:
+    """The index that a normal output without influence exceeds with so small a probability.
+
+    By the distribution F of explained over other variance; NaN if too few samples are left.
+    """
+    count, terms = len(bins.bin), bins.count * (1 + bins.lined) - 1
+    spare = count - 1 - terms
+    if spare < 1:
+        return np.nan
+    explained = terms * float(f.isf(chance, terms, spare)) / spare
+    return 1 - (count - 1) / spare / (1 + explained)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 
 from ringsim.analysis import ranks
+from ringsim.analysis.confounded import confounded
 from ringsim.analysis.design import Placement
 from ringsim.analysis.drawn import Drawn, drawn
 from ringsim.analysis.intervals import Array
@@ -37,8 +38,9 @@ def influence(
     For every output NAME ``NAME_rank_correlation`` and ``NAME_partial_rank_correlation``; along
     ``group`` the ``separation`` of samples that were lost, ended in another way than planned, or
     violate a requirement: the probability that the input is larger there.  Intervals as for other
-    statistics.  In partial correlations an input of many places is represented by its mean, for its
-    quarters by the means of these, and for its places by these.
+    statistics.  Pairs of inputs that go together beyond chance are along ``pair``.  In partial
+    correlations an input of many places is represented by its mean, for its quarters by the means
+    of these, and for its places by these.
     """
     inputs = drawn(campaign)
     if not inputs.names:
@@ -77,6 +79,7 @@ def influence(
         "input", _held(np.array(inputs.level)),
         {"long_name": "other inputs that its partial correlations hold", "units": "1"},
     )  # fmt: skip
+    found |= confounded(inputs, ok)
     coords: dict[str, Any] = {"input": np.array(inputs.names, dtype=object)}
     if groups:
         coords["group"] = np.array([*groups], dtype=object)

@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterator
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.confounded import confounding_notes
 from ringsim.analysis.dependence import LEVEL
 from ringsim.analysis.intervals import Array
 from ringsim.analysis.quantities import quantities
@@ -45,13 +46,14 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...], outputs: Outputs) -> Tab
     head = ["what explains"]
     for name in names:
         head += [HEADS[name]] + ["95 % interval"] * (f"{name}_interval" in analysis)
-    rows = []
+    rows, named = [], set[str]()
     for output in chosen_of(analysis, outputs):
         one = analysis.sel(output=output)
         size = np.nan_to_num(one[names[0]].values, nan=-np.inf)
         order = np.argsort(-size, kind="stable")
         chosen = [k for k in order[~place[order]][:_MOST] if np.isfinite(size[k])]
         chosen += [k for k in order[place[order]][:_MOST_PLACES] if np.isfinite(size[k])]
+        named |= {str(analysis[dim].values[k]) for k in chosen}
         for k in chosen:
             row = [f"{output} by {analysis[dim].values[k]}"]
             for name in names:
@@ -59,7 +61,9 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...], outputs: Outputs) -> Tab
                 if f"{name}_interval" in one:
                     row.append(_ends(one[f"{name}_interval"].values[k]))
             rows.append([*row, str(one["index_used"].item()), str(one["index_lost"].item())])
-    return Table([*head, f"{of} used", "lost"], rows)
+    notes = measure_notes(analysis)
+    notes += confounding_notes(analysis, named) if dim == "input" else []
+    return Table([*head, f"{of} used", "lost"], rows, notes)
 
 
 def _gate(analysis: xr.Dataset, only: Outputs) -> Iterator[str]:
@@ -97,7 +101,7 @@ def sensitivity_tables(analysis: xr.Dataset, outputs: Outputs = None) -> list[Ta
     """Indices of failures and of ``outputs``, by default of all, and what they leave out."""
     found = []
     if names := next((names for names in SETS if names[0] in analysis), ()):
-        found.append(_told(analysis, names, outputs)._replace(notes=measure_notes(analysis)))
+        found.append(_told(analysis, names, outputs))
     if "second_order_index" in analysis:
         found.append(_second(analysis, outputs))
     return found + refusals(analysis, outputs)
