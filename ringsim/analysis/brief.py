@@ -123,7 +123,8 @@ def _cleared(
     correlation, which holds that, is within chance.
     """
     paired = partners(analysis)
-    if not paired or output not in _correlated(analysis):
+    # Blocks move one group by itself: their indices are its own.
+    if not paired or "factor" in analysis.dims or output not in _correlated(analysis):
         return found, []
     partial = analysis[f"{output}_partial_rank_correlation"].values
     clear = np.isnan(partial) | standing_out(analysis, output)[1]

@@ -16,6 +16,13 @@ Outputs = Collection[str] | None
 _MOST = 5
 """Groups or inputs that are told for each output."""
 _MOST_PLACES = 3
+_SLACK = 0.05
+"""How far Sobol' indices may lie above what is possible before that is told."""
+_LEAST = -0.1
+"""Below zero they lie more often: the errors of first-order indices are those of the larger ones.
+"""
+_WIDE = 0.5
+"""Length from which on an interval of a Sobol' index says next to nothing."""
 SETS = (
     ("total_index", "first_order_index"),
     ("mean_absolute_effect", "effect_deviation"),
@@ -114,14 +121,49 @@ def measure_notes(analysis: xr.Dataset) -> list[str]:
             "mu*: mean absolute change of the output, in its unit, when the group moves by half of "
             "its levels; sigma: scatter of that change"
         ]
-    if "total_index" in analysis and analysis["total_index_interval"].isnull().all():
-        return ["no intervals: give design.replicates = 8, or more, for independent replicates"]
+    if "total_index" in analysis:
+        none = analysis["total_index_interval"].isnull().all()
+        cure = "no intervals: give design.replicates = 8, or more, for independent replicates"
+        return [cure] * bool(none) + _unsure(analysis)
     if "given_data_index" in analysis:
         return [
             "shares of the variance by one input alone, from bins: corrected for chance, too small "
             "where the output bends within a bin"
         ]
     return []
+
+
+def _unsure(analysis: xr.Dataset) -> list[str]:
+    """A note if Sobol' indices are what none can be, or intervals too long to tell anything."""
+    first, total = (analysis[f"{each}_index"].values for each in ("first_order", "total"))
+    ends = [analysis[f"{each}_index_interval"].values for each in ("first_order", "total")]
+    # Without intervals, what the estimators leave open is not known.
+    low, high = (
+        np.where(np.isnan(end), value + side, end)
+        for end, value, side in (
+            (ends[0][..., 0], first, -_SLACK),
+            (ends[1][..., 1], total, _SLACK),
+        )
+    )
+    both, wide = np.stack([first, total]), np.stack([np.ptp(each, axis=-1) for each in ends])
+    signs = {
+        f"indices outside of 0 .. 1 ({number_text(_farthest(both), 2)})": (
+            (both < _LEAST) | (both > 1.0 + _SLACK)
+        ).any(axis=(0, 2)),
+        "first-order indices above total ones": (low > high).any(axis=1),
+        f"intervals longer than {_WIDE}": (wide > _WIDE).any(axis=(0, 2)),
+    }  # fmt: skip
+    outputs = analysis["output"].values
+    found = [f"{sign} of {', '.join(outputs[own])}" for sign, own in signs.items() if own.any()]
+    if not found:
+        return []
+    return [f"too few base samples: {'; '.join(found)}: give more of them (design.samples)"]
+
+
+def _farthest(values: Array) -> float:
+    """The value that is farthest from what lies between 0 and 1."""
+    known = values[np.isfinite(values)]
+    return float(known[np.argmax(np.abs(known - 0.5))]) if len(known) else np.nan
 
 
 def refusals(analysis: xr.Dataset, outputs: Outputs = None) -> list[Table]:
