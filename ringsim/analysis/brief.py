@@ -24,11 +24,12 @@ _CHANCE = {"given_data_index": "chance_level"}
 
 def output_table(analysis: xr.Dataset, names: list[str]) -> Table:
     """Mean with its interval, scatter, quantiles and range of each output."""
-    rows, all_used = [], analysis.attrs["samples"]
+    rows = []
     for name in names:
-        values, used = analysis[name].values, int(analysis[f"{name}_samples"].values[0])
+        values, counts = analysis[name].values, analysis[f"{name}_samples"].values
         mean, deviation, *quantiles, least, most = values
-        count = str(used) if used == all_used else f"{used} of {all_used}"
+        used, run = counts[0], counts[:3].sum()  # what has not run is the last
+        count = str(used) if used == run else f"{used} of {run}"
         units = analysis[name].attrs["units"]
         units = "" if units == "1" else units
         if least == most:
@@ -197,7 +198,7 @@ def what_separates(analysis: xr.Dataset) -> Table:
     """Inputs that are larger, or smaller, in samples that ended otherwise or violate."""
     if "group" not in analysis.dims:
         return Table((), ())
-    rows, samples = [], analysis.attrs["samples"]
+    rows, samples = [], analysis.attrs["samples_run"]
     normal = float(norm.isf(ranks.chance_of_each(analysis.sizes["input"]) / 2))
     for group in analysis["group"].values:
         one = analysis.sel(group=group)

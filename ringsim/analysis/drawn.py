@@ -61,8 +61,8 @@ def drawn(campaign: xr.Dataset) -> Drawn:
             kept[name] = column
     count = campaign.sizes["sample"]
     values = np.array([each[0] for each in kept.values()]).reshape(-1, count).T
-    level, path = (tuple(each[k] for each in kept.values()) for k in (1, 2))
-    return Drawn(tuple(kept), values, level, path)
+    levels, paths = (tuple(str(each[k]) for each in kept.values()) for k in (1, 2))
+    return Drawn(tuple(kept), values, levels, paths)
 
 
 def _places(campaign: xr.Dataset, variable: xr.DataArray) -> list[str]:

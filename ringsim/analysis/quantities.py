@@ -47,6 +47,11 @@ def lost(campaign: xr.Dataset) -> Mask:
     return np.asarray(campaign["status"].to_numpy() >= Status.SOLVER_FAILED)
 
 
+def ran(campaign: xr.Dataset) -> Mask:
+    """Which samples have run; the others are neither lost nor without a value."""
+    return np.asarray(campaign["status"].to_numpy() >= Status.OK)
+
+
 def used(campaign: xr.Dataset) -> xr.Dataset:
     """The samples whose numbers hold; the others are told, and never counted."""
     return campaign.isel(sample=np.flatnonzero(good(campaign)))

@@ -18,7 +18,7 @@ from ringsim.analysis.design import Placement
 from ringsim.analysis.drawn import drawn
 from ringsim.analysis.influence import groups_of
 from ringsim.analysis.intervals import Array
-from ringsim.analysis.quantities import good, lost, numbers, quantities
+from ringsim.analysis.quantities import good, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import Requirement
 
 _LEAST_OF_A_KIND = 10
@@ -74,8 +74,8 @@ def sensitivity(
     along ``input``; each with its ``..._interval``.  ``index_used`` and ``index_lost`` count blocks
     or samples, ``missing`` the samples without the output, ``missing_lost`` those of failed runs
     among them, and ``missing_by_inputs`` is the probability that samples missing at random would
-    go with inputs as much: below 0.05 there is no index.  ``names`` are the outputs to tell of
-    beside failures, by default all.
+    go with inputs as much: below 0.05 there is no index.  What has not run yet is none of them.
+    ``names`` are the outputs to tell of beside failures, by default all.
     """
     blocks, inputs = blocks_of(campaign), drawn(campaign)
     outputs = {
@@ -85,32 +85,35 @@ def sensitivity(
     }
     if not outputs or not inputs.names or (blocks is None and not _plain(placed)):
         return xr.Dataset()
-    index = campaign["sample"].to_numpy()
-    count = len(index)
-    block = None if blocks is None else np.repeat(np.arange(len(blocks.rows)), blocks.size)
+    size = 1 if blocks is None else blocks.size
+    # Blocks count, or samples, all of which have run.
+    held = np.flatnonzero(ran(campaign).reshape(-1, size).all(axis=1))
+    here = (held[:, None] * size + np.arange(size)).ravel()
+    index, columns = campaign["sample"].to_numpy()[here], inputs.values[here]
+    count, block = len(here), None if blocks is None else np.repeat(np.arange(len(held)), size)
     tested: dict[bytes, tuple[float, list[given_data.Bins]]] = {}
     found: dict[str, Found] = {}
-    counts, gone = np.zeros((len(outputs), 4), dtype=np.int64), lost(campaign)
+    counts, gone = np.zeros((len(outputs), 4), dtype=np.int64), lost(campaign)[here]
     chance = np.full(len(outputs), np.nan)
-    for k, (name, (values, _)) in enumerate(outputs.items()):
+    for k, (name, (every, _)) in enumerate(outputs.items()):
+        values = every[here]
         missing = np.isnan(values)
-        by_block = missing[:, None] if blocks is None else missing.reshape(blocks.rows.shape)
-        whole = np.asarray(~by_block.any(axis=1))
+        whole = np.asarray(~missing.reshape(-1, size).any(axis=1))
         # Outputs that lack the same samples share the test, and the bins.
         if (key := missing.tobytes()) not in tested:
-            tested[key] = dependence(missing, inputs.values, block), []
+            tested[key] = dependence(missing, columns, block), []
         chance[k], bins = tested[key]
         counts[k] = whole.sum(), len(whole) - whole.sum(), missing.sum(), (missing & gone).sum()
         if chance[k] < LEVEL:
             continue
         if blocks is None:
             if whole.sum() >= given_data.LEAST:
-                bins += [given_data.Bins(c[whole]) for c in inputs.values.T] if not bins else []
+                bins += [given_data.Bins(c[whole]) for c in columns.T] if not bins else []
                 found[name] = _given(bins, values[whole], index[whole], placed)
         elif whole.sum() >= _LEAST_BLOCKS:
-            number = np.flatnonzero(whole)
-            kept = Blocks(blocks.rows[whole])
-            rows = values.reshape(blocks.rows.shape)[whole]
+            number = held[whole]
+            kept = Blocks(blocks.rows[number])
+            rows = values.reshape(-1, size)[whole]
             found[name] = (
                 _sobol(rows, blocks, number % placed.replicates, binary=name not in quantities())
                 if blocks.of_indices
@@ -122,7 +125,7 @@ def sensitivity(
     for k, (name, about) in enumerate({
         "index_used": f"{of} that indices are from",
         "index_lost": f"{of} that are left out, because a sample of them has no value",
-        "missing": f"samples of {count} without a value",
+        "missing": f"samples of {count} that have run without a value",
         "missing_lost": "of these, samples whose run failed",
     }.items()):  # fmt: skip
         made[name] = "output", counts[:, k], {"long_name": about, "units": "1"}
