@@ -95,17 +95,19 @@ def interval(estimate: float, left_out: Array) -> tuple[float, float]:
     return estimate - half, estimate + half
 
 
-def indices(bins: Bins, outputs: Array) -> Array:
-    """Indices of a column with many outputs, shape (samples, outputs), which have none missing."""
-    count, samples = len(outputs), np.arange(len(outputs))
-    y = outputs - outputs.mean(axis=0)
+def indices(bins: Bins, centred: Array) -> Array:
+    """Indices of a column with many outputs less their means, shape (samples, outputs), of which
+    none is missing.
+    """
+    count, samples = len(centred), np.arange(len(centred))
 
     def by_bin(weight: Array) -> csr_array:
         return csr_array((weight, (bins.bin, samples)), shape=(bins.count, count))
 
     one, along = by_bin(np.ones(count)), by_bin(bins.place)
     sums = one.sum(axis=1), along.sum(axis=1), by_bin(bins.place**2).sum(axis=1)
-    return _adjusted(bins.lined, sums, (one @ y).T, (along @ y).T, (y**2).sum(axis=0))
+    squares = np.einsum("ij,ij->j", centred, centred)
+    return _adjusted(bins.lined, sums, (one @ centred).T, (along @ centred).T, squares)
 
 
 def chance_level(columns: Sequence[Bins], output: Array) -> float:
@@ -117,7 +119,8 @@ def chance_level(columns: Sequence[Bins], output: Array) -> float:
     """
     random = np.random.default_rng(0)
     shuffles = int(np.clip(_NUMBERS // len(output), 39, _SHUFFLES))
-    shuffled = np.stack([random.permutation(output) for _ in range(shuffles)], axis=1)
+    y = output - output.mean()
+    shuffled = np.stack([random.permutation(y) for _ in range(shuffles)], axis=1)
     largest = np.full(shuffles, np.nan)
     for bins in columns:
         largest = np.fmax(largest, indices(bins, shuffled))
