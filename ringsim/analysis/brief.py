@@ -5,27 +5,31 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.stats import norm
 
-from ringsim.analysis.intervals import LEVEL, Array
+from ringsim.analysis import ranks
+from ringsim.analysis.confounded import confounding_notes, partners
+from ringsim.analysis.intervals import Array
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.sensitivity_text import HEADS, SETS, measure_notes
 from ringsim.tables import Table, interval_text, number_text
 
-_NORMAL = 1.96
-"""Standard deviations that one in twenty leaves out."""
 _MOST = 3
 """Inputs that are told for each output."""
+_RANKS = {"partial_": "partial rank correlation", "": "rank correlation"}
+"""Of rank correlations the one that holds the other inputs first, with their heads."""
 _CHANCE = {"given_data_index": "chance_level"}
 """Measures that chance lifts, and how far."""
 
 
 def output_table(analysis: xr.Dataset, names: list[str]) -> Table:
     """Mean with its interval, scatter, quantiles and range of each output."""
-    rows, all_used = [], analysis.attrs["samples"]
+    rows = []
     for name in names:
-        values, used = analysis[name].values, int(analysis[f"{name}_samples"].values[0])
+        values, counts = analysis[name].values, analysis[f"{name}_samples"].values
         mean, deviation, *quantiles, least, most = values
-        count = str(used) if used == all_used else f"{used} of {all_used}"
+        used, run = counts[0], counts[:3].sum()  # what has not run is the last
+        count = str(used) if used == run else f"{used} of {run}"
         units = analysis[name].attrs["units"]
         units = "" if units == "1" else units
         if least == most:
@@ -57,26 +61,33 @@ def what_matters(analysis: xr.Dataset) -> Table:
     measure = next((first for first, _ in SETS if first in analysis), None)
     if measure is None and "input_is_place" not in analysis:
         return Table((), ())
-    rows, quiet = [], []
+    rows, quiet, doubtful = [], [], list[str]()
     told = dict(_indexed(analysis, measure)) if measure else {}
     known = _correlated(analysis)
     groups = [name for name in told if name not in quantities()]
     for output in [n for n in quantities() if n in told or n in known] + groups:
-        found = told.get(output) or list(_ranked(analysis, output))
+        found = told[output] if output in told else list(_ranked(analysis, output))
+        found, others = _cleared(analysis, output, found)
+        doubtful += [f"{output} by {name}" for name in others[:_MOST]]
         rows += [(output if k == 0 else "", *row) for k, row in enumerate(found[:_MOST])]
         if not found:
             quiet.append(output)
     notes = measure_notes(analysis)
-    if any(row[2] == "-" for row in rows):
-        count = analysis.sizes["input"]
+    if rows and "input" in analysis.dims and "factor" not in analysis.dims:
         notes.append(
-            f"rank correlations alone: by chance about {(1 - LEVEL) * count:.2g} of {count} inputs "
-            "would be told"
+            f"told is what the largest of all {analysis.sizes['input']} inputs would reach by "
+            "chance in fewer than one output of 20"
+        )
+        notes += confounding_notes(analysis, {row[1] for row in rows})
+    if doubtful:
+        notes.append(
+            "not told, because an input of larger index that goes with it explains it (its partial "
+            f"rank correlation is within chance): {', '.join(doubtful)}"
         )
     if quiet:
         notes.append(f"nothing that chance would not explain: {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
-    head = ("what matters for", "input", index, "95 % interval", "rank correlation")
+    head = ("what matters for", "input", index, "95 % interval", *_RANKS.values())
     return Table(head, rows, notes, left=2)
 
 
@@ -99,10 +110,34 @@ def _indexed(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, list[tup
                 (
                     str(analysis[dim].values[k]), number_text(values[k], 2),
                     _ends(ends[k]),
-                    _rank(analysis, output, str(analysis[dim].values[k])),
+                    *_correlations(analysis, output, str(analysis[dim].values[k])),
                 )
                 for k in chosen
             ]  # fmt: skip
+
+
+def _cleared(
+    analysis: xr.Dataset, output: str, found: list[tuple[str, ...]]
+) -> tuple[list[tuple[str, ...]], list[str]]:
+    """The rows, the largest first, of inputs whose index cannot be that of another one, and the
+    names of the others: they go with an input of a larger index, and their partial rank
+    correlation, which holds that, is within chance.
+    """
+    paired = partners(analysis)
+    # Blocks move one group by itself: their indices are its own.
+    if not paired or "factor" in analysis.dims or output not in _correlated(analysis):
+        return found, []
+    partial = analysis[f"{output}_partial_rank_correlation"].values
+    clear = np.isnan(partial) | standing_out(analysis, output)[1]
+    stands = dict(zip(analysis["input"].values.tolist(), clear.tolist(), strict=True))
+    kept, others = list[tuple[str, ...]](), list[str]()
+    for row in found:
+        larger = {each[0] for each in kept}
+        if stands[row[0]] or paired.get(row[0], set()).isdisjoint(larger):
+            kept.append(row)
+        else:
+            others.append(row[0])
+    return kept, others
 
 
 def _correlated(analysis: xr.Dataset) -> list[str]:
@@ -115,24 +150,41 @@ def _correlated(analysis: xr.Dataset) -> list[str]:
 
 
 def _ranked(analysis: xr.Dataset, output: str) -> Iterator[tuple[str, ...]]:
-    """Inputs whose rank correlation with an output without index is beyond chance."""
-    name = f"{output}_rank_correlation"
-    if name not in analysis:
+    """Inputs whose rank correlation with an output without index is beyond chance: the partial one
+    where samples are enough to hold the other inputs.
+    """
+    if output not in _correlated(analysis):
         return
-    values, ends = analysis[name].values, analysis[f"{name}_interval"].values
-    # Of n independent samples without correlation: variance 1 / (n - 1).
-    beyond = _beyond(values, ends, _NORMAL / (analysis[f"{output}_samples"].values[0] - 1) ** 0.5)
-    for k in np.argsort(-np.abs(np.nan_to_num(values))):
+    values, beyond = standing_out(analysis, output)
+    for k in np.argsort(-np.abs(np.nan_to_num(values)), kind="stable"):
         if beyond[k]:
-            yield str(analysis["input"].values[k]), "-", "-", _signed(values[k], ends[k])
+            name = str(analysis["input"].values[k])
+            yield name, "-", "-", *_correlations(analysis, output, name)
 
 
-def _rank(analysis: xr.Dataset, output: str, name: str) -> str:
-    known = f"{output}_rank_correlation"
-    if known not in analysis or name not in analysis["input"].values:
-        return "-"
+def standing_out(analysis: xr.Dataset, output: str) -> tuple[Array, NDArray[np.bool_]]:
+    """Rank correlations of all inputs, partial where there are such, and which of them stand out
+    of what the largest reaches by chance; shape (input,) both.
+    """
+    (values, ends), (plain, plain_ends) = (
+        (analysis[name].values, analysis[f"{name}_interval"].values)
+        for name in (f"{output}_{word}rank_correlation" for word in _RANKS)
+    )
+    partial = np.isfinite(values)
+    values, ends = np.where(partial, values, plain), np.where(partial[:, None], ends, plain_ends)
+    samples = int(analysis[f"{output}_samples"].values[0])
+    held = np.where(partial, analysis["inputs_held"].values, 0)
+    chance = ranks.largest_by_chance(samples, held, len(values))
+    return values, _beyond(values, ends, chance)
+
+
+def _correlations(analysis: xr.Dataset, output: str, name: str) -> tuple[str, ...]:
+    """The cells of an input's rank correlations."""
+    if output not in _correlated(analysis) or name not in analysis["input"].values:
+        return ("-",) * len(_RANKS)
     one = analysis.sel(input=name)
-    return _signed(one[known].item(), one[f"{known}_interval"].values)
+    known = (f"{output}_{word}rank_correlation" for word in _RANKS)
+    return tuple(_signed(one[each].item(), one[f"{each}_interval"].values) for each in known)
 
 
 def _signed(value: float, ends: Array) -> str:
@@ -146,14 +198,15 @@ def what_separates(analysis: xr.Dataset) -> Table:
     """Inputs that are larger, or smaller, in samples that ended otherwise or violate."""
     if "group" not in analysis.dims:
         return Table((), ())
-    rows, samples = [], analysis.attrs["samples"]
+    rows, samples = [], analysis.attrs["samples_run"]
+    normal = float(norm.isf(ranks.chance_of_each(analysis.sizes["input"]) / 2))
     for group in analysis["group"].values:
         one = analysis.sel(group=group)
         middle, ends = one["separation"].values, one["separation_interval"].values
         order = np.argsort(-np.abs(np.nan_to_num(middle - 0.5)))
         own = one["group_samples"].item()
         # Variance of the area under the curve without a difference: Mann and Whitney (1947).
-        chance = _NORMAL * ((samples + 1) / (12.0 * own * max(samples - own, 1))) ** 0.5
+        chance = normal * ((samples + 1) / (12.0 * own * max(samples - own, 1))) ** 0.5
         beyond = _beyond(middle - 0.5, ends - 0.5, chance)
         chosen = [k for k in order if beyond[k]]
         first = str(group).split("; ")[0]
@@ -169,12 +222,12 @@ def what_separates(analysis: xr.Dataset) -> Table:
     return Table(head, rows, left=2)
 
 
-def _beyond(values: Array, ends: Array, chance: float) -> NDArray[np.bool_]:
-    """Which values stand out of chance: by their intervals, or where there are none because the
-    design gives none, by what one in twenty would reach.
+def _beyond(values: Array, ends: Array, chance: Array | float) -> NDArray[np.bool_]:
+    """Which values are larger than the largest of all by chance, and if they have intervals leave
+    out zero by these, too.
     """
     apart = (ends[:, 0] > 0.0) | (ends[:, 1] < 0.0)
-    return np.where(np.isfinite(ends).all(axis=1), apart, np.abs(values) > chance)
+    return (np.abs(values) > chance) & (apart | ~np.isfinite(ends).all(axis=1))
 
 
 def _ends(interval: Array, digits: int = 2) -> str:

@@ -23,11 +23,13 @@ class Drawn:
     values: Array
     level: tuple[str, ...]
     """Of each column: "input"; of one that has many places "mean", "quarter" and "place"."""
+    path: tuple[str, ...]
+    """Of each column the scene path of its input."""
 
 
 def drawn(campaign: xr.Dataset) -> Drawn:
     """All drawn inputs; one that several paths share is one column, named after the first."""
-    found: dict[str, tuple[Array, str]] = {}
+    found: dict[str, tuple[Array, str, str]] = {}
     for name, variable in campaign.data_vars.items():
         says = variable.attrs
         if says.get("role") != "input" or says.get("path") == "solver.error_bars":
@@ -38,18 +40,18 @@ def drawn(campaign: xr.Dataset) -> Drawn:
             if values.ndim == 1 and len(words) <= _MOST_WORDS:
                 for word in words[: 1 if len(words) == 2 else None]:
                     is_so = (values.astype(str) == word).astype(float)
-                    found[f"{path} = {word}"] = is_so, "input"
+                    found[f"{path} = {word}"] = is_so, "input", path
         elif values.ndim == 1:
-            found[path] = values.astype(float), "input"
+            found[path] = values.astype(float), "input", path
         else:
             numbers = values.astype(float)
-            found[f"mean of {path}"] = numbers.mean(axis=1), "mean"
+            found[f"mean of {path}"] = numbers.mean(axis=1), "mean", path
             if (count := numbers.shape[1]) >= _LEAST_QUARTERED:
                 for low, high in stretches(count, 4):
                     mean = numbers[:, low:high].mean(axis=1)
-                    found[f"mean of {path}[{low + 1}..{high}]"] = mean, "quarter"
+                    found[f"mean of {path}[{low + 1}..{high}]"] = mean, "quarter", path
             for k, place in enumerate(_places(campaign, variable)):
-                found[f"{path}[{place}]"] = numbers[:, k], "place"
+                found[f"{path}[{place}]"] = numbers[:, k], "place", path
     seen: set[bytes] = set()
     kept = {}
     for name, column in found.items():
@@ -59,7 +61,8 @@ def drawn(campaign: xr.Dataset) -> Drawn:
             kept[name] = column
     count = campaign.sizes["sample"]
     values = np.array([each[0] for each in kept.values()]).reshape(-1, count).T
-    return Drawn(tuple(kept), values, tuple(each[1] for each in kept.values()))
+    levels, paths = (tuple(str(each[k]) for each in kept.values()) for k in (1, 2))
+    return Drawn(tuple(kept), values, levels, paths)
 
 
 def _places(campaign: xr.Dataset, variable: xr.DataArray) -> list[str]:

@@ -1,8 +1,11 @@
 """First-order indices from samples of any design, without blocks of runs."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata
+from scipy.sparse import csr_array
+from scipy.stats import f, rankdata
 
 from ringsim.analysis.intervals import Array, jackknife_error, student
 
@@ -55,24 +58,32 @@ def index(bins: Bins, output: Array, part: NDArray[np.int64]) -> tuple[float, Ar
         whole = cells.sum(axis=1, keepdims=True)
         return np.asarray(np.hstack([whole, whole - cells]).T, dtype=float)
 
-    n, sy, syy = summed(None), summed(y), summed(y * y).sum(axis=1)
+    n, sx, sxx = summed(None), summed(x), summed(x * x)
+    found = _adjusted(bins.lined, (n, sx, sxx), summed(y), summed(x * y), summed(y * y).sum(axis=1))
+    return float(found[0]), found[1:]
+
+
+def _adjusted(
+    lined: bool, columns: tuple[Array, Array, Array], sy: Array, sxy: Array, syy: Array
+) -> Array:
+    """Indices from sums over bins, along the last axis: ``columns`` are those of 1, x and x^2."""
+    n, sx, sxx = columns
     full = np.maximum(n, 1.0)
     explained = sy**2 / full
-    free = (n > 0).sum(axis=1) - 1.0
-    if bins.lined:
-        sx = summed(x)
-        sxx, sxy = summed(x * x) - sx**2 / full, summed(x * y) - sx * sy / full
-        sloped = sxx > 1e-12
-        explained += np.where(sloped, sxy**2 / np.where(sloped, sxx, 1.0), 0.0)
-        free += sloped.sum(axis=1)
-    samples = n.sum(axis=1)
-    total = syy - sy.sum(axis=1) ** 2 / np.maximum(samples, 1.0)
-    left = syy - explained.sum(axis=1)
+    free = (n > 0).sum(axis=-1) - 1.0
+    if lined:
+        spread = sxx - sx**2 / full
+        sloped = spread > 1e-12
+        along = (sxy - sx * sy / full) ** 2
+        explained = explained + np.where(sloped, along / np.where(sloped, spread, 1.0), 0.0)
+        free = free + sloped.sum(axis=-1)
+    samples = n.sum(axis=-1)
+    total = syy - sy.sum(axis=-1) ** 2 / np.maximum(samples, 1.0)
+    left = syy - explained.sum(axis=-1)
     known = (total > 0) & (samples - 1 > free)
     spare = np.where(known, samples - 1 - free, 1.0)
     found = 1 - left / np.where(known, total, 1.0) * (samples - 1) / spare
-    found = np.where(known, found, np.nan)
-    return float(found[0]), found[1:]
+    return np.asarray(np.where(known, found, np.nan))
 
 
 def interval(estimate: float, left_out: Array) -> tuple[float, float]:
@@ -84,9 +95,46 @@ def interval(estimate: float, left_out: Array) -> tuple[float, float]:
     return estimate - half, estimate + half
 
 
-def chance_level(bins: Bins, output: Array) -> float:
-    """The index that the output would reach by chance in one case of 20: by shuffling it."""
-    random, none = np.random.default_rng(0), np.zeros(len(output), dtype=np.int64)
+def indices(bins: Bins, centred: Array) -> Array:
+    """Indices of a column with many outputs less their means, shape (samples, outputs), of which
+    none is missing.
+    """
+    count, samples = len(centred), np.arange(len(centred))
+
+    def by_bin(weight: Array) -> csr_array:
+        return csr_array((weight, (bins.bin, samples)), shape=(bins.count, count))
+
+    one, along = by_bin(np.ones(count)), by_bin(bins.place)
+    sums = one.sum(axis=1), along.sum(axis=1), by_bin(bins.place**2).sum(axis=1)
+    squares = np.einsum("ij,ij->j", centred, centred)
+    return _adjusted(bins.lined, sums, (one @ centred).T, (along @ centred).T, squares)
+
+
+def chance_level(columns: Sequence[Bins], output: Array) -> float:
+    """The largest index of all columns that an output of chance reaches in one case of 20.
+
+    From the same shuffles of the output, shape (samples,), for all columns, so that what these have
+    in common counts; NaN if no column has an index.
+    Source: Westfall and Young, Resampling-Based Multiple Testing (1993), the largest statistic.
+    """
+    random = np.random.default_rng(0)
     shuffles = int(np.clip(_NUMBERS // len(output), 39, _SHUFFLES))
-    found = [index(bins, random.permutation(output), none)[0] for _ in range(shuffles)]
-    return float(np.nanquantile(found, _LEVEL))
+    y = output - output.mean()
+    shuffled = np.stack([random.permutation(y) for _ in range(shuffles)], axis=1)
+    largest = np.full(shuffles, np.nan)
+    for bins in columns:
+        largest = np.fmax(largest, indices(bins, shuffled))
+    return float(np.quantile(largest, _LEVEL))
+
+
+def level_of_normal(bins: Bins, chance: float) -> float:
+    """The index that a normal output without influence exceeds with so small a probability.
+
+    By the distribution F of explained over other variance; NaN if too few samples are left.
+    """
+    count, terms = len(bins.bin), bins.count * (1 + bins.lined) - 1
+    spare = count - 1 - terms
+    if spare < 1:
+        return np.nan
+    explained = terms * float(f.isf(chance, terms, spare)) / spare
+    return 1 - (count - 1) / spare / (1 + explained)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 
 from ringsim.analysis import ranks
+from ringsim.analysis.confounded import confounded
 from ringsim.analysis.design import Placement
 from ringsim.analysis.drawn import Drawn, drawn
 from ringsim.analysis.intervals import Array
@@ -40,8 +41,9 @@ def influence(
     For every output NAME ``NAME_rank_correlation`` and ``NAME_partial_rank_correlation``; along
     ``group`` the ``separation`` of samples that were lost, ended in another way than planned, or
     violate a requirement: the probability that the input is larger there.  Intervals as for other
-    statistics.  In partial correlations an input of many places is represented by its mean, for its
-    quarters by the means of these, and for its places by these.
+    statistics.  Pairs of inputs that go together beyond chance are along ``pair``.  In partial
+    correlations an input of many places is represented by its mean, for its quarters by the means
+    of these, and for its places by these.
     """
     inputs = drawn(campaign)
     if not inputs.names or subset_simulation(campaign) is not None:
@@ -76,6 +78,11 @@ def influence(
         "input", np.isin(inputs.level, ["place", "quarter"]),
         {"long_name": "whether it is of one place, or a quarter, of many", "units": "1"},
     )  # fmt: skip
+    found["inputs_held"] = (
+        "input", _held(np.array(inputs.level)),
+        {"long_name": "other inputs that its partial correlations hold", "units": "1"},
+    )  # fmt: skip
+    found |= confounded(inputs, ok)
     coords: dict[str, Any] = {"input": np.array(inputs.names, dtype=object)}
     if groups:
         coords["group"] = np.array([*groups], dtype=object)
@@ -111,10 +118,7 @@ def _correlated(
             found[held] = ranks.partial_correlations(columns[rows][:, held], output[rows])
         return found
 
-    every = np.ones(len(output), dtype=bool)
-    held = np.zeros(len(level), dtype=int)
-    for each in _LEVELS:
-        held[own | (level == each)] = (own | (level == each)).sum() - 1
+    every, held = np.ones(len(output), dtype=bool), _held(level)
     results = []
     for measure, others in ((plain, 0), (partial, held)):
         middle, ends = measure(every), np.full((len(level), 2), np.nan)
@@ -128,6 +132,14 @@ def _correlated(
             ends = np.stack(both, axis=1)
         results.append((middle, ends))
     return results[0], results[1]
+
+
+def _held(level: NDArray[np.str_]) -> NDArray[np.int64]:
+    """How many other inputs the partial correlation of each one holds, shape (input,)."""
+    found, own = np.zeros(len(level), dtype=np.int64), level == "input"
+    for each in _LEVELS:
+        found[own | (level == each)] = (own | (level == each)).sum() - 1
+    return found
 
 
 def groups_of(

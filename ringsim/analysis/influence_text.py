@@ -5,6 +5,7 @@ from collections.abc import Collection
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.confounded import confounding_notes
 from ringsim.analysis.intervals import LEVEL, Array
 from ringsim.analysis.quantities import quantities
 from ringsim.tables import Table, interval_text, number_text
@@ -28,6 +29,7 @@ def influence_tables(
 def _correlated(analysis: xr.Dataset, outputs: Collection[str]) -> Table:
     names, place = analysis["input"].values, analysis["input_is_place"].values
     rows, notes, certain, least, lacking = [], list[str](), False, 0, list[str]()
+    named = set[str]()
     for output in outputs:
         if f"{output}_rank_correlation" not in analysis:
             continue
@@ -42,6 +44,7 @@ def _correlated(analysis: xr.Dataset, outputs: Collection[str]) -> Table:
         used = int(analysis[f"{output}_samples"].values[0])
         least = min(least or used, used)
         chosen = _largest(plain[0], place)
+        named |= {str(names[k]) for k in chosen}
         rows += [
             (f"{output} with {names[k]}", *_told(*plain, k), *_told(*partial, k), str(used))
             for k in chosen
@@ -60,6 +63,7 @@ def _correlated(analysis: xr.Dataset, outputs: Collection[str]) -> Table:
             if certain else f"one in twenty reaches {1.96 / (least - 1) ** 0.5:.2g}"
         )  # fmt: skip
         notes.append(f"the largest of {len(names)} inputs; by chance alone {chance}")
+        notes += confounding_notes(analysis, named)
     head = ("rank correlation", "correlation", "95 % interval", "partial", "95 % interval")
     return Table((*head, "used"), rows, notes)
 

@@ -37,11 +37,6 @@ def numbers(campaign: xr.Dataset, name: str) -> Array:
     return np.where(values < 0, np.nan, values) if counts else values
 
 
-def run(campaign: xr.Dataset) -> Mask:
-    """Which samples have run, whatever came of it."""
-    return np.asarray(campaign["status"].to_numpy() >= 0)
-
-
 def good(campaign: xr.Dataset) -> Mask:
     """Which samples have numbers that hold."""
     return np.asarray(campaign["status"].to_numpy() == Status.OK)
@@ -60,6 +55,11 @@ def tells_of(campaign: xr.Dataset, name: str) -> Mask:
 def lost(campaign: xr.Dataset) -> Mask:
     """Which samples have run and given no numbers that hold."""
     return np.asarray(campaign["status"].to_numpy() >= Status.SOLVER_FAILED)
+
+
+def ran(campaign: xr.Dataset) -> Mask:
+    """Which samples have run; the others are neither lost nor without a value."""
+    return np.asarray(campaign["status"].to_numpy() >= Status.OK)
 
 
 def used(campaign: xr.Dataset) -> xr.Dataset:

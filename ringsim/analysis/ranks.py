@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, rankdata
+from scipy.stats import norm, rankdata, t
 
 from ringsim.analysis.intervals import LEVEL, Array, jackknife_error, student
 
@@ -76,6 +76,26 @@ def correlation_interval(found: Array, samples: int, held: int = 0) -> tuple[Arr
     half = _WIDE * np.sqrt((1.0 + found**2 / 2.0) / free)
     middle = to_normal(found)
     return np.tanh(middle - half), np.tanh(middle + half)
+
+
+def chance_of_each(among: int) -> float:
+    """Probability that each of ``among`` tests may have if any one is to err in one case of 20.
+
+    Source: Sidak, J. Am. Statistical Association 62 (1967), for independent ones.
+    """
+    return float(-np.expm1(np.log(LEVEL) / among))
+
+
+def largest_by_chance(samples: int, held: Array, among: int) -> Array:
+    """Size of a rank correlation that the largest of ``among`` ones, without any correlation in
+    truth, exceeds in one case of 20; ``held`` are the numbers of other columns held.
+
+    Student's t for correlations of normal numbers, which those of ranks are close to, with Sidak's
+    correction; infinite if too few samples are left.
+    """
+    free = np.maximum(samples - 2.0 - held, 0.0)
+    beyond = t.isf(chance_of_each(among) / 2, np.maximum(free, 1.0))
+    return np.asarray(np.where(free > 0, beyond / np.sqrt(free + beyond**2), np.inf))
 
 
 def to_normal(correlation: Array) -> Array:

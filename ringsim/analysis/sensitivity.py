@@ -18,7 +18,7 @@ from ringsim.analysis.design import Placement
 from ringsim.analysis.drawn import drawn
 from ringsim.analysis.influence import groups_of
 from ringsim.analysis.intervals import Array
-from ringsim.analysis.quantities import good, lost, numbers, quantities, run
+from ringsim.analysis.quantities import good, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import Requirement
 
 _LEAST_OF_A_KIND = 10
@@ -39,7 +39,7 @@ ABOUT = {
     "mean_effect": "mean change of the output by a move upwards (mu)",
     "effect_deviation": "standard deviation of the change by a move upwards (sigma)",
     "given_data_index": "share of the variance by the input alone, from plain samples",
-    "chance_level": "index that one in 20 outputs without any influence would reach",
+    "chance_level": "largest index of all inputs that one in 20 outputs of chance would reach",
 }  # fmt: skip
 
 
@@ -71,11 +71,11 @@ def sensitivity(
     Designs of kind saltelli have ``first_order_index`` and ``total_index`` (and
     ``second_order_index``) along ``factor``, those of kind morris ``mean_absolute_effect``,
     ``mean_effect`` and ``effect_deviation``, plain ones ``given_data_index`` and ``chance_level``
-    along ``input``; each with its ``..._interval``.  Of blocks or samples that have run,
-    ``index_used`` and ``index_lost`` count those used and left out, ``missing`` the samples without
-    the output, ``missing_lost`` those of failed runs among them, and ``missing_by_inputs`` is the
-    probability that samples missing at random would go with inputs as much: below 0.05 there is no
-    index.  ``names`` are the outputs to tell of beside failures, by default all.
+    along ``input``; each with its ``..._interval``.  ``index_used`` and ``index_lost`` count blocks
+    or samples, ``missing`` the samples without the output, ``missing_lost`` those of failed runs
+    among them, and ``missing_by_inputs`` is the probability that samples missing at random would
+    go with inputs as much: below 0.05 there is no index.  What has not run yet is none of them.
+    ``names`` are the outputs to tell of beside failures, by default all.
     """
     blocks, inputs = blocks_of(campaign), drawn(campaign)
     outputs = {
@@ -85,39 +85,35 @@ def sensitivity(
     }
     if not outputs or not inputs.names or (blocks is None and not _plain(placed)):
         return xr.Dataset()
-    index = campaign["sample"].to_numpy()
-    block = None if blocks is None else np.repeat(np.arange(len(blocks.rows)), blocks.size)
-    # What has not run is not lost, nor is it missing by its inputs.
-    ran = ran_whole = run(campaign)
-    if blocks is not None:
-        ran_whole = np.asarray(ran.reshape(blocks.rows.shape).all(axis=1))
-        ran = np.repeat(ran_whole, blocks.size)
-    count = int(ran.sum())
+    size = 1 if blocks is None else blocks.size
+    # Blocks count, or samples, all of which have run.
+    held = np.flatnonzero(ran(campaign).reshape(-1, size).all(axis=1))
+    here = (held[:, None] * size + np.arange(size)).ravel()
+    index, columns = campaign["sample"].to_numpy()[here], inputs.values[here]
+    count, block = len(here), None if blocks is None else np.repeat(np.arange(len(held)), size)
     tested: dict[bytes, tuple[float, list[given_data.Bins]]] = {}
     found: dict[str, Found] = {}
-    counts, gone = np.zeros((len(outputs), 4), dtype=np.int64), lost(campaign)
+    counts, gone = np.zeros((len(outputs), 4), dtype=np.int64), lost(campaign)[here]
     chance = np.full(len(outputs), np.nan)
-    for k, (name, (values, _)) in enumerate(outputs.items()):
-        missing = np.isnan(values) & ran
-        by_block = missing[:, None] if blocks is None else missing.reshape(blocks.rows.shape)
-        whole = np.asarray(~by_block.any(axis=1) & ran_whole)
+    for k, (name, (every, _)) in enumerate(outputs.items()):
+        values = every[here]
+        missing = np.isnan(values)
+        whole = np.asarray(~missing.reshape(-1, size).any(axis=1))
         # Outputs that lack the same samples share the test, and the bins.
         if (key := missing.tobytes()) not in tested:
-            of = None if block is None else block[ran]
-            tested[key] = dependence(missing[ran], inputs.values[ran], of), []
+            tested[key] = dependence(missing, columns, block), []
         chance[k], bins = tested[key]
-        left = ran_whole.sum() - whole.sum()
-        counts[k] = whole.sum(), left, missing.sum(), (missing & gone).sum()
+        counts[k] = whole.sum(), len(whole) - whole.sum(), missing.sum(), (missing & gone).sum()
         if chance[k] < LEVEL:
             continue
         if blocks is None:
             if whole.sum() >= given_data.LEAST:
-                bins += [given_data.Bins(c[whole]) for c in inputs.values.T] if not bins else []
+                bins += [given_data.Bins(c[whole]) for c in columns.T] if not bins else []
                 found[name] = _given(bins, values[whole], index[whole], placed)
         elif whole.sum() >= _LEAST_BLOCKS:
-            number = np.flatnonzero(whole)
-            kept = Blocks(blocks.rows[whole])
-            rows = values.reshape(blocks.rows.shape)[whole]
+            number = held[whole]
+            kept = Blocks(blocks.rows[number])
+            rows = values.reshape(-1, size)[whole]
             found[name] = (
                 _sobol(rows, blocks, number % placed.replicates, binary=name not in quantities())
                 if blocks.of_indices
@@ -125,11 +121,11 @@ def sensitivity(
             )
     coords = {"input": inputs.names} if blocks is None else {"factor": blocks.groups}
     made = _dataset(outputs, found, coords, block is not None)
-    each = "samples" if block is None else "blocks"
+    of = "samples" if block is None else "blocks"
     for k, (name, about) in enumerate({
-        "index_used": f"{each} that indices are from",
-        "index_lost": f"{each} that are left out, because a sample of them has no value",
-        "missing": f"samples of {count} without a value",
+        "index_used": f"{of} that indices are from",
+        "index_lost": f"{of} that are left out, because a sample of them has no value",
+        "missing": f"samples of {count} that have run without a value",
         "missing_lost": "of these, samples whose run failed",
     }.items()):  # fmt: skip
         made[name] = "output", counts[:, k], {"long_name": about, "units": "1"}
@@ -181,15 +177,11 @@ def _given(
     part = np.unique(part, return_inverse=True)[1]
     certain = placed.has_intervals and placed.kind != "sobol" and part.max() > 0
     told, chance = np.full((len(bins), 3), np.nan), np.full((len(bins), 1), np.nan)
-    levels: dict[bytes, float] = {}
+    chance[:] = given_data.chance_level(bins, values)
     for k, each in enumerate(bins):
         told[k, 0], left_out = given_data.index(each, values, part)
         if certain:
             told[k, 1:] = given_data.interval(told[k, 0], left_out)
-        key = bytes([each.lined]) + np.bincount(each.bin).tobytes()
-        if key not in levels:
-            levels[key] = given_data.chance_level(each, values)
-        chance[k] = levels[key]
     return {"given_data_index": (("input",), told), "chance_level": (("input",), chance)}
 
 

@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterator
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.confounded import confounding_notes
 from ringsim.analysis.dependence import LEVEL
 from ringsim.analysis.intervals import Array
 from ringsim.analysis.quantities import quantities
@@ -15,6 +16,13 @@ Outputs = Collection[str] | None
 _MOST = 5
 """Groups or inputs that are told for each output."""
 _MOST_PLACES = 3
+_SLACK = 0.05
+"""How far Sobol' indices may lie above what is possible before that is told."""
+_LEAST = -0.1
+"""Below zero they lie more often: the errors of first-order indices are those of the larger ones.
+"""
+_WIDE = 0.5
+"""Length from which on an interval of a Sobol' index says next to nothing."""
 SETS = (
     ("total_index", "first_order_index"),
     ("mean_absolute_effect", "effect_deviation"),
@@ -45,13 +53,14 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...], outputs: Outputs) -> Tab
     head = ["what explains"]
     for name in names:
         head += [HEADS[name]] + ["95 % interval"] * (f"{name}_interval" in analysis)
-    rows = []
+    rows, named = [], set[str]()
     for output in chosen_of(analysis, outputs):
         one = analysis.sel(output=output)
         size = np.nan_to_num(one[names[0]].values, nan=-np.inf)
         order = np.argsort(-size, kind="stable")
         chosen = [k for k in order[~place[order]][:_MOST] if np.isfinite(size[k])]
         chosen += [k for k in order[place[order]][:_MOST_PLACES] if np.isfinite(size[k])]
+        named |= {str(analysis[dim].values[k]) for k in chosen}
         for k in chosen:
             row = [f"{output} by {analysis[dim].values[k]}"]
             for name in names:
@@ -59,7 +68,9 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...], outputs: Outputs) -> Tab
                 if f"{name}_interval" in one:
                     row.append(_ends(one[f"{name}_interval"].values[k]))
             rows.append([*row, str(one["index_used"].item()), str(one["index_lost"].item())])
-    return Table([*head, f"{of} used", "lost"], rows)
+    notes = measure_notes(analysis)
+    notes += confounding_notes(analysis, named) if dim == "input" else []
+    return Table([*head, f"{of} used", "lost"], rows, notes)
 
 
 def _gate(analysis: xr.Dataset, only: Outputs) -> Iterator[str]:
@@ -97,7 +108,7 @@ def sensitivity_tables(analysis: xr.Dataset, outputs: Outputs = None) -> list[Ta
     """Indices of failures and of ``outputs``, by default of all, and what they leave out."""
     found = []
     if names := next((names for names in SETS if names[0] in analysis), ()):
-        found.append(_told(analysis, names, outputs)._replace(notes=measure_notes(analysis)))
+        found.append(_told(analysis, names, outputs))
     if "second_order_index" in analysis:
         found.append(_second(analysis, outputs))
     return found + refusals(analysis, outputs)
@@ -110,14 +121,49 @@ def measure_notes(analysis: xr.Dataset) -> list[str]:
             "mu*: mean absolute change of the output, in its unit, when the group moves by half of "
             "its levels; sigma: scatter of that change"
         ]
-    if "total_index" in analysis and analysis["total_index_interval"].isnull().all():
-        return ["no intervals: give design.replicates = 8, or more, for independent replicates"]
+    if "total_index" in analysis:
+        none = analysis["total_index_interval"].isnull().all()
+        cure = "no intervals: give design.replicates = 8, or more, for independent replicates"
+        return [cure] * bool(none) + _unsure(analysis)
     if "given_data_index" in analysis:
         return [
             "shares of the variance by one input alone, from bins: corrected for chance, too small "
             "where the output bends within a bin"
         ]
     return []
+
+
+def _unsure(analysis: xr.Dataset) -> list[str]:
+    """A note if Sobol' indices are what none can be, or intervals too long to tell anything."""
+    first, total = (analysis[f"{each}_index"].values for each in ("first_order", "total"))
+    ends = [analysis[f"{each}_index_interval"].values for each in ("first_order", "total")]
+    # Without intervals, what the estimators leave open is not known.
+    low, high = (
+        np.where(np.isnan(end), value + side, end)
+        for end, value, side in (
+            (ends[0][..., 0], first, -_SLACK),
+            (ends[1][..., 1], total, _SLACK),
+        )
+    )
+    both, wide = np.stack([first, total]), np.stack([np.ptp(each, axis=-1) for each in ends])
+    signs = {
+        f"indices outside of 0 .. 1 ({number_text(_farthest(both), 2)})": (
+            (both < _LEAST) | (both > 1.0 + _SLACK)
+        ).any(axis=(0, 2)),
+        "first-order indices above total ones": (low > high).any(axis=1),
+        f"intervals longer than {_WIDE}": (wide > _WIDE).any(axis=(0, 2)),
+    }  # fmt: skip
+    outputs = analysis["output"].values
+    found = [f"{sign} of {', '.join(outputs[own])}" for sign, own in signs.items() if own.any()]
+    if not found:
+        return []
+    return [f"too few base samples: {'; '.join(found)}: give more of them (design.samples)"]
+
+
+def _farthest(values: Array) -> float:
+    """The value that is farthest from what lies between 0 and 1."""
+    known = values[np.isfinite(values)]
+    return float(known[np.argmax(np.abs(known - 0.5))]) if len(known) else np.nan
 
 
 def refusals(analysis: xr.Dataset, outputs: Outputs = None) -> list[Table]:

@@ -14,7 +14,7 @@ from ringsim.analysis.blocks import population_of
 from ringsim.analysis.design import Placement, placement
 from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import NONE, Array, Interval
-from ringsim.analysis.quantities import CHECKED, good, lost, numbers, quantities
+from ringsim.analysis.quantities import CHECKED, good, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
 from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import sensitivity
@@ -27,7 +27,7 @@ from ringsim.variables import Fate, Status
 QUANTILES = {"quantile_05": 0.05, "median": 0.5, "quantile_95": 0.95}
 STATISTICS = ("mean", "standard_deviation", *QUANTILES, "minimum", "maximum")
 PARTS = (0.25, 0.5, 0.75, 1.0)
-"""Shares of the samples, the first ones, after which estimates are told as well."""
+"""Shares of the samples that have run, the first ones, after which estimates are told as well."""
 COUNTED = ("used", "lost", "without_value", "not_run")
 SOURCES = ("sampling", "numerical", "engines")
 """What makes a mean wrong: few samples, steps and elements, and the choice of the engine."""
@@ -85,11 +85,15 @@ def analyse(
         attrs={
             "title": campaign.attrs.get("title", ""),
             "campaign_identity": campaign.attrs.get("identity", ""),
-            "samples": campaign.sizes["sample"], "design": placed.kind, "intervals": placed.told,
+            "samples": campaign.sizes["sample"], "samples_run": int(ran(campaign).sum()),
+            "design": placed.kind, "intervals": placed.told,
             "stopping": "".join(stopping_lines(campaign, placed)),
         },
     )  # fmt: skip
-    found["part"].attrs = {"long_name": "share of the samples, the first ones", "units": "1"}
+    found["part"].attrs = {
+        "long_name": "share of the samples that have run, the first ones",
+        "units": "1",
+    }
     stand = population_of(campaign)
     for name in quantities():
         if name in stand and np.isfinite(numbers(stand, name)[good(stand)]).any():
@@ -109,10 +113,11 @@ def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any
     """All variables about one output."""
     values, ok = numbers(campaign, name), good(campaign)
     known = ok & np.isfinite(values)
-    place = np.arange(len(values))
+    run = ran(campaign)
+    place = np.cumsum(run)[known]
     used, index = values[known], campaign["sample"].to_numpy()[known]
     counts = [known.sum(), lost(campaign).sum(), (ok & ~known).sum()]
-    parts = [used[place[known] < round(part * len(values))] for part in PARTS]
+    parts = [used[place <= round(part * run.sum())] for part in PARTS]
     about = campaign[name].attrs.get("long_name", name)
     units = {"units": quantities()[name].units}
 
@@ -217,10 +222,10 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
         rows[f"lost: {code.word}"] = (gone & (status == code), ok | gone)
     rows = {word: (own, of) for word, (own, of) in rows.items() if own.any()}
     shares = np.full((len(rows), len(PARTS)), np.nan)
-    ends = np.full((len(rows), 2), np.nan)
+    ends, run = np.full((len(rows), 2), np.nan), np.flatnonzero(ran(campaign))
     for k, (own, of) in enumerate(rows.values()):
         for part, share in enumerate(PARTS):
-            first = slice(round(share * len(ok)))
+            first = run[: round(share * len(run))]
             if of[first].any():
                 shares[k, part] = own[first].sum() / of[first].sum()
         ends[k] = _share_interval(own[of], index[of], placed)

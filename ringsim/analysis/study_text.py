@@ -33,6 +33,8 @@ def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
     matters, whatever chance would explain.
     """
     counts = counted(analysis.attrs["samples"], "sample")
+    if (run := analysis.attrs["samples_run"]) < analysis.attrs["samples"]:
+        counts += f", of which {run} have run"
     counts += f", design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
     lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.analysis.confounded import pairs
 from ringsim.analysis.design import placement_of
 from ringsim.campaign.folder import opened_as
 from ringsim.campaign.growing import grown
@@ -13,17 +14,21 @@ from ringsim.campaign.status import in_words
 from ringsim.choice import kind_of
 from ringsim.execution.local import Local
 from ringsim.execution.work import Array, Work, relative_cost
+from ringsim.refusal import show
 from ringsim.sampling.columns import Column, Table
 from ringsim.sampling.designs.grouped import Grouped
 from ringsim.sampling.designs.subset_simulation import SubsetSimulation
 from ringsim.sampling.values import labels_of
 from ringsim.storage.journal import Survey, survey
 from ringsim.storage.result import Result, check_of, sample_of
+from ringsim.tables import counted
 
 Samples = NDArray[np.int64]
 _MOST_SHOWN = 10
 _SHORT = 20.0
 """A trial run that takes longer hardly consists of loading code, s."""
+_STRONG = 0.5
+"""Rank correlation of two inputs that is told before anything runs."""
 
 
 def plan(order: Order, workers: int) -> list[str]:
@@ -55,6 +60,8 @@ def plan(order: Order, workers: int) -> list[str]:
     placed = placement_of(design)
     if placed.population and not placed.has_intervals:
         lines.append(f"  statistics     {placed.told}")
+    if placed.population and not campaign.specification.correlations:
+        lines += _confounded(table)
     if rule := campaign.specification.rule:
         numbers = rule.numbers(table.samples, campaign.specification.rule_replicates)
         looks = ", ".join(map(str, numbers)) or "none before the last sample"
@@ -115,6 +122,36 @@ def _predicted(
     ends = f"{each.min():.3g}", f"{each.max():.3g}"
     spread = f" ({ends[0]} to {ends[1]} s)" if ends[0] != ends[1] else ""
     return each, [f"{each.mean():.3g} s each{spread}, {basis}"]
+
+
+def _confounded(table: Table) -> list[str]:
+    """A line if inputs go together, as points of a design do that are few for its dimensions."""
+    found: dict[bytes, tuple[str, Array]] = {}
+    for column in table.columns:
+        if column.path and column.values.dtype.kind in "iuf":
+            values = column.values.reshape(table.samples, -1).astype(float)
+            for k, each in enumerate(values.T):
+                place = show(column.places[k]) if column.places else k + 1
+                name = f"{column.path}[{place}]" if column.dim else column.path
+                found.setdefault(each.tobytes(), (name, each))  # paths that share their values
+    names = [name for name, _ in found.values()]
+    if len(names) < 2:
+        return []
+    values = np.column_stack([each for _, each in found.values()])
+    strong = [
+        pair for pair in pairs(values, ~np.eye(len(names), dtype=bool))
+        if abs(pair.correlation) > _STRONG
+    ]  # fmt: skip
+    if not strong:
+        return []
+    first, more = strong[0], len(strong) - 1
+    others = f" (and {counted(more, 'other pair')})" * (more > 0)
+    both = f"{names[first.first]} and {names[first.second]}"
+    return [
+        f"  inputs         {both} have a rank correlation of {first.correlation:+.2f} in these "
+        f"samples{others}: the effect of one may be told as the "
+        'other\'s; draw more samples for each replicate, or with design.kind = "random"'
+    ]
 
 
 def _extent(column: Column) -> str:

@@ -123,6 +123,23 @@ def test_a_bootstrap_over_the_blocks_of_one_sequence_would_be_too_long():
     assert any("no intervals: give design.replicates = 8" in line for line in told(found))
 
 
+@pytest.mark.parametrize("function", [ishigami, lambda x: x[:, 0] - 0.3 * x[:, 1]])
+def test_too_few_base_samples_are_told_by_what_no_index_can_be(function):
+    for design, few in ((Saltelli(samples=16), True), (Saltelli(samples=8, replicates=1), True),
+                        (Saltelli(samples=512), False)):  # fmt: skip
+        found = analyse(drawn_campaign(design, function, 3, 1))
+        lines = [line for line in told(found) if line.startswith("too few base samples: ")]
+        assert len(lines) == few
+
+
+def test_a_first_order_index_above_the_total_one_is_told_if_their_intervals_are_apart():
+    found = analyse(drawn_campaign(Saltelli(samples=2048), lambda x: x[:, 0], 3, 1))
+    assert not sensitivity_tables(found)[0].notes
+    found.first_order_index_interval[0, 0] = found.total_index_interval[0, 0] + 0.02
+    (note,) = sensitivity_tables(found)[0].notes
+    assert "first-order indices above total ones of asynchrony_max" in note
+
+
 def test_samples_lost_at_random_cost_whole_blocks_and_are_told():
     random = np.random.default_rng(5)
     made = drawn_campaign(
@@ -311,7 +328,7 @@ def test_given_data_indices_are_corrected_for_chance():
         found.append(given_data.index(given_data.Bins(x), y, np.zeros(1000, dtype=int))[0])
     # Standard error of the mean of 100: sqrt(2 * 19) / 1000 / 10 = 0.0006.
     assert abs(np.mean(found)) < 0.002
-    levels = [given_data.chance_level(given_data.Bins(x), y)]
+    levels = [given_data.chance_level([given_data.Bins(x)], y)]
     assert 0.02 < np.mean(np.array(found) > levels) * 2 < 0.2
     assert levels[0] == pytest.approx(np.quantile(found, 0.95), abs=0.006)
 

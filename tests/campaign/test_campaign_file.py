@@ -147,6 +147,22 @@ def test_dry_run_says_where_there_will_be_no_intervals_and_no_range_of_one(bench
     assert "give design.replicates = 8" in bench.run(*start)
 
 
+def test_dry_run_says_where_the_design_makes_inputs_go_together(bench):
+    """111 inputs: 100 points a replicate are few, 512 are enough."""
+    file = bench.folder / "friction.toml"
+    own = (ROOT / "campaigns" / "nonsync_friction.toml").read_text()
+    plan = ("campaign", file, "--judge", "fake_solver:spy", "--dry-run", "--out", "out")
+    for samples, told in ((1000, True), (5120, False)):
+        design = f"samples = {samples}, replicates = 10"
+        file.write_text(own.replace("samples = 64", design))
+        printed = bench.run(*plan, solver="fake_solver:spy")
+        lines = [line for line in printed.splitlines() if "have a rank correlation of" in line]
+        assert len(lines) == told
+        if told:
+            both = '["section 12 second hinge"] and rods.young_modulus'
+            assert f"{both} have a rank correlation of -0.60" in lines[0]
+
+
 def test_a_folder_without_any_result_is_not_merged(bench):
     bench.run("campaign", bench.write(2), "--out", "out")
     for journal in (bench.folder / "out" / "journals").glob("*.journal"):

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsim.analysis.campaign_samples import endings, inputs, judged_by
-from ringsim.analysis.quantities import good, numbers, run
+from ringsim.analysis.quantities import good, numbers, ran
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, head
 from ringsim.plots.campaign.names import WIDE, in_lines
@@ -43,7 +43,7 @@ def by_input(campaign: xr.Dataset) -> Figure:
     the foot of each panel.
     """
     every = campaign.sizes["sample"]
-    campaign = campaign.isel(sample=np.flatnonzero(run(campaign)))
+    campaign = campaign.isel(sample=np.flatnonzero(ran(campaign)))
     names, name = inputs(campaign), judged_by(campaign)
     words = endings(campaign)
     height = np.where(good(campaign), numbers(campaign, name), np.nan)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from ringsim.analysis.campaign_samples import inputs, judged_by, scalars
 from ringsim.analysis.courses import courses
 from ringsim.analysis.design import placement
-from ringsim.analysis.quantities import run
+from ringsim.analysis.quantities import ran
 from ringsim.analysis.reading import any_finite
 from ringsim.files import writing
 from ringsim.plots import style
@@ -41,7 +41,7 @@ def _converges(campaign: xr.Dataset) -> bool:
 
 def _has_run(campaign: xr.Dataset) -> bool:
     """Whether something became of drawn inputs."""
-    return bool(inputs(campaign)) and bool(run(campaign).any())
+    return bool(inputs(campaign)) and bool(ran(campaign).any())
 
 
 class Picture(NamedTuple):

@@ -19,7 +19,7 @@ from ringsim.analysis.campaign_samples import (
     values_of,
 )
 from ringsim.analysis.design import placement
-from ringsim.analysis.quantities import run
+from ringsim.analysis.quantities import ran
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, head
 
@@ -98,7 +98,7 @@ def one_by_one(campaign: xr.Dataset) -> Figure:
     """
     names, ends = scalars(campaign), endings(campaign)
     words, moved = moves(campaign)
-    samples, has_run = campaign["sample"].to_numpy(), run(campaign)
+    samples, has_run = campaign["sample"].to_numpy(), ran(campaign)
     figure = Figure(figsize=(9.6, 1.75 * len(names) + 2.4))
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     others = sorted(set(ends.tolist()) - LOOKS.keys())

@@ -192,7 +192,7 @@ def _draw(axes: Axes, bars: Bars) -> None:
              _INSIDE[measure][1], 0.34)  # fmt: skip
     if np.isfinite(bars.chance):
         axes.axvline(bars.chance, color=style.VERMILLION, linestyle="dashed", linewidth=1.2,
-                     label="by chance in one case of 20")  # fmt: skip
+                     label="the largest by chance in one case of 20")  # fmt: skip
     axes.axvline(0.0, color=style.INK, linewidth=0.8)
     axes.locator_params(axis="x", nbins=5)
     axes.set_yticks(height, [in_lines(name) for name in bars.names], fontsize=8)
