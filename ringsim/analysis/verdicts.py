@@ -14,7 +14,7 @@ from ringsim.analysis.looks import Levels, Rule, rule_of
 from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities, tells_of
 from ringsim.analysis.requirements import OUTCOME, Requirement
 from ringsim.refusal import InputError, known_or_nearest
-from ringsim.variables import Code, Fate, flags_of
+from ringsim.variables import GOALS, Code, Fate, flags_of
 
 
 class Verdict(Code):
