@@ -154,7 +154,7 @@ def test_dry_run_says_where_the_design_makes_inputs_go_together(bench):
     plan = ("campaign", file, "--judge", "fake_solver:spy", "--dry-run", "--out", "out")
     for samples, told in ((1000, True), (5120, False)):
         design = f"samples = {samples}, replicates = 10"
-        file.write_text(own.replace("samples = 64", design))
+        file.write_text(own.replace("samples = 5120, replicates = 10", design))
         printed = bench.run(*plan, solver="fake_solver:spy")
         lines = [line for line in printed.splitlines() if "have a rank correlation of" in line]
         assert len(lines) == told
