@@ -6,6 +6,7 @@ from typing import Any
 import jinja2
 import xarray as xr
 
+from ringsim.analysis.brief import what_matters, what_separates
 from ringsim.analysis.campaign_notes import budget_lines, override_lines, peak_lines, restart_lines
 from ringsim.analysis.campaign_samples import campaign_file, endings, scalars
 from ringsim.analysis.design import placement
@@ -70,6 +71,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "statistics": tables.statistics(campaign, analysis), "errors": error_table(analysis, names),
         "no_population": "" if placed.population or not placed.kind else placed.told,
         "verdicts": verdict_table(analysis),
+        "brief": [what_matters(analysis), what_separates(analysis)],
         "matters": [*influence_tables(analysis, names), *sensitivity_tables(analysis, names)],
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
         "peaks": peak_lines(campaign), "stopping": stopping,
