@@ -50,6 +50,7 @@ def influence(
         return xr.Dataset()
     found: dict[str, Any] = {}
     index, ok = campaign["sample"].to_numpy(), good(campaign)
+    columns, last = ranks.Columns(inputs.values), np.ones(len(ok), dtype=bool)
     for name in quantities():
         if name not in campaign:
             continue
@@ -57,7 +58,9 @@ def influence(
         known = ok & np.isfinite(values)
         if known.sum() < LEAST or np.ptp(values[known]) == 0:
             continue
-        columns, replicate = inputs.values[known], placed.replicate_of(index[known])
+        if not np.array_equal(known, last):  # most outputs lack the same samples
+            columns, last = ranks.Columns(inputs.values[known]), known
+        replicate = placed.replicate_of(index[known])
         plain, partial = _correlated(columns, values[known], inputs, placed, replicate)
         for word, (middle, ends) in {"": plain, "partial_": partial}.items():
             about = f"{word.replace('_', ' ')}rank correlation with {name}"
@@ -101,7 +104,7 @@ def _told(
 
 
 def _correlated(
-    columns: Array, output: Array, inputs: Drawn, placed: Placement,
+    columns: ranks.Columns, output: Array, inputs: Drawn, placed: Placement,
     replicate: NDArray[np.int64] | None,
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:  # fmt: skip
     """Plain and partial rank correlations, shape (input,), with intervals, shape (input, 2)."""
@@ -109,13 +112,13 @@ def _correlated(
     own = level == "input"
 
     def plain(rows: Any) -> Array:
-        return ranks.correlations(columns[rows], output[rows])
+        return ranks.correlations(columns.ranks(rows), output[rows])
 
     def partial(rows: Any) -> Array:
-        found = np.full(len(level), np.nan)
+        found, x = np.full(len(level), np.nan), columns.ranks(rows)
         for each in (each for each in _LEVELS if (level == each).any() or each == "mean"):
             held = own | (level == each)
-            found[held] = ranks.partial_correlations(columns[rows][:, held], output[rows])
+            found[held] = ranks.partial_correlations(x[:, held], output[rows])
         return found
 
     every, held = np.ones(len(output), dtype=bool), _held(level)

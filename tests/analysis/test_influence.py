@@ -35,7 +35,8 @@ def test_rank_correlations_are_those_of_scipy():
     columns = random.integers(0, 5, (50, 3)).astype(float)
     output = columns @ [1.0, -0.5, 0.0] + random.normal(size=50)
     expected = [spearmanr(column, output).statistic for column in columns.T]
-    np.testing.assert_allclose(ranks.correlations(columns, output), expected, rtol=1e-12)
+    found = ranks.correlations(ranks.centred_ranks(columns), output)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
 def test_partial_correlations_are_those_of_residuals():
@@ -46,7 +47,7 @@ def test_partial_correlations_are_those_of_residuals():
     from scipy.stats import rankdata
 
     x, y = rankdata(columns, axis=0), rankdata(output)
-    for k, found in enumerate(ranks.partial_correlations(columns, output)):
+    for k, found in enumerate(ranks.partial_correlations(ranks.centred_ranks(columns), output)):
         others = np.column_stack([np.ones(60), np.delete(x, k, axis=1)])
         fits = [np.linalg.lstsq(others, each, rcond=None)[0] for each in (x[:, k], y)]
         left = [each - others @ fit for each, fit in zip((x[:, k], y), fits, strict=True)]
@@ -60,7 +61,7 @@ def test_intervals_of_correlations_cover_normal_pairs():
     ends = []
     for _ in range(CAMPAIGNS):
         x, y = random.normal(size=(2, 60))
-        found = ranks.correlations(x[:, None], 0.6 * x + 0.8 * y)
+        found = ranks.correlations(ranks.centred_ranks(x[:, None]), 0.6 * x + 0.8 * y)
         ends.append(np.ravel(ranks.correlation_interval(found, 60)))
     assert 0.92 <= covered(np.transpose(ends), true) <= 0.98
 
@@ -83,13 +84,14 @@ def test_intervals_from_replicates_cover(kind):
     many = np.random.default_rng(5).random((400_000, 3))
     first = many[:, :1]
     high = output(many) > 1.2
-    true = ranks.correlations(first, output(many)), ranks.areas(first, high)
+    true = ranks.correlations(ranks.centred_ranks(first), output(many)), ranks.areas(first, high)
     which = np.arange(128) % 8
     ends = [[], []]
     for seed in range(300):
         x = points(kind, 128, 8, seed)
         y = output(x)
-        correlate = lambda rows: ranks.correlations(x[rows, :1], y[rows])  # noqa: B023, E731
+        of = ranks.Columns(x[:, :1])
+        correlate = lambda rows: ranks.correlations(of.ranks(rows), y[rows])  # noqa: B023, E731
         area = lambda rows: ranks.areas(x[rows, :1], y[rows] > 1.2)  # noqa: B023, E731
         ends[0].append(np.ravel(ranks.replicate_interval(correlate, which, np.arctanh, np.tanh)))
         ends[1].append(np.ravel(ranks.replicate_interval(area, which, logit, expit)))
