@@ -119,8 +119,8 @@ def chance_level(columns: Sequence[Bins], output: Array) -> float:
     From the same shuffles of the output, shape (samples,), for all columns, so that what these have
     in common counts; NaN if no column has an index.
     Source: Westfall and Young, Resampling-Based Multiple Testing (1993), the largest statistic.
-    Of many samples the distribution F tells the same, with Sidak's correction, in a hundredth of
-    the time: within 7 % of the shuffles where the kurtosis is below a hundredth of the samples.
+    Of many samples the distribution F tells the same, with Sidak's correction: within 7 % of the
+    shuffles where the kurtosis is below a hundredth of the samples.
     """
     scatter = output - output.mean()
     if len(output) >= _MANY and (scatter**4).mean() < 0.01 * len(output) * scatter.var() ** 2:

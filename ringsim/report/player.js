@@ -175,8 +175,9 @@
   function tick(now) {
     if (!playing) return;
     // A whole run lasts ten seconds, whatever the run's own clock says.
-    time += (end() * Math.min(100, now - last)) / 10000;
-    last = now;
+    // The first frame may have begun before the click.
+    time += (end() * Math.min(100, Math.max(0, now - last))) / 10000;
+    last = Math.max(last, now);
     if (time >= end()) { time = end(); setPlaying(false); }
     draw();
     if (playing) requestAnimationFrame(tick);

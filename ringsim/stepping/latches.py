@@ -111,7 +111,7 @@ def meetings(times: Array, angles: Array, rates: Array) -> Iterator[Meeting]:
         own, speed = past[:, plane, section], rates[:, plane, section]
         time = crossing(times[ends], own[ends], speed[ends])
         if own[step + 1] < ON_STOP:
-            met = float(speed[step + 1])
+            met = max(float(speed[step + 1]), 0.0)
         else:
             bend = _acceleration(times, own, speed, step)
             met = math.sqrt(max(max(speed[step], 0.0) ** 2 - 2.0 * bend * own[step], 0.0))
