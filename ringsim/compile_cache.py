@@ -19,6 +19,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
+PACKING = "NUMBA_SLP_VECTORIZE"
 SOURCES = Path(__file__).parent / "frame"
 
 
@@ -43,6 +44,14 @@ def choose_folder() -> Path:
     if (loaded := sys.modules.get("numba")) is not None:  # by a script, before ringsim was
         loaded.config.CACHE_DIR = str(folder)
     return folder
+
+
+def pack_numbers() -> None:
+    """Switch on the pass that packs neighbouring numbers into registers (``ringsim.frame.eights``),
+    which numba leaves out unless told; it changes no result.
+    """
+    if os.environ.setdefault(PACKING, "1") != "0" and "numba" in sys.modules:
+        sys.modules["numba"].config.SLP_VECTORIZE = 1
 
 
 def compile_once(kind: Hashable, compiling: Callable[[], object]) -> None:

@@ -144,11 +144,15 @@ class FrameCables:
         border(table, drums, log_decays, log_slopes, slopes, spans, rates, left, by_place, factors)
         return count
 
-    def add_tangent(self, arms: Arms, fronts: Array, columns: Array, rows: Array) -> None:
-        """Add to the fronts and, for each factor, to a column and a row, (unknowns, factors)."""
+    def add_tangent(
+        self, arms: Arms, fronts: Array, columns: Array, rows: Array, first: int
+    ) -> None:
+        """Add to the fronts and, for each factor from the ``first`` column on, to a column and a
+        row, shape (unknowns, columns).
+        """
         add_line_tangent(self.lines, arms, self._spans, fronts)
-        pull_lines(self.lines, self._mesh, arms, self._factors[0], columns)
-        pull_lines(self.lines, self._mesh, arms, self._factors[1], rows)
+        pull_lines(self.lines, self._mesh, arms, self._factors[0], columns, first)
+        pull_lines(self.lines, self._mesh, arms, self._factors[1], rows, first)
 
     def _retable(self) -> None:
         chain = self._chain

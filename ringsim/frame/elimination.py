@@ -5,132 +5,197 @@ so they are eliminated there; what that leaves of the others (the Schur compleme
 parent front (the multifrontal method: Duff and Reid, ACM Transactions on Mathematical Software 9,
 1983).  Parts come first, then the blocks in their order; a closed ring's fronts carry the last
 block along.  The work grows linearly with the sections.
+
+With the unknowns that go first, a front [A B; C D] becomes [. B; C A^-1 .] and an inverse A^-1 of
+its own: what is left of triangular factors would be too small for whole registers.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
+from ringsim.frame.eights import EIGHT, NONE, dot, less, load, product, size_of, store, total
 from ringsim.frame.mesh import Mesh
-from ringsim.frame.parts import Indices
+from ringsim.frame.parts import MOST_GONE, Indices
 from ringsim.frame.vectors import compiled
 from ringsim.layout.pose import Array
 
 LEAST_PIVOT = 1e-9
-"""Pivot over the sum of its row's entries when its turn comes.  Elimination without exchange loses
-as many digits; Newton renews what they spoil, but not without end."""
+"""Pivot over the sum of its row's entries in the front.  Elimination without exchange loses as many
+digits; Newton renews what they spoil, but not without end."""
+_WIDE = 3 * EIGHT
+"""Columns at a time of what a front leaves: as many as two neighbouring blocks have."""
+
+
+class Fronts(NamedTuple):
+    """Matrices, shape (n, most, most and some zeros), and inverses, (n, MOST_GONE, MOST_GONE)."""
+
+    whole: Array
+    inverse: Array
+
+    @classmethod
+    def empty(cls, mesh: Mesh) -> "Fronts":
+        """Those of a mesh."""
+        n, most = mesh.spots.shape
+        return cls(np.zeros((n, most, most + _WIDE)), np.zeros((n, MOST_GONE, MOST_GONE)))
 
 
 @compiled
-def factor(mesh: Mesh, fronts: Array) -> bool:
-    """Eliminate all fronts, shape (n, most, most), in place, with inverse pivots; False where a
-    pivot is too small.
-    """
-    sound = True
+def factor(mesh: Mesh, fronts: Fronts) -> bool:
+    """Eliminate all fronts, in place; False where a pivot is too small."""
+    sound, buffer, units = True, np.zeros(MOST_GONE + _WIDE), np.eye(MOST_GONE)
+    others = 1.0 - units
     for number in range(len(mesh.gone)):
-        a, gone, size = fronts[number], mesh.gone[number], mesh.size[number]
+        a, inverse = fronts.whole[number], fronts.inverse[number]
+        gone, size = np.uintp(mesh.gone[number]), np.uintp(mesh.size[number])
         for spot in mesh.fixed:
             for k in range(gone):
                 if mesh.spots[number, k] == spot:
                     a[k, :size] = 0.0
                     a[:size, k] = 0.0
                     a[k, k] = 1.0
-        for k in range(gone):
-            total = 0.0
-            for j in range(k, size):
-                total += abs(a[k, j])
-            sound &= abs(a[k, k]) > LEAST_PIVOT * total
-            inverse = 1.0 / a[k, k]
-            a[k, k] = inverse
-            for i in range(k + 1, gone):
-                share = a[i, k] * inverse
-                a[i, k] = share
-                for j in range(k + 1, size):
-                    a[i, j] -= share * a[k, j]
+        sound &= _invert(a, gone, size, units, others, buffer, inverse)
         if gone < size:
-            _reduce(a, gone, size, mesh.up[number], fronts[mesh.parent[number]])
+            parent = fronts.whole[mesh.parent[number]]
+            _reduce(a, gone, size, inverse, mesh.up[number], buffer, parent)
     return sound
 
 
 @compiled
-def _reduce(a: Array, gone: int, size: int, up: Indices, parent: Array) -> None:
-    """Eliminate the rows of a front that stay, and add them to its parent."""
-    fours = gone - gone % 4
-    for i in range(gone, size):
-        for k in range(gone):
-            share = a[i, k] * a[k, k]
-            a[i, k] = share
-            for j in range(k + 1, gone):
-                a[i, j] -= share * a[k, j]
-        # Four pivots at once: the row is read and written a quarter as often.
-        for k in range(0, fours, 4):
-            p, q, r, s = a[i, k], a[i, k + 1], a[i, k + 2], a[i, k + 3]
-            for j in range(gone, size):
-                a[i, j] -= p * a[k, j] + q * a[k + 1, j] + r * a[k + 2, j] + s * a[k + 3, j]
-        for k in range(fours, gone):
-            share = a[i, k]
-            for j in range(gone, size):
-                a[i, j] -= share * a[k, j]
-        row = up[i]
-        for j in range(gone, size):
-            parent[row, up[j]] += a[i, j]
-
-
-@compiled
-def solve(mesh: Mesh, fronts: Array, x: Array) -> None:
-    """Replace right-hand sides ``x``, shape (unknowns, n), by solutions with factored fronts."""
-    columns = x.shape[1]
-    for number in range(len(mesh.gone)):
-        a, spots = fronts[number], mesh.spots[number]
-        for k in range(mesh.gone[number]):
-            pivot = spots[k]
-            for spot in mesh.fixed:
-                if spot == pivot:
-                    x[pivot] = 0.0
-            for i in range(k + 1, mesh.size[number]):
-                share, row = a[i, k], spots[i]
-                if share != 0.0:
-                    for c in range(columns):
-                        x[row, c] -= share * x[pivot, c]
-    for number in range(len(mesh.gone) - 1, -1, -1):
-        a, spots = fronts[number], mesh.spots[number]
-        for k in range(mesh.gone[number] - 1, -1, -1):
-            pivot = spots[k]
-            for j in range(k + 1, mesh.size[number]):
-                share, row = a[k, j], spots[j]
-                if share != 0.0:
-                    for c in range(columns):
-                        x[pivot, c] -= share * x[row, c]
-            for c in range(columns):
-                x[pivot, c] *= a[k, k]
-
-
-@compiled
-def solve_one(mesh: Mesh, fronts: Array, x: Array) -> None:
-    """``solve`` for one right-hand side, shape (unknowns,): by rows, which lie together."""
-    y = np.empty(fronts.shape[1])
-    for number in range(len(mesh.gone)):
-        a, spots, gone = fronts[number], mesh.spots[number], mesh.gone[number]
+def _invert(
+    a: Array, gone: int, size: int, units: Array, others: Array, column: Array, out: Array
+) -> bool:
+    """Invert the part of a front that goes (Gauss and Jordan); False if a pivot is too small."""
+    sound = True
+    for i in range(gone):
+        store(out[i], 0, load(a[i], 0))
+        store(out[i], EIGHT, load(a[i], EIGHT))
+    for k in range(gone):
+        sums = NONE
+        for j in range(np.uintp(0), size, np.uintp(EIGHT)):
+            sums = less(sums, -1.0, size_of(load(a[k], j)))
+        pivot = out[k, k]
+        sound &= abs(pivot) > LEAST_PIVOT * total(sums)
         for i in range(gone):
-            known = 0.0
-            for k in range(i):
-                known += a[i, k] * y[k]
-            y[i] = x[spots[i]] - known
+            column[i] = out[i, k]
+        column[k] = 0.0
+        for first in range(np.uintp(0), np.uintp(MOST_GONE), np.uintp(EIGHT)):
+            # No single number is put into a row: loading all eight would wait for it.
+            other, unit = load(others[k], first), load(units[k], first)
+            own = less(unit, -1.0, product(load(out[k], first), other))
+            own = less(NONE, -1.0 / pivot, own)
+            for i in range(gone):
+                store(out[i], first, less(product(load(out[i], first), other), column[i], own))
+            store(out[k], first, own)
+    return sound
+
+
+@compiled
+def _reduce(
+    a: Array, gone: int, size: int, inverse: Array, up: Indices, buffer: Array, parent: Array
+) -> None:
+    """Eliminate the rows of a front that stay, and add them to its parent."""
+    share, left = buffer[:MOST_GONE], buffer[MOST_GONE:]
+    for i in range(gone, size):
+        row, to = a[i], parent[up[i]]
+        low, high = NONE, NONE
+        for k in range(gone):
+            low = less(low, -row[k], load(inverse[k], 0))
+            high = less(high, -row[k], load(inverse[k], EIGHT))
+        store(share, 0, low)
+        store(share, EIGHT, high)
+        for first in range(gone, size, np.uintp(_WIDE)):
+            x, y = load(row, first), load(row, first + np.uintp(EIGHT))
+            z = load(row, first + np.uintp(2 * EIGHT))
+            if size - first > np.uintp(2 * EIGHT):
+                for k in range(gone):
+                    x = less(x, share[k], load(a[k], first))
+                    y = less(y, share[k], load(a[k], first + np.uintp(EIGHT)))
+                    z = less(z, share[k], load(a[k], first + np.uintp(2 * EIGHT)))
+            else:
+                for k in range(gone):
+                    x = less(x, share[k], load(a[k], first))
+                    y = less(y, share[k], load(a[k], first + np.uintp(EIGHT)))
+            store(left, 0, x)
+            store(left, EIGHT, y)
+            store(left, 2 * EIGHT, z)
+            for j in range(min(size - first, np.uintp(_WIDE))):
+                to[up[first + j]] += left[j]
+        store(row, 0, low)
+        store(row, EIGHT, high)
+
+
+@compiled
+def solve(mesh: Mesh, fronts: Fronts, x: Array) -> None:
+    """Replace right-hand sides ``x``, shape (unknowns, a multiple of EIGHT), by solutions with
+    factored fronts.
+    """
+    most = fronts.whole.shape[1]
+    b, known = np.zeros((most, EIGHT)), np.zeros((MOST_GONE, EIGHT))
+    one, eight = np.uintp(1), np.uintp(EIGHT)
+    for column in range(np.uintp(0), np.uintp(x.shape[1]), eight):
+        for number in range(len(mesh.gone)):
+            a, spots = fronts.whole[number], mesh.spots[number]
+            gone, size = np.uintp(mesh.gone[number]), np.uintp(mesh.size[number])
             for spot in mesh.fixed:
-                if spot == spots[i]:
-                    y[i] = 0.0
-            x[spots[i]] = y[i]
-        for i in range(gone, mesh.size[number]):
-            known = 0.0
+                store(x[spot], column, NONE)
             for k in range(gone):
-                known += a[i, k] * y[k]
-            x[spots[i]] -= known
+                store(b[k], 0, load(x[spots[k]], column))
+            # Two rows at once: a sum waits for the one before.  An odd last row is its own twin.
+            for i in range(gone, size, np.uintp(2)):
+                twin = min(i + one, size - one)
+                p, q = load(x[spots[i]], column), load(x[spots[twin]], column)
+                for k in range(gone):
+                    y = load(b[k], 0)
+                    p, q = less(p, a[i, k], y), less(q, a[twin, k], y)
+                store(x[spots[i]], column, p)
+                store(x[spots[twin]], column, q)
+        for number in range(len(mesh.gone) - 1, -1, -1):
+            a, spots, inverse = fronts.whole[number], mesh.spots[number], fronts.inverse[number]
+            gone, size = np.uintp(mesh.gone[number]), np.uintp(mesh.size[number])
+            for k in range(size):
+                store(b[k], 0, load(x[spots[k]], column))
+            for i in range(np.uintp(0), gone, np.uintp(2)):
+                twin = min(i + one, gone - one)
+                p, q = load(b[i], 0), load(b[twin], 0)
+                for k in range(gone, size):
+                    y = load(b[k], 0)
+                    p, q = less(p, a[i, k], y), less(q, a[twin, k], y)
+                store(known[i], 0, p)
+                store(known[twin], 0, q)
+            for i in range(np.uintp(0), gone, np.uintp(2)):
+                twin = min(i + one, gone - one)
+                p, q = NONE, NONE
+                for k in range(gone):
+                    y = load(known[k], 0)
+                    p, q = less(p, -inverse[i, k], y), less(q, -inverse[twin, k], y)
+                store(x[spots[i]], column, p)
+                store(x[spots[twin]], column, q)
+
+
+@compiled
+def solve_one(mesh: Mesh, fronts: Fronts, x: Array) -> None:
+    """``solve`` for one right-hand side, shape (unknowns,)."""
+    most = fronts.whole.shape[1]
+    b, known = np.zeros(most + EIGHT), np.zeros(MOST_GONE)
+    for number in range(len(mesh.gone)):
+        a, spots = fronts.whole[number], mesh.spots[number]
+        gone, size = np.uintp(mesh.gone[number]), np.uintp(mesh.size[number])
+        for spot in mesh.fixed:
+            x[spot] = 0.0
+        known[:] = 0.0
+        for k in range(gone):
+            known[k] = x[spots[k]]
+        for i in range(gone, size):
+            x[spots[i]] -= dot(a[i], 0, known, gone)
     for number in range(len(mesh.gone) - 1, -1, -1):
-        a, spots, gone = fronts[number], mesh.spots[number], mesh.gone[number]
-        size = mesh.size[number]
+        a, spots, inverse = fronts.whole[number], mesh.spots[number], fronts.inverse[number]
+        gone, size = np.uintp(mesh.gone[number]), np.uintp(mesh.size[number])
         for k in range(gone, size):
-            y[k] = x[spots[k]]
-        for k in range(gone - 1, -1, -1):
-            known = 0.0
-            for j in range(k + 1, size):
-                known += a[k, j] * y[j]
-            y[k] = (x[spots[k]] - known) * a[k, k]
-            x[spots[k]] = y[k]
+            b[k - gone] = x[spots[k]]
+        b[size - gone : size - gone + np.uintp(EIGHT)] = 0.0
+        known[gone:] = 0.0
+        for i in range(gone):
+            known[i] = x[spots[i]] - dot(a[i], gone, b, size - gone)
+        for i in range(gone):
+            x[spots[i]] = dot(inverse[i], 0, known, gone)

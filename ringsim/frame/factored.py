@@ -10,15 +10,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dgetrf, dgetrs
 
-from ringsim.frame.elimination import factor, solve, solve_one
+from ringsim.frame.eights import EIGHT
+from ringsim.frame.elimination import Fronts, factor, solve, solve_one
 from ringsim.frame.mesh import Mesh
 from ringsim.layout.pose import Array
 
 
 class Border(NamedTuple):
-    """C and R, shape (unknowns, k) each, and D, (k, k); the hub has the last three if ``strung``.
+    """C and R, shape (unknowns, k) each, and D, (k, k); the hub has the first three if ``strung``.
 
+    k is a whole number of eights: columns of zeros, whose z is zero, fill the last.
     ``hub_inertia``, N/m, is that of a hub that no string pulls: it moves by this alone.  Else nan.
     """
 
@@ -28,18 +31,25 @@ class Border(NamedTuple):
     strung: bool
     hub_inertia: float
 
+    @classmethod
+    def empty(cls, unknowns: int, needed: int, strung: bool, hub_inertia: float) -> "Border":
+        """With room for so many columns."""
+        k = EIGHT * math.ceil(needed / EIGHT)
+        columns, rows = np.zeros((2, unknowns, k))
+        return cls(columns, rows, -np.eye(k), strung, hub_inertia)
+
 
 class Factored:
     """Solves with the tangent; ``sound`` unless a pivot is too small."""
 
-    def __init__(self, mesh: Mesh, fronts: Array, border: Border) -> None:
+    def __init__(self, mesh: Mesh, fronts: Fronts, border: Border) -> None:
         self._mesh, self._fronts, self._border = mesh, fronts, border
         self.sound = bool(factor(mesh, fronts))
         if len(border.corner):
             solve(mesh, fronts, border.columns)
             corner = border.corner - border.rows.T @ border.columns
-            # Its few dozen rows and columns are solved with once an iteration.
-            self._corner = np.linalg.inv(corner) if self.sound else corner
+            # LAPACK itself: around it numpy and scipy spend more than these few dozen rows take.
+            self._corner = dgetrf(corner, overwrite_a=True)[:2]
 
     def solve(self, g: Array) -> Array:
         """The change of all unknowns, the hub's last, that takes a residual to zero."""
@@ -50,11 +60,11 @@ class Factored:
         if len(border.corner):
             right = -(x @ border.rows)
             if border.strung:
-                right[-3:] += hub
-            z = self._corner @ right
+                right[:3] += hub
+            z, _ = dgetrs(*self._corner, right)
             x -= border.columns @ z
             if border.strung:
-                hub[:] = z[-3:]
+                hub[:] = z[:3]
         if not math.isnan(border.hub_inertia):
             hub /= border.hub_inertia
         return np.asarray(found)

@@ -133,8 +133,12 @@ def place_lines(lines: Lines, pose: Pose, arms: Arms, out: Array) -> None:
 
 
 @compiled
-def pull_lines(lines: Lines, mesh: Mesh, arms: Arms, forces: Array, out: Array) -> None:
-    """Add what forces on all points, shape (n, points, 3), do to the unknowns: (unknowns, n)."""
+def pull_lines(
+    lines: Lines, mesh: Mesh, arms: Arms, forces: Array, out: Array, first: int
+) -> None:
+    """Add what forces on all points, shape (n, points, 3), do to the unknowns, (unknowns, columns),
+    from the ``first`` column on.
+    """
     for n in range(len(lines.frame)):
         k, angle = mesh.home[lines.frame[n]], lines.angle[n]
         arm, turned = vector(arms.whole[n]), cross(vector(arms.axis[n]), vector(arms.swung[n]))
@@ -142,10 +146,10 @@ def pull_lines(lines: Lines, mesh: Mesh, arms: Arms, forces: Array, out: Array) 
             force = vector(forces[c, n])
             moment = cross(arm, force)
             for i in range(3):
-                out[k + i, c] += force[i]
-                out[k + 3 + i, c] += moment[i]
+                out[k + i, first + c] += force[i]
+                out[k + 3 + i, first + c] += moment[i]
             if angle >= 0:
-                out[mesh.angle_home[angle], c] += dot(turned, force)
+                out[mesh.angle_home[angle], first + c] += dot(turned, force)
 
 
 @compiled

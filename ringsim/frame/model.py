@@ -8,6 +8,7 @@ from ringsim.choice import kind_of
 from ringsim.frame.balance import Held, add_slides, balance, put_in_place
 from ringsim.frame.cables import FrameCables
 from ringsim.frame.edge import EdgeCables
+from ringsim.frame.elimination import Fronts
 from ringsim.frame.factored import Border, Factored
 from ringsim.frame.following import Coefficients, Followed
 from ringsim.frame.hanging import Hanging
@@ -125,7 +126,7 @@ class FrameModel:
         self.start = self._started(pose)
         self.hanging = None if hung is None else Hanging(hung, mesh, self.start.place.hung.copy())
         self._begun = self.start.place.points.copy()
-        self._fronts = np.zeros((len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]))
+        self._fronts = Fronts.empty(mesh)
 
     def work(self, state: State) -> float:
         """Of loads and gravity since the start, J."""
@@ -192,7 +193,7 @@ class FrameModel:
         mesh = self.mesh
         by_rate = self.coefficients.rate_by_place(step)
         by_place = self.coefficients.acceleration_by_place(step)
-        fronts = self._fronts
+        fronts = self._fronts.whole
         inertial = now.acceleration.points
         if self._held.weighs:
             inertial = inertial - self.gravity
@@ -211,20 +212,20 @@ class FrameModel:
         if self.strings is not None:
             inertia = self.strings.hub_mass * by_place
             blocks = self.strings.tangents(*now.net, by_rate)
-        hub = 0 if blocks is None else 3
+        strung = blocks is not None
         pulled = 0
         if self.cables is not None:
             pulled = self.cables.factor(time, *self._pulled, now.rate.lines, by_rate)
-        columns, rows = np.zeros((2, mesh.unknowns, pulled + hub))
-        corner = -np.eye(pulled + hub)
+        hub = 3 if strung else 0
+        alone = math.nan if strung else inertia
+        border = Border.empty(mesh.unknowns, hub + pulled, strung, alone)
         if self.cables is not None:
-            self.cables.add_tangent(self._arms, fronts, columns, rows)
+            self.cables.add_tangent(self._arms, fronts, border.columns, border.rows, hub)
         if blocks is not None:
-            add_strings(mesh, self._held.ends, blocks, fronts, columns)
-            rows[:, -3:] = columns[:, -3:]
-            corner[-3:, -3:] = blocks.sum(axis=0) + inertia * np.eye(3)
-            inertia = math.nan
-        return Factored(mesh, fronts, Border(columns, rows, corner, blocks is not None, inertia))
+            add_strings(mesh, self._held.ends, blocks, fronts, border.columns)
+            border.rows[:, :3] = border.columns[:, :3]
+            border.corner[:3, :3] = blocks.sum(axis=0) + inertia * np.eye(3)
+        return Factored(mesh, self._fronts, border)
 
     def _place(self, state: State) -> None:
         """Places of all followed coordinates at the state's pose."""

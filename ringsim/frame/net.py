@@ -30,16 +30,15 @@ def stretched(ends: Array, rates: Array, hub: Array, hub_rate: Array) -> tuple[A
 @compiled
 def add_strings(mesh: Mesh, ends: Indices, blocks: Array, fronts: Array, columns: Array) -> None:
     """Add derivatives of the strings' pulls, (n, 3, 3), to the fronts, and those after the hub's
-    place to the last three columns.
+    place to the first three columns.
     """
-    hub = columns.shape[1] - 3
     for n in range(len(ends)):
         number, first = mesh.frame_local[ends[n], 0], mesh.frame_local[ends[n], 1]
         home = mesh.home[ends[n]]
         for i in range(3):
             for j in range(3):
                 fronts[number, first + i, first + j] += blocks[n, i, j]
-                columns[home + i, hub + j] -= blocks[n, i, j]
+                columns[home + i, j] -= blocks[n, i, j]
 
 
 class Strings:

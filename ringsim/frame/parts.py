@@ -14,6 +14,8 @@ from ringsim.frame.skeleton import CURE, NOT_HERE, Element, End, Skeleton
 from ringsim.refusal import InputError
 
 Indices = NDArray[np.int64]
+MOST_GONE = 16
+"""Unknowns that a front eliminates at most; parts with more have several fronts."""
 
 
 class Parts:
@@ -24,7 +26,7 @@ class Parts:
     home, angle_home
         First unknown of each frame, and that of each angle.
     of_element
-        Part, and front, of each element.
+        First front of each element's part.
     unknowns, gone, size, spots, parent, up
         See ``ringsim.frame.mesh.Mesh``.
     """
@@ -82,10 +84,10 @@ class Parts:
         return found
 
     def front_of(self, unknown: int) -> tuple[int, int]:
-        """The front that eliminates an unknown, and its place there."""
-        firsts = self.spots[:, 0]
-        front = int(np.flatnonzero(firsts <= unknown)[np.argmax(firsts[firsts <= unknown])])
-        return front, unknown - int(firsts[front])
+        """The front that begins to eliminate an unknown's part or block, and its place there."""
+        firsts = self.spots[self._heads, 0]
+        head = int(np.flatnonzero(firsts <= unknown)[np.argmax(firsts[firsts <= unknown])])
+        return int(self._heads[head]), unknown - int(firsts[head])
 
     def _inner_of(self, end: End) -> list[int]:
         """Inner frames, and angles behind them, of an end."""
@@ -128,24 +130,35 @@ class Parts:
         """The fronts of parts, then of blocks: each block is eliminated into the next one and the
         last, which a closed ring's first one is coupled to.
         """
-        lists, width, start = list(parts), self._width, self._start
+        width, start = self._width, self._start
+        lists: list[list[int]] = []
+        gone: list[int] = []
+        heads: list[int] = []
+        for spots, own in zip(parts, inner, strict=True):
+            heads.append(len(lists))
+            for went in range(0, own, MOST_GONE):
+                lists.append(spots[went:])
+                gone.append(min(own - went, MOST_GONE))
+        blocks = len(lists)
         for k in range(self._blocks):
             rest = sorted({k + 1, self._blocks - 1} & set(range(k + 1, self._blocks)))
             lists.append(
                 [start + width * one + place for one in (k, *rest) for place in range(width)]
             )
-        self.gone = np.array([*inner, *[width] * self._blocks])
-        self.size = np.array([len(spots) for spots in lists])
+            gone.append(width)
+        self._heads = np.array([*heads, *range(blocks, len(lists))])
+        self.of_element = self._heads[self.of_element]
+        self.gone, self.size = np.array(gone), np.array([len(spots) for spots in lists])
         shape = len(lists), int(self.size.max())
         self.spots, self.up = np.full(shape, -1), np.full(shape, -1)
         self.parent = np.full(len(lists), -1)
         for number, spots in enumerate(lists):
             self.spots[number, : len(spots)] = spots
-            rest = spots[int(self.gone[number]) :]
+            rest = spots[gone[number] :]
             if rest:
-                parent = len(parts) + min((spot - start) // width for spot in rest)
+                inner_left = rest[0] < start
+                first = min((spot - start) // width for spot in rest if spot >= start)
+                parent = number + 1 if inner_left else blocks + first
                 places = {spot: k for k, spot in enumerate(lists[parent])}
                 self.parent[number] = parent
-                self.up[number, int(self.gone[number]) : len(spots)] = [
-                    places[spot] for spot in rest
-                ]
+                self.up[number, gone[number] : len(spots)] = [places[spot] for spot in rest]

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from numeric_tangent import Probe, error
-from ringsim.frame.elimination import factor, solve, solve_one
+from ringsim.frame.eights import EIGHT
+from ringsim.frame.elimination import Fronts, factor, solve, solve_one
 from ringsim.frame.model import FrameModel
 from ringsim.scene import Scene, load_scene
 
@@ -127,14 +128,14 @@ def test_tangent_of_pulleys(friction: dict[str, Any]) -> None:
 def test_elimination_solves_as_numpy_does(values: dict[str, Any]) -> None:
     """Random fronts with heavy diagonals, unsymmetric: to round-off."""
     mesh, rng = FrameModel(scene().with_values(values)).mesh, np.random.default_rng(0)
-    fronts = np.zeros((len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]))
+    fronts = Fronts.empty(mesh)
     dense = np.zeros((mesh.unknowns, mesh.unknowns))
-    for front, spots, size in zip(fronts, mesh.spots, mesh.size, strict=True):
+    for front, spots, size in zip(fronts.whole, mesh.spots, mesh.size, strict=True):
         front[:size, :size] = rng.normal(size=(size, size)) + 30.0 * np.eye(size)
         dense[np.ix_(spots[:size], spots[:size])] += front[:size, :size]
     dense[mesh.fixed] = dense[:, mesh.fixed] = 0.0
     dense[mesh.fixed, mesh.fixed] = 1.0
-    right = rng.normal(size=(mesh.unknowns, 3))
+    right = rng.normal(size=(mesh.unknowns, 2 * EIGHT))
     right[mesh.fixed] = 0.0
     found = right.copy()
     assert factor(mesh, fronts)
@@ -147,7 +148,8 @@ def test_elimination_solves_as_numpy_does(values: dict[str, Any]) -> None:
 
 def test_a_pivot_that_vanishes_is_told() -> None:
     mesh = FrameModel(scene(boom="none")).mesh
-    shape = len(mesh.gone), mesh.spots.shape[1], mesh.spots.shape[1]
-    fronts = np.broadcast_to(np.eye(shape[1]), shape).copy()
-    fronts[0, 0, :2] = 1e-12, 1.0
+    fronts = Fronts.empty(mesh)
+    fronts.whole[:, :, : fronts.whole.shape[1]] = np.eye(fronts.whole.shape[1])
+    assert factor(mesh, fronts)
+    fronts.whole[0, 0, :2] = 1e-12, 1.0
     assert not factor(mesh, fronts)

@@ -1,0 +1,78 @@
+"""Eight numbers of a row at a time, as tuples: one register of a modern processor, or two.
+
+numba turns tuples into separate numbers; the compiler's SLP pass, which ``ringsim.frame`` switches on,
+packs them again.  Loops over rows of a dozen numbers would be too short for its loop pass: most of
+their time goes to what is left beside whole registers.
+"""
+
+from typing import TypeAlias
+
+import numpy as np
+
+from ringsim.frame.vectors import compiled
+from ringsim.layout.pose import Array
+
+EIGHT = 8
+Eight: TypeAlias = tuple[float, float, float, float, float, float, float, float]
+NONE: Eight = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@compiled
+def load(row: Array, first: int) -> Eight:
+    """Eight numbers of a row."""
+    # Unsigned: numba would ask each signed place whether it counts from the end.
+    k = np.uintp(first)
+    return (
+        row[k], row[k + np.uintp(1)], row[k + np.uintp(2)], row[k + np.uintp(3)],
+        row[k + np.uintp(4)], row[k + np.uintp(5)], row[k + np.uintp(6)], row[k + np.uintp(7)],
+    )  # fmt: skip
+
+
+@compiled
+def store(row: Array, first: int, x: Eight) -> None:
+    """Put eight numbers into a row."""
+    k = np.uintp(first)
+    row[k], row[k + np.uintp(1)], row[k + np.uintp(2)] = x[0], x[1], x[2]
+    row[k + np.uintp(3)], row[k + np.uintp(4)], row[k + np.uintp(5)] = x[3], x[4], x[5]
+    row[k + np.uintp(6)], row[k + np.uintp(7)] = x[6], x[7]
+
+
+@compiled
+def less(x: Eight, share: float, y: Eight) -> Eight:
+    """X - share y."""
+    return (
+        x[0] - share * y[0], x[1] - share * y[1], x[2] - share * y[2], x[3] - share * y[3],
+        x[4] - share * y[4], x[5] - share * y[5], x[6] - share * y[6], x[7] - share * y[7],
+    )  # fmt: skip
+
+
+@compiled
+def product(x: Eight, y: Eight) -> Eight:
+    """Of each two numbers."""
+    return (
+        x[0] * y[0], x[1] * y[1], x[2] * y[2], x[3] * y[3],
+        x[4] * y[4], x[5] * y[5], x[6] * y[6], x[7] * y[7],
+    )  # fmt: skip
+
+
+@compiled
+def size_of(x: Eight) -> Eight:
+    """Of each number."""
+    return (
+        abs(x[0]), abs(x[1]), abs(x[2]), abs(x[3]), abs(x[4]), abs(x[5]), abs(x[6]), abs(x[7])
+    )  # fmt: skip
+
+
+@compiled
+def total(x: Eight) -> float:
+    """Of all eight."""
+    return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]))
+
+
+@compiled
+def dot(row: Array, first: int, y: Array, n: int) -> float:
+    """Of n numbers of a row with those of y, which has zeros behind them up to whole eights."""
+    found = NONE
+    for k in range(np.uintp(0), np.uintp(n), np.uintp(EIGHT)):
+        found = less(found, -1.0, product(load(row, np.uintp(first) + k), load(y, k)))
+    return total(found)
