@@ -79,7 +79,8 @@ class Chain:
     def __init__(self, cables: Sequence[Cable], points_per_cable: Sequence[int]) -> None:
         self.cables, self._points_per_cable = tuple(cables), tuple(points_per_cable)
         ends = np.cumsum([points - 2 for points in points_per_cable])
-        self._pulleys = [slice(*ends_of) for ends_of in pairwise([0, *ends])]
+        self.pulleys = [slice(*ends_of) for ends_of in pairwise([0, *ends])]
+        """Pulleys of each cable."""
         slip = []
         for number, (cable, points) in enumerate(zip(cables, points_per_cable, strict=True), 1):
             given, pulleys = cable.friction.coefficients.shape, points - 2
@@ -192,10 +193,10 @@ class Chain:
 
     def log_decays(self, angles: Array) -> Array:
         """Logarithms of the full decay at angles (rad) of all pulleys, shape (pulleys,)."""
-        own = zip(self.cables, self._pulleys, strict=True)
+        own = zip(self.cables, self.pulleys, strict=True)
         return np.concatenate([c.friction.log_decay(angles[n], c.pulley_radius) for c, n in own])
 
     def log_slopes(self, angles: Array) -> Array:
         """Their derivatives after the angles, 1/rad."""
-        own = zip(self.cables, self._pulleys, strict=True)
+        own = zip(self.cables, self.pulleys, strict=True)
         return np.concatenate([c.friction.log_slope(angles[n], c.pulley_radius) for c, n in own])

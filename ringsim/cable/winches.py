@@ -153,6 +153,11 @@ class Winches:
         self._ahead: dict[tuple[int, int], float] = {}
         self._ropes: dict[int, _Rope] = {}
 
+    def asks_slope(self, number: int) -> bool:
+        """Whether a winch of a cable asks how its ideal path changes with the opening angle."""
+        own = (winch for (cable, _), winch in self._winches.items() if cable == number)
+        return any(isinstance(winch.winding, FeedbackWinding) for winch in own)
+
     @property
     def answering(self) -> bool:
         """Whether any winch answers to its rope in this step."""
@@ -245,7 +250,8 @@ class Winches:
     def advance(self, time: float, state: ChainState, slopes: Array) -> None:
         """Begin a step at ``time`` (s) in a state of the chain.
 
-        ``slopes`` are the derivatives of the cables' ideal paths after the opening angle, m/rad.
+        ``slopes`` are the derivatives of the cables' ideal paths after the opening angle, m/rad,
+        where ``asks_slope``.
         """
         self._start, self._held, self._ropes = time, state.wound, {}
         for place, winch in self._winches.items():

@@ -155,9 +155,11 @@ class Integration:
             solver.it.currentStepSize = control.next_step(self._built.faults.next_time)
             self._fresh = False
             if cables is not None and self._chain is not None:
-                now, slope = control.now, self._scene.structure.path_slope
-                slopes = [slope(cable, now.angles[plane]) for plane, cable in cables.present]
-                cables.advance(now.time, self._chain, np.array(slopes))
+                now, slopes = control.now, np.zeros(len(cables.present))
+                for number, (plane, cable) in enumerate(cables.present):
+                    if cables.winches.asks_slope(number):
+                        slopes[number] = self._scene.structure.path_slope(cable, now.angles[plane])
+                cables.advance(now.time, self._chain, slopes)
         else:
             solver.it.currentStepSize = control.retry(solver.it.currentStepSize)
         self._built.model.assembly.dry_joints.begin()

@@ -7,6 +7,8 @@ that it enters as a border of the system, not as its entries.
 """
 
 import math
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +24,8 @@ from ringsim.frame.chain import (
     Spans,
     border,
     measure,
-    tighten,
+    of_ropes,
+    pull_cables,
     turning_pulleys,
 )
 from ringsim.frame.lines import (
@@ -35,8 +38,16 @@ from ringsim.frame.lines import (
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.parts import Parts
 from ringsim.frame.skeleton import Skeleton
+from ringsim.frame.tape import play, taped
 from ringsim.layout.pose import Array
 from ringsim.stepping.turning import Turning
+
+
+class _Turned(NamedTuple):
+    """Rope wound (m) and its rate (m/s) at both ends of each cable, shape (cables, 2)."""
+
+    wound: Array
+    rate: Array
 
 
 class FrameCables:
@@ -59,18 +70,48 @@ class FrameCables:
         start = np.array([skeleton.layout.sheave(s)[0] for path in paths for s in path])
         self.ropes = self._chain.start(start)
         self.lines = lines_of(skeleton, parts, paths, self.ropes)
-        self._drums_at, self._drums = math.nan, Drums(*np.zeros((3, 0)))
+        self._turned_at, self._turned = math.nan, _Turned(*np.zeros((2, len(own), 2)))
+        self._drums = Drums(*np.zeros((3, 0)))
         self._turning = Turning()
+        own_laws = zip(own, self._chain.pulleys, strict=True)
+        laws = [(c.friction, c.pulley_radius, (n.stop - n.start,)) for c, n in own_laws]
+        self._decays = taped([(lambda a, f=f, r=r: f.log_decay(a, r), n) for f, r, n in laws], 1, 1)
+        self._slopes = taped([(lambda a, f=f, r=r: f.log_slope(a, r), n) for f, r, n in laws], 1, 1)
         self._retable()
 
     def state(self, time: float, places: Array, rates: Array) -> ChainState:
         """The chain at places and rates of all points; ValueError if it has no answer."""
-        path = path_rate = None
-        if self.winches.answering:
-            lengths, _, moving = self.ropes.measured(places, rates)
-            path, path_rate = self.ropes.along(lengths), self.ropes.along(moving)
-        wound, wound_rate = self.winches.at(time, self.ropes, path, path_rate)
-        return self._chain.state(self.ropes, places, rates, wound, wound_rate)
+        self._evaluate(time, places, rates)
+        ropes, spans, turned = self.ropes, self._spans, self._turned
+        paths, path_rates, strains, strain_rates, forces, means = of_ropes(
+            self._table, self._drums, spans
+        )
+        angles = spans.angle.copy()
+        return ChainState(
+            ropes=ropes,
+            material=self._chain.material[:, ropes.cable],
+            lengths=spans.length.copy(),
+            rates=spans.rate.copy(),
+            directions=spans.unit.copy(),
+            angles=angles,
+            log_decays=self._decays.rows[1].copy(),
+            friction_slopes=partial(self._chain.log_slopes, angles),
+            speeds=spans.speed.copy(),
+            exponents=spans.exponent.copy(),
+            slip_speeds=self._chain.slip_speed,
+            shares=spans.share.copy(),
+            tensions=spans.tension.copy(),
+            paths=paths,
+            path_rates=path_rates,
+            natural=self._drums.natural,
+            wound_rates=self._drums.winding,
+            strains=strains,
+            strain_rates=strain_rates,
+            forces=forces,
+            mean_tensions=means,
+            wound=turned.wound,
+            wound_rate=turned.rate,
+        )
 
     def go_on(
         self, ropes: Ropes, places: Array, rates: Array, wound: Array, speed: Array
@@ -94,44 +135,43 @@ class FrameCables:
         self._turning.forget()
         self.winches.advance(time, state, slopes)
 
-    def pull(
-        self, time: float, arms: Arms, places: Array, rates: Array, g: Array
-    ) -> tuple[Drums, Array]:
+    def pull(self, time: float, arms: Arms, places: Array, rates: Array, g: Array) -> None:
         """Add what resists the cables' pull to the residual, shape (unknowns,); ValueError if the
-        chain has no answer.  Returns what the tangent needs, with the logarithms of the decays.
+        chain has no answer.
         """
-        ropes, spans, table = self.ropes, self._spans, self._table
-        least = measure(table, ropes.behind, places, rates, spans)
-        # Winches that do not answer to their ropes turn alike in all iterations of a step.
-        if self.winches.answering or time != self._drums_at:
-            self._drums, self._drums_at = self._turned(time), time
-        drums = self._drums
-        if not (drums.natural.min() > 0.0 and least > SHORTEST):
-            self.state(time, places, rates)  # says what is wrong
-        log_decays = self._chain.log_decays(spans.angle)
-        tighten(table, drums, log_decays, spans)
-        self._turning.note(ropes, spans.speed)
-        pull_spans(self.lines, self._mesh, arms, spans, g)
-        return drums, log_decays
+        self._evaluate(time, places, rates)
+        self._turning.note(self.ropes, self._spans.speed)
+        pull_spans(self.lines, self._mesh, arms, self._spans, g)
 
-    def _turned(self, time: float) -> Drums:
-        """What the winches have done by a time (s), for spans that have been measured."""
+    def _evaluate(self, time: float, places: Array, rates: Array) -> None:
+        """Winches and spans at a time (s)."""
+        ropes, spans, table = self.ropes, self._spans, self._table
+        # Winches that do not answer to their ropes turn alike in all iterations of a step.
+        if self.winches.answering or time != self._turned_at:
+            self._turn(time, places, rates)
+        least = pull_cables(table, ropes.behind, self._drums, self._decays, places, rates, spans)
+        if not (least > SHORTEST and self._drums.natural.min() > 0.0):
+            self._chain.state(ropes, places, rates, *self._turned)  # says what is wrong
+
+    def _turn(self, time: float, places: Array, rates: Array) -> None:
+        """What the winches have done by a time (s)."""
         ropes, spans, path, path_rate = self.ropes, self._spans, None, None
         if self.winches.answering:
+            measure(self._table, ropes.behind, places, rates, spans)
             path, path_rate = ropes.along(spans.length), ropes.along(spans.rate)
-        wound, wound_rate = self.winches.at(time, ropes, path, path_rate)
+        wound, rate = self.winches.at(time, ropes, path, path_rate)
         inflow = np.zeros(len(ropes.starts))
-        inflow[ropes.of_end[:, 1]] = -wound_rate[:, 1]
+        inflow[ropes.of_end[:, 1]] = -rate[:, 1]
         natural = ropes.content - ropes.per_rope(wound)
-        return Drums(natural, ropes.per_rope(wound_rate), inflow)
+        self._drums = Drums(natural, ropes.per_rope(rate), inflow)
+        self._turned_at, self._turned = time, _Turned(wound, rate)
 
-    def factor(
-        self, time: float, drums: Drums, log_decays: Array, rates: Array, by_place: float
-    ) -> int:
+    def factor(self, time: float, rates: Array, by_place: float) -> int:
         """Factor how tensions change in the state of the last ``pull``; returns the number of
         factors.  ``by_place`` is the derivative of the points' rates after their places, 1/s.
         """
-        spans, table, left = self._spans, self._table, np.ones(len(drums.natural))
+        spans, table, drums = self._spans, self._table, self._drums
+        left = np.ones(len(drums.natural))
         if self.winches.answering:
             path, path_rate = self.ropes.along(spans.length), self.ropes.along(spans.rate)
             left = self.winches.stiffness_left(time, self.ropes, path, path_rate)
@@ -140,8 +180,10 @@ class FrameCables:
         slopes = self._turning.slopes(self.ropes, spans.speed, own, lambda s: np.tanh(s / slip))
         count = turning_pulleys(table, slopes)
         self._factors = factors = np.zeros((2, count, self.points, 3))
-        log_slopes = self._chain.log_slopes(spans.angle)
-        border(table, drums, log_decays, log_slopes, slopes, spans, rates, left, by_place, factors)
+        self._slopes.rows[0] = spans.angle
+        play(self._slopes)
+        logs = self._decays.rows[1], self._slopes.rows[1]
+        border(table, drums, *logs, slopes, spans, rates, left, by_place, factors)
         return count
 
     def add_tangent(
@@ -158,4 +200,4 @@ class FrameCables:
         chain = self._chain
         self._table = RopeTable.of(self.ropes, chain.material, chain.slip_speed)
         self._spans = Spans.empty(self.ropes)
-        self._drums_at = math.nan
+        self._turned_at = math.nan

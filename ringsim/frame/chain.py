@@ -1,7 +1,7 @@
-"""The tension chain of ringsim.cable.chain and its tangent, compiled for Newton's iterations.
+"""The tension chain of ringsim.cable.chain and its tangent, compiled.
 
 The equations are told there and in ringsim.cable.tangent; both agree to round-off
-(tests/frame/test_compiled_chain.py).  Accepted states are evaluated by those.
+(tests/frame/test_compiled_chain.py).
 """
 
 import math
@@ -11,6 +11,7 @@ import numpy as np
 
 from ringsim.cable.ropes import Ropes
 from ringsim.frame.parts import Indices
+from ringsim.frame.tape import Tape, play
 from ringsim.frame.vectors import Vector, compiled, dot, minus, plus, times, vector
 from ringsim.layout.pose import Array
 
@@ -133,6 +134,40 @@ def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> 
         for i in range(first, last):
             spans.share[i] /= mean
             spans.tension[i] = tension * spans.share[i]
+
+
+@compiled
+def pull_cables(
+    table: RopeTable, behind: Indices, drums: Drums, decays: Tape, places: Array, rates: Array,
+    spans: Spans,
+) -> float:  # fmt: skip
+    """Spans, with their tensions, at places and rates of the points; returns the least length."""
+    least = measure(table, behind, places, rates, spans)
+    for j in range(len(behind)):
+        decays.rows[0, j] = spans.angle[j]
+    play(decays)
+    tighten(table, drums, decays.rows[1], spans)
+    return least
+
+
+@compiled
+def of_ropes(table: RopeTable, drums: Drums, spans: Spans) -> Array:
+    """Paths and their rates, strains and theirs, forces before slack and mean tensions of ropes whose
+    spans are known, shape (6, ropes).
+    """
+    out = np.zeros((6, len(table.starts)))
+    for rope in range(len(table.starts)):
+        path = path_rate = 0.0
+        for i in range(table.starts[rope], table.ends[rope]):
+            path += spans.length[i]
+            path_rate += spans.rate[i]
+        natural, winding = drums.natural[rope], drums.winding[rope]
+        out[0, rope], out[1, rope], out[2, rope] = path, path_rate, path / natural - 1.0
+        out[3, rope] = (path_rate + path / natural * winding) / natural
+        out[4, rope] = _force(table, rope, path, path_rate, natural, winding)
+        tension = _tension(table, rope, path, path_rate, natural, winding)
+        out[5, rope] = table.alive[rope] * tension
+    return out
 
 
 @compiled

@@ -1,8 +1,8 @@
 """Eight numbers of a row at a time, as tuples: one register of a modern processor, or two.
 
-numba turns tuples into separate numbers; the compiler's SLP pass, which ``ringsim.frame`` switches on,
-packs them again.  Loops over rows of a dozen numbers would be too short for its loop pass: most of
-their time goes to what is left beside whole registers.
+numba turns tuples into separate numbers; the compiler's SLP pass, which ``ringsim.frame`` switches
+on, packs them again.  Loops over rows of a dozen numbers would be too short for its loop pass: most
+of their time goes to what is left beside whole registers.
 """
 
 from typing import TypeAlias

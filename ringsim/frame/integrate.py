@@ -120,9 +120,11 @@ class Integration(Remembering):
         self._model.laws.begin()
         cables, now = self._model.cables, self._control.now
         if cables is not None and self._now.chain is not None:
-            slope = self._scene.structure.path_slope
-            slopes = [slope(cable, now.angles[plane]) for plane, cable in cables.present]
-            cables.begin(now.time, self._now.chain, np.array(slopes))
+            slopes = np.zeros(len(cables.present))
+            for number, (plane, cable) in enumerate(cables.present):
+                if cables.winches.asks_slope(number):
+                    slopes[number] = self._scene.structure.path_slope(cable, now.angles[plane])
+            cables.begin(now.time, self._now.chain, slopes)
 
     def _try(self, step: float) -> tuple[State, Instant]:
         """The state a step later."""

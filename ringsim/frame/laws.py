@@ -1,14 +1,13 @@
 """Torques on joint angles: friction, stops and joints that stick, by the laws of ringsim.parts."""
 
-import math
-from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.frame.parts import Indices
 from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
+from ringsim.frame.tape import Law, Tape, play, taped
 from ringsim.frame.vectors import compiled
 from ringsim.layout.joints import JointOpening
 from ringsim.layout.pose import Array
@@ -21,34 +20,71 @@ from ringsim.scene import Scene
 from ringsim.stepping.turning import Turning
 
 _NUDGE = 1e-7
-"""Change of place (m, rad) and rate by which the slopes of laws are measured."""
-_SIDES = np.array([[1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
-Law = Callable[[Array, Array], Reaction]
+"""Change of angle (rad) and rate (rad/s) by which the slopes of laws are measured."""
+_TURNED, _RATE, _ON, _ELASTIC, _DAMPING, _STORED = range(6)
+"""Rows of the laws' tape: coordinate, its rate and whether the law acts; parts of its Reaction."""
 
 
-def slope_of(
-    law: Callable[[Array, Array], Array], x: Array, rate: Array, rate_by_place: float
-) -> Array:
-    """Derivative of a force after its coordinate, whose rate follows it, by central differences."""
-    moved = _NUDGE * _SIDES[0].reshape(-1, *[1] * x.ndim)
-    hurried = _NUDGE * _SIDES[1].reshape(-1, *[1] * x.ndim)
-    # All at once: numpy's calls cost more than its numbers.
-    ahead, behind, faster, slower = law(x + moved, rate + hurried)
-    return np.asarray((ahead - behind + rate_by_place * (faster - slower)) / (2.0 * _NUDGE))
+class Acting(NamedTuple):
+    """Laws on coordinates x = sense * angle + offset, all shape (n,), and the angles' numbers.
+
+    The first ``soft`` of them have slopes of their own; behind them is dry friction (``Turning``).
+    """
+
+    tape: Tape
+    own: Indices
+    sense: Array
+    offset: Array
+    soft: int
 
 
 @compiled
-def folded_between(angles: Array, own: Indices, sense: Array) -> tuple[float, float]:
-    """How far the least and the most folded V-joint are, rad.
+def _feel(acting: Acting, angles: Array, rates: Array, more: float, faster: float) -> None:
+    """Play the laws at angles and rates, with all coordinates and rates so much larger."""
+    rows = acting.tape.rows
+    for n in range(len(acting.own)):
+        k, sense = acting.own[n], acting.sense[n]
+        rows[_TURNED, n] = sense * angles[k] + acting.offset[n] + more
+        rows[_RATE, n] = sense * rates[k] + faster
+    play(acting.tape)
 
-    Of angles (a,), rad; their numbers and senses are arrays (planes, sections).
-    """
-    least, most = math.inf, -math.inf
-    for plane in range(own.shape[0]):
-        for section in range(own.shape[1]):
-            folded = sense[plane, section] * angles[own[plane, section]]
-            least, most = min(least, folded), max(most, folded)
-    return least, most
+
+@compiled
+def push_joints(acting: Acting, angles: Array, rates: Array, g: Array, home: Indices) -> None:
+    """Add torques to a residual, whose unknowns of the angles are at ``home``."""
+    _feel(acting, angles, rates, 0.0, 0.0)
+    rows = acting.tape.rows
+    for n in range(len(acting.own)):
+        total = rows[_ELASTIC, n] + rows[_DAMPING, n]
+        g[home[acting.own[n]]] += acting.sense[n] * total
+
+
+@compiled
+def add_joint_slopes(
+    acting: Acting, angles: Array, rates: Array, rate_by_angle: float, out: Array
+) -> None:
+    """Add derivatives after the angles, whose rates follow them, by central differences."""
+    rows, n = acting.tape.rows, acting.soft
+    slopes = np.zeros((2, n))
+    for side in (1.0, -1.0):
+        for what in range(2):
+            _feel(acting, angles, rates, (1 - what) * side * _NUDGE, what * side * _NUDGE)
+            for k in range(n):
+                slopes[what, k] += side * (rows[_ELASTIC, k] + rows[_DAMPING, k])
+    for k in range(n):
+        whole = slopes[0, k] + rate_by_angle * slopes[1, k]
+        out[acting.own[k]] += whole / (2.0 * _NUDGE)
+
+
+@compiled
+def passing_joints(acting: Acting, angles: Array, rates: Array, lost: Array) -> float:
+    """Add torques that dissipate to ``lost``; returns the energy stored, J."""
+    _feel(acting, angles, rates, 0.0, 0.0)
+    rows, stored = acting.tape.rows, 0.0
+    for n in range(len(acting.own)):
+        lost[acting.own[n]] += acting.sense[n] * rows[_DAMPING, n]
+        stored += rows[_STORED, n]
+    return stored
 
 
 class Torques(NamedTuple):
@@ -101,12 +137,12 @@ class JointLaws:
             self._rub(family, law, skeleton)
         spring, sections = scene.hinge_spring, openings.angle.shape[1]
         self._spring = None if spring is None else spring.at(np.arange(sections))
-        self._sprung = np.ones(openings.angle.shape)
+        self._sprung = np.ones(openings.angle.shape, dtype=bool)
         latch = scene.latch
         self._pawl = latch.at(np.arange(sections)) if latch is not None and latch.pushes else None
         self.latched = np.zeros(openings.angle.shape, dtype=bool)
-        self._latches = False
         self.stuck: list[tuple[StuckVJoint, tuple[int, int], float]] = []
+        self._tape()
 
     def _rub(self, family: str, law: JointFriction, skeleton: Skeleton) -> None:
         joints = skeleton.layout.joints
@@ -129,11 +165,51 @@ class JointLaws:
             senses = np.array([skeleton.angles[n].sense for n in rest])
             self._friction.append((at_section(law, sections), np.array(rest), senses, Turning()))
 
+    def _tape(self) -> None:
+        """Note all laws, each on joints of its own, anew."""
+        own, sense = self._openings
+        stop, spring, pawl = self._stop, self._spring, self._pawl
+        laws: list[tuple[Law, Indices, Array, float]] = []
+        if stop is not None:
+            laws.append((lambda x, rate, on: stop.torque(x, rate, on), own, sense, 0.0))
+        if spring is not None:
+
+            def drive(x: Any, _: Any, on: Any) -> Reaction:
+                return Reaction(*(on * part for part in spring.torque(x)))
+
+            laws.append((drive, own, sense, 0.0))
+        if pawl is not None:
+            laws.append((lambda x, _rate, _on: pawl.torque(x), own, sense, 0.0))
+        for fault, place, opening in self.stuck:
+            where, against = np.array([own[place]]), np.array([-sense[place]])
+            law = fault.torque
+            laws.append((lambda x, rate, _, law=law: law(x, rate), where, against, np.pi - opening))
+        soft = sum(each.size for _, each, *_ in laws)
+        for friction, where, senses, _ in self._friction:
+            torque = friction.torque
+            laws.append((lambda _x, rate, _, t=torque: (0.0, t(rate), 0.0), where, senses, 0.0))
+        self._acting = Acting(
+            taped([(law, each.shape) for law, each, *_ in laws], 3, 3),
+            np.concatenate([np.zeros(0, np.int64), *(each.ravel() for _, each, *_ in laws)]),
+            np.concatenate([np.zeros(0), *(sense.ravel() for *_, sense, _ in laws)]),
+            np.concatenate([np.zeros(0), *(np.full(w.size, off) for _, w, _, off in laws)]),
+            soft,
+        )
+        self._switch()
+
+    def _switch(self) -> None:
+        """Tell stops which joints are latched, and springs which are whole."""
+        on, first = self._acting.tape.rows[_ON], 0
+        for law, states in ((self._stop, self.latched), (self._spring, self._sprung)):
+            if law is not None:
+                on[first : first + states.size] = states.ravel()
+                first += states.size
+
     def latch(self, deployed: NDArray[np.bool_]) -> None:
         """Hold these V-joints from both sides from now on, if the stop latches."""
         if self._stop is not None and self._stop.latch:
             self.latched |= deployed
-            self._latches = bool(self.latched.any())
+            self._switch()
 
     def begin(self) -> None:
         """Begin a step."""
@@ -143,71 +219,25 @@ class JointLaws:
     def stick(self, fault: StuckVJoint, place: tuple[int, int], opening: float) -> None:
         """Hold a V-joint, (plane, section), at an opening angle (rad)."""
         self.stuck.append((fault, place, opening))
+        self._tape()
 
     def fail(self, place: tuple[int, int]) -> None:
         """Break the spring of a V-joint, (plane, section)."""
-        self._sprung[place] = 0.0
-
-    def _acting(
-        self, angles: Array, rates: Array
-    ) -> list[tuple[Indices, Array, Array, Array, Law]]:
-        """Angles, senses, coordinates and rates of every law that acts, and the law."""
-        found: list[tuple[Indices, Array, Array, Array, Law]] = []
-        own, sense = self._openings
-        if self._stop is not None:
-            least, most = folded_between(angles, own, sense)
-            free = least > _NUDGE and most < self._stop.most_folded - _NUDGE
-            if self._latches or not free:
-                stop, latched, folded = self._stop, self.latched, sense * angles[own]
-
-                def hold(x: Array, rate: Array) -> Reaction:
-                    return stop.torque(x, rate, latched)
-
-                found.append((own, sense, folded, sense * rates[own], hold))
-        if self._spring is not None:
-            spring, alive = self._spring, self._sprung
-
-            def drive(x: Array, rate: Array) -> Reaction:
-                return Reaction(*(alive * part for part in spring.torque(x)))
-
-            found.append((own, sense, sense * angles[own], sense * rates[own], drive))
-        if self._pawl is not None:
-            pawl = self._pawl
-
-            def lift(x: Array, _: Array) -> Reaction:
-                return pawl.torque(x)
-
-            found.append((own, sense, sense * angles[own], sense * rates[own], lift))
-        for fault, place, opening in self.stuck:
-            where = np.array([own[place]])
-            turned = np.pi - sense[place] * angles[where] - opening
-            found.append(
-                (where, np.array([-sense[place]]), turned, -sense[place] * rates[where],
-                 fault.torque)
-            )  # fmt: skip
-        return found
+        self._sprung[place] = False
+        self._switch()
 
     def push(self, angles: Array, rates: Array, g: Array, home: Indices) -> None:
         """Add all torques but those of linear friction to a residual, whose unknowns of the angles
         are at ``home``; angles in rad and rates in rad/s, shape (a,).
         """
         for friction, own, sense, turning in self._friction:
-            turned = sense * rates[own]
-            turning.note(friction, turned)
-            g[home[own]] += sense * friction.torque(turned)
-        for own, sense, x, rate, law in self._acting(angles, rates):
-            g[home[own]] += sense * law(x, rate).total
+            turning.note(friction, sense * rates[own])
+        push_joints(self._acting, angles, rates, g, home)
 
     def passing(self, angles: Array, rates: Array) -> Torques:
         """What all torques take and store."""
-        lost, stored = self.damping * rates, 0.0
-        for friction, own, sense, _ in self._friction:
-            lost[own] += sense * friction.torque(sense * rates[own])
-        for own, sense, x, rate, law in self._acting(angles, rates):
-            reaction = law(x, rate)
-            lost[own] += sense * reaction.damping
-            stored += float(np.sum(reaction.stored))
-        return Torques(lost, stored)
+        lost = self.damping * rates
+        return Torques(lost, passing_joints(self._acting, angles, rates, lost))
 
     def stop_torques(self, angles: Array, rates: Array) -> Array | None:
         """Torques of the stop, (planes, sections), N m; None without."""
@@ -223,6 +253,5 @@ class JointLaws:
         for friction, own, sense, turning in self._friction:
             turned = sense * rates[own]
             found[own] += rate_by_angle * turning.tangents(friction, turned, friction.torque)
-        for own, _, x, rate, law in self._acting(angles, rates):
-            found[own] += slope_of(lambda *at, law=law: law(*at).total, x, rate, rate_by_angle)
+        add_joint_slopes(self._acting, angles, rates, rate_by_angle, found)
         return found

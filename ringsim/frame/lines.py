@@ -133,9 +133,7 @@ def place_lines(lines: Lines, pose: Pose, arms: Arms, out: Array) -> None:
 
 
 @compiled
-def pull_lines(
-    lines: Lines, mesh: Mesh, arms: Arms, forces: Array, out: Array, first: int
-) -> None:
+def pull_lines(lines: Lines, mesh: Mesh, arms: Arms, forces: Array, out: Array, first: int) -> None:
     """Add what forces on all points, shape (n, points, 3), do to the unknowns, (unknowns, columns),
     from the ``first`` column on.
     """

@@ -20,8 +20,8 @@ class Mesh(NamedTuple):
     Of the ends of elements: frame, angle (-1: none), axes in the frame, number of the point
     there; lengths (m), stiffness of u and psi, shape (e, 6), and masses (``inertia_of``).
     Points with mass: frame, place in it and mass beside that of the elements.  ``home`` and
-    ``angle_home`` are the unknowns of frames (the first of six) and angles; ``part`` the front of each
-    element, ``local`` its unknowns (x, phi, angle by end) there, -1 for none.
+    ``angle_home`` are the unknowns of frames (the first of six) and angles; ``part`` the front of
+    each element, ``local`` its unknowns (x, phi, angle by end) there, -1 for none.
     Fronts (see ``ringsim.frame.elimination``), those of the parts first and then one a block:
     number of unknowns that go, of all, their places in the system (``spots``, -1 behind the last),
     the front that takes the rest and where (``up``).  ``fixed`` unknowns do not move.

@@ -62,7 +62,7 @@ class FrameModel:
         mesh = self.mesh
         self.openings = Openings.of(skeleton)
         self.laws = JointLaws(scene, skeleton, self.openings)
-        self.strings = None if self.layout.net is None else Strings(self.layout.net)
+        self.strings = None if self.layout.net is None else Strings(self.layout.net, mesh)
         edge = self.layout.edge
         self.edge = None if edge is None else EdgeCables(scene, edge, mesh)
         self.coefficients = Coefficients.of(scene.solver.spectral_radius)
@@ -173,17 +173,14 @@ class FrameModel:
             slide.hold(now.pose, inner)
         if self.strings is not None:
             g[-3:] += self.strings.hub_mass * (now.acceleration.hub[0] - self.gravity)
-            pulls = self.strings.pulls(*now.net)
-            if pulls is not None:
-                inner[self._string_spots] += pulls
-                g[-3:] -= pulls.sum(axis=0)
+            self.strings.pull(*now.net, g)
         if self.edge is not None:
             self.edge.push(now.pose.place, inner)
         if self.hanging is not None:
             self.hanging.push(now, inner)
         if self.cables is not None:
             lines = now.place.lines, now.rate.lines
-            self._pulled = self.cables.pull(time, self._arms, *lines, inner)
+            self.cables.pull(time, self._arms, *lines, inner)
         self.reaction = inner[self.mesh.fixed]
         inner[self.mesh.fixed] = 0.0
         return g
@@ -215,7 +212,7 @@ class FrameModel:
         strung = blocks is not None
         pulled = 0
         if self.cables is not None:
-            pulled = self.cables.factor(time, *self._pulled, now.rate.lines, by_rate)
+            pulled = self.cables.factor(time, now.rate.lines, by_rate)
         hub = 3 if strung else 0
         alone = math.nan if strung else inertia
         border = Border.empty(mesh.unknowns, hub + pulled, strung, alone)
