@@ -18,16 +18,8 @@ from ringsim.cable.records import Cables
 from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.winches import Winches
-from ringsim.frame.chain import (
-    Drums,
-    RopeTable,
-    Spans,
-    border,
-    measure,
-    of_ropes,
-    pull_cables,
-    turning_pulleys,
-)
+from ringsim.frame.chain import Drums, RopeTable, Spans, measure, of_ropes, pull_cables
+from ringsim.frame.chain_tangent import border, factors_needed
 from ringsim.frame.lines import (
     Arms,
     add_line_tangent,
@@ -178,7 +170,7 @@ class FrameCables:
         slip = table.slip_speed
         own = (1.0 - spans.exponent**2) / slip
         slopes = self._turning.slopes(self.ropes, spans.speed, own, lambda s: np.tanh(s / slip))
-        count = turning_pulleys(table, slopes)
+        count = factors_needed(table, slopes)
         self._factors = factors = np.zeros((2, count, self.points, 3))
         self._slopes.rows[0] = spans.angle
         play(self._slopes)
@@ -198,6 +190,6 @@ class FrameCables:
 
     def _retable(self) -> None:
         chain = self._chain
-        self._table = RopeTable.of(self.ropes, chain.material, chain.slip_speed)
+        self._table = RopeTable.of(self.ropes, chain.material, chain.slip_speed, self.lines.span)
         self._spans = Spans.empty(self.ropes)
         self._turned_at = math.nan

@@ -1,7 +1,6 @@
-"""The tension chain of ringsim.cable.chain and its tangent, compiled.
+"""The tension chain of ringsim.cable.chain, compiled.
 
-The equations are told there and in ringsim.cable.tangent; both agree to round-off
-(tests/frame/test_compiled_chain.py).
+The equations are told there; both agree to round-off (tests/frame/test_compiled_chain.py).
 """
 
 import math
@@ -12,17 +11,14 @@ import numpy as np
 from ringsim.cable.ropes import Ropes
 from ringsim.frame.parts import Indices
 from ringsim.frame.tape import Tape, play
-from ringsim.frame.vectors import Vector, compiled, dot, minus, plus, times, vector
+from ringsim.frame.vectors import compiled, dot, minus, plus, times, vector
 from ringsim.layout.pose import Array
-
-PASSING = 2e-4
-"""Slope of a pulley's friction over that at rest below which Newton's tangent does without it: more
-than 0.9999 of the friction acts, and the rope's speed no longer changes it."""
 
 
 class RopeTable(NamedTuple):
     """What faults alone change: first span of each rope and one more than the last, first points of
-    the spans, pulley before each span (-1: none, or jammed there), whether a rope is whole; EA (N),
+    the spans, pulley before each span (-1: none, or jammed there), whether spans are felt, as they
+    are between different frames, and whether a rope is whole; EA (N),
     Kelvin-Voigt time (s) and slack width (N) of each rope; slip speeds of the pulleys, m/s.
     """
 
@@ -30,18 +26,21 @@ class RopeTable(NamedTuple):
     ends: Indices
     near: Indices
     pulley: Indices
+    felt: Indices
     alive: Array
     material: Array
     slip_speed: Array
 
     @classmethod
-    def of(cls, ropes: Ropes, material: Array, slip_speed: Array) -> "RopeTable":
-        """Of the ropes of a chain."""
+    def of(cls, ropes: Ropes, material: Array, slip_speed: Array, felt: Indices) -> "RopeTable":
+        """Of the ropes of a chain, whose spans of these numbers are felt."""
         pulley = np.full(ropes.spans, -1)
         slips = ropes.slips > 0.0
         pulley[ropes.behind[slips]] = np.flatnonzero(slips)
+        own = np.zeros(ropes.spans, dtype=np.int64)
+        own[felt] = 1
         return cls(
-            ropes.starts, ropes.ends, ropes.near, pulley, ropes.alive.astype(float),
+            ropes.starts, ropes.ends, ropes.near, pulley, own, ropes.alive.astype(float),
             material[:, ropes.cable].T.copy(), slip_speed,
         )  # fmt: skip
 
@@ -152,8 +151,8 @@ def pull_cables(
 
 @compiled
 def of_ropes(table: RopeTable, drums: Drums, spans: Spans) -> Array:
-    """Paths and their rates, strains and theirs, forces before slack and mean tensions of ropes whose
-    spans are known, shape (6, ropes).
+    """Of ropes whose spans are known, shape (6, ropes): paths and their rates, strains and theirs,
+    forces before slack and mean tensions.
     """
     out = np.zeros((6, len(table.starts)))
     for rope in range(len(table.starts)):
@@ -164,14 +163,14 @@ def of_ropes(table: RopeTable, drums: Drums, spans: Spans) -> Array:
         natural, winding = drums.natural[rope], drums.winding[rope]
         out[0, rope], out[1, rope], out[2, rope] = path, path_rate, path / natural - 1.0
         out[3, rope] = (path_rate + path / natural * winding) / natural
-        out[4, rope] = _force(table, rope, path, path_rate, natural, winding)
+        out[4, rope] = force_of(table, rope, path, path_rate, natural, winding)
         tension = _tension(table, rope, path, path_rate, natural, winding)
         out[5, rope] = table.alive[rope] * tension
     return out
 
 
 @compiled
-def _force(
+def force_of(
     table: RopeTable, rope: int, path: float, path_rate: float, natural: float, winding: float
 ) -> float:
     """Elastic and viscous force of a rope before slack."""
@@ -184,118 +183,6 @@ def _force(
 def _tension(
     table: RopeTable, rope: int, path: float, path_rate: float, natural: float, winding: float
 ) -> float:
-    force, width = _force(table, rope, path, path_rate, natural, winding), table.material[rope, 2]
+    force, width = force_of(table, rope, path, path_rate, natural, winding), table.material[rope, 2]
     smooth: float = width * math.log1p(math.exp(max(-abs(force) / width, -200.0)))
     return max(force, 0.0) + smooth
-
-
-@compiled
-def turning_pulleys(table: RopeTable, slopes: Array) -> int:
-    """Number of pulleys of whole ropes whose friction changes with speed, and ropes with one."""
-    count = 0
-    for rope in range(len(table.starts)):
-        if table.alive[rope] > 0.0:
-            own = 0
-            for i in range(table.starts[rope] + 1, table.ends[rope]):
-                j = table.pulley[i]
-                own += slopes[j] * table.slip_speed[j] > PASSING
-            count += own + 1 + (own > 0)
-    return count
-
-
-@compiled
-def border(
-    table: RopeTable,
-    drums: Drums,
-    log_decays: Array,
-    log_slopes: Array,
-    slopes: Array,
-    spans: Spans,
-    velocities: Array,
-    left: Array,
-    by_velocity: float,
-    out: Array,
-) -> None:
-    """Changes of tension in factors: pulls on points and what they change with, (2, k, p, 3)."""
-    n = len(spans.length)
-    swing = np.empty((n, 3))
-    for i in range(n):
-        k = table.near[i]
-        moving = minus(vector(velocities[k + 1]), vector(velocities[k]))
-        aside = minus(moving, times(spans.rate[i], vector(spans.unit[i])))
-        for c in range(3):
-            swing[i, c] = aside[c] / spans.length[i]
-    row = 0
-    for rope in range(len(table.starts)):
-        if table.alive[rope] == 0.0:
-            continue
-        first, last = table.starts[rope], table.ends[rope]
-        path = path_rate = 0.0
-        for i in range(first, last):
-            path += spans.length[i]
-            path_rate += spans.rate[i]
-        natural, winding = drums.natural[rope], drums.winding[rope]
-        force = _force(table, rope, path, path_rate, natural, winding)
-        slack = 0.5 + 0.5 * math.tanh(0.5 * force / table.material[rope, 2])
-        elastic = table.material[rope, 0] / natural * slack
-        viscous = elastic * table.material[rope, 1]
-        stretched = left[rope] * (elastic + viscous * winding / natural) + by_velocity * viscous
-        for i in range(first, last):
-            unit = vector(spans.unit[i])
-            change = plus(times(stretched, unit), times(left[rope] * viscous, vector(swing[i])))
-            _pair(out, row, table.near[i], times(spans.share[i], unit), change)
-        row += 1
-        ratio, turned = natural / path, False
-        steadily = winding + ratio * path_rate
-        part, part_rate, tail = path, path_rate, path
-        for b in range(first + 1, last):
-            j = table.pulley[b]
-            part -= spans.length[b - 1]
-            part_rate -= spans.rate[b - 1]
-            tail -= spans.share[b - 1] * spans.length[b - 1]
-            p = spans.exponent[j]
-            if not slopes[j] * table.slip_speed[j] > PASSING:
-                continue
-            turned = True
-            felt = log_decays[j] * slopes[j]
-            share = part / path
-            for i in range(first, last):
-                unit = vector(spans.unit[i])
-                here = 1.0 if i >= b else 0.0
-                by_rate = -ratio * felt * (here - share)
-                by_length = felt * (
-                    steadily / path * (here - share)
-                    + ratio / path * (part_rate - share * path_rate)
-                )
-                change = plus(
-                    times(by_length + by_velocity * by_rate, unit), times(by_rate, vector(swing[i]))
-                )
-                lifted = spans.tension[i] * (here - tail / path)
-                _pair(out, row, table.near[i], times(lifted, unit), change)
-            before, after = vector(spans.unit[b - 1]), vector(spans.unit[b])
-            cosine = dot(before, after)
-            aside = minus(after, times(cosine, before))
-            sine = math.sqrt(dot(aside, aside))
-            if sine > 1e-7:
-                bent = p * log_slopes[j] / sine
-                none = (0.0, 0.0, 0.0)
-                _pair(out, row, table.near[b - 1], none, times(bent / spans.length[b - 1], aside))
-                aside = minus(before, times(cosine, after))
-                _pair(out, row, table.near[b], none, times(bent / spans.length[b], aside))
-            row += 1
-        if turned:
-            for i in range(first, last):
-                unit = vector(spans.unit[i])
-                longer = times((1.0 - spans.share[i]) / path, unit)
-                _pair(out, row, table.near[i], times(spans.tension[i], unit), longer)
-            row += 1
-
-
-@compiled
-def _pair(out: Array, row: int, near: int, pull: Vector, change: Vector) -> None:
-    """Add a span's pull and change to those of its points."""
-    for c in range(3):
-        out[0, row, near, c] -= pull[c]
-        out[0, row, near + 1, c] += pull[c]
-        out[1, row, near, c] -= change[c]
-        out[1, row, near + 1, c] += change[c]

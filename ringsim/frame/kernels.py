@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ringsim.frame.eights import EIGHT, NONE, less, load
+from ringsim.frame.eights import store as eight
 from ringsim.frame.element import carried, element_tangent, middle, scaled
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.vectors import (
@@ -180,7 +182,7 @@ def begin_tangent(
     """
     for number in range(len(mesh.size)):
         fronts[number, : mesh.size[number], : mesh.size[number]] = 0.0
-    k12, rows, h = np.zeros((12, 12)), np.zeros((12, 14)), np.zeros((14, 14))
+    k12, rows, h = np.zeros((12, 12)), np.zeros((12, 16)), np.zeros((14, 16))
     for e in range(len(mesh.length)):
         r1, r2, axes, d, psi, n, w, m, bending = _loaded(mesh, pose, points, strains, e)
         f1, m1, f2, m2 = _pulls(mesh, accelerations, e, n, w, m)
@@ -215,14 +217,16 @@ def begin_tangent(
             moment = m1 if side == 0 else m2
             a = minus(vector(points[mesh.point[e, side]]), vector(pose.place[mesh.frame[e, side]]))
             z = (end[2], end[5], end[8])
-            for j in range(14):
-                force = (rows[x, j], rows[x + 1, j], rows[x + 2, j])
-                torque = (rows[phi, j], rows[phi + 1, j], rows[phi + 2, j])
-                swung = cross(a, force)
+            for c in range(0, 2 * EIGHT, EIGHT):
+                force = load(rows[x], c), load(rows[x + 1], c), load(rows[x + 2], c)
+                torque = load(rows[phi], c), load(rows[phi + 1], c), load(rows[phi + 2], c)
                 for i in range(3):
-                    h[own + i, j] = force[i]
-                    h[own + 3 + i, j] = torque[i] + swung[i]
-                h[own + 6, j] = dot(z, torque)
+                    eight(h[own + i], c, force[i])
+                eight(h[own + 3], c, less(less(torque[0], a[2], force[1]), -a[1], force[2]))
+                eight(h[own + 4], c, less(less(torque[1], a[0], force[2]), -a[2], force[0]))
+                eight(h[own + 5], c, less(less(torque[2], a[1], force[0]), -a[0], force[1]))
+                turning = less(less(NONE, -z[0], torque[0]), -z[1], torque[1])
+                eight(h[own + 6], c, less(turning, -z[2], torque[2]))
             # The arm and the joint's axis turn with the frame under constant force and moment:
             # (d phi x a) x f = (a f^T - (f . a)) d phi, (d phi x z) . m = (z x m) . d phi.
             along, sideways = dot(f, a), cross(z, moment)
@@ -233,12 +237,14 @@ def begin_tangent(
                 h[own + 6, own + 3 + i] += sideways[i]
         front = fronts[mesh.part[e]]
         for i in range(14):
-            row = mesh.local[e, i]
-            if row >= 0:
-                for j in range(14):
-                    column = mesh.local[e, j]
-                    if column >= 0:
-                        front[row, column] += h[i, j]
+            if mesh.local[e, i] >= 0:
+                row = front[mesh.local[e, i]]
+                for side in range(2):
+                    first, own = np.uintp(mesh.local[e, 7 * side]), np.uintp(7 * side)
+                    for j in range(np.uintp(6)):
+                        row[first + j] += h[i, own + j]
+                    if mesh.local[e, 7 * side + 6] >= 0:
+                        row[mesh.local[e, 7 * side + 6]] += h[i, 7 * side + 6]
     # Points with mass of their own: those of frames in parts have no arm.
     for p in range(len(mesh.point_mass)):
         if mesh.point_mass[p] == 0.0:

@@ -11,16 +11,8 @@ from ringsim.cable.ropes import Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.tangent import decay_factors, rope_tangent
 from ringsim.cable.winding.constant import ConstantWinding
-from ringsim.frame.chain import (
-    PASSING,
-    Drums,
-    RopeTable,
-    Spans,
-    border,
-    measure,
-    tighten,
-    turning_pulleys,
-)
+from ringsim.frame.chain import Drums, RopeTable, Spans, measure, tighten
+from ringsim.frame.chain_tangent import PASSING, border, factors_needed
 
 ROUND_OFF = 1e-11
 """Sums of a dozen terms in another order, through exponentials of their logarithms."""
@@ -36,7 +28,7 @@ LEFT = np.array([1.0, 0.6, 0.8])
 class Case:
     """Ropes at random places and rates, the second cable perhaps jammed, the first one cut."""
 
-    def __init__(self, seed: int, *, jammed: bool, cut: bool) -> None:
+    def __init__(self, seed: int, *, jammed: bool, cut: bool, unfelt: tuple[int, ...] = ()) -> None:
         random = np.random.default_rng(seed)
         self.chain, count = Chain(CABLES, POINTS), sum(POINTS)
         self.points = 0.1 * random.normal(size=(count, 3))
@@ -51,7 +43,8 @@ class Case:
         if cut:
             self.ropes = self.ropes.cut(0, 3)
         self.points += 1e-3 * random.normal(size=(count, 3))
-        self.table = RopeTable.of(self.ropes, self.chain.material, self.chain.slip_speed)
+        self.felt = np.setdiff1d(np.arange(self.ropes.spans), unfelt)
+        self.table = RopeTable.of(self.ropes, self.chain.material, self.chain.slip_speed, self.felt)
         inflow = np.zeros(len(self.ropes.starts))
         inflow[self.ropes.of_end[:, 1]] = -self.wound_rate[:, 1]
         natural = self.ropes.content - self.ropes.per_rope(self.wound)
@@ -83,13 +76,17 @@ def test_tensions_are_those_of_the_chain(seed: int, jammed: bool, cut: bool) -> 
     assert np.ptp(np.abs(truth.exponents[slips])) > 0.1  # some turn round, some slip
 
 
+@pytest.mark.parametrize("unfelt", [(), (1, 2, 3, 4, 10, 11)], ids=["all", "felt"])
 @pytest.mark.parametrize(("seed", "jammed", "cut"), CASES)
-def test_the_border_is_the_tangent_of_the_chain(seed: int, jammed: bool, cut: bool) -> None:
-    case = Case(seed, jammed=jammed, cut=cut)
+def test_the_border_is_the_tangent_of_the_chain(
+    seed: int, jammed: bool, cut: bool, unfelt: tuple[int, ...]
+) -> None:
+    """Both points of a span that is not felt are on one frame: its pulls there are no force."""
+    case = Case(seed, jammed=jammed, cut=cut, unfelt=unfelt)
     truth, ropes, by_velocity = case.evaluated(), case.ropes, 40.0
     left = LEFT[: len(ropes.starts)]
     slopes = truth.exponent_slopes
-    count, points = turning_pulleys(case.table, slopes), sum(POINTS)
+    count, points = factors_needed(case.table, slopes), sum(POINTS)
     out = np.zeros((2, count, points, 3))
     log_slopes = case.chain.log_slopes(case.spans.angle)
     border(
@@ -119,4 +116,11 @@ def test_the_border_is_the_tangent_of_the_chain(seed: int, jammed: bool, cut: bo
                 expected[point + 1, :, other] -= block
                 expected[point, :, other + 1] -= block
                 expected[point + 1, :, other + 1] += block
+    if unfelt:
+        separate = factors_needed(case.table._replace(felt=np.ones_like(case.table.felt)), slopes)
+        assert count < separate
+    for near in sorted(ropes.near[list(unfelt)], reverse=True):
+        for each in (expected, found):
+            each[near] += each[near + 1]
+            each[near + 1] = 0.0
     assert np.allclose(found, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
