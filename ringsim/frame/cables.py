@@ -18,19 +18,15 @@ from ringsim.cable.records import Cables
 from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.winches import Winches
-from ringsim.frame.chain import Drums, RopeTable, Spans, measure, of_ropes, pull_cables
-from ringsim.frame.chain_tangent import border, factors_needed
-from ringsim.frame.lines import (
-    Arms,
-    add_line_tangent,
-    lines_of,
-    pull_lines,
-    pull_spans,
-)
+from ringsim.frame.chain import Drums, RopeTable, Spans, measure, of_ropes, pull_tight
+from ringsim.frame.chain_tangent import factors_needed
+from ringsim.frame.factored import Border
+from ringsim.frame.lines import Arms, lines_of
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.parts import Parts
+from ringsim.frame.pulling import add_cables, pull_cables
 from ringsim.frame.skeleton import Skeleton
-from ringsim.frame.tape import play, taped
+from ringsim.frame.tape import taped
 from ringsim.layout.pose import Array
 from ringsim.stepping.turning import Turning
 
@@ -73,8 +69,12 @@ class FrameCables:
 
     def state(self, time: float, places: Array, rates: Array) -> ChainState:
         """The chain at places and rates of all points; ValueError if it has no answer."""
-        self._evaluate(time, places, rates)
+        self._turn(time, places, rates)
         ropes, spans, turned = self.ropes, self._spans, self._turned
+        least = pull_tight(
+            self._table, ropes.behind, self._drums, self._decays, places, rates, spans
+        )
+        self._require(least, places, rates)
         paths, path_rates, strains, strain_rates, forces, means = of_ropes(
             self._table, self._drums, spans
         )
@@ -131,23 +131,25 @@ class FrameCables:
         """Add what resists the cables' pull to the residual, shape (unknowns,); ValueError if the
         chain has no answer.
         """
-        self._evaluate(time, places, rates)
+        self._turn(time, places, rates)
+        least = pull_cables(
+            self.lines, self._mesh, arms, self._table, self.ropes.behind, self._drums,
+            self._decays, places, rates, self._spans, g,
+        )  # fmt: skip
+        self._require(least, places, rates)
         self._turning.note(self.ropes, self._spans.speed)
-        pull_spans(self.lines, self._mesh, arms, self._spans, g)
 
-    def _evaluate(self, time: float, places: Array, rates: Array) -> None:
-        """Winches and spans at a time (s)."""
-        ropes, spans, table = self.ropes, self._spans, self._table
-        # Winches that do not answer to their ropes turn alike in all iterations of a step.
-        if self.winches.answering or time != self._turned_at:
-            self._turn(time, places, rates)
-        least = pull_cables(table, ropes.behind, self._drums, self._decays, places, rates, spans)
-        if not (least > SHORTEST and self._drums.natural.min() > 0.0):
-            self._chain.state(ropes, places, rates, *self._turned)  # says what is wrong
+    def _require(self, least: float, places: Array, rates: Array) -> None:
+        """ValueError if a span is shorter than can be, or more rope is wound than there is."""
+        if not (least > SHORTEST and self._enough):
+            self._chain.state(self.ropes, places, rates, *self._turned)  # says what is wrong
 
     def _turn(self, time: float, places: Array, rates: Array) -> None:
         """What the winches have done by a time (s)."""
         ropes, spans, path, path_rate = self.ropes, self._spans, None, None
+        # Winches that do not answer to their ropes turn alike in all iterations of a step.
+        if time == self._turned_at and not self.winches.answering:
+            return
         if self.winches.answering:
             measure(self._table, ropes.behind, places, rates, spans)
             path, path_rate = ropes.along(spans.length), ropes.along(spans.rate)
@@ -155,38 +157,36 @@ class FrameCables:
         inflow = np.zeros(len(ropes.starts))
         inflow[ropes.of_end[:, 1]] = -rate[:, 1]
         natural = ropes.content - ropes.per_rope(wound)
-        self._drums = Drums(natural, ropes.per_rope(rate), inflow)
+        self._drums, self._enough = (
+            Drums(natural, ropes.per_rope(rate), inflow),
+            natural.min() > 0.0,
+        )
         self._turned_at, self._turned = time, _Turned(wound, rate)
 
-    def factor(self, time: float, rates: Array, by_place: float) -> int:
-        """Factor how tensions change in the state of the last ``pull``; returns the number of
-        factors.  ``by_place`` is the derivative of the points' rates after their places, 1/s.
-        """
-        spans, table, drums = self._spans, self._table, self._drums
-        left = np.ones(len(drums.natural))
+    def factors(self, time: float) -> int:
+        """Number of factors in which tensions change in the state of the last ``pull``."""
+        spans, drums, slip = self._spans, self._drums, self._table.slip_speed
+        self._left = np.ones(len(drums.natural))
         if self.winches.answering:
             path, path_rate = self.ropes.along(spans.length), self.ropes.along(spans.rate)
-            left = self.winches.stiffness_left(time, self.ropes, path, path_rate)
-        slip = table.slip_speed
+            self._left = self.winches.stiffness_left(time, self.ropes, path, path_rate)
         own = (1.0 - spans.exponent**2) / slip
-        slopes = self._turning.slopes(self.ropes, spans.speed, own, lambda s: np.tanh(s / slip))
-        count = factors_needed(table, slopes)
-        self._factors = factors = np.zeros((2, count, self.points, 3))
-        self._slopes.rows[0] = spans.angle
-        play(self._slopes)
-        logs = self._decays.rows[1], self._slopes.rows[1]
-        border(table, drums, *logs, slopes, spans, rates, left, by_place, factors)
-        return count
+        turning = self._turning
+        self._felt = turning.slopes(self.ropes, spans.speed, own, lambda s: np.tanh(s / slip))
+        return factors_needed(self._table, self._felt)
 
     def add_tangent(
-        self, arms: Arms, fronts: Array, columns: Array, rows: Array, first: int
+        self, arms: Arms, rates: Array, by_place: float, count: int, fronts: Array, border: Border
     ) -> None:
-        """Add to the fronts and, for each factor from the ``first`` column on, to a column and a
-        row, shape (unknowns, columns).
+        """Add to the fronts and, for each of so many factors, to the last columns and rows of a
+        border; ``by_place`` is the derivative of the points' rates after their places, 1/s.
         """
-        add_line_tangent(self.lines, arms, self._spans, fronts)
-        pull_lines(self.lines, self._mesh, arms, self._factors[0], columns, first)
-        pull_lines(self.lines, self._mesh, arms, self._factors[1], rows, first)
+        add_cables(
+            self.lines, self._mesh, arms, self._table, self._drums, self._decays, self._slopes,
+            self._felt, self._spans, rates, self._left, by_place,
+            np.zeros((2, count, self.points, 3)), fronts, border.columns, border.rows,
+            border.first,
+        )  # fmt: skip
 
     def _retable(self) -> None:
         chain = self._chain

@@ -136,7 +136,7 @@ def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> 
 
 
 @compiled
-def pull_cables(
+def pull_tight(
     table: RopeTable, behind: Indices, drums: Drums, decays: Tape, places: Array, rates: Array,
     spans: Spans,
 ) -> float:  # fmt: skip

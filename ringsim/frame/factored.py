@@ -31,10 +31,15 @@ class Border(NamedTuple):
     strung: bool
     hub_inertia: float
 
+    @property
+    def first(self) -> int:
+        """First column of the ropes."""
+        return 3 if self.strung else 0
+
     @classmethod
-    def empty(cls, unknowns: int, needed: int, strung: bool, hub_inertia: float) -> "Border":
-        """With room for so many columns."""
-        k = EIGHT * math.ceil(needed / EIGHT)
+    def empty(cls, unknowns: int, factors: int, strung: bool, hub_inertia: float) -> "Border":
+        """With room for the hub and so many factors of the ropes."""
+        k = EIGHT * math.ceil((factors + 3 * strung) / EIGHT)
         columns, rows = np.zeros((2, unknowns, k))
         return cls(columns, rows, -np.eye(k), strung, hub_inertia)
 

@@ -209,15 +209,12 @@ class FrameModel:
         if self.strings is not None:
             inertia = self.strings.hub_mass * by_place
             blocks = self.strings.tangents(*now.net, by_rate)
-        strung = blocks is not None
-        pulled = 0
-        if self.cables is not None:
-            pulled = self.cables.factor(time, now.rate.lines, by_rate)
-        hub = 3 if strung else 0
-        alone = math.nan if strung else inertia
-        border = Border.empty(mesh.unknowns, hub + pulled, strung, alone)
-        if self.cables is not None:
-            self.cables.add_tangent(self._arms, fronts, border.columns, border.rows, hub)
+        cables, strung = self.cables, blocks is not None
+        factors = 0 if cables is None else cables.factors(time)
+        border = Border.empty(mesh.unknowns, factors, strung, math.nan if strung else inertia)
+        if cables is not None:
+            rates = now.rate.lines
+            cables.add_tangent(self._arms, rates, by_rate, factors, fronts, border)
         if blocks is not None:
             add_strings(mesh, self._held.ends, blocks, fronts, border.columns)
             border.rows[:, :3] = border.columns[:, :3]

@@ -71,7 +71,7 @@ class MotionSteps(Remembering):
 
     def advance(self, now: Instant, stops: StopContact) -> None:
         """Choose the step after an accepted one."""
-        self._past.append((now.time, float(np.mean(now.rates))))
+        self._past.append((now.time, float(now.rates.sum()) / now.rates.size))
         wanted = max(self._from_motion(), self._solver.step / _FINEST)
         if stops.resting_rate > 0.0:
             wanted = max(min(wanted, self._depth / stops.resting_rate), self._contact)

@@ -25,6 +25,8 @@ class Turning:
 
     def __init__(self) -> None:
         self._owner: object = None
+        self._noted: list[Array] = []
+        """Rates that no slope has been asked for yet."""
         self._seen = np.empty((2, 0))
         """Last rate on either side."""
         self._back = np.empty(0, dtype=bool)
@@ -39,10 +41,14 @@ class Turning:
         """Remember an iterate: rates, shape (n,), of pulleys or joints, whose meaning changes with
         their ``owner``, as speeds (m/s) of the ropes that a fault may split.
         """
-        back = np.asarray(rates < 0.0)
         if self._owner is not owner:
-            self._owner, self._seen = owner, np.full((2, len(rates)), np.nan)
-            self._back, self._stayed = back, -np.ones(len(rates))
+            self._owner, self._noted = owner, []
+            self._seen = np.full((2, len(rates)), np.nan)
+            self._back, self._stayed = rates < 0.0, -np.ones(len(rates))
+        self._noted.append(rates.copy())
+
+    def _take(self, rates: Array) -> None:
+        back = rates < 0.0
         self._stayed = (self._stayed + 1.0) * (back == self._back)
         self._back = back
         np.copyto(self._seen[0], rates, where=~back)
@@ -56,6 +62,9 @@ class Turning:
         """
         if self._owner is not owner:
             return own
+        for noted in self._noted:
+            self._take(noted)
+        self._noted = []
         other = self._seen[1 - self._back.astype(int), np.arange(len(rates))]
         secants = (law(rates) - law(other)) / (rates - other)
         # fmax: NaN where the other side was never seen.
