@@ -70,6 +70,10 @@ class FrameCables:
     def state(self, time: float, places: Array, rates: Array) -> ChainState:
         """The chain at places and rates of all points; ValueError if it has no answer."""
         self._turn(time, places, rates)
+        return self._tightened(places, rates)
+
+    def _tightened(self, places: Array, rates: Array) -> ChainState:
+        """The chain with its winches as they have turned."""
         ropes, spans, turned = self.ropes, self._spans, self._turned
         least = pull_tight(
             self._table, ropes.behind, self._drums, self._decays, places, rates, spans
@@ -113,7 +117,8 @@ class FrameCables:
         """
         self.ropes = ropes
         self._retable()
-        return self._chain.state(ropes, places, rates, wound, speed)
+        self._wind(wound, speed)
+        return self._tightened(places, rates)
 
     def strike(self, fault: CableFault, state: ChainState) -> None:
         """Let a fault change the ropes."""
@@ -153,15 +158,17 @@ class FrameCables:
         if self.winches.answering:
             measure(self._table, ropes.behind, places, rates, spans)
             path, path_rate = ropes.along(spans.length), ropes.along(spans.rate)
-        wound, rate = self.winches.at(time, ropes, path, path_rate)
+        self._wind(*self.winches.at(time, ropes, path, path_rate))
+        self._turned_at = time
+
+    def _wind(self, wound: Array, rate: Array) -> None:
+        """Let the winches have wound so much (m), at rates (m/s), shape (cables, 2)."""
+        ropes = self.ropes
         inflow = np.zeros(len(ropes.starts))
         inflow[ropes.of_end[:, 1]] = -rate[:, 1]
         natural = ropes.content - ropes.per_rope(wound)
-        self._drums, self._enough = (
-            Drums(natural, ropes.per_rope(rate), inflow),
-            natural.min() > 0.0,
-        )
-        self._turned_at, self._turned = time, _Turned(wound, rate)
+        self._drums = Drums(natural, ropes.per_rope(rate), inflow)
+        self._enough, self._turned = bool(natural.min() > 0.0), _Turned(wound, rate)
 
     def factors(self, time: float) -> int:
         """Number of factors in which tensions change in the state of the last ``pull``."""

@@ -153,7 +153,7 @@ class _Points:
         self.craft: list[int] = []
 
     def at(self, frame: int, arm: Array) -> int:
-        key = (frame, *np.round(arm * 1e9).astype(int))
+        key = (frame, *(round(1e9 * x) for x in arm.tolist()))
         if key not in self._known:
             self._known[key] = len(self.frames)
             self.frames.append(frame)

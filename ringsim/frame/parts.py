@@ -5,6 +5,7 @@ unknowns that elements hold together form a part, and a part touches one block, 
 neighbours.
 """
 
+from bisect import bisect_right
 from collections.abc import Sequence
 
 import numpy as np
@@ -85,9 +86,8 @@ class Parts:
 
     def front_of(self, unknown: int) -> tuple[int, int]:
         """The front that begins to eliminate an unknown's part or block, and its place there."""
-        firsts = self.spots[self._heads, 0]
-        head = int(np.flatnonzero(firsts <= unknown)[np.argmax(firsts[firsts <= unknown])])
-        return int(self._heads[head]), unknown - int(firsts[head])
+        head = bisect_right(self._firsts, unknown) - 1
+        return int(self._heads[head]), unknown - self._firsts[head]
 
     def _inner_of(self, end: End) -> list[int]:
         """Inner frames, and angles behind them, of an end."""
@@ -147,6 +147,7 @@ class Parts:
             )
             gone.append(width)
         self._heads = np.array([*heads, *range(blocks, len(lists))])
+        self._firsts = [lists[head][0] for head in self._heads]
         self.of_element = self._heads[self.of_element]
         self.gone, self.size = np.array(gone), np.array([len(spots) for spots in lists])
         shape = len(lists), int(self.size.max())

@@ -169,26 +169,31 @@ class Layout:
         tr(J) / 2 - J about c; a rod so has two at its ends.  A flexible boom counts as rigid; the
         net's hub is left out.
         """
-        found: list[tuple[float, int, Array, Array]] = []
+        parts: list[tuple[Array, int, Array, Array]] = []
         bodies = list(enumerate(self.bodies))
         if self.boom is not None:
             top = self.boom.top.body
             bodies.append((top, Body(self.bodies[top].pose, (self.boom.lump,))))
+        sixth = np.full(6, 1.0 / 6.0)
         for number, body in bodies:
             mass, centre = body.mass, body.centre
             seconds = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
             values, axes = np.linalg.eigh(seconds - mass * np.outer(centre, centre))
             arms = (axes * np.sqrt(3.0 * np.maximum(values, 0.0) / mass)).T
-            found += [(mass / 6.0, number, *body.pose.at(centre + r)) for r in (*arms, *-arms)]
+            spread = centre + np.concatenate([arms, -arms])
+            parts.append((mass * sixth, number, *body.pose.at(spread)))
         for rod in self.rods:
             middle, tube = rod.station(0.5), rod.tube
             across = math.sqrt(3.0 * tube.second_moment / tube.area)
             arms = np.diag([0.5 * rod.length, across, across])
-            found += [(rod.mass / 6.0, -1, *middle.at(r)) for r in (*arms, *-arms)]
+            parts.append((rod.mass * sixth, -1, *middle.at(np.concatenate([arms, -arms]))))
             for station, mass, _ in rod.masses:
                 pose = rod.station(rod.stations[station])
-                found.append((mass, -1, pose.place, pose.rate))
-        return PointMasses(*map(np.array, zip(*found, strict=True)))
+                parts.append((np.array([mass]), -1, pose.place[None], pose.rate[None]))
+        masses, numbers, places, rates = zip(*parts, strict=True)
+        counts = [len(each) for each in masses]
+        joined = (np.concatenate(each) for each in (places, rates))
+        return PointMasses(np.concatenate(masses), np.repeat(numbers, counts), *joined)
 
     def sheave(self, sheave: Sheave) -> tuple[Array, Array]:
         """Place of a sheave and its derivative after the coordinate, shape (3,), m."""

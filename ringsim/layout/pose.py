@@ -53,9 +53,11 @@ class Pose:
         return cls(real_of(place), frame, rate_of(place), turn)
 
     def at(self, arm: Array) -> tuple[Array, Array]:
-        """A point fixed in this frame: its place, m, and derivative, m per unit of q."""
-        lever = self.axes @ arm
-        return self.place + lever, self.rate + cross(self.turn, lever)
+        """Points fixed in this frame, shape (..., 3): places, m, and derivatives, m per unit of
+        q.
+        """
+        lever = arm @ self.axes.T
+        return self.place + lever, self.rate + lever @ skew(self.turn).T
 
 
 def cross(a: Any, b: Any) -> NDArray[Any]:
