@@ -139,8 +139,10 @@ def profile(name: str) -> None:
     import ringsim.frame.cables as cables
     import ringsim.frame.factored as factored
     import ringsim.frame.integrate as integrate
+    import ringsim.frame.laws as laws
     import ringsim.frame.meter as meter
     import ringsim.frame.model as model
+    import ringsim.frame.net as net
 
     scene = scene_of(name)
     integrate.solve(scene.with_values({"solver.end_time": 0.5, "record.interval": 0.1}))
@@ -148,8 +150,10 @@ def profile(name: str) -> None:
     calls: Counter[str] = Counter()
     rooms = {
         model: ("balance", "begin_tangent", "add_slides", "add_strings"),
-        factored: ("factor", "solve", "solve_one"),
-        cables: ("measure", "tighten", "pull_spans", "border", "pull_lines", "add_line_tangent"),
+        factored: ("factor", "solve", "solve_one", "dgetrf", "dgetrs"),
+        cables: ("pull_cables", "add_cables", "pull_tight", "of_ropes", "factors_needed"),
+        net: ("pull_strings", "string_tangents", "stretched"),
+        laws: ("push_joints", "add_joint_slopes", "passing_joints"),
         integrate: ("move", "moved_between", "straighten"),
         meter: ("kinetic_energy",),
     }
@@ -157,10 +161,10 @@ def profile(name: str) -> None:
         for kernel in names:
             own = getattr(room, kernel)
 
-            def timed(*given: Any, own: Any = own, key: str = kernel) -> Any:
+            def timed(*given: Any, own: Any = own, key: str = kernel, **more: Any) -> Any:
                 begun = time.process_time()
                 try:
-                    return own(*given)
+                    return own(*given, **more)
                 finally:
                     spent[key] += time.process_time() - begun
                     calls[key] += 1
@@ -174,7 +178,7 @@ def profile(name: str) -> None:
         own = 1e3 * each / calls[kernel]
         print(f"| {kernel} | {calls[kernel]} | {own:.3f} | {each / taken:.1%} |")
     rest = taken - sum(spent.values())
-    what = "all else: laws, chain of accepted states, step control, records"
+    what = "all else: calls, energies, step control, records"
     print(f"| {what} |  |  | {rest / taken:.1%} |")
     print(f"\n{taken:.2f} s in all")
 

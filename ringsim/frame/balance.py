@@ -1,11 +1,15 @@
-"""What every residual needs, in one call: places, rates, rods, masses, linear friction."""
+"""Residual and tangent but for cables, in one call each: numba takes longer to receive these tables
+than to go through most of them.
+"""
 
 from typing import NamedTuple
 
 from ringsim.frame.following import Coefficients, Followed, follow
-from ringsim.frame.kernels import Pose, Strains, add_forces, place_points
+from ringsim.frame.kernels import Pose, Strains, add_forces, begin_tangent, place_points
+from ringsim.frame.laws import Acting, add_joint_slopes, push_joints
 from ringsim.frame.lines import Arms, Lines, place_lines
 from ringsim.frame.mesh import Mesh
+from ringsim.frame.net import Web, add_strings, pull_strings
 from ringsim.frame.parts import Indices
 from ringsim.frame.slide import aside
 from ringsim.frame.vectors import compiled
@@ -54,23 +58,22 @@ def put_in_place(
 
 @compiled
 def balance(
-    mesh: Mesh, lines: Lines, held: Held, coefficients: Coefficients, step: float,
-    start: Followed, pose: Pose, hub: Array, arms: Arms, now: Followed, strains: Strains, g: Array,
-) -> None:  # fmt: skip
-    """Follow a pose over a step, and add forces of rods, masses, slides and linear friction to the
-    residual, shape (unknowns,).
+    mesh: Mesh, lines: Lines, held: Held, joints: Acting, web: Web, coefficients: Coefficients,
+    step: float, start: Followed, pose: Pose, hub: Array, arms: Arms, now: Followed,
+    strains: Strains, g: Array,
+) -> bool:  # fmt: skip
+    """Follow a pose over a step, and add forces of rods, masses, slides, joints and strings to the
+    residual, shape (all unknowns,); returns whether a string pulls.
     """
     put_in_place(mesh, lines, held, pose, hub, arms, now.place)
     follow(coefficients, step, start, now)
-    first, last = held.cuts[POINTS], held.cuts[LINES]
-    points = now.place[first:last].reshape((-1, 3))
-    accelerations = now.acceleration[first:last].reshape((-1, 3))
-    if held.weighs:
-        accelerations = accelerations - held.gravity
-    add_forces(mesh, pose, points, accelerations, strains, g)
-    rates = now.rate[held.cuts[ANGLES] : held.cuts[ENDS]]
+    cuts = held.cuts
+    points = now.place[cuts[POINTS] : cuts[LINES]].reshape((-1, 3))
+    add_forces(mesh, pose, points, _inertial(held, now), strains, g)
+    rates = now.rate[cuts[ANGLES] : cuts[ENDS]]
     for n in range(len(held.damping)):
         g[mesh.angle_home[n]] += held.damping[n] * rates[n]
+    push_joints(joints, pose.angle, rates, mesh, g)
     for n in range(len(held.top)):
         top, low = held.top[n], held.low[n]
         gaps, rows = aside(pose, top, low)
@@ -79,6 +82,56 @@ def balance(
             for i in range(6):
                 g[mesh.home[top] + i] += force * rows[k, i]
                 g[mesh.home[low] + i] += force * rows[k, 6 + i]
+    if len(web.bodies) == 0:
+        return False
+    for i in range(3):
+        g[len(g) - 3 + i] += web.hub_mass * (now.acceleration[cuts[HUB] + i] - held.gravity[i])
+    ends, end_rates, at, hub_rate = _strings(held, now)
+    return bool(pull_strings(web, mesh, ends, end_rates, at, hub_rate, g))
+
+
+@compiled
+def _inertial(held: Held, now: Followed) -> Array:
+    """Accelerations of the points with mass, less that of gravity, (p, 3), m/s^2."""
+    found = now.acceleration[held.cuts[POINTS] : held.cuts[LINES]].reshape((-1, 3))
+    return found - held.gravity if held.weighs else found
+
+
+@compiled
+def _strings(held: Held, now: Followed) -> tuple[Array, Array, Array, Array]:
+    """Places and rates of the strings' ends, (n, 3), and of the hub, (3,)."""
+    ends, hub, last = held.cuts[ENDS], held.cuts[HUB], held.cuts[HUNG]
+    return (
+        now.place[ends:hub].reshape((-1, 3)), now.rate[ends:hub].reshape((-1, 3)),
+        now.place[hub:last], now.rate[hub:last],
+    )  # fmt: skip
+
+
+@compiled
+def differentiate(
+    mesh: Mesh, held: Held, joints: Acting, web: Web, pose: Pose, now: Followed, strains: Strains,
+    by_rate: float, by_place: float, strung: bool, fronts: Array, columns: Array, rows: Array,
+    corner: Array,
+) -> None:  # fmt: skip
+    """Set the fronts, and the border's part of strings, if one pulls, to the derivative of
+    ``balance``; ``by_rate`` and ``by_place`` are those of rates and accelerations after places.
+    """
+    cuts = held.cuts
+    points = now.place[cuts[POINTS] : cuts[LINES]].reshape((-1, 3))
+    begin_tangent(mesh, pose, points, _inertial(held, now), strains, by_place, fronts)
+    add_slides(mesh, held, pose, fronts)
+    for n in range(len(held.damping)):
+        front, spot = mesh.angle_local[n, 0], mesh.angle_local[n, 1]
+        fronts[front, spot, spot] += held.damping[n] * by_rate
+    rates = now.rate[cuts[ANGLES] : cuts[ENDS]]
+    add_joint_slopes(joints, pose.angle, rates, by_rate, mesh, fronts)
+    if strung:
+        for i in range(3):
+            corner[i, i] = web.hub_mass * by_place
+        ends, end_rates, at, hub_rate = _strings(held, now)
+        add_strings(
+            web, mesh, ends, end_rates, at, hub_rate, by_rate, fronts, columns, rows, corner
+        )
 
 
 @compiled

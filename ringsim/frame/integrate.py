@@ -182,7 +182,7 @@ class Integration(Remembering):
 
     def _move(self, state: State, by: Array) -> None:
         move(self._model.mesh, state.pose, by[: self._model.mesh.unknowns])
-        if self._model.strings is not None:
+        if self._model.with_hub:
             state.hub += by[-3:]
 
     def _guess(self, step: float) -> Array:
@@ -221,7 +221,7 @@ class Integration(Remembering):
         """Changes of all unknowns."""
         found = np.zeros(self._model.size)
         moved_between(self._model.mesh, before.pose, after.pose, found)
-        if self._model.strings is not None:
+        if self._model.with_hub:
             found[-3:] = after.hub - before.hub
         return found
 

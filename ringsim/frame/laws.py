@@ -1,10 +1,12 @@
 """Torques on joint angles: friction, stops and joints that stick, by the laws of ringsim.parts."""
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.frame.mesh import Mesh
 from ringsim.frame.parts import Indices
 from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.frame.tape import Law, Tape, play, taped
@@ -50,20 +52,22 @@ def _feel(acting: Acting, angles: Array, rates: Array, more: float, faster: floa
 
 
 @compiled
-def push_joints(acting: Acting, angles: Array, rates: Array, g: Array, home: Indices) -> None:
-    """Add torques to a residual, whose unknowns of the angles are at ``home``."""
+def push_joints(acting: Acting, angles: Array, rates: Array, mesh: Mesh, g: Array) -> None:
+    """Add torques to a residual."""
     _feel(acting, angles, rates, 0.0, 0.0)
     rows = acting.tape.rows
     for n in range(len(acting.own)):
         total = rows[_ELASTIC, n] + rows[_DAMPING, n]
-        g[home[acting.own[n]]] += acting.sense[n] * total
+        g[mesh.angle_home[acting.own[n]]] += acting.sense[n] * total
 
 
 @compiled
 def add_joint_slopes(
-    acting: Acting, angles: Array, rates: Array, rate_by_angle: float, out: Array
+    acting: Acting, angles: Array, rates: Array, by_rate: float, mesh: Mesh, fronts: Array
 ) -> None:
-    """Add derivatives after the angles, whose rates follow them, by central differences."""
+    """Add derivatives after the angles to the fronts, by central differences; ``by_rate`` is that
+    of rates, 1/s.
+    """
     rows, n = acting.tape.rows, acting.soft
     slopes = np.zeros((2, n))
     for side in (1.0, -1.0):
@@ -72,8 +76,9 @@ def add_joint_slopes(
             for k in range(n):
                 slopes[what, k] += side * (rows[_ELASTIC, k] + rows[_DAMPING, k])
     for k in range(n):
-        whole = slopes[0, k] + rate_by_angle * slopes[1, k]
-        out[acting.own[k]] += whole / (2.0 * _NUDGE)
+        front, spot = mesh.angle_local[acting.own[k], 0], mesh.angle_local[acting.own[k], 1]
+        whole = slopes[0, k] + by_rate * slopes[1, k]
+        fronts[front, spot, spot] += whole / (2.0 * _NUDGE)
 
 
 @compiled
@@ -125,8 +130,9 @@ class Openings(NamedTuple):
 class JointLaws:
     """All torques of a scene's joints.
 
-    ``damping`` is the torque over the rate of each angle where friction is linear, N m s/rad, and
-    ``stuck`` are the faults that hold V-joints, (plane, section), at opening angles, rad.
+    ``damping`` is the torque over the rate of each angle where friction is linear, N m s/rad,
+    ``acting`` are all other laws, and ``stuck`` the faults that hold V-joints, (plane, section), at
+    opening angles, rad.
     """
 
     def __init__(self, scene: Scene, skeleton: Skeleton, openings: Openings) -> None:
@@ -188,7 +194,7 @@ class JointLaws:
         for friction, where, senses, _ in self._friction:
             torque = friction.torque
             laws.append((lambda _x, rate, _, t=torque: (0.0, t(rate), 0.0), where, senses, 0.0))
-        self._acting = Acting(
+        self.acting = Acting(
             taped([(law, each.shape) for law, each, *_ in laws], 3, 3),
             np.concatenate([np.zeros(0, np.int64), *(each.ravel() for _, each, *_ in laws)]),
             np.concatenate([np.zeros(0), *(sense.ravel() for *_, sense, _ in laws)]),
@@ -199,7 +205,7 @@ class JointLaws:
 
     def _switch(self) -> None:
         """Tell stops which joints are latched, and springs which are whole."""
-        on, first = self._acting.tape.rows[_ON], 0
+        on, first = self.acting.tape.rows[_ON], 0
         for law, states in ((self._stop, self.latched), (self._spring, self._sprung)):
             if law is not None:
                 on[first : first + states.size] = states.ravel()
@@ -226,18 +232,20 @@ class JointLaws:
         self._sprung[place] = False
         self._switch()
 
-    def push(self, angles: Array, rates: Array, g: Array, home: Indices) -> None:
-        """Add all torques but those of linear friction to a residual, whose unknowns of the angles
-        are at ``home``; angles in rad and rates in rad/s, shape (a,).
-        """
+    def note(self, rates: Array) -> None:
+        """Remember an iterate for slopes of dry friction: rates of the angles, rad/s."""
         for friction, own, sense, turning in self._friction:
             turning.note(friction, sense * rates[own])
-        push_joints(self._acting, angles, rates, g, home)
+
+    def dry_slopes(self, rates: Array) -> Iterator[tuple[Indices, Array]]:
+        """Angles that rub dry, and derivatives of their torques after their rates, N m s/rad."""
+        for friction, own, sense, turning in self._friction:
+            yield own, turning.tangents(friction, sense * rates[own], friction.torque)
 
     def passing(self, angles: Array, rates: Array) -> Torques:
         """What all torques take and store."""
         lost = self.damping * rates
-        return Torques(lost, passing_joints(self._acting, angles, rates, lost))
+        return Torques(lost, passing_joints(self.acting, angles, rates, lost))
 
     def stop_torques(self, angles: Array, rates: Array) -> Array | None:
         """Torques of the stop, (planes, sections), N m; None without."""
@@ -246,12 +254,3 @@ class JointLaws:
         own, sense = self._openings
         folded, rate = sense * angles[own], sense * rates[own]
         return np.asarray(self._stop.torque(folded, rate, self.latched).total)
-
-    def slopes(self, angles: Array, rates: Array, rate_by_angle: float) -> Array:
-        """Derivatives of the torques after the angles, whose rates follow them, N m/rad: (a,)."""
-        found = self.damping * rate_by_angle
-        for friction, own, sense, turning in self._friction:
-            turned = sense * rates[own]
-            found[own] += rate_by_angle * turning.tangents(friction, turned, friction.torque)
-        add_joint_slopes(self._acting, angles, rates, rate_by_angle, found)
-        return found

@@ -5,6 +5,7 @@ import numpy as np
 from ringsim.cable.state import ChainState, work_between
 from ringsim.frame.kernels import Strains, kinetic_energy
 from ringsim.frame.model import FrameModel
+from ringsim.frame.net import passing_strings
 from ringsim.frame.state import State
 from ringsim.stepping.instant import Energies
 from ringsim.stepping.losses import Passing, lost_between
@@ -34,10 +35,10 @@ class EnergyMeter:
         elastic = 0.5 * float(np.sum(mesh.stiffness * state.strains**2)) + torques.stored
         elastic += sum(slide.stored(pose) for slide in model.slides)
         forces, places, rates = [torques.lost], [pose.angle], [state.rate.angles]
-        if model.strings is not None:
-            stored, resisting, lengths, along = model.strings.passing(*state.net)
+        if model.with_hub:
+            stored, resisting, lengths, along = passing_strings(model.web, *state.net)
             moving = state.rate.hub[0]
-            kinetic += 0.5 * model.strings.hub_mass * float(moving @ moving)
+            kinetic += 0.5 * model.web.hub_mass * float(moving @ moving)
             elastic += stored
             forces.append(resisting)
             places.append(lengths)

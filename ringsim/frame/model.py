@@ -5,18 +5,18 @@ import math
 import numpy as np
 
 from ringsim.choice import kind_of
-from ringsim.frame.balance import Held, add_slides, balance, put_in_place
+from ringsim.frame.balance import Held, balance, differentiate, put_in_place
 from ringsim.frame.cables import FrameCables
 from ringsim.frame.edge import EdgeCables
 from ringsim.frame.elimination import Fronts
 from ringsim.frame.factored import Border, Factored
 from ringsim.frame.following import Coefficients, Followed
 from ringsim.frame.hanging import Hanging
-from ringsim.frame.kernels import Pose, Strains, add_forces, begin_tangent, move
+from ringsim.frame.kernels import Pose, Strains, add_forces, move
 from ringsim.frame.laws import JointLaws, Openings
 from ringsim.frame.lines import Arms, no_lines
 from ringsim.frame.mesh import mesh_of
-from ringsim.frame.net import Strings, add_strings
+from ringsim.frame.net import Web
 from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
 from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
 from ringsim.frame.state import State
@@ -38,8 +38,8 @@ class FrameModel:
     ----------
     ideal
         The structure with rigid rods, at the start.
-    size
-        Number of unknowns: those of the mesh and the hub's three, if there is a net.
+    with_hub, size
+        Whether a net has a hub; number of unknowns: those of the mesh and the hub's three.
     moving
         Its acceleration then.
     reaction
@@ -62,7 +62,8 @@ class FrameModel:
         mesh = self.mesh
         self.openings = Openings.of(skeleton)
         self.laws = JointLaws(scene, skeleton, self.openings)
-        self.strings = None if self.layout.net is None else Strings(self.layout.net, mesh)
+        self.with_hub, self._strung = self.layout.net is not None, False
+        self.web = Web.of(self.layout.net)
         edge = self.layout.edge
         self.edge = None if edge is None else EdgeCables(scene, edge, mesh)
         self.coefficients = Coefficients.of(scene.solver.spectral_radius)
@@ -81,7 +82,7 @@ class FrameModel:
                 BeamSlide(mesh, nodes, boom[0].length, beam.low.body, STIFFNESS * stiffest)
             )
         self.slides: list[Slide] = [*slides, *self._beam_slides]
-        self.size = mesh.unknowns + (0 if self.strings is None else 3)
+        self.size = mesh.unknowns + 3 * self.with_hub
         self.loads = np.zeros(self.size)
         at, forces = [], []
         for number, force in self.layout.forces:
@@ -125,6 +126,7 @@ class FrameModel:
         self._arms = Arms.empty(lines)
         self.start = self._started(pose)
         self.hanging = None if hung is None else Hanging(hung, mesh, self.start.place.hung.copy())
+        self.reaction = np.zeros(len(mesh.fixed))
         self._begun = self.start.place.points.copy()
         self._fronts = Fronts.empty(mesh)
 
@@ -134,8 +136,8 @@ class FrameModel:
         done = float(np.sum(forces * (state.pose.place[at] - start)))
         if self._held.weighs:
             moved = self._masses @ (state.place.points - self._begun)
-            if self.strings is not None:
-                moved += self.strings.hub_mass * (state.hub - self._hub)
+            if self.with_hub:
+                moved += self.web.hub_mass * (state.hub - self._hub)
             done += float(moved @ self.gravity)
         return done if self.hanging is None else done + self.hanging.work(state)
 
@@ -164,61 +166,48 @@ class FrameModel:
         """
         g = -self.loads
         inner = g[: self.mesh.unknowns]
-        balance(
-            self.mesh, self._lines, self._held, self.coefficients, step, start.followed, now.pose,
-            now.hub, self._arms, now.followed, strains, inner,
+        self._strung = balance(
+            self.mesh, self._lines, self._held, self.laws.acting, self.web, self.coefficients,
+            step, start.followed, now.pose, now.hub, self._arms, now.followed, strains, g,
         )  # fmt: skip
-        self.laws.push(now.pose.angle, now.rate.angles, inner, self.mesh.angle_home)
+        self.laws.note(now.rate.angles)
         for slide in self._beam_slides:
             slide.hold(now.pose, inner)
-        if self.strings is not None:
-            g[-3:] += self.strings.hub_mass * (now.acceleration.hub[0] - self.gravity)
-            self.strings.pull(*now.net, g)
         if self.edge is not None:
             self.edge.push(now.pose.place, inner)
         if self.hanging is not None:
             self.hanging.push(now, inner)
         if self.cables is not None:
-            lines = now.place.lines, now.rate.lines
-            self.cables.pull(time, self._arms, *lines, inner)
-        self.reaction = inner[self.mesh.fixed]
-        inner[self.mesh.fixed] = 0.0
+            self.cables.pull(time, self._arms, now.place.lines, now.rate.lines, inner)
+        if len(self.mesh.fixed):
+            self.reaction = inner[self.mesh.fixed]
+            inner[self.mesh.fixed] = 0.0
         return g
 
     def tangent(self, time: float, step: float, now: State, strains: Strains) -> Factored:
-        """The residual's derivative after the unknowns, factored."""
-        mesh = self.mesh
+        """The derivative of the last residual after the unknowns, factored."""
+        mesh, cables, strung, fronts = self.mesh, self.cables, self._strung, self._fronts.whole
         by_rate = self.coefficients.rate_by_place(step)
         by_place = self.coefficients.acceleration_by_place(step)
-        fronts = self._fronts.whole
-        inertial = now.acceleration.points
-        if self._held.weighs:
-            inertial = inertial - self.gravity
-        begin_tangent(mesh, now.pose, now.place.points, inertial, strains, by_place, fronts)
-        add_slides(mesh, self._held, now.pose, fronts)
-        slopes = self.laws.slopes(now.pose.angle, now.rate.angles, by_rate)
-        front, spot = mesh.angle_local.T
-        fronts[front, spot, spot] += slopes
+        factors = 0 if cables is None else cables.factors(time)
+        alone = self.with_hub and not strung
+        hub_inertia = self.web.hub_mass * by_place if alone else math.nan
+        border = Border.empty(mesh.unknowns, factors, strung, hub_inertia)
+        differentiate(
+            mesh, self._held, self.laws.acting, self.web, now.pose, now.followed, strains, by_rate,
+            by_place, strung, fronts, border.columns, border.rows, border.corner,
+        )  # fmt: skip
+        for own, slopes in self.laws.dry_slopes(now.rate.angles):
+            front, spot = mesh.angle_local[own].T
+            fronts[front, spot, spot] += by_rate * slopes
         for slide in self._beam_slides:
             slide.add_tangent(now.pose, fronts)
         if self.edge is not None:
             self.edge.add_tangent(now.pose.place, fronts)
         if self.hanging is not None:
             self.hanging.add_tangent(now, by_rate, by_place, fronts)
-        blocks, inertia = None, math.nan
-        if self.strings is not None:
-            inertia = self.strings.hub_mass * by_place
-            blocks = self.strings.tangents(*now.net, by_rate)
-        cables, strung = self.cables, blocks is not None
-        factors = 0 if cables is None else cables.factors(time)
-        border = Border.empty(mesh.unknowns, factors, strung, math.nan if strung else inertia)
         if cables is not None:
-            rates = now.rate.lines
-            cables.add_tangent(self._arms, rates, by_rate, factors, fronts, border)
-        if blocks is not None:
-            add_strings(mesh, self._held.ends, blocks, fronts, border.columns)
-            border.rows[:, :3] = border.columns[:, :3]
-            border.corner[:3, :3] = blocks.sum(axis=0) + inertia * np.eye(3)
+            cables.add_tangent(self._arms, now.rate.lines, by_rate, factors, fronts, border)
         return Factored(mesh, self._fronts, border)
 
     def _place(self, state: State) -> None:
@@ -255,7 +244,7 @@ class FrameModel:
         small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)
         move(self.mesh, ahead.pose, small * self.first[: self.mesh.unknowns])
         move(self.mesh, behind.pose, -small * self.first[: self.mesh.unknowns])
-        if self.strings is not None:
+        if self.with_hub:
             self.first[-3:] = self.first[self._string_spots].mean(axis=0)
             ahead.hub += small * self.first[-3:]
             behind.hub -= small * self.first[-3:]

@@ -1,6 +1,7 @@
 """The net's strings from corners to a hub, a point with three unknowns of its own."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,11 +19,34 @@ _STRETCH, _RATE, _ELASTIC, _DAMPING, _STORED = range(5)
 """Rows of the law's tape."""
 
 
+class Web(NamedTuple):
+    """Strings from a hub: their law, the bodies at their ends, length without force (m), whether
+    they only pull, and the mass of the hub (kg).
+    """
+
+    tape: Tape
+    bodies: Indices
+    free: float
+    one_sided: bool
+    hub_mass: float
+
+    @classmethod
+    def of(cls, held: HubNet | None) -> "Web":
+        """Those of a net; none without."""
+        if held is None:
+            return cls(taped([], 2, 3), np.zeros(0, dtype=np.int64), 0.0, True, 0.0)
+        law, bodies = held.law, np.array(held.bodies, dtype=np.int64)
+        tape = taped([(at_section(law, np.arange(len(bodies))).tension, bodies.shape)], 2, 3)
+        return cls(tape, bodies, law.neutral_length, not law.two_sided, law.hub_mass)
+
+
 @compiled
 def stretched(
     ends: Array, rates: Array, hub: Array, hub_rate: Array
 ) -> tuple[Array, Array, Array, float]:
-    """Lengths (m), their rates (m/s) and directions of strings from the hub; the greatest."""
+    """Lengths (m), their rates (m/s) and directions of strings from the hub, at places and rates of
+    shape (n, 3) and (3,); the greatest length.
+    """
     n, most = len(ends), 0.0
     lengths, along, units = np.empty(n), np.empty(n), np.empty((n, 3))
     for k in range(n):
@@ -36,109 +60,80 @@ def stretched(
 
 
 @compiled
-def _feel(
-    tape: Tape, free: float, lengths: Array, along: Array, more: float, faster: float
-) -> None:
+def _feel(web: Web, lengths: Array, along: Array, more: float, faster: float) -> None:
     """Play the law at lengths and rates, all so much larger."""
+    rows = web.tape.rows
     for k in range(len(lengths)):
-        tape.rows[_STRETCH, k] = lengths[k] - free + more
-        tape.rows[_RATE, k] = along[k] + faster
-    play(tape)
+        rows[_STRETCH, k], rows[_RATE, k] = lengths[k] - web.free + more, along[k] + faster
+    play(web.tape)
+
+
+@compiled
+def _force(web: Web, k: int) -> float:
+    return float(web.tape.rows[_ELASTIC, k] + web.tape.rows[_DAMPING, k])
 
 
 @compiled
 def pull_strings(
-    tape: Tape, free: float, one_sided: bool, mesh: Mesh, bodies: Indices,
-    ends: Array, rates: Array, hub: Array, hub_rate: Array, g: Array,
-) -> None:  # fmt: skip
-    """Add what resists at the bodies and, in the last three unknowns, at the hub."""
+    web: Web, mesh: Mesh, ends: Array, rates: Array, hub: Array, hub_rate: Array, g: Array
+) -> bool:
+    """Add what resists at the bodies and, in the last three unknowns, at the hub; False while all
+    strings are slack.
+    """
     lengths, along, units, most = stretched(ends, rates, hub, hub_rate)
-    if one_sided and most <= free:
-        return
-    _feel(tape, free, lengths, along, 0.0, 0.0)
+    if web.one_sided and most <= web.free:
+        return False
+    _feel(web, lengths, along, 0.0, 0.0)
     at = len(g) - 3
-    for n in range(len(bodies)):
-        home, pull = mesh.home[bodies[n]], tape.rows[_ELASTIC, n] + tape.rows[_DAMPING, n]
+    for n in range(len(web.bodies)):
+        home, pull = mesh.home[web.bodies[n]], _force(web, n)
         for i in range(3):
             g[home + i] += pull * units[n, i]
             g[at + i] -= pull * units[n, i]
+    return True
 
 
 @compiled
-def string_tangents(
-    tape: Tape, free: float, one_sided: bool, rate_by_place: float,
-    ends: Array, rates: Array, hub: Array, hub_rate: Array,
-) -> Array:  # fmt: skip
-    """Derivatives of the forces after the bodies' places, (n, 3, 3), N/m; none, (0, 3, 3), while
-    all strings are slack.
+def add_strings(
+    web: Web, mesh: Mesh, ends: Array, rates: Array, hub: Array, hub_rate: Array, by_rate: float,
+    fronts: Array, columns: Array, rows: Array, corner: Array,
+) -> None:  # fmt: skip
+    """Add derivatives of the strings' pulls to the fronts, and those after the hub's place to the
+    first three columns, rows and corner of the border; ``by_rate`` is the derivative of rates after
+    places, 1/s.
     """
-    lengths, along, units, most = stretched(ends, rates, hub, hub_rate)
-    n = 0 if one_sided and most <= free else len(lengths)
-    out, slope = np.zeros((n, 3, 3)), np.zeros(n)
-    if n == 0:
-        return out
+    lengths, along, units, _ = stretched(ends, rates, hub, hub_rate)
+    slope, block = np.zeros(len(lengths)), np.zeros((3, 3))
     for side in (1.0, -1.0):
         for what in range(2):
-            _feel(tape, free, lengths, along, (1 - what) * side * _NUDGE, what * side * _NUDGE)
-            share = side / (2.0 * _NUDGE) * (1.0 if what == 0 else rate_by_place)
-            for k in range(n):
-                slope[k] += share * (tape.rows[_ELASTIC, k] + tape.rows[_DAMPING, k])
-    _feel(tape, free, lengths, along, 0.0, 0.0)
-    for k in range(n):
-        across = (tape.rows[_ELASTIC, k] + tape.rows[_DAMPING, k]) / lengths[k]
+            _feel(web, lengths, along, (1 - what) * side * _NUDGE, what * side * _NUDGE)
+            share = side / (2.0 * _NUDGE) * (1.0 if what == 0 else by_rate)
+            for n in range(len(slope)):
+                slope[n] += share * _force(web, n)
+    _feel(web, lengths, along, 0.0, 0.0)
+    for n in range(len(slope)):
+        body = web.bodies[n]
+        number, first = mesh.frame_local[body, 0], mesh.frame_local[body, 1]
+        across = _force(web, n) / lengths[n]
         for i in range(3):
-            out[k, i, i] = across
             for j in range(3):
-                out[k, i, j] += (slope[k] - across) * units[k, i] * units[k, j]
-    return out
+                block[i, j] = (slope[n] - across) * units[n, i] * units[n, j]
+            block[i, i] += across
+        for i in range(3):
+            for j in range(3):
+                fronts[number, first + i, first + j] += block[i, j]
+                columns[mesh.home[body] + i, j] -= block[i, j]
+                rows[mesh.home[body] + i, j] -= block[i, j]
+                corner[i, j] += block[i, j]
 
 
-@compiled
-def add_strings(mesh: Mesh, ends: Indices, blocks: Array, fronts: Array, columns: Array) -> None:
-    """Add derivatives of the strings' pulls, (n, 3, 3), to the fronts, and those after the hub's
-    place to the first three columns.
+def passing_strings(
+    web: Web, ends: Array, rates: Array, hub: Array, hub_rate: Array
+) -> tuple[float, Array, Array, Array]:
+    """Energy stored (J), dissipating forces of the strings (N), their lengths (m) and rates of
+    these (m/s).
     """
-    for n in range(len(ends)):
-        number, first = mesh.frame_local[ends[n], 0], mesh.frame_local[ends[n], 1]
-        home = mesh.home[ends[n]]
-        for i in range(3):
-            for j in range(3):
-                fronts[number, first + i, first + j] += blocks[n, i, j]
-                columns[home + i, j] -= blocks[n, i, j]
-
-
-class Strings:
-    """Strings between the hub and the origins of bodies, at places and rates of shape (n, 3)."""
-
-    def __init__(self, held: HubNet, mesh: Mesh) -> None:
-        self.hub_mass, self._free = held.law.hub_mass, held.law.neutral_length
-        self._one_sided, self._mesh = not held.law.two_sided, mesh
-        self._bodies = np.array(held.bodies, dtype=np.int64)
-        law = at_section(held.law, np.arange(len(held.bodies)))
-        self._tape = taped([(law.tension, self._bodies.shape)], 2, 3)
-
-    def pull(self, ends: Array, rates: Array, hub: Array, hub_rate: Array, g: Array) -> None:
-        """Add what resists to the residual, whose last three unknowns are the hub's."""
-        own = self._tape, self._free, self._one_sided, self._mesh, self._bodies
-        pull_strings(*own, ends, rates, hub, hub_rate, g)
-
-    def passing(
-        self, ends: Array, rates: Array, hub: Array, hub_rate: Array
-    ) -> tuple[float, Array, Array, Array]:
-        """Energy stored (J), dissipating forces of the strings (N), their lengths (m) and rates of
-        these (m/s).
-        """
-        lengths, along, _, _ = stretched(ends, rates, hub, hub_rate)
-        _feel(self._tape, self._free, lengths, along, 0.0, 0.0)
-        rows = self._tape.rows
-        return float(rows[_STORED].sum()), rows[_DAMPING].copy(), lengths, along
-
-    def tangents(
-        self, ends: Array, rates: Array, hub: Array, hub_rate: Array, rate_by_place: float
-    ) -> Array | None:
-        """Derivatives of the forces after the bodies' places, (n, 3, 3), N/m; None while all are
-        slack.
-        """
-        own = self._tape, self._free, self._one_sided, rate_by_place
-        found: Array = string_tangents(*own, ends, rates, hub, hub_rate)
-        return found if len(found) else None
+    lengths, along, _, _ = stretched(ends, rates, hub, hub_rate)
+    _feel(web, lengths, along, 0.0, 0.0)
+    rows = web.tape.rows
+    return float(rows[_STORED].sum()), rows[_DAMPING].copy(), lengths, along

@@ -23,7 +23,7 @@ def momenta(model: FrameModel, state: State, *, craft: bool = True) -> Array:
     for (first, second), (mass, other) in zip(mesh.point, mesh.mass, strict=True):
         pushed[first] += mass * rate[first] + other * rate[second]
         pushed[second] += mass * rate[second] + other * rate[first]
-    if model.strings is not None:
+    if model.with_hub:
         place = np.vstack([place, state.place.hub])
-        pushed = np.vstack([pushed, model.strings.hub_mass * state.rate.hub])
+        pushed = np.vstack([pushed, model.web.hub_mass * state.rate.hub])
     return np.array([pushed.sum(axis=0), np.cross(place, pushed).sum(axis=0)])

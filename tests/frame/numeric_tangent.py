@@ -40,7 +40,7 @@ class Probe:
     def _moved(self, by: Array) -> State:
         state, unknowns = self._start.copy(), self.model.mesh.unknowns
         move(self.model.mesh, state.pose, by[:unknowns])
-        if self.model.strings is not None:
+        if self.model.with_hub:
             state.hub += by[-3:]
         return state
 
@@ -64,7 +64,7 @@ class Probe:
     def _on_top(self, base: State, by: Array) -> Array:
         state, unknowns = base.copy(), self.model.mesh.unknowns
         move(self.model.mesh, state.pose, by[:unknowns])
-        if self.model.strings is not None:
+        if self.model.with_hub:
             state.hub += by[-3:]
         elements = len(self.model.mesh.length)
         strains = Strains(state.strains, np.zeros((elements, 6)), 1.0 / self.step)
