@@ -149,13 +149,13 @@ def profile(name: str) -> None:
     spent: Counter[str] = Counter()
     calls: Counter[str] = Counter()
     rooms = {
-        model: ("balance", "begin_tangent", "add_slides", "add_strings"),
+        model: ("balance", "differentiate"),
         factored: ("factor", "solve", "solve_one", "dgetrf", "dgetrs"),
         cables: ("pull_cables", "add_cables", "pull_tight", "of_ropes", "factors_needed"),
-        net: ("pull_strings", "string_tangents", "stretched"),
-        laws: ("push_joints", "add_joint_slopes", "passing_joints"),
+        net: ("stretched",),
+        laws: ("passing_joints",),
         integrate: ("move", "moved_between", "straighten"),
-        meter: ("kinetic_energy",),
+        meter: ("energies_of",),
     }
     for room, names in rooms.items():
         for kernel in names:

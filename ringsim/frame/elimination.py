@@ -10,6 +10,7 @@ With the unknowns that go first, a front [A B; C D] becomes [. B; C A^-1 .] and 
 its own: what is left of triangular factors would be too small for whole registers.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +29,9 @@ _WIDE = 3 * EIGHT
 
 
 class Fronts(NamedTuple):
-    """Matrices, shape (n, most, most and some zeros), and inverses, (n, MOST_GONE, MOST_GONE)."""
+    """Matrices, shape (n, rows, columns), with zeros behind the last column, and inverses, shape
+    (n, MOST_GONE, MOST_GONE).
+    """
 
     whole: Array
     inverse: Array
@@ -37,7 +40,11 @@ class Fronts(NamedTuple):
     def empty(cls, mesh: Mesh) -> "Fronts":
         """Those of a mesh."""
         n, most = mesh.spots.shape
-        return cls(np.zeros((n, most, most + _WIDE)), np.zeros((n, MOST_GONE, MOST_GONE)))
+        # As far as whole eights, or what is read at a time, reach beyond the last column.
+        reach = mesh.gone + _WIDE * np.ceil((mesh.size - mesh.gone) / _WIDE).astype(int)
+        columns = max(most, MOST_GONE, int(reach.max()))
+        columns = EIGHT * math.ceil(columns / EIGHT)
+        return cls(np.zeros((n, most, columns)), np.zeros((n, MOST_GONE, MOST_GONE)))
 
 
 @compiled

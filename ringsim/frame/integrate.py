@@ -161,7 +161,7 @@ class Integration(Remembering):
                 g = model.residual(time, step, self._now, after, self._strains)
             except ValueError as error:
                 raise NoBalanceError(str(error)) from error
-            norm = float(np.sqrt(g @ g))
+            norm = math.sqrt(g @ g)
             if not math.isfinite(norm):
                 raise NoBalanceError("the state is not finite")
             if norm <= tolerance:

@@ -265,13 +265,18 @@ def begin_tangent(
 
 
 @compiled
-def kinetic_energy(mesh: Mesh, velocities: Array) -> float:
-    """Of rods and points, J; velocities of the points, shape (p, 3), m/s."""
-    found = 0.0
+def energies_of(mesh: Mesh, velocities: Array, strains: Array) -> tuple[float, float]:
+    """Kinetic energy of rods and points and elastic energy of rods, J; velocities of the points,
+    shape (p, 3), m/s.
+    """
+    kinetic = elastic = 0.0
     for e in range(len(mesh.mass)):
         v1, v2 = vector(velocities[mesh.point[e, 0]]), vector(velocities[mesh.point[e, 1]])
-        found += 0.5 * mesh.mass[e, 0] * (dot(v1, v1) + dot(v2, v2)) + mesh.mass[e, 1] * dot(v1, v2)
+        kinetic += 0.5 * mesh.mass[e, 0] * (dot(v1, v1) + dot(v2, v2))
+        kinetic += mesh.mass[e, 1] * dot(v1, v2)
+        for k in range(6):
+            elastic += 0.5 * mesh.stiffness[e, k] * strains[e, k] * strains[e, k]
     for p in range(len(mesh.point_mass)):
         v = vector(velocities[p])
-        found += 0.5 * mesh.point_mass[p] * dot(v, v)
-    return found
+        kinetic += 0.5 * mesh.point_mass[p] * dot(v, v)
+    return kinetic, elastic

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ringsim.cable.state import ChainState, work_between
-from ringsim.frame.kernels import Strains, kinetic_energy
+from ringsim.frame.kernels import Strains, energies_of
 from ringsim.frame.model import FrameModel
 from ringsim.frame.net import passing_strings
 from ringsim.frame.state import State
@@ -19,7 +19,7 @@ class EnergyMeter:
     """
 
     def __init__(self, model: FrameModel) -> None:
-        self._model = model
+        self._model, self._damped = model, bool(model.mesh.tau.any())
         self._kept: tuple[Passing, ChainState | None] | None = None
         self._last: tuple[Passing, ChainState | None] | None = None
 
@@ -31,9 +31,8 @@ class EnergyMeter:
         model, mesh = self._model, self._model.mesh
         pose = state.pose
         torques = model.laws.passing(pose.angle, state.rate.angles)
-        kinetic = kinetic_energy(mesh, state.rate.points)
-        elastic = 0.5 * float(np.sum(mesh.stiffness * state.strains**2)) + torques.stored
-        elastic += sum(slide.stored(pose) for slide in model.slides)
+        kinetic, elastic = energies_of(mesh, state.rate.points, state.strains)
+        elastic += torques.stored + sum(slide.stored(pose) for slide in model.slides)
         forces, places, rates = [torques.lost], [pose.angle], [state.rate.angles]
         if model.with_hub:
             stored, resisting, lengths, along = passing_strings(model.web, *state.net)
@@ -52,7 +51,7 @@ class EnergyMeter:
             forces.append(-hold.friction.ravel())
             places.append(state.place.hung.ravel())
             rates.append(state.rate.hung.ravel())
-        if mesh.tau.any():
+        if self._damped:
             straining = strains.lead * state.strains + strains.before
             forces.append((mesh.tau[:, None] * mesh.stiffness * straining).ravel())
             places.append(state.strains.ravel())

@@ -1,6 +1,7 @@
 """A scene in joint coordinates: residual and Newton's step at any state."""
 
 import math
+import sys
 
 import numpy as np
 
@@ -94,6 +95,7 @@ class FrameModel:
             forces.append(force)
         loaded = np.array(at, dtype=np.int64)
         self._loaded = loaded, pose.place[loaded], np.array(forces).reshape(-1, 3)
+        self._tau = float(mesh.tau.max())
         self._tolerance = residual_tolerance(scene, self.layout, 0.0)
         self._masses = mesh.point_mass.copy()
         np.add.at(self._masses, mesh.point, mesh.mass.sum(axis=1)[:, None])
@@ -152,10 +154,9 @@ class FrameModel:
         coordinates of order 1 m: of inertia, of the rods with their damping, of slides.
         """
         inertia = self._heaviest * self.coefficients.acceleration_by_place(step)
-        rods = self._stiffest * (1.0 + float(self.mesh.tau.max()) * strains.lead)
+        rods = self._stiffest * (1.0 + self._tau * strains.lead)
         slides = STIFFNESS * self._stiffest if self.slides else 0.0
-        small = 4.0 * float(np.finfo(float).eps)
-        reached = small * (math.sqrt(self.size) * (inertia + rods) + slides)
+        reached = 4.0 * sys.float_info.epsilon * (math.sqrt(self.size) * (inertia + rods) + slides)
         return max(self._tolerance, reached)
 
     def residual(

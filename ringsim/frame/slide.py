@@ -1,5 +1,6 @@
 """Bodies that slide along a boom: a stiff spring across it."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -34,7 +35,7 @@ class Slide:
 
     def size(self, pose: Pose) -> float:
         """Distance from the line, m."""
-        return float(np.linalg.norm(self.at(pose).sizes))
+        return math.hypot(*self.at(pose).sizes.tolist())
 
     def stored(self, pose: Pose) -> float:
         """Energy of the spring, J."""

@@ -116,7 +116,8 @@ def taped(laws: Sequence[tuple[Law, tuple[int, ...]]], inputs: int, results: int
     )  # fmt: skip
     for block, (*_, left, right) in zip(blocks, table, strict=True):
         rows[: len(block), left:right] = block
-    return Tape(np.array(code).reshape(-1, 5), np.array(table).reshape(-1, 4), rows)
+    operations = np.array(code, dtype=np.int64).reshape(-1, 5)
+    return Tape(operations, np.array(table, dtype=np.int64).reshape(-1, 4), rows)
 
 
 @compiled

@@ -122,9 +122,9 @@ class Locks(Remembering):
         if self._latches is not None:
             away |= self._latches.missing(self.deployed) & (angles <= high - _NEAR)
         folding = (rates < 0.0) & self._away & ~self.stowed & (angles > low)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            opening = np.where((rates > 0.0) & away, (high - angles) / rates, math.inf)
-            waiting = np.minimum(opening, np.where(folding, (low - angles) / rates, math.inf))
+        waiting, opening = np.full(rates.shape, math.inf), (rates > 0.0) & away
+        np.divide(high - angles, rates, out=waiting, where=opening)
+        np.divide(low - angles, rates, out=waiting, where=folding)
         first = np.unravel_index(int(np.argmin(waiting)), waiting.shape)
         resting = self.deployed & (angles > high - _NEAR)
         if self.stops:
