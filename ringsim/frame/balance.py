@@ -5,12 +5,13 @@ than to go through most of them.
 from typing import NamedTuple
 
 from ringsim.frame.following import Coefficients, Followed, follow
-from ringsim.frame.kernels import Pose, Strains, add_forces, begin_tangent, place_points
+from ringsim.frame.kernels import Pose, Strains, add_forces, place_points
 from ringsim.frame.laws import Acting, add_joint_slopes, push_joints
 from ringsim.frame.lines import Arms, Lines, place_lines
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.net import Web, add_strings, pull_strings
 from ringsim.frame.parts import Indices
+from ringsim.frame.rod_tangent import begin_tangent
 from ringsim.frame.slide import aside
 from ringsim.frame.vectors import compiled
 from ringsim.layout.pose import Array
@@ -23,7 +24,8 @@ strings and its hub, bodies that hang on lines."""
 class Held(NamedTuple):
     """Where followed coordinates begin, shape (7,); bodies at the ends of strings, and on lines;
     bodies with a boom and those that slide along it, with the stiffness that holds them (N/m);
-    linear friction of the angles, N m s/rad; whether there is gravity, and it, m/s^2.
+    linear friction of the angles, N m s/rad; whether there is gravity, and it, m/s^2; what elements
+    hold at the pose that was balanced last.
     """
 
     cuts: Indices
@@ -35,6 +37,7 @@ class Held(NamedTuple):
     damping: Array
     weighs: bool
     gravity: Array
+    loads: Array
 
 
 @compiled
@@ -69,7 +72,7 @@ def balance(
     follow(coefficients, step, start, now)
     cuts = held.cuts
     points = now.place[cuts[POINTS] : cuts[LINES]].reshape((-1, 3))
-    add_forces(mesh, pose, points, _inertial(held, now), strains, g)
+    add_forces(mesh, pose, points, _inertial(held, now), strains, held.loads, g)
     rates = now.rate[cuts[ANGLES] : cuts[ENDS]]
     for n in range(len(held.damping)):
         g[mesh.angle_home[n]] += held.damping[n] * rates[n]
@@ -109,16 +112,18 @@ def _strings(held: Held, now: Followed) -> tuple[Array, Array, Array, Array]:
 
 @compiled
 def differentiate(
-    mesh: Mesh, held: Held, joints: Acting, web: Web, pose: Pose, now: Followed, strains: Strains,
+    mesh: Mesh, held: Held, joints: Acting, web: Web, pose: Pose, now: Followed, lead: float,
     by_rate: float, by_place: float, strung: bool, fronts: Array, columns: Array, rows: Array,
     corner: Array,
 ) -> None:  # fmt: skip
     """Set the fronts, and the border's part of strings, if one pulls, to the derivative of
-    ``balance``; ``by_rate`` and ``by_place`` are those of rates and accelerations after places.
+    the last ``balance``; ``lead``, ``by_rate`` and ``by_place`` are those of rates of strains
+    after strains, and of rates and accelerations after places.
     """
     cuts = held.cuts
     points = now.place[cuts[POINTS] : cuts[LINES]].reshape((-1, 3))
-    begin_tangent(mesh, pose, points, _inertial(held, now), strains, by_place, fronts)
+    inertial = _inertial(held, now)
+    begin_tangent(mesh, pose, points, inertial, held.loads, lead, by_place, fronts)
     add_slides(mesh, held, pose, fronts)
     for n in range(len(held.damping)):
         front, spot = mesh.angle_local[n, 0], mesh.angle_local[n, 1]

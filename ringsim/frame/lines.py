@@ -14,7 +14,7 @@ import numpy as np
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.sheaves import BlockSheave, Sheave
 from ringsim.frame.chain import Spans
-from ringsim.frame.kernels import Pose
+from ringsim.frame.kernels import Pose, push
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.parts import Indices, Parts
 from ringsim.frame.skeleton import Skeleton
@@ -26,7 +26,6 @@ from ringsim.frame.vectors import (
     minus,
     mul,
     plus,
-    put,
     times,
     turn,
     turned_about_z,
@@ -160,8 +159,7 @@ def pull_spans(lines: Lines, mesh: Mesh, arms: Arms, spans: Spans, g: Array) -> 
             n = lines.near[s] + side
             pull = force if side == 1 else times(-1.0, force)
             k, angle = mesh.home[lines.frame[n]], lines.angle[n]
-            put(g[k : k + 3], pull)
-            put(g[k + 3 : k + 6], cross(vector(arms.whole[n]), pull))
+            push(g, k, pull, cross(vector(arms.whole[n]), pull))
             if angle >= 0:
                 turned = cross(vector(arms.swung[n]), pull)
                 g[mesh.angle_home[angle]] += dot(vector(arms.axis[n]), turned)

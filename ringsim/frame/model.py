@@ -122,6 +122,7 @@ class FrameModel:
             damping=self.laws.damping,
             weighs=self.layout.gravity is not None,
             gravity=self.gravity,
+            loads=np.zeros((len(mesh.length), 5, 3, 3)),
         )
         self._string_spots = mesh.home[self._held.ends][:, None] + np.arange(3)
         self._lines = no_lines() if self.cables is None else self.cables.lines
@@ -195,8 +196,8 @@ class FrameModel:
         hub_inertia = self.web.hub_mass * by_place if alone else math.nan
         border = Border.empty(mesh.unknowns, factors, strung, hub_inertia)
         differentiate(
-            mesh, self._held, self.laws.acting, self.web, now.pose, now.followed, strains, by_rate,
-            by_place, strung, fronts, border.columns, border.rows, border.corner,
+            mesh, self._held, self.laws.acting, self.web, now.pose, now.followed, strains.lead,
+            by_rate, by_place, strung, fronts, border.columns, border.rows, border.corner,
         )  # fmt: skip
         for own, slopes in self.laws.dry_slopes(now.rate.angles):
             front, spot = mesh.angle_local[own].T
@@ -239,7 +240,8 @@ class FrameModel:
         if any(rod.nodes for rod in self.layout.rods):
             held = Strains(state.strains, np.zeros_like(state.strains), 0.0)
             points, unloaded = state.place.points, np.zeros(self.mesh.unknowns)
-            add_forces(self.mesh, pose, points, np.zeros_like(points), held, unloaded)
+            still, loads = np.zeros_like(points), self._held.loads
+            add_forces(self.mesh, pose, points, still, held, loads, unloaded)
         # Accelerations of the points: differences of places along the motion.
         ahead, behind = state.copy(), state.copy()
         small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)
