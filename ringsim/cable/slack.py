@@ -20,6 +20,9 @@ _SLACKEST = -200.0
 """y / b below which the tension stays as it is: exp(-200) = 1e-87 is nothing beside any force, and
 its square and its inverse are still doubles."""
 
+_TAUT = 40.0
+"""y / b above which exp(-y / b) is lost in the round-off of y^2."""
+
 
 def tension(force: Array, width: Array) -> Array:
     """q(y) in N.
@@ -43,6 +46,8 @@ def energy(force: Array, width: Array) -> Array:
     -Li2(-exp z) = z^2 / 2 + pi^2 / 6 + Li2(-exp(-z)).
     """
     z = np.asarray(force / width, dtype=float)
+    if z.min() > _TAUT:
+        return np.asarray(width**2 * (0.5 * z**2 + np.pi**2 / 6.0))
     small = np.exp(-np.abs(z))
     kernel = np.log1p(small[..., None] * _NODES) / _NODES
     tail = np.asarray(kernel @ _WEIGHTS)

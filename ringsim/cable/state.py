@@ -71,7 +71,7 @@ class ChainState:
     def winch_tensions(self) -> Array:
         """Tension at both ends of each cable, in N, shape (cables, 2)."""
         edge = self.ropes.cable_starts
-        return np.stack([self.tensions[edge[:-1]], self.tensions[edge[1:] - 1]], axis=-1)
+        return np.array([self.tensions[edge[:-1]], self.tensions[edge[1:] - 1]]).T
 
     @property
     def point_forces(self) -> Array:
@@ -94,7 +94,8 @@ class ChainState:
     def held_beyond(self) -> Array:
         """Natural length from each pulley to its rope's far end, m, shape (pulleys,)."""
         rope = self.ropes.of_pulley
-        total = np.append(0.0, np.cumsum(self.lengths))
+        total = np.zeros(len(self.lengths) + 1)
+        np.cumsum(self.lengths, out=total[1:])
         beyond = total[self.ropes.ends[rope]] - total[self.ropes.behind]
         return np.asarray(beyond * (self.natural / self.paths)[rope])
 

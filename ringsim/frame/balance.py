@@ -24,8 +24,7 @@ strings and its hub, bodies that hang on lines."""
 class Held(NamedTuple):
     """Where followed coordinates begin, shape (7,); bodies at the ends of strings, and on lines;
     bodies with a boom and those that slide along it, with the stiffness that holds them (N/m);
-    linear friction of the angles, N m s/rad; whether there is gravity, and it, m/s^2; what elements
-    hold at the pose that was balanced last.
+    linear friction of the angles, N m s/rad; whether there is gravity, and it, m/s^2.
     """
 
     cuts: Indices
@@ -37,7 +36,6 @@ class Held(NamedTuple):
     damping: Array
     weighs: bool
     gravity: Array
-    loads: Array
 
 
 @compiled
@@ -63,16 +61,17 @@ def put_in_place(
 def balance(
     mesh: Mesh, lines: Lines, held: Held, joints: Acting, web: Web, coefficients: Coefficients,
     step: float, start: Followed, pose: Pose, hub: Array, arms: Arms, now: Followed,
-    strains: Strains, g: Array,
+    strains: Strains, loads: Array, g: Array,
 ) -> bool:  # fmt: skip
     """Follow a pose over a step, and add forces of rods, masses, slides, joints and strings to the
-    residual, shape (all unknowns,); returns whether a string pulls.
+    residual, shape (all unknowns,); returns whether a string pulls.  ``loads`` keep what elements
+    hold.
     """
     put_in_place(mesh, lines, held, pose, hub, arms, now.place)
     follow(coefficients, step, start, now)
     cuts = held.cuts
     points = now.place[cuts[POINTS] : cuts[LINES]].reshape((-1, 3))
-    add_forces(mesh, pose, points, _inertial(held, now), strains, held.loads, g)
+    add_forces(mesh, pose, points, _inertial(held, now), strains, loads, g)
     rates = now.rate[cuts[ANGLES] : cuts[ENDS]]
     for n in range(len(held.damping)):
         g[mesh.angle_home[n]] += held.damping[n] * rates[n]
@@ -112,8 +111,8 @@ def _strings(held: Held, now: Followed) -> tuple[Array, Array, Array, Array]:
 
 @compiled
 def differentiate(
-    mesh: Mesh, held: Held, joints: Acting, web: Web, pose: Pose, now: Followed, lead: float,
-    by_rate: float, by_place: float, strung: bool, fronts: Array, columns: Array, rows: Array,
+    mesh: Mesh, held: Held, joints: Acting, web: Web, pose: Pose, now: Followed, loads: Array,
+    lead: float, by_rate: float, by_place: float, strung: bool, fronts: Array, columns: Array, rows: Array,
     corner: Array,
 ) -> None:  # fmt: skip
     """Set the fronts, and the border's part of strings, if one pulls, to the derivative of
@@ -123,7 +122,7 @@ def differentiate(
     cuts = held.cuts
     points = now.place[cuts[POINTS] : cuts[LINES]].reshape((-1, 3))
     inertial = _inertial(held, now)
-    begin_tangent(mesh, pose, points, inertial, held.loads, lead, by_place, fronts)
+    begin_tangent(mesh, pose, points, inertial, loads, lead, by_place, fronts)
     add_slides(mesh, held, pose, fronts)
     for n in range(len(held.damping)):
         front, spot = mesh.angle_local[n, 0], mesh.angle_local[n, 1]

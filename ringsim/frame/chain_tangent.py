@@ -17,7 +17,7 @@ than 0.9999 of the friction acts, and the rope's speed no longer changes it."""
 def _turns(table: RopeTable, slopes: Array, span: int) -> bool:
     """Whether the friction of the pulley before a span changes with speed."""
     j = table.pulley[span]
-    return j >= 0 and slopes[j] * table.slip_speed[j] > PASSING
+    return bool(j >= 0 and slopes[j] * table.slip_speed[j] > PASSING)
 
 
 @compiled

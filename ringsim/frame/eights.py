@@ -7,9 +7,7 @@ of their time goes to what is left beside whole registers.
 
 from typing import TypeAlias
 
-import numpy as np
-
-from ringsim.frame.vectors import compiled
+from ringsim.frame.vectors import compiled, unsigned
 from ringsim.layout.pose import Array
 
 EIGHT = 8
@@ -20,21 +18,20 @@ NONE: Eight = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 @compiled
 def load(row: Array, first: int) -> Eight:
     """Eight numbers of a row."""
-    # Unsigned: numba would ask each signed place whether it counts from the end.
-    k = np.uintp(first)
+    k = unsigned(first)
     return (
-        row[k], row[k + np.uintp(1)], row[k + np.uintp(2)], row[k + np.uintp(3)],
-        row[k + np.uintp(4)], row[k + np.uintp(5)], row[k + np.uintp(6)], row[k + np.uintp(7)],
+        row[k], row[k + unsigned(1)], row[k + unsigned(2)], row[k + unsigned(3)],
+        row[k + unsigned(4)], row[k + unsigned(5)], row[k + unsigned(6)], row[k + unsigned(7)],
     )  # fmt: skip
 
 
 @compiled
 def store(row: Array, first: int, x: Eight) -> None:
     """Put eight numbers into a row."""
-    k = np.uintp(first)
-    row[k], row[k + np.uintp(1)], row[k + np.uintp(2)] = x[0], x[1], x[2]
-    row[k + np.uintp(3)], row[k + np.uintp(4)], row[k + np.uintp(5)] = x[3], x[4], x[5]
-    row[k + np.uintp(6)], row[k + np.uintp(7)] = x[6], x[7]
+    k = unsigned(first)
+    row[k], row[k + unsigned(1)], row[k + unsigned(2)] = x[0], x[1], x[2]
+    row[k + unsigned(3)], row[k + unsigned(4)], row[k + unsigned(5)] = x[3], x[4], x[5]
+    row[k + unsigned(6)], row[k + unsigned(7)] = x[6], x[7]
 
 
 @compiled
@@ -73,6 +70,6 @@ def total(x: Eight) -> float:
 def dot(row: Array, first: int, y: Array, n: int) -> float:
     """Of n numbers of a row with those of y, which has zeros behind them up to whole eights."""
     found = NONE
-    for k in range(np.uintp(0), np.uintp(n), np.uintp(EIGHT)):
-        found = less(found, -1.0, product(load(row, np.uintp(first) + k), load(y, k)))
+    for k in range(unsigned(0), unsigned(n), unsigned(EIGHT)):
+        found = less(found, -1.0, product(load(row, unsigned(first) + k), load(y, k)))
     return total(found)

@@ -18,7 +18,7 @@ import numpy as np
 from ringsim.frame.eights import EIGHT, NONE, dot, less, load, product, size_of, store, total
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.parts import MOST_GONE, Indices
-from ringsim.frame.vectors import compiled
+from ringsim.frame.vectors import compiled, unsigned
 from ringsim.layout.pose import Array
 
 LEAST_PIVOT = 1e-9
@@ -54,7 +54,7 @@ def factor(mesh: Mesh, fronts: Fronts) -> bool:
     others = 1.0 - units
     for number in range(len(mesh.gone)):
         a, inverse = fronts.whole[number], fronts.inverse[number]
-        gone, size = np.uintp(mesh.gone[number]), np.uintp(mesh.size[number])
+        gone, size = unsigned(mesh.gone[number]), unsigned(mesh.size[number])
         for spot in mesh.fixed:
             for k in range(gone):
                 if mesh.spots[number, k] == spot:
@@ -79,14 +79,14 @@ def _invert(
         store(out[i], EIGHT, load(a[i], EIGHT))
     for k in range(gone):
         sums = NONE
-        for j in range(np.uintp(0), size, np.uintp(EIGHT)):
+        for j in range(unsigned(0), size, unsigned(EIGHT)):
             sums = less(sums, -1.0, size_of(load(a[k], j)))
         pivot = out[k, k]
         sound &= abs(pivot) > LEAST_PIVOT * total(sums)
         for i in range(gone):
             column[i] = out[i, k]
         column[k] = 0.0
-        for first in range(np.uintp(0), np.uintp(MOST_GONE), np.uintp(EIGHT)):
+        for first in range(unsigned(0), unsigned(MOST_GONE), unsigned(EIGHT)):
             # No single number is put into a row: loading all eight would wait for it.
             other, unit = load(others[k], first), load(units[k], first)
             own = less(unit, -1.0, product(load(out[k], first), other))
@@ -111,22 +111,22 @@ def _reduce(
             high = less(high, -row[k], load(inverse[k], EIGHT))
         store(share, 0, low)
         store(share, EIGHT, high)
-        for first in range(gone, size, np.uintp(_WIDE)):
-            x, y = load(row, first), load(row, first + np.uintp(EIGHT))
-            z = load(row, first + np.uintp(2 * EIGHT))
-            if size - first > np.uintp(2 * EIGHT):
+        for first in range(gone, size, unsigned(_WIDE)):
+            x, y = load(row, first), load(row, first + unsigned(EIGHT))
+            z = load(row, first + unsigned(2 * EIGHT))
+            if size - first > unsigned(2 * EIGHT):
                 for k in range(gone):
                     x = less(x, share[k], load(a[k], first))
-                    y = less(y, share[k], load(a[k], first + np.uintp(EIGHT)))
-                    z = less(z, share[k], load(a[k], first + np.uintp(2 * EIGHT)))
+                    y = less(y, share[k], load(a[k], first + unsigned(EIGHT)))
+                    z = less(z, share[k], load(a[k], first + unsigned(2 * EIGHT)))
             else:
                 for k in range(gone):
                     x = less(x, share[k], load(a[k], first))
-                    y = less(y, share[k], load(a[k], first + np.uintp(EIGHT)))
+                    y = less(y, share[k], load(a[k], first + unsigned(EIGHT)))
             store(left, 0, x)
             store(left, EIGHT, y)
             store(left, 2 * EIGHT, z)
-            for j in range(min(size - first, np.uintp(_WIDE))):
+            for j in range(min(size - first, unsigned(_WIDE))):
                 to[up[first + j]] += left[j]
         store(row, 0, low)
         store(row, EIGHT, high)
@@ -139,17 +139,17 @@ def solve(mesh: Mesh, fronts: Fronts, x: Array) -> None:
     """
     most = fronts.whole.shape[1]
     b, known = np.zeros((most, EIGHT)), np.zeros((MOST_GONE, EIGHT))
-    one, eight = np.uintp(1), np.uintp(EIGHT)
-    for column in range(np.uintp(0), np.uintp(x.shape[1]), eight):
+    one, eight = unsigned(1), unsigned(EIGHT)
+    for column in range(unsigned(0), unsigned(x.shape[1]), eight):
         for number in range(len(mesh.gone)):
             a, spots = fronts.whole[number], mesh.spots[number]
-            gone, size = np.uintp(mesh.gone[number]), np.uintp(mesh.size[number])
+            gone, size = unsigned(mesh.gone[number]), unsigned(mesh.size[number])
             for spot in mesh.fixed:
                 store(x[spot], column, NONE)
             for k in range(gone):
                 store(b[k], 0, load(x[spots[k]], column))
             # Two rows at once: a sum waits for the one before.  An odd last row is its own twin.
-            for i in range(gone, size, np.uintp(2)):
+            for i in range(gone, size, unsigned(2)):
                 twin = min(i + one, size - one)
                 p, q = load(x[spots[i]], column), load(x[spots[twin]], column)
                 for k in range(gone):
@@ -159,10 +159,10 @@ def solve(mesh: Mesh, fronts: Fronts, x: Array) -> None:
                 store(x[spots[twin]], column, q)
         for number in range(len(mesh.gone) - 1, -1, -1):
             a, spots, inverse = fronts.whole[number], mesh.spots[number], fronts.inverse[number]
-            gone, size = np.uintp(mesh.gone[number]), np.uintp(mesh.size[number])
+            gone, size = unsigned(mesh.gone[number]), unsigned(mesh.size[number])
             for k in range(size):
                 store(b[k], 0, load(x[spots[k]], column))
-            for i in range(np.uintp(0), gone, np.uintp(2)):
+            for i in range(unsigned(0), gone, unsigned(2)):
                 twin = min(i + one, gone - one)
                 p, q = load(b[i], 0), load(b[twin], 0)
                 for k in range(gone, size):
@@ -170,7 +170,7 @@ def solve(mesh: Mesh, fronts: Fronts, x: Array) -> None:
                     p, q = less(p, a[i, k], y), less(q, a[twin, k], y)
                 store(known[i], 0, p)
                 store(known[twin], 0, q)
-            for i in range(np.uintp(0), gone, np.uintp(2)):
+            for i in range(unsigned(0), gone, unsigned(2)):
                 twin = min(i + one, gone - one)
                 p, q = NONE, NONE
                 for k in range(gone):
@@ -187,7 +187,7 @@ def solve_one(mesh: Mesh, fronts: Fronts, x: Array) -> None:
     b, known = np.zeros(most + EIGHT), np.zeros(MOST_GONE)
     for number in range(len(mesh.gone)):
         a, spots = fronts.whole[number], mesh.spots[number]
-        gone, size = np.uintp(mesh.gone[number]), np.uintp(mesh.size[number])
+        gone, size = unsigned(mesh.gone[number]), unsigned(mesh.size[number])
         for spot in mesh.fixed:
             x[spot] = 0.0
         known[:] = 0.0
@@ -197,10 +197,10 @@ def solve_one(mesh: Mesh, fronts: Fronts, x: Array) -> None:
             x[spots[i]] -= dot(a[i], 0, known, gone)
     for number in range(len(mesh.gone) - 1, -1, -1):
         a, spots, inverse = fronts.whole[number], mesh.spots[number], fronts.inverse[number]
-        gone, size = np.uintp(mesh.gone[number]), np.uintp(mesh.size[number])
+        gone, size = unsigned(mesh.gone[number]), unsigned(mesh.size[number])
         for k in range(gone, size):
             b[k - gone] = x[spots[k]]
-        b[size - gone : size - gone + np.uintp(EIGHT)] = 0.0
+        b[size - gone : size - gone + unsigned(EIGHT)] = 0.0
         known[gone:] = 0.0
         for i in range(gone):
             known[i] = x[spots[i]] - dot(a[i], gone, b, size - gone)

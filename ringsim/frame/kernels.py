@@ -3,8 +3,6 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from ringsim.frame.element import carried, middle, scaled
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.vectors import (
@@ -26,6 +24,7 @@ from ringsim.frame.vectors import (
     transposed,
     turn,
     turned,
+    unsigned,
     vector,
 )
 from ringsim.layout.pose import Array
@@ -87,14 +86,13 @@ def straighten(pose: Pose) -> None:
 @compiled
 def push(g: Array, first: int, force: Vector, moment: Vector) -> None:
     """Add a force and a moment to the unknowns of a frame."""
-    # Unsigned: numba would ask each signed place whether it counts from the end.
-    k = np.uintp(first)
+    k = unsigned(first)
     g[k] += force[0]
-    g[k + np.uintp(1)] += force[1]
-    g[k + np.uintp(2)] += force[2]
-    g[k + np.uintp(3)] += moment[0]
-    g[k + np.uintp(4)] += moment[1]
-    g[k + np.uintp(5)] += moment[2]
+    g[k + unsigned(1)] += force[1]
+    g[k + unsigned(2)] += force[2]
+    g[k + unsigned(3)] += moment[0]
+    g[k + unsigned(4)] += moment[1]
+    g[k + unsigned(5)] += moment[2]
 
 
 @compiled
@@ -159,7 +157,9 @@ def pulls_of(
 
 
 @compiled
-def held_by(loads: Array, e: int) -> tuple[Matrix, Matrix, Matrix, Vector, ...]:
+def held_by(
+    loads: Array, e: int
+) -> tuple[Matrix, Matrix, Matrix, Vector, Vector, Vector, Vector, Vector, Vector]:
     """What ``add_forces`` has kept of an element: ``_loaded``."""
     low, high = loads[e, 3], loads[e, 4]
     return (

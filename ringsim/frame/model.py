@@ -122,8 +122,8 @@ class FrameModel:
             damping=self.laws.damping,
             weighs=self.layout.gravity is not None,
             gravity=self.gravity,
-            loads=np.zeros((len(mesh.length), 5, 3, 3)),
         )
+        self._loads = np.zeros((len(mesh.length), 5, 3, 3))
         self._string_spots = mesh.home[self._held.ends][:, None] + np.arange(3)
         self._lines = no_lines() if self.cables is None else self.cables.lines
         self._arms = Arms.empty(lines)
@@ -136,7 +136,7 @@ class FrameModel:
     def work(self, state: State) -> float:
         """Of loads and gravity since the start, J."""
         at, start, forces = self._loaded
-        done = float(np.sum(forces * (state.pose.place[at] - start)))
+        done = float(np.vdot(forces, state.pose.place[at] - start))
         if self._held.weighs:
             moved = self._masses @ (state.place.points - self._begun)
             if self.with_hub:
@@ -170,7 +170,8 @@ class FrameModel:
         inner = g[: self.mesh.unknowns]
         self._strung = balance(
             self.mesh, self._lines, self._held, self.laws.acting, self.web, self.coefficients,
-            step, start.followed, now.pose, now.hub, self._arms, now.followed, strains, g,
+            step, start.followed, now.pose, now.hub, self._arms, now.followed, strains,
+            self._loads, g,
         )  # fmt: skip
         self.laws.note(now.rate.angles)
         for slide in self._beam_slides:
@@ -196,8 +197,8 @@ class FrameModel:
         hub_inertia = self.web.hub_mass * by_place if alone else math.nan
         border = Border.empty(mesh.unknowns, factors, strung, hub_inertia)
         differentiate(
-            mesh, self._held, self.laws.acting, self.web, now.pose, now.followed, strains.lead,
-            by_rate, by_place, strung, fronts, border.columns, border.rows, border.corner,
+            mesh, self._held, self.laws.acting, self.web, now.pose, now.followed, self._loads,
+            strains.lead, by_rate, by_place, strung, fronts, border.columns, border.rows, border.corner,
         )  # fmt: skip
         for own, slopes in self.laws.dry_slopes(now.rate.angles):
             front, spot = mesh.angle_local[own].T
@@ -240,8 +241,8 @@ class FrameModel:
         if any(rod.nodes for rod in self.layout.rods):
             held = Strains(state.strains, np.zeros_like(state.strains), 0.0)
             points, unloaded = state.place.points, np.zeros(self.mesh.unknowns)
-            still, loads = np.zeros_like(points), self._held.loads
-            add_forces(self.mesh, pose, points, still, held, loads, unloaded)
+            still = np.zeros_like(points)
+            add_forces(self.mesh, pose, points, still, held, self._loads, unloaded)
         # Accelerations of the points: differences of places along the motion.
         ahead, behind = state.copy(), state.copy()
         small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)

@@ -7,7 +7,7 @@ from ringsim.frame.eights import store as eight
 from ringsim.frame.element import element_tangent
 from ringsim.frame.kernels import Pose, held_by, pulls_of
 from ringsim.frame.mesh import Mesh
-from ringsim.frame.vectors import compiled, cross, dot, minus, times, vector
+from ringsim.frame.vectors import compiled, cross, dot, minus, times, unsigned, vector
 from ringsim.layout.pose import Array
 
 
@@ -64,15 +64,15 @@ def begin_tangent(
             a = minus(vector(points[mesh.point[e, side]]), vector(pose.place[mesh.frame[e, side]]))
             z = (end[2], end[5], end[8])
             for c in range(0, 2 * EIGHT, EIGHT):
-                force = load(rows[x], c), load(rows[x + 1], c), load(rows[x + 2], c)
-                torque = load(rows[phi], c), load(rows[phi + 1], c), load(rows[phi + 2], c)
-                for i in range(3):
-                    eight(h[own + i], c, force[i])
-                eight(h[own + 3], c, less(less(torque[0], a[2], force[1]), -a[1], force[2]))
-                eight(h[own + 4], c, less(less(torque[1], a[0], force[2]), -a[2], force[0]))
-                eight(h[own + 5], c, less(less(torque[2], a[1], force[0]), -a[0], force[1]))
-                turning = less(less(NONE, -z[0], torque[0]), -z[1], torque[1])
-                eight(h[own + 6], c, less(turning, -z[2], torque[2]))
+                fx, fy, fz = load(rows[x], c), load(rows[x + 1], c), load(rows[x + 2], c)
+                mx, my, mz = load(rows[phi], c), load(rows[phi + 1], c), load(rows[phi + 2], c)
+                eight(h[own], c, fx)
+                eight(h[own + 1], c, fy)
+                eight(h[own + 2], c, fz)
+                eight(h[own + 3], c, less(less(mx, a[2], fy), -a[1], fz))
+                eight(h[own + 4], c, less(less(my, a[0], fz), -a[2], fx))
+                eight(h[own + 5], c, less(less(mz, a[1], fx), -a[0], fy))
+                eight(h[own + 6], c, less(less(less(NONE, -z[0], mx), -z[1], my), -z[2], mz))
             # The arm and the joint's axis turn with the frame under constant force and moment:
             # (d phi x a) x f = (a f^T - (f . a)) d phi, (d phi x z) . m = (z x m) . d phi.
             along, sideways = dot(f, a), cross(z, moment)
@@ -86,9 +86,9 @@ def begin_tangent(
             if mesh.local[e, i] >= 0:
                 row = front[mesh.local[e, i]]
                 for side in range(2):
-                    first, own = np.uintp(mesh.local[e, 7 * side]), np.uintp(7 * side)
-                    for j in range(np.uintp(6)):
-                        row[first + j] += h[i, own + j]
+                    first, begun = unsigned(mesh.local[e, 7 * side]), unsigned(7 * side)
+                    for j in range(unsigned(6)):
+                        row[first + j] += h[i, begun + j]
                     if mesh.local[e, 7 * side + 6] >= 0:
                         row[mesh.local[e, 7 * side + 6]] += h[i, 7 * side + 6]
     # Points with mass of their own: those of frames in parts have no arm.

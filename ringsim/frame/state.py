@@ -27,9 +27,11 @@ class Groups(NamedTuple):
     @classmethod
     def of(cls, values: Array, held: Held) -> "Groups":
         """Views of followed coordinates."""
-        cuts = held.cuts.tolist()
-        own = [values[first:last] for first, last in pairwise(cuts)]
-        return cls(*(each if n == 2 else each.reshape(-1, 3) for n, each in enumerate(own)))
+        points, lines, angles, *rest = [
+            values[first:last] for first, last in pairwise(held.cuts.tolist())
+        ]
+        ends, hub, hung = (each.reshape(-1, 3) for each in rest)
+        return cls(points.reshape(-1, 3), lines.reshape(-1, 3), angles, ends, hub, hung)
 
 
 class State:
@@ -44,8 +46,12 @@ class State:
         self._held = held
         self.place = Groups.of(followed.place, held)
         self.rate = Groups.of(followed.rate, held)
-        self.acceleration = Groups.of(followed.acceleration, held)
         self.chain: ChainState | None = None
+
+    @property
+    def acceleration(self) -> Groups:
+        """As ``place``."""
+        return Groups.of(self.followed.acceleration, self._held)
 
     @property
     def net(self) -> tuple[Array, Array, Array, Array]:

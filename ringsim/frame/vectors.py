@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, TypeAlias, TypeVar, cast
 
+import numpy as np
 from numba import njit
 
 from ringsim.layout.pose import Array
@@ -26,6 +27,14 @@ def compiled(function: _Function) -> _Function:
     has loaded need not round alike, and samples would depend on who ran them.
     """
     return cast(_Function, njit(cache=True, error_model="numpy")(function))
+
+
+@compiled
+def unsigned(k: Any) -> Any:
+    """A place or a count without sign: of others numba asks each time whether they count from the
+    end, which keeps neighbouring numbers out of one register.
+    """
+    return np.uintp(k)
 
 
 @compiled

@@ -90,9 +90,13 @@ class Rod:
         """Of its elements where nothing strains them, m."""
         return self.lengths * (1.0 + self.strain)
 
+    @cached_property
+    def _drawn(self) -> tuple[Pose, ...]:
+        return tuple(self.station(share) for share in self.stations)
+
     def node(self, station: int) -> Pose:
         """The pose of a station by its number."""
-        return self.nodes[station] if self.nodes else self.station(self.stations[station])
+        return (self.nodes or self._drawn)[station]
 
     def station(self, share: float) -> Pose:
         """The pose at a share of the length."""

@@ -1,6 +1,7 @@
 """Tensions of the cables' spans."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -42,11 +43,11 @@ class CableTension(Output):
         """Shape (planes, spans), N; NaN where a plane has no cable or one of fewer spans."""
         if now.chain is None:
             return None
-        edges = now.chain.ropes.cable_starts
-        found = np.full((len(now.angles), int(np.diff(edges).max())), np.nan)
-        for number, planes in enumerate(now.planes):
-            own = now.chain.tensions[edges[number] : edges[number + 1]]
-            found[list(planes), : len(own)] = own
+        edges = now.chain.ropes.cable_starts.tolist()
+        found = np.full((len(now.angles), max(b - a for a, b in pairwise(edges))), np.nan)
+        for planes, (first, last) in zip(now.planes, pairwise(edges), strict=True):
+            for plane in planes:
+                found[plane, : last - first] = now.chain.tensions[first:last]
         return found
 
     def reduce(self, run: Run, series: Series) -> Values:

@@ -125,14 +125,14 @@ class Locks(Remembering):
         waiting, opening = np.full(rates.shape, math.inf), (rates > 0.0) & away
         np.divide(high - angles, rates, out=waiting, where=opening)
         np.divide(low - angles, rates, out=waiting, where=folding)
-        first = np.unravel_index(int(np.argmin(waiting)), waiting.shape)
+        first = int(waiting.argmin())
         resting = self.deployed & (angles > high - _NEAR)
         if self.stops:
             resting |= (self.stowed & (angles < low + _NEAR)) | (angles < low)
         return StopContact(
-            time_to_next=float(waiting[first]),
-            rate_of_next=float(abs(rates[first])),
-            resting_rate=float(np.max(np.abs(rates), where=resting, initial=0.0)),
+            time_to_next=float(waiting.flat[first]),
+            rate_of_next=abs(float(rates.flat[first])),
+            resting_rate=float(np.abs(rates[resting]).max()) if resting.any() else 0.0,
         )
 
 
