@@ -112,8 +112,8 @@ def _strings(held: Held, now: Followed) -> tuple[Array, Array, Array, Array]:
 @compiled
 def differentiate(
     mesh: Mesh, held: Held, joints: Acting, web: Web, pose: Pose, now: Followed, loads: Array,
-    lead: float, by_rate: float, by_place: float, strung: bool, fronts: Array, columns: Array, rows: Array,
-    corner: Array,
+    lead: float, by_rate: float, by_place: float, strung: bool, fronts: Array, columns: Array,
+    rows: Array, corner: Array,
 ) -> None:  # fmt: skip
     """Set the fronts, and the border's part of strings, if one pulls, to the derivative of
     the last ``balance``; ``lead``, ``by_rate`` and ``by_place`` are those of rates of strains

@@ -198,7 +198,8 @@ class FrameModel:
         border = Border.empty(mesh.unknowns, factors, strung, hub_inertia)
         differentiate(
             mesh, self._held, self.laws.acting, self.web, now.pose, now.followed, self._loads,
-            strains.lead, by_rate, by_place, strung, fronts, border.columns, border.rows, border.corner,
+            strains.lead, by_rate, by_place, strung, fronts, border.columns, border.rows,
+            border.corner,
         )  # fmt: skip
         for own, slopes in self.laws.dry_slopes(now.rate.angles):
             front, spot = mesh.angle_local[own].T
