@@ -32,6 +32,7 @@ def choose_folder() -> Path:
     if given := os.environ.get(VARIABLE):
         return Path(given)
     made = f"ringsim-{_sources()}-numba-{version('numba')}-{_processor()}"
+    made += "" if packs() else "-unpacked"
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     folder = Path(cache) / "ringsim" / made
     if not _usable(folder):
@@ -46,12 +47,11 @@ def choose_folder() -> Path:
     return folder
 
 
-def pack_numbers() -> None:
-    """Switch on the pass that packs neighbouring numbers into registers (``ringsim.frame.eights``),
-    which numba leaves out unless told; it changes no result.
+def packs() -> bool:
+    """Whether rows of fronts are packed into registers (``ringsim.frame.vectors.packed``): unless
+    NUMBA_SLP_VECTORIZE is 0.
     """
-    if os.environ.setdefault(PACKING, "1") != "0" and "numba" in sys.modules:
-        sys.modules["numba"].config.SLP_VECTORIZE = 1
+    return os.environ.get(PACKING) != "0"
 
 
 def compile_once(kind: Hashable, compiling: Callable[[], object]) -> None:
@@ -61,7 +61,7 @@ def compile_once(kind: Hashable, compiling: Callable[[], object]) -> None:
     to which numba ties its files; its ``repr`` is that of its content.
     """
     folder = choose_folder()
-    made = repr((version("numba"), sys.version, _sources(), str(SOURCES), kind)).encode()
+    made = repr((version("numba"), sys.version, _sources(), str(SOURCES), packs(), kind)).encode()
     mark = folder / f"compiled-{hashlib.blake2b(made, digest_size=12).hexdigest()}"
     if mark.exists():
         return

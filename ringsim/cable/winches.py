@@ -153,10 +153,15 @@ class Winches:
         self._ahead: dict[tuple[int, int], float] = {}
         self._ropes: dict[int, _Rope] = {}
 
-    def asks_slope(self, number: int) -> bool:
-        """Whether a winch of a cable asks how its ideal path changes with the opening angle."""
-        own = (winch for (cable, _), winch in self._winches.items() if cable == number)
-        return any(isinstance(winch.winding, FeedbackWinding) for winch in own)
+    def path_slopes(self, slope: Callable[[int], float]) -> Array:
+        """Derivatives of the cables' ideal paths after the opening angle, m/rad, shape (cables,),
+        by a function of the cable's number; 0 where no winch asks for it.
+        """
+        asking = {
+            n for (n, _), w in self._winches.items() if isinstance(w.winding, FeedbackWinding)
+        }
+        found = [slope(n) if n in asking else 0.0 for n in range(len(self._held))]
+        return np.array(found)
 
     @property
     def answering(self) -> bool:
@@ -250,8 +255,7 @@ class Winches:
     def advance(self, time: float, state: ChainState, slopes: Array) -> None:
         """Begin a step at ``time`` (s) in a state of the chain.
 
-        ``slopes`` are the derivatives of the cables' ideal paths after the opening angle, m/rad,
-        where ``asks_slope``.
+        ``slopes`` are those of ``path_slopes``.
         """
         self._start, self._held, self._ropes = time, state.wound, {}
         for place, winch in self._winches.items():

@@ -155,10 +155,13 @@ class Integration:
             solver.it.currentStepSize = control.next_step(self._built.faults.next_time)
             self._fresh = False
             if cables is not None and self._chain is not None:
-                now, slopes = control.now, np.zeros(len(cables.present))
-                for number, (plane, cable) in enumerate(cables.present):
-                    if cables.winches.asks_slope(number):
-                        slopes[number] = self._scene.structure.path_slope(cable, now.angles[plane])
+                now, slope, present = control.now, self._scene.structure.path_slope, cables.present
+
+                def slope_of(number: int) -> float:
+                    plane, cable = present[number]
+                    return slope(cable, now.angles[plane])
+
+                slopes = cables.winches.path_slopes(slope_of)
                 cables.advance(now.time, self._chain, slopes)
         else:
             solver.it.currentStepSize = control.retry(solver.it.currentStepSize)

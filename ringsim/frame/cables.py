@@ -26,7 +26,7 @@ from ringsim.frame.mesh import Mesh
 from ringsim.frame.parts import Parts
 from ringsim.frame.pulling import add_cables, pull_cables
 from ringsim.frame.skeleton import Skeleton
-from ringsim.frame.tape import taped
+from ringsim.frame.tape import Tape, taped
 from ringsim.layout.pose import Array
 from ringsim.stepping.turning import Turning
 
@@ -61,11 +61,17 @@ class FrameCables:
         self._turned_at, self._turned = math.nan, _Turned(*np.zeros((2, len(own), 2)))
         self._drums = Drums(*np.zeros((3, 0)))
         self._turning = Turning()
-        own_laws = zip(own, self._chain.pulleys, strict=True)
-        laws = [(c.friction, c.pulley_radius, (n.stop - n.start,)) for c, n in own_laws]
-        self._decays = taped([(lambda a, f=f, r=r: f.log_decay(a, r), n) for f, r, n in laws], 1, 1)
-        self._slopes = taped([(lambda a, f=f, r=r: f.log_slope(a, r), n) for f, r, n in laws], 1, 1)
+        self._decays, self._log_slopes = self._taped("log_decay"), self._taped("log_slope")
+        self._left, self._slopes = np.ones(0), np.ones(0)
         self._retable()
+
+    def _taped(self, name: str) -> Tape:
+        """A law of the pulleys' friction, over the angles of all cables."""
+        laws = []
+        for cable, own in zip(self._chain.cables, self._chain.pulleys, strict=True):
+            law = partial(getattr(cable.friction, name), radius=cable.pulley_radius)
+            laws.append((law, (own.stop - own.start,), cable.friction))
+        return taped(laws, 1, 1)
 
     def state(self, time: float, places: Array, rates: Array) -> ChainState:
         """The chain at places and rates of all points; ValueError if it has no answer."""
@@ -179,18 +185,24 @@ class FrameCables:
             self._left = self.winches.stiffness_left(time, self.ropes, path, path_rate)
         own = (1.0 - spans.exponent**2) / slip
         turning = self._turning
-        self._felt = turning.slopes(self.ropes, spans.speed, own, lambda s: np.tanh(s / slip))
-        return factors_needed(self._table, self._felt)
+        self._slopes = turning.slopes(self.ropes, spans.speed, own, lambda s: np.tanh(s / slip))
+        return factors_needed(self._table, self._slopes)
 
     def add_tangent(
-        self, arms: Arms, rates: Array, by_place: float, count: int, fronts: Array, border: Border
+        self,
+        arms: Arms,
+        rates: Array,
+        rate_by_place: float,
+        count: int,
+        fronts: Array,
+        border: Border,
     ) -> None:
         """Add to the fronts and, for each of so many factors, to the last columns and rows of a
-        border; ``by_place`` is the derivative of the points' rates after their places, 1/s.
+        border; ``rate_by_place`` is the derivative of the points' rates after places, 1/s.
         """
         add_cables(
-            self.lines, self._mesh, arms, self._table, self._drums, self._decays, self._slopes,
-            self._felt, self._spans, rates, self._left, by_place,
+            self.lines, self._mesh, arms, self._table, self._drums, self._decays, self._log_slopes,
+            self._slopes, self._spans, rates, self._left, rate_by_place,
             np.zeros((2, count, self.points, 3)), fronts, border.columns, border.rows,
             border.first,
         )  # fmt: skip

@@ -46,7 +46,7 @@ def border(
     spans: Spans,
     velocities: Array,
     left: Array,
-    by_velocity: float,
+    rate_by_place: float,
     out: Array,
 ) -> None:
     """Changes of tension in factors: pulls on points and what they change with, (2, k, p, 3).
@@ -77,7 +77,7 @@ def border(
         slack = 0.5 + 0.5 * math.tanh(0.5 * force / table.material[rope, 2])
         elastic = table.material[rope, 0] / natural * slack
         viscous = elastic * table.material[rope, 1]
-        stretched = left[rope] * (elastic + viscous * winding / natural) + by_velocity * viscous
+        stretched = left[rope] * (elastic + viscous * winding / natural) + rate_by_place * viscous
         for i in range(first, last):
             unit = vector(spans.unit[i])
             change = plus(times(stretched, unit), times(left[rope] * viscous, vector(swing[i])))
@@ -107,7 +107,8 @@ def border(
                     + ratio / path * (part_rate - share * path_rate)
                 )
                 change = plus(
-                    times(by_length + by_velocity * by_rate, unit), times(by_rate, vector(swing[i]))
+                    times(by_length + rate_by_place * by_rate, unit),
+                    times(by_rate, vector(swing[i])),
                 )
                 pull = (0.0, 0.0, 0.0) if begun or i < b else times(spans.tension[i], unit)
                 _pair(out, row, table.near[i], pull, change)

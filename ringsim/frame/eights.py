@@ -1,13 +1,13 @@
 """Eight numbers of a row at a time, as tuples: one register of a modern processor, or two.
 
-numba turns tuples into separate numbers; the compiler's SLP pass, which ``ringsim.frame`` switches
-on, packs them again.  Loops over rows of a dozen numbers would be too short for its loop pass: most
-of their time goes to what is left beside whole registers.
+numba turns tuples into separate numbers, and the SLP pass of the compiler (``packed``) packs them.
+Loops over rows of a dozen numbers would be too short for its loop pass: most of their time goes to
+what is left beside whole registers.
 """
 
 from typing import TypeAlias
 
-from ringsim.frame.vectors import compiled, unsigned
+from ringsim.frame.vectors import packed, unsigned
 from ringsim.layout.pose import Array
 
 EIGHT = 8
@@ -15,8 +15,8 @@ Eight: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 NONE: Eight = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-@compiled
-def load(row: Array, first: int) -> Eight:
+@packed
+def take_eight(row: Array, first: int) -> Eight:
     """Eight numbers of a row."""
     k = unsigned(first)
     return (
@@ -25,8 +25,8 @@ def load(row: Array, first: int) -> Eight:
     )  # fmt: skip
 
 
-@compiled
-def store(row: Array, first: int, x: Eight) -> None:
+@packed
+def put_eight(row: Array, first: int, x: Eight) -> None:
     """Put eight numbers into a row."""
     k = unsigned(first)
     row[k], row[k + unsigned(1)], row[k + unsigned(2)] = x[0], x[1], x[2]
@@ -34,7 +34,7 @@ def store(row: Array, first: int, x: Eight) -> None:
     row[k + unsigned(6)], row[k + unsigned(7)] = x[6], x[7]
 
 
-@compiled
+@packed
 def less(x: Eight, share: float, y: Eight) -> Eight:
     """X - share y."""
     return (
@@ -43,7 +43,7 @@ def less(x: Eight, share: float, y: Eight) -> Eight:
     )  # fmt: skip
 
 
-@compiled
+@packed
 def product(x: Eight, y: Eight) -> Eight:
     """Of each two numbers."""
     return (
@@ -52,7 +52,7 @@ def product(x: Eight, y: Eight) -> Eight:
     )  # fmt: skip
 
 
-@compiled
+@packed
 def size_of(x: Eight) -> Eight:
     """Of each number."""
     return (
@@ -60,16 +60,16 @@ def size_of(x: Eight) -> Eight:
     )  # fmt: skip
 
 
-@compiled
+@packed
 def total(x: Eight) -> float:
     """Of all eight."""
     return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]))
 
 
-@compiled
-def dot(row: Array, first: int, y: Array, n: int) -> float:
+@packed
+def row_dot(row: Array, first: int, y: Array, n: int) -> float:
     """Of n numbers of a row with those of y, which has zeros behind them up to whole eights."""
     found = NONE
     for k in range(unsigned(0), unsigned(n), unsigned(EIGHT)):
-        found = less(found, -1.0, product(load(row, unsigned(first) + k), load(y, k)))
+        found = less(found, -1.0, product(take_eight(row, unsigned(first) + k), take_eight(y, k)))
     return total(found)

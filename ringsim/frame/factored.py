@@ -50,11 +50,13 @@ class Factored:
     def __init__(self, mesh: Mesh, fronts: Fronts, border: Border) -> None:
         self._mesh, self._fronts, self._border = mesh, fronts, border
         self.sound = bool(factor(mesh, fronts))
-        if len(border.corner):
+        if self.sound and len(border.corner):
             solve(mesh, fronts, border.columns)
             corner = border.corner - border.rows.T @ border.columns
             # LAPACK itself: around it numpy and scipy spend more than these few dozen rows take.
-            self._corner = dgetrf(corner, overwrite_a=True)[:2]
+            # Transposed, so that rows are its columns.
+            *self._corner, wrong = dgetrf(corner.T, overwrite_a=True)
+            self.sound &= wrong == 0
 
     def solve(self, g: Array) -> Array:
         """The change of all unknowns, the hub's last, that takes a residual to zero."""
@@ -66,7 +68,7 @@ class Factored:
             right = -(x @ border.rows)
             if border.strung:
                 right[:3] += hub
-            z, _ = dgetrs(*self._corner, right)
+            z, _ = dgetrs(*self._corner, right, trans=1)
             x -= border.columns @ z
             if border.strung:
                 hub[:] = z[:3]

@@ -120,11 +120,14 @@ class Integration(Remembering):
         self._model.laws.begin()
         cables, now = self._model.cables, self._control.now
         if cables is not None and self._now.chain is not None:
-            slopes = np.zeros(len(cables.present))
-            for number, (plane, cable) in enumerate(cables.present):
-                if cables.winches.asks_slope(number):
-                    slopes[number] = self._scene.structure.path_slope(cable, now.angles[plane])
+            slopes = cables.winches.path_slopes(self._path_slope)
             cables.begin(now.time, self._now.chain, slopes)
+
+    def _path_slope(self, number: int) -> float:
+        """Derivative of a cable's ideal path after the opening angle, m/rad."""
+        assert self._model.cables is not None
+        plane, cable = self._model.cables.present[number]
+        return self._scene.structure.path_slope(cable, self._control.now.angles[plane])
 
     def _try(self, step: float) -> tuple[State, Instant]:
         """The state a step later."""

@@ -175,30 +175,40 @@ class JointLaws:
         """Note all laws, each on joints of its own, anew."""
         own, sense = self._openings
         stop, spring, pawl = self._stop, self._spring, self._pawl
-        laws: list[tuple[Law, Indices, Array, float]] = []
+        laws: list[tuple[Law, object, Indices, Array, float]] = []
         if stop is not None:
-            laws.append((lambda x, rate, on: stop.torque(x, rate, on), own, sense, 0.0))
+            laws.append((stop.torque, stop, own, sense, 0.0))
         if spring is not None:
 
             def drive(x: Any, _: Any, on: Any) -> Reaction:
                 return Reaction(*(on * part for part in spring.torque(x)))
 
-            laws.append((drive, own, sense, 0.0))
+            laws.append((drive, spring, own, sense, 0.0))
         if pawl is not None:
-            laws.append((lambda x, _rate, _on: pawl.torque(x), own, sense, 0.0))
+            laws.append((lambda x, _rate, _on: pawl.torque(x), pawl, own, sense, 0.0))
         for fault, place, opening in self.stuck:
             where, against = np.array([own[place]]), np.array([-sense[place]])
-            law = fault.torque
-            laws.append((lambda x, rate, _, law=law: law(x, rate), where, against, np.pi - opening))
-        soft = sum(each.size for _, each, *_ in laws)
+            hold = fault.torque
+            laws.append(
+                (
+                    lambda x, rate, _, hold=hold: hold(x, rate),
+                    fault,
+                    where,
+                    against,
+                    np.pi - opening,
+                )
+            )
+        soft = sum(each.size for _, _, each, *_ in laws)
         for friction, where, senses, _ in self._friction:
-            torque = friction.torque
-            laws.append((lambda _x, rate, _, t=torque: (0.0, t(rate), 0.0), where, senses, 0.0))
+            rub = friction.torque
+            laws.append(
+                (lambda _x, rate, _, rub=rub: (0.0, rub(rate), 0.0), friction, where, senses, 0.0)
+            )
         self.acting = Acting(
-            taped([(law, each.shape) for law, each, *_ in laws], 3, 3),
-            np.concatenate([np.zeros(0, np.int64), *(each.ravel() for _, each, *_ in laws)]),
+            taped([(law, each.shape, record) for law, record, each, *_ in laws], 3, 3),
+            np.concatenate([np.zeros(0, np.int64), *(each.ravel() for _, _, each, *_ in laws)]),
             np.concatenate([np.zeros(0), *(sense.ravel() for *_, sense, _ in laws)]),
-            np.concatenate([np.zeros(0), *(np.full(w.size, off) for _, w, _, off in laws)]),
+            np.concatenate([np.zeros(0), *(np.full(w.size, off) for _, _, w, _, off in laws)]),
             soft,
         )
         self._switch()

@@ -39,10 +39,10 @@ class FrameModel:
     ----------
     ideal
         The structure with rigid rods, at the start.
-    with_hub, size
-        Whether a net has a hub; number of unknowns: those of the mesh and the hub's three.
     moving
         Its acceleration then.
+    with_hub, size
+        Whether a net has a hub; number of unknowns: those of the mesh and the hub's three.
     reaction
         What was last out of balance on the unknowns that do not move, N and N m.
     """
@@ -123,7 +123,7 @@ class FrameModel:
             weighs=self.layout.gravity is not None,
             gravity=self.gravity,
         )
-        self._loads = np.zeros((len(mesh.length), 5, 3, 3))
+        self._held_loads = np.zeros((len(mesh.length), 5, 3, 3))
         self._string_spots = mesh.home[self._held.ends][:, None] + np.arange(3)
         self._lines = no_lines() if self.cables is None else self.cables.lines
         self._arms = Arms.empty(lines)
@@ -171,7 +171,7 @@ class FrameModel:
         self._strung = balance(
             self.mesh, self._lines, self._held, self.laws.acting, self.web, self.coefficients,
             step, start.followed, now.pose, now.hub, self._arms, now.followed, strains,
-            self._loads, g,
+            self._held_loads, g,
         )  # fmt: skip
         self.laws.note(now.rate.angles)
         for slide in self._beam_slides:
@@ -197,7 +197,7 @@ class FrameModel:
         hub_inertia = self.web.hub_mass * by_place if alone else math.nan
         border = Border.empty(mesh.unknowns, factors, strung, hub_inertia)
         differentiate(
-            mesh, self._held, self.laws.acting, self.web, now.pose, now.followed, self._loads,
+            mesh, self._held, self.laws.acting, self.web, now.pose, now.followed, self._held_loads,
             strains.lead, by_rate, by_place, strung, fronts, border.columns, border.rows,
             border.corner,
         )  # fmt: skip
@@ -243,7 +243,7 @@ class FrameModel:
             held = Strains(state.strains, np.zeros_like(state.strains), 0.0)
             points, unloaded = state.place.points, np.zeros(self.mesh.unknowns)
             still = np.zeros_like(points)
-            add_forces(self.mesh, pose, points, still, held, self._loads, unloaded)
+            add_forces(self.mesh, pose, points, still, held, self._held_loads, unloaded)
         # Accelerations of the points: differences of places along the motion.
         ahead, behind = state.copy(), state.copy()
         small = 1e-6 / max(float(np.abs(self.first).max()), 1e-300)

@@ -36,7 +36,8 @@ class Web(NamedTuple):
         if held is None:
             return cls(taped([], 2, 3), np.zeros(0, dtype=np.int64), 0.0, True, 0.0)
         law, bodies = held.law, np.array(held.bodies, dtype=np.int64)
-        tape = taped([(at_section(law, np.arange(len(bodies))).tension, bodies.shape)], 2, 3)
+        tension = at_section(law, np.arange(len(bodies))).tension
+        tape = taped([(tension, bodies.shape, law)], 2, 3)
         return cls(tape, bodies, law.neutral_length, not law.two_sided, law.hub_mass)
 
 

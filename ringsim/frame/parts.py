@@ -15,8 +15,6 @@ from ringsim.frame.skeleton import CURE, NOT_HERE, Element, End, Skeleton
 from ringsim.refusal import InputError
 
 Indices = NDArray[np.int64]
-MOST_GONE = 16
-"""Unknowns that a front eliminates at most; parts with more have several fronts."""
 
 
 class Parts:
@@ -27,7 +25,7 @@ class Parts:
     home, angle_home
         First unknown of each frame, and that of each angle.
     of_element
-        First front of each element's part.
+        Part, and front, of each element.
     unknowns, gone, size, spots, parent, up
         See ``ringsim.frame.mesh.Mesh``.
     """
@@ -85,9 +83,9 @@ class Parts:
         return found
 
     def front_of(self, unknown: int) -> tuple[int, int]:
-        """The front that begins to eliminate an unknown's part or block, and its place there."""
-        head = bisect_right(self._firsts, unknown) - 1
-        return int(self._heads[head]), unknown - self._firsts[head]
+        """The front that eliminates an unknown, and its place there."""
+        front = bisect_right(self._firsts, unknown) - 1
+        return front, unknown - self._firsts[front]
 
     def _inner_of(self, end: End) -> list[int]:
         """Inner frames, and angles behind them, of an end."""
@@ -130,36 +128,25 @@ class Parts:
         """The fronts of parts, then of blocks: each block is eliminated into the next one and the
         last, which a closed ring's first one is coupled to.
         """
-        width, start = self._width, self._start
-        lists: list[list[int]] = []
-        gone: list[int] = []
-        heads: list[int] = []
-        for spots, own in zip(parts, inner, strict=True):
-            heads.append(len(lists))
-            for went in range(0, own, MOST_GONE):
-                lists.append(spots[went:])
-                gone.append(min(own - went, MOST_GONE))
-        blocks = len(lists)
+        lists, width, start = list(parts), self._width, self._start
         for k in range(self._blocks):
             rest = sorted({k + 1, self._blocks - 1} & set(range(k + 1, self._blocks)))
             lists.append(
                 [start + width * one + place for one in (k, *rest) for place in range(width)]
             )
-            gone.append(width)
-        self._heads = np.array([*heads, *range(blocks, len(lists))])
-        self._firsts = [lists[head][0] for head in self._heads]
-        self.of_element = self._heads[self.of_element]
-        self.gone, self.size = np.array(gone), np.array([len(spots) for spots in lists])
+        self._firsts = [spots[0] for spots in lists]
+        self.gone = np.array([*inner, *[width] * self._blocks])
+        self.size = np.array([len(spots) for spots in lists])
         shape = len(lists), int(self.size.max())
         self.spots, self.up = np.full(shape, -1), np.full(shape, -1)
         self.parent = np.full(len(lists), -1)
         for number, spots in enumerate(lists):
             self.spots[number, : len(spots)] = spots
-            rest = spots[gone[number] :]
+            rest = spots[int(self.gone[number]) :]
             if rest:
-                inner_left = rest[0] < start
-                first = min((spot - start) // width for spot in rest if spot >= start)
-                parent = number + 1 if inner_left else blocks + first
+                parent = len(parts) + min((spot - start) // width for spot in rest)
                 places = {spot: k for k, spot in enumerate(lists[parent])}
                 self.parent[number] = parent
-                self.up[number, gone[number] : len(spots)] = [places[spot] for spot in rest]
+                self.up[number, int(self.gone[number]) : len(spots)] = [
+                    places[spot] for spot in rest
+                ]

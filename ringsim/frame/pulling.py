@@ -28,17 +28,23 @@ def pull_cables(
 @compiled
 def add_cables(
     lines: Lines, mesh: Mesh, arms: Arms, table: RopeTable, drums: Drums, decays: Tape,
-    log_slopes: Tape, slopes: Array, spans: Spans, rates: Array, left: Array, by_rate: float,
+    log_slopes: Tape, slopes: Array, spans: Spans, rates: Array, left: Array, rate_by_place: float,
     factors: Array, fronts: Array, columns: Array, rows: Array, first: int,
 ) -> None:  # fmt: skip
     """Add how spans turn to the fronts, and how tensions change to the border's columns and rows,
-    from the ``first`` on; ``factors`` are zeros, shape (2, k, points, 3).
+    from the ``first`` on.
+
+    ``decays`` and ``log_slopes`` are the laws of the pulleys' friction, played last for the spans,
+    and to be played; ``slopes`` those of its exponents after the ropes' speeds (s/m), ``rates`` of
+    the points (m/s), ``left`` the share of a change of path that stretches each rope,
+    ``rate_by_place`` the derivative of rates after places (1/s), ``factors`` zeros, shape
+    (2, k, points, 3).
     """
     for j in range(len(spans.angle)):
         log_slopes.rows[0, j] = spans.angle[j]
     play(log_slopes)
     border(
-        table, drums, decays.rows[1], log_slopes.rows[1], slopes, spans, rates, left, by_rate,
+        table, drums, decays.rows[1], log_slopes.rows[1], slopes, spans, rates, left, rate_by_place,
         factors,
     )  # fmt: skip
     add_line_tangent(lines, arms, spans, fronts)

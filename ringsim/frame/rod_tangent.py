@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from ringsim.frame.eights import EIGHT, NONE, less, load
-from ringsim.frame.eights import store as eight
+from ringsim.frame.eights import EIGHT, NONE, less, put_eight, take_eight
 from ringsim.frame.element import element_tangent
 from ringsim.frame.kernels import Pose, held_by, pulls_of
 from ringsim.frame.mesh import Mesh
@@ -64,15 +63,23 @@ def begin_tangent(
             a = minus(vector(points[mesh.point[e, side]]), vector(pose.place[mesh.frame[e, side]]))
             z = (end[2], end[5], end[8])
             for c in range(0, 2 * EIGHT, EIGHT):
-                fx, fy, fz = load(rows[x], c), load(rows[x + 1], c), load(rows[x + 2], c)
-                mx, my, mz = load(rows[phi], c), load(rows[phi + 1], c), load(rows[phi + 2], c)
-                eight(h[own], c, fx)
-                eight(h[own + 1], c, fy)
-                eight(h[own + 2], c, fz)
-                eight(h[own + 3], c, less(less(mx, a[2], fy), -a[1], fz))
-                eight(h[own + 4], c, less(less(my, a[0], fz), -a[2], fx))
-                eight(h[own + 5], c, less(less(mz, a[1], fx), -a[0], fy))
-                eight(h[own + 6], c, less(less(less(NONE, -z[0], mx), -z[1], my), -z[2], mz))
+                fx, fy, fz = (
+                    take_eight(rows[x], c),
+                    take_eight(rows[x + 1], c),
+                    take_eight(rows[x + 2], c),
+                )
+                mx, my, mz = (
+                    take_eight(rows[phi], c),
+                    take_eight(rows[phi + 1], c),
+                    take_eight(rows[phi + 2], c),
+                )
+                put_eight(h[own], c, fx)
+                put_eight(h[own + 1], c, fy)
+                put_eight(h[own + 2], c, fz)
+                put_eight(h[own + 3], c, less(less(mx, a[2], fy), -a[1], fz))
+                put_eight(h[own + 4], c, less(less(my, a[0], fz), -a[2], fx))
+                put_eight(h[own + 5], c, less(less(mz, a[1], fx), -a[0], fy))
+                put_eight(h[own + 6], c, less(less(less(NONE, -z[0], mx), -z[1], my), -z[2], mz))
             # The arm and the joint's axis turn with the frame under constant force and moment:
             # (d phi x a) x f = (a f^T - (f . a)) d phi, (d phi x z) . m = (z x m) . d phi.
             along, sideways = dot(f, a), cross(z, moment)

@@ -3,6 +3,9 @@
 A law is Python that numpy, exudyn's expressions and this module can follow: called once on rows
 that note what is done with them, it leaves a tape.  So one file serves all engines, and Newton's
 iterations do without the microsecond that numpy takes to begin each operation.
+
+A law that is to be taped works on each number by itself, by arithmetic and the functions of
+``_KNOWN``, and does not branch on numbers: ``numpy.where`` does that.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,18 +15,22 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from ringsim.frame.parts import Indices
+from ringsim.frame.skeleton import CURE, NOT_HERE
 from ringsim.frame.vectors import compiled
 from ringsim.layout.pose import Array
+from ringsim.refusal import InputError
 
 _KNOWN = (
     np.add, np.subtract, np.multiply, np.divide, np.maximum, np.minimum, np.negative, np.absolute,
     np.sign, np.sqrt, np.square, np.power, np.exp, np.log, np.sin, np.cos, np.tanh, np.arctanh,
-    np.greater, np.less, np.positive, np.where,
+    np.greater, np.less, np.greater_equal, np.less_equal, np.arctan, np.expm1, np.log1p,
+    np.positive, np.where,
 )  # fmt: skip
 (
     _ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _MAXIMUM, _MINIMUM, _NEGATIVE, _ABSOLUTE,
     _SIGN, _SQRT, _SQUARE, _POWER, _EXP, _LOG, _SIN, _COS, _TANH, _ARCTANH,
-    _GREATER, _LESS, _POSITIVE, _WHERE,
+    _GREATER, _LESS, _GREATER_EQUAL, _LESS_EQUAL, _ARCTAN, _EXPM1, _LOG1P,
+    _POSITIVE, _WHERE,
 ) = range(len(_KNOWN))  # fmt: skip
 
 Law = Callable[..., Any]
@@ -50,13 +57,21 @@ class Row(NDArrayOperatorsMixin):
 
     def __array_ufunc__(self, ufunc: Any, method: str, *given: Any, **options: Any) -> Any:
         """What numpy calls for its element-wise functions."""
-        return NotImplemented if method != "__call__" or options else self._notes.do(ufunc, given)
+        if method != "__call__" or options:
+            raise TypeError(f"it calls numpy.{ufunc.__name__} otherwise than on numbers alone")
+        return self._notes.do(ufunc, given)
 
     def __array_function__(self, function: Any, _: Any, given: Any, options: Any) -> Any:
         """What numpy calls for its other functions."""
         if function is np.zeros_like:
             return 0.0
-        return NotImplemented if options else self._notes.do(function, given)
+        if function is np.clip and not options:
+            return np.minimum(np.maximum(given[0], given[1]), given[2])
+        return self._notes.do(function, given)
+
+    def __bool__(self) -> bool:
+        """Refused: a tape has one way through a law."""
+        raise TypeError("it branches on a number, instead of numpy.where")
 
 
 class _Notes:
@@ -70,7 +85,7 @@ class _Notes:
 
     def do(self, function: Any, given: Sequence[Any]) -> Any:
         if function not in _KNOWN:
-            return NotImplemented
+            raise TypeError(f"it calls numpy.{function.__name__}")
         operands = [self._place(each) for each in given]
         self.rows.append(np.zeros(self.shape))
         self._note(_KNOWN.index(function), len(self.rows) - 1, operands)
@@ -92,20 +107,30 @@ class _Notes:
         return len(self.rows) - 1
 
 
-def taped(laws: Sequence[tuple[Law, tuple[int, ...]]], inputs: int, results: int) -> Tape:
-    """A tape of laws, each with the shape of its coordinates.
+def taped(laws: Sequence[tuple[Law, tuple[int, ...], object]], inputs: int, results: int) -> Tape:
+    """A tape of laws, each with the shape of its coordinates and the record that it belongs to.
 
-    A law takes so many ``inputs`` and returns as many results, or one.  TypeError if it does what
+    A law takes so many ``inputs`` and returns so many ``results``.  InputError if it does what
     tapes do not know.
     """
     code: list[tuple[int, ...]] = []
     table: list[tuple[int, ...]] = []
     blocks: list[Array] = []
-    for law, shape in laws:
+    for law, shape, record in laws:
         notes = _Notes(shape, inputs, results)
-        found = law(*notes.given)
-        for place, each in enumerate(found if isinstance(found, tuple) else [found], inputs):
-            notes.end(each, place)
+        try:
+            found = law(*notes.given)
+            told = found if isinstance(found, tuple) else (found,)
+            if len(told) != results:
+                raise TypeError(f"it tells {len(told)} things, not {results}")
+            for place, each in enumerate(told, inputs):
+                notes.end(each, place)
+        except (TypeError, AttributeError, ValueError) as error:
+            known = ", ".join(each.__name__ for each in _KNOWN)
+            raise InputError(
+                f"{NOT_HERE} the law of {type(record).__name__}: {error} (write it with arithmetic "
+                f"and numpy's {known} on each number, or {CURE})"
+            ) from error
         left = sum(block.shape[1] for block in blocks)
         blocks.append(np.array([row.ravel() for row in notes.rows]))
         table.append((len(code), len(code) + len(notes.code), left, left + blocks[-1].shape[1]))
@@ -143,10 +168,10 @@ def play(tape: Tape) -> None:
                     out[k] = x[k] / y[k]
             elif kind == _MAXIMUM:
                 for k in range(len(out)):
-                    out[k] = x[k] if x[k] >= y[k] else y[k]
+                    out[k] = x[k] if x[k] >= y[k] or x[k] != x[k] else y[k]
             elif kind == _MINIMUM:
                 for k in range(len(out)):
-                    out[k] = x[k] if x[k] <= y[k] else y[k]
+                    out[k] = x[k] if x[k] <= y[k] or x[k] != x[k] else y[k]
             elif kind == _NEGATIVE:
                 for k in range(len(out)):
                     out[k] = -x[k]
@@ -188,7 +213,17 @@ def _play_function(kind: int, x: Array, y: Array, out: Array) -> None:
             out[k] = np.tanh(a)
         elif kind == _ARCTANH:
             out[k] = np.arctanh(a)
+        elif kind == _ARCTAN:
+            out[k] = np.arctan(a)
+        elif kind == _EXPM1:
+            out[k] = np.expm1(a)
+        elif kind == _LOG1P:
+            out[k] = np.log1p(a)
         elif kind == _GREATER:
             out[k] = 1.0 if a > y[k] else 0.0
-        else:
+        elif kind == _GREATER_EQUAL:
+            out[k] = 1.0 if a >= y[k] else 0.0
+        elif kind == _LESS:
             out[k] = 1.0 if a < y[k] else 0.0
+        else:
+            out[k] = 1.0 if a <= y[k] else 0.0

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
-from numba import njit
+from numba import config, njit
 
+from ringsim.compile_cache import packs
 from ringsim.layout.pose import Array
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -27,6 +28,27 @@ def compiled(function: _Function) -> _Function:
     has loaded need not round alike, and samples would depend on who ran them.
     """
     return cast(_Function, njit(cache=True, error_model="numpy")(function))
+
+
+def packed(function: _Function) -> _Function:
+    """As ``compiled``, with the pass of LLVM that packs neighbouring numbers into registers (SLP).
+
+    numba leaves it out since it once compiled wrongly (numba issue 8705), so that it is for the
+    fronts alone, whose solutions tests compare with numpy's and, bit by bit, with those without it.
+    What is compiled elsewhere in the process does not see it.
+    """
+    made: Any = njit(cache=True, error_model="numpy")(function)
+    compiling = made.compile
+
+    def compile_packed(signature: Any) -> Any:
+        before, config.SLP_VECTORIZE = config.SLP_VECTORIZE, int(packs())
+        try:
+            return compiling(signature)
+        finally:
+            config.SLP_VECTORIZE = before
+
+    made.compile = compile_packed
+    return cast(_Function, made)
 
 
 @compiled

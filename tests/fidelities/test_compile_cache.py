@@ -121,3 +121,35 @@ def test_two_runs_on_an_empty_cache_give_the_same(tmp_path: Path) -> None:
     one, other = (ended(p)[0] for p in [started(RUNS, tmp_path, **places) for _ in range(2)])
     assert one == other == ended(started(RUNS, tmp_path, **places))[0]
     assert list(tmp_path.rglob("*.nbc"))
+
+
+FRONTS = """
+import hashlib
+import numpy as np
+from numba import config
+from ringsim.frame.elimination import Fronts, factor, solve, solve_one
+from ringsim.frame.model import FrameModel
+from ringsim.scene import load_scene
+mesh = FrameModel(load_scene("ring18").with_values({"structure.sections": 4})).mesh
+fronts, random = Fronts.empty(mesh), np.random.default_rng(0)
+for front, size in zip(fronts.whole, mesh.size, strict=True):
+    front[:size, :size] = random.normal(size=(size, size)) + 30.0 * np.eye(size)
+assert factor(mesh, fronts)
+many, one = random.normal(size=(mesh.unknowns, 16)), random.normal(size=mesh.unknowns)
+solve(mesh, fronts, many)
+solve_one(mesh, fronts, one)
+assert config.SLP_VECTORIZE == 0
+print(hashlib.sha256(many.tobytes() + one.tobytes()).hexdigest())
+"""
+
+
+def test_packed_fronts_are_the_same_bit_by_bit(tmp_path: Path) -> None:
+    """With and without the pass that numba leaves out; each has a folder of its own."""
+    cache = {"XDG_CACHE_HOME": str(tmp_path)}
+    told = [
+        ended(started(FRONTS, tmp_path, **cache, **more))[0]
+        for more in ({}, {"NUMBA_SLP_VECTORIZE": "0"})
+    ]
+    assert len(told[0]) == 64
+    assert told[0] == told[1]
+    assert len(list((tmp_path / "ringsim").glob("ringsim-*"))) == 2

@@ -122,8 +122,20 @@ def test_tangent_of_pulleys(friction: dict[str, Any]) -> None:
     "values",
     [{"boom": "none", "structure.sections": n} for n in (3, 4, 5, 18)]
     + [OPEN | {"structure.sections": n} for n in (1, 2, 5)]
-    + [{"boom.base": "fixed"}, FLEXIBLE, {"rods.elements": 4}],
-    ids=["3", "4", "5", "18", "arc-1", "arc-2", "arc-5", "fixed", "flexible", "four-elements"],
+    + [{"boom.base": "fixed"}, FLEXIBLE, {"rods.elements": 4}, FLEXIBLE | {"boom.elements": 20}],
+    ids=[
+        "3",
+        "4",
+        "5",
+        "18",
+        "arc-1",
+        "arc-2",
+        "arc-5",
+        "fixed",
+        "flexible",
+        "four-elements",
+        "boom",
+    ],
 )
 def test_elimination_solves_as_numpy_does(values: dict[str, Any]) -> None:
     """Random fronts with heavy diagonals, unsymmetric: to round-off."""

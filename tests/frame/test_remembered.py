@@ -19,7 +19,6 @@ from pydantic import BaseModel
 from law_scenes import STOPS, of_cables, of_forces
 from ringsim.cable.winches import Winches
 from ringsim.dataset import save
-from ringsim.frame.laws import JointLaws
 from ringsim.frame.model import FrameModel
 from ringsim.frame.storing import Storing
 from ringsim.scene import Scene
@@ -72,9 +71,6 @@ def inside(thing: Any) -> dict[Any, Any] | None:
     if isinstance(thing, Winches):
         # These begin anew with every step.
         own = {name: one for name, one in own.items() if name not in ("_start", "_held", "_ropes")}
-    if isinstance(thing, JointLaws):
-        # Played anew at every angle, for the joints that are told here as latched and whole.
-        own = {name: one for name, one in own.items() if name != "_acting"}
     return own
 
 

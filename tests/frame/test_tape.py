@@ -20,6 +20,7 @@ from ringsim.parts.joint_friction.viscous_coulomb import ViscousCoulombFriction
 from ringsim.parts.latch import Latch
 from ringsim.parts.net.hub import SpringNet
 from ringsim.parts.stop.spring_damper import SpringDamperStop
+from ringsim.refusal import InputError
 
 SHAPE = (2, 5)
 STOP = SpringDamperStop(stiffness=50.0, damping=0.3, stowed_angle=10.0)
@@ -61,7 +62,7 @@ def played(tape: Tape, given: list[Any], results: int) -> list[Any]:
 @pytest.mark.parametrize("name", laws())
 def test_a_tape_does_what_its_law_does(name: str) -> None:
     law, random = laws()[name], np.random.default_rng(0)
-    tape = taped([(law, SHAPE)], 3, 3)
+    tape = taped([(law, SHAPE, None)], 3, 3)
     for _ in range(3):  # a tape keeps nothing of what it was played with before
         x, v = random.normal(size=(2, *SHAPE))
         on = random.random(SHAPE) > 0.5
@@ -83,7 +84,7 @@ def test_a_tape_does_what_its_law_does(name: str) -> None:
 def test_pulleys(friction: Any, what: str) -> None:
     law = getattr(friction, what)
     angles = np.linspace(0.1, 3.1, 10).reshape(SHAPE)
-    (found,) = played(taped([(lambda a: law(a, 0.01), SHAPE)], 1, 1), [angles], 1)
+    (found,) = played(taped([(lambda a: law(a, 0.01), SHAPE, friction)], 1, 1), [angles], 1)
     assert np.abs(found - law(angles, 0.01)).max() <= ROUND_OFF
 
 
@@ -94,18 +95,25 @@ def test_pulleys(friction: Any, what: str) -> None:
         lambda x, y: np.square(x) / y + x**3 - y**2, lambda x, y: -np.sin(x) + np.cos(+y),
         lambda x, y: np.where(np.less(x, y), np.tanh(x), np.arctanh(0.1 * y)),
         lambda x, y: np.maximum(x, y) * np.minimum(x, 0.5) + np.greater(y, x),
+        lambda x, y: np.clip(x, -0.5, 0.5) + (x >= y) - (y <= 0.0) + np.arctan(y),
+        lambda x, y: np.log1p(np.abs(x)) - np.expm1(y),
     ],
 )  # fmt: skip
 def test_functions(law: Any) -> None:
     x, y = np.random.default_rng(2).normal(size=(2, *SHAPE))
-    (found,) = played(taped([(law, SHAPE)], 2, 1), [x, y], 1)
+    (found,) = played(taped([(law, SHAPE, None)], 2, 1), [x, y], 1)
     assert np.abs(found - law(x, y)).max() <= 4.0 * ROUND_OFF * np.abs(found).max()
 
 
 def test_laws_behind_one_another_keep_to_their_own_columns() -> None:
     x, v = np.random.default_rng(1).normal(size=(2, 4))
     tape = taped(
-        [(lambda x, v: 2.0 * x + v, (3,)), (lambda x, v: np.where(x > v, x * v, 0.0), (1,))], 2, 1
+        [
+            (lambda x, v: 2.0 * x + v, (3,), None),
+            (lambda x, v: np.where(x > v, x * v, 0.0), (1,), None),
+        ],
+        2,
+        1,
     )
     tape.rows[0], tape.rows[1] = x, v
     play(tape)
@@ -113,9 +121,30 @@ def test_laws_behind_one_another_keep_to_their_own_columns() -> None:
     assert tape.rows[2].tolist() == [*(2.0 * x + v)[:3], last]
 
 
+def branching(x: Any) -> Any:
+    return 2.0 * x if x > 0.0 else -5.0 * x
+
+
 @pytest.mark.parametrize(
-    "law", [lambda x: np.floor(x), lambda x: np.add.reduce(x), lambda x: np.clip(x, 0.0, 1.0)]
+    ("law", "cause"),
+    [
+        (lambda x: np.floor(x), "floor"),
+        (lambda x: np.add.reduce(x), "add"),
+        (lambda x: np.round(x), "round"),
+        (branching, "branches"),
+        (lambda x: max(x, 0.0), "branches"),
+        (lambda x: np.where(np.asarray(x) > 0.0, x, 9.0), "branches"),
+        (lambda x: (x > 0.0) and (x < 1.0), "branches"),
+        (lambda x: (x, x), "2 things, not 1"),
+        (lambda x: x.sum(), "sum"),
+    ],
 )
-def test_what_tapes_do_not_know_is_refused(law: Any) -> None:
-    with pytest.raises(TypeError):
-        taped([(law, SHAPE)], 1, 1)
+def test_what_tapes_do_not_know_is_refused(law: Any, cause: str) -> None:
+    with pytest.raises(InputError, match=f'frame" does not represent the law of .*Stop: .*{cause}'):
+        taped([(law, SHAPE, STOP)], 1, 1)
+
+
+def test_numbers_that_are_none_stay_so() -> None:
+    x = np.full(SHAPE, np.nan)
+    tape = taped([(lambda x: np.maximum(x, 0.0) + np.minimum(0.0, x), SHAPE, None)], 1, 1)
+    assert np.isnan(played(tape, [x], 1)[0]).all()
