@@ -4,6 +4,7 @@ Run: python benchmarks/frame_cost.py ratio [SCENE ...]     both engines in turn,
      python benchmarks/frame_cost.py growth [sections ...]  the frame engine alone
      python benchmarks/frame_cost.py profile [SCENE]        its time by what it is spent on
      python benchmarks/frame_cost.py energy [SCENE ...]     energy errors of both at nine tolerances
+     python benchmarks/frame_cost.py energy SCENE:SECONDS   of its beginning, at 33
 
 Every run has a process of its own, which compiles and loads before the clock starts.  Times are
 processor time with one thread; what is compared holds all outputs and energies.  Errors are against
@@ -25,17 +26,21 @@ from collections import Counter
 from typing import Any
 
 SCENES = ("ring18-cable", "ring18", "72")
-NEAR = (0.92, 0.94, 0.96, 0.98, 1.0, 1.02, 1.04, 1.06, 1.08)
-"""Factors of the tolerance, too near to each other for the error to differ but by chance."""
+NEAR = 0.92, 1.08
+"""Range of factors of the tolerance: so near that the error differs by chance alone."""
 COMPARED = ("deployment_time", "asynchrony_max", "peak_tension")
 
 
 def scene_of(name: str) -> Any:
-    """A built-in scene, or a closed ring of so many sections without a net, of twice the force."""
+    """A built-in scene, perhaps until a time (s) behind a colon, or a closed ring of so many
+    sections without a net, of twice the force.
+    """
     from ringsim.scene import load_scene
 
+    name, _, until = name.partition(":")
     if not name.isdigit():
-        return load_scene(name)
+        scene = load_scene(name)
+        return scene.with_values({"solver.end_time": float(until)}) if until else scene
     return load_scene("ring18").with_values(
         {
             "structure.sections": int(name),
@@ -110,8 +115,10 @@ def energy(names: list[str]) -> None:
     print("| scene | exudyn | frames | smallest, largest: exudyn | frames |\n|---|---|---|---|---|")
     for name in names:
         means, ranges = [], []
+        count = 33 if ":" in name else 9
+        factors = [NEAR[0] + (NEAR[1] - NEAR[0]) * k / (count - 1) for k in range(count)]
         for fidelity in ("full", "frame"):
-            errors = [run(name, fidelity, factor)["energy"] for factor in NEAR]
+            errors = [run(name, fidelity, factor)["energy"] for factor in factors]
             spread = statistics.stdev(errors) / math.sqrt(len(errors))
             means.append(f"{statistics.mean(errors):.2e} +- {spread:.1e}")
             ranges.append(f"{min(errors):.1e}, {max(errors):.1e}")

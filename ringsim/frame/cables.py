@@ -2,8 +2,8 @@
 
 Spans between two frames pull on them; that their directions turn is part of the fronts.  How
 tensions change couples all spans of a rope: dT = A dlog with few columns A (one for the mean
-tension, one for its share along the path, and one for every pulley whose friction turns round), so
-that it enters as a border of the system, not as its entries.
+tension, one for its share along the path, and one for the pulleys of a body whose friction turns
+round), so that it enters as a border of the system, not as its entries.
 """
 
 import math
