@@ -19,7 +19,7 @@ from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.winches import Winches
 from ringsim.frame.chain import Drums, RopeTable, Spans, measure, of_ropes, pull_tight
-from ringsim.frame.chain_tangent import factors_needed
+from ringsim.frame.chain_tangent import factors_needed, felt_slopes
 from ringsim.frame.factored import Border
 from ringsim.frame.lines import Arms, lines_of
 from ringsim.frame.mesh import Mesh
@@ -185,7 +185,8 @@ class FrameCables:
             self._left = self.winches.stiffness_left(time, self.ropes, path, path_rate)
         own = (1.0 - spans.exponent**2) / slip
         turning = self._turning
-        self._slopes = turning.slopes(self.ropes, spans.speed, own, lambda s: np.tanh(s / slip))
+        found = turning.slopes(self.ropes, spans.speed, own, lambda s: np.tanh(s / slip))
+        self._slopes = felt_slopes(found, own, slip)
         return factors_needed(self._table, self._slopes)
 
     def add_tangent(

@@ -13,11 +13,19 @@ PASSING = 2e-4
 than 0.9999 of the friction acts, and the rope's speed no longer changes it."""
 
 
+def felt_slopes(slopes: Array, own: Array, slip_speed: Array) -> Array:
+    """Slopes of the pulleys' friction, s/m, less those that tangents do without: of pulleys that
+    slip, and that Newton has seen on one side alone (``ringsim.stepping.turning``): then slopes are
+    their ``own``.  In a step of 0.1 us a light hinge assembly may turn to and fro at 300 m/s, and
+    only a slope of a hundred-thousandth of that at rest leads it to its place.
+    """
+    return np.where((slopes * slip_speed > PASSING) | (slopes > own), slopes, 0.0)
+
+
 @compiled
 def _turns(table: RopeTable, slopes: Array, span: int) -> bool:
     """Whether the friction of the pulley before a span changes with speed."""
-    j = table.pulley[span]
-    return bool(j >= 0 and slopes[j] * table.slip_speed[j] > PASSING)
+    return bool(table.pulley[span] >= 0 and slopes[table.pulley[span]] > 0.0)
 
 
 @compiled

@@ -12,7 +12,7 @@ from ringsim.cable.state import ChainState
 from ringsim.cable.tangent import decay_factors, rope_tangent
 from ringsim.cable.winding.constant import ConstantWinding
 from ringsim.frame.chain import Drums, RopeTable, Spans, measure, tighten
-from ringsim.frame.chain_tangent import PASSING, border, factors_needed
+from ringsim.frame.chain_tangent import PASSING, border, factors_needed, felt_slopes
 
 ROUND_OFF = 1e-11
 """Sums of a dozen terms in another order, through exponentials of their logarithms."""
@@ -85,7 +85,8 @@ def test_the_border_is_the_tangent_of_the_chain(
     case = Case(seed, jammed=jammed, cut=cut, unfelt=unfelt)
     truth, ropes, by_velocity = case.evaluated(), case.ropes, 40.0
     left = LEFT[: len(ropes.starts)]
-    slopes = truth.exponent_slopes
+    own = truth.exponent_slopes
+    slopes = felt_slopes(own, own, truth.slip_speeds)
     count, points = factors_needed(case.table, slopes), sum(POINTS)
     out = np.zeros((2, count, points, 3))
     log_slopes = case.chain.log_slopes(case.spans.angle)
@@ -124,3 +125,12 @@ def test_the_border_is_the_tangent_of_the_chain(
             each[near] += each[near + 1]
             each[near + 1] = 0.0
     assert np.allclose(found, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_a_pulley_that_was_seen_on_both_sides_is_felt_at_any_speed() -> None:
+    """Full friction changes nothing, unless it has changed its sign within the step."""
+    slip = np.full(4, 1e-3)
+    speeds = np.array([300.0, 300.0, -160.0, 1e-4])
+    own = (1.0 - np.tanh(speeds / slip) ** 2) / slip
+    seen = np.maximum(own, [0.0, 2.0 / 600.0, 2.0 / 320.0, 0.0])
+    assert felt_slopes(seen, own, slip).tolist() == [0.0, *seen[1:]]
