@@ -100,14 +100,21 @@ def measure(table: RopeTable, behind: Indices, places: Array, rates: Array, span
 
 
 @compiled
+def path_of(spans: Spans, first: int, last: int) -> tuple[float, float]:
+    """Length (m) and its rate (m/s) of the path along spans ``first`` to ``last`` - 1."""
+    path = path_rate = 0.0
+    for i in range(first, last):
+        path += spans.length[i]
+        path_rate += spans.rate[i]
+    return path, path_rate
+
+
+@compiled
 def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> None:
     """Tensions of all spans."""
     for rope in range(len(table.starts)):
         first, last = table.starts[rope], table.ends[rope]
-        path = path_rate = 0.0
-        for i in range(first, last):
-            path += spans.length[i]
-            path_rate += spans.rate[i]
+        path, path_rate = path_of(spans, first, last)
         natural, winding = drums.natural[rope], drums.winding[rope]
         beyond = path
         rate_beyond = path_rate
@@ -156,10 +163,7 @@ def of_ropes(table: RopeTable, drums: Drums, spans: Spans) -> Array:
     """
     out = np.zeros((6, len(table.starts)))
     for rope in range(len(table.starts)):
-        path = path_rate = 0.0
-        for i in range(table.starts[rope], table.ends[rope]):
-            path += spans.length[i]
-            path_rate += spans.rate[i]
+        path, path_rate = path_of(spans, table.starts[rope], table.ends[rope])
         natural, winding = drums.natural[rope], drums.winding[rope]
         out[0, rope], out[1, rope], out[2, rope] = path, path_rate, path / natural - 1.0
         out[3, rope] = (path_rate + path / natural * winding) / natural

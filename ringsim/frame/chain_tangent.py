@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ringsim.frame.chain import Drums, RopeTable, Spans, force_of
+from ringsim.frame.chain import Drums, RopeTable, Spans, force_of, path_of
 from ringsim.frame.vectors import Vector, compiled, dot, minus, plus, put, times, vector
 from ringsim.layout.pose import Array
 
@@ -76,10 +76,7 @@ def border(
         if table.alive[rope] == 0.0:
             continue
         first, last = table.starts[rope], table.ends[rope]
-        path = path_rate = 0.0
-        for i in range(first, last):
-            path += spans.length[i]
-            path_rate += spans.rate[i]
+        path, path_rate = path_of(spans, first, last)
         natural, winding = drums.natural[rope], drums.winding[rope]
         force = force_of(table, rope, path, path_rate, natural, winding)
         slack = 0.5 + 0.5 * math.tanh(0.5 * force / table.material[rope, 2])

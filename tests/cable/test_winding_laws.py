@@ -114,6 +114,15 @@ def test_a_winch_with_feedback_keeps_its_hours_too():
         winches.advance(time, case.state(), np.zeros(1))
 
 
+def test_slopes_of_ideal_paths_are_asked_for_where_a_winch_answers():
+    steady = Winch(winding=ConstantWinding(speed=0.1))
+    winches = Winches([Cable(winch=steady), Cable(winch=Winch(winding=STALL))])
+    asked = []
+    slopes = winches.path_slopes(lambda number: asked.append(number) or -0.25)
+    assert asked == [1]
+    assert slopes.tolist() == [0.0, -0.25]
+
+
 def test_a_cable_reads_back_from_plain_tables():
     table = {
         "end": "last",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -139,7 +140,8 @@ many, one = random.normal(size=(mesh.unknowns, 16)), random.normal(size=mesh.unk
 solve(mesh, fronts, many)
 solve_one(mesh, fronts, one)
 assert config.SLP_VECTORIZE == 0
-print(hashlib.sha256(many.tobytes() + one.tobytes()).hexdigest())
+code = "".join(factor.inspect_asm().values())
+print(hashlib.sha256(many.tobytes() + one.tobytes()).hexdigest(), code.count("mulpd"))
 """
 
 
@@ -147,9 +149,11 @@ def test_packed_fronts_are_the_same_bit_by_bit(tmp_path: Path) -> None:
     """With and without the pass that numba leaves out; each has a folder of its own."""
     cache = {"XDG_CACHE_HOME": str(tmp_path)}
     told = [
-        ended(started(FRONTS, tmp_path, **cache, **more))[0]
+        ended(started(FRONTS, tmp_path, **cache, **more))[0].split()
         for more in ({}, {"NUMBA_SLP_VECTORIZE": "0"})
     ]
-    assert len(told[0]) == 64
-    assert told[0] == told[1]
+    assert len(told[0][0]) == 64
+    assert told[0][0] == told[1][0]
+    if platform.machine() == "x86_64":  # its name for several products at once
+        assert int(told[0][1]) > 2 * int(told[1][1])
     assert len(list((tmp_path / "ringsim").glob("ringsim-*"))) == 2

@@ -1,8 +1,12 @@
 """The compiled tension chain against the one that accepted states are evaluated with."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
+from law_scenes import CABLES as CABLES_AND_FAULTS
+from law_scenes import of_cables
 from ringsim.cable.chain import Chain
 from ringsim.cable.friction.bearing import BearingFriction
 from ringsim.cable.friction.capstan import CapstanFriction
@@ -13,6 +17,8 @@ from ringsim.cable.tangent import decay_factors, rope_tangent
 from ringsim.cable.winding.constant import ConstantWinding
 from ringsim.frame.chain import Drums, RopeTable, Spans, measure, tighten
 from ringsim.frame.chain_tangent import PASSING, border, factors_needed, felt_slopes
+from ringsim.frame.integrate import Integration
+from ringsim.frame.model import FrameModel
 
 ROUND_OFF = 1e-11
 """Sums of a dozen terms in another order, through exponentials of their logarithms."""
@@ -74,6 +80,27 @@ def test_tensions_are_those_of_the_chain(seed: int, jammed: bool, cut: bool) -> 
     slips = case.ropes.slips > 0.0
     assert np.allclose(spans.exponent[slips], truth.exponents[slips], rtol=1e-9, atol=1e-12)
     assert np.ptp(np.abs(truth.exponents[slips])) > 0.1  # some turn round, some slip
+
+
+@pytest.mark.parametrize("faults", [False, True], ids=["sound", "faults"])
+def test_accepted_states_are_those_of_the_chain(faults: bool) -> None:
+    """All that energies and outputs read of a chain, after a run: whole, jammed and cut ropes."""
+    values = CABLES_AND_FAULTS["faults"] if faults else {}
+    run = Integration(FrameModel(of_cables(values | {"solver.end_time": 0.4})))
+    run.run()
+    cables, state, time = run._model.cables, run._now, run._control.now.time
+    assert cables is not None
+    found = cables.state(time, state.place.lines, state.rate.lines)
+    wound = found.wound, found.wound_rate
+    truth = cables._chain.state(cables.ropes, state.place.lines, state.rate.lines, *wound)
+    assert found.tensions.max() > 1.0
+    assert found.ropes.alive.tolist() == ([True, True, False] if faults else [True, True])
+    for field in fields(ChainState):
+        one, other = getattr(found, field.name), getattr(truth, field.name)
+        if isinstance(other, np.ndarray):
+            allowed = ROUND_OFF * max(1e-3, np.abs(other).max())
+            assert np.abs(one - other).max() <= allowed, field.name
+    assert found.friction_slopes() == pytest.approx(truth.friction_slopes())
 
 
 @pytest.mark.parametrize("unfelt", [(), (1, 2, 3, 4, 10, 11)], ids=["all", "felt"])

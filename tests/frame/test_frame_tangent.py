@@ -13,6 +13,7 @@ import pytest
 from numeric_tangent import Probe, error
 from ringsim.frame.eights import EIGHT
 from ringsim.frame.elimination import Fronts, factor, solve, solve_one
+from ringsim.frame.mesh import Mesh
 from ringsim.frame.model import FrameModel
 from ringsim.scene import Scene, load_scene
 
@@ -124,23 +125,37 @@ def test_tangent_of_pulleys(friction: dict[str, Any]) -> None:
     + [OPEN | {"structure.sections": n} for n in (1, 2, 5)]
     + [{"boom.base": "fixed"}, FLEXIBLE, {"rods.elements": 4}, FLEXIBLE | {"boom.elements": 20}],
     ids=[
-        "3",
-        "4",
-        "5",
-        "18",
-        "arc-1",
-        "arc-2",
-        "arc-5",
-        "fixed",
-        "flexible",
-        "four-elements",
-        "boom",
+        "3", "4", "5", "18", "arc-1", "arc-2", "arc-5", "fixed", "flexible", "four-elements", "boom"
     ],
-)
+)  # fmt: skip
 def test_elimination_solves_as_numpy_does(values: dict[str, Any]) -> None:
+    check_elimination(FrameModel(scene().with_values(values)).mesh)
+
+
+def test_blocks_of_three_planes_are_eliminated_in_panels() -> None:
+    """Four blocks of 18 unknowns, the last of them carried along, with a part before each."""
+    lists = [[*range(7 * k, 7 * k + 7), *range(28 + 18 * k, 46 + 18 * k)] for k in range(4)]
+    for k in range(4):
+        rest = sorted({k, k + 1, 3} & set(range(k, 4)))
+        lists.append([28 + 18 * one + place for one in rest for place in range(18)])
+    spots, up = np.full((2, len(lists), max(map(len, lists))), -1)
+    gone, parent = np.array([7] * 4 + [18] * 4), np.array([4, 5, 6, 7, 5, 6, 7, -1])
+    for number, own in enumerate(lists):
+        spots[number, : len(own)] = own
+        left = own[gone[number] :]
+        up[number, gone[number] : len(own)] = [lists[parent[number]].index(spot) for spot in left]
+    mesh = FrameModel(scene(boom="none")).mesh._replace(
+        gone=gone, size=np.array([len(own) for own in lists]), spots=spots, parent=parent, up=up,
+        fixed=np.array([30, 50]), unknowns=100,
+    )  # fmt: skip
+    check_elimination(mesh)
+
+
+def check_elimination(mesh: Mesh) -> None:
     """Random fronts with heavy diagonals, unsymmetric: to round-off."""
-    mesh, rng = FrameModel(scene().with_values(values)).mesh, np.random.default_rng(0)
-    fronts = Fronts.empty(mesh)
+    rng, fronts = np.random.default_rng(0), Fronts.empty(mesh)
+    # One matrix a front, however many panels: what many elements a rod take grows no faster.
+    assert len(fronts.whole) == len(mesh.gone)
     dense = np.zeros((mesh.unknowns, mesh.unknowns))
     for front, spots, size in zip(fronts.whole, mesh.spots, mesh.size, strict=True):
         front[:size, :size] = rng.normal(size=(size, size)) + 30.0 * np.eye(size)
