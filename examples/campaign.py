@@ -1,7 +1,8 @@
 """A small campaign: how uncertain forces and friction spread the deployment time of a ring.
 
 Writes a campaign file, runs its 16 samples on two cores and merges them into one netCDF file.  The
-"frame" fidelity keeps a sample near a second; leave that line out for the full model.  Interrupted, the same command goes on where it stopped.
+"frame" fidelity keeps a sample near a second; leave that line out for the full model.
+Interrupted, the same command goes on where it stopped.
 """
 
 import subprocess
