@@ -23,7 +23,7 @@ _CHANCE = {"given_data_index": "chance_level"}
 
 
 def output_table(analysis: xr.Dataset, names: list[str]) -> Table:
-    """Mean with its interval, scatter, quantiles and range of each output."""
+    """Mean with its interval, scatter, quantiles and range of each output, and its worst sample."""
     rows = []
     for name in names:
         values, counts = analysis[name].values, analysis[f"{name}_samples"].values
@@ -33,19 +33,28 @@ def output_table(analysis: xr.Dataset, names: list[str]) -> Table:
         units = analysis[name].attrs["units"]
         units = "" if units == "1" else units
         if least == most:
-            rows.append((name, units, number_text(least), "all alike", *"-----", "-", count))
+            rows.append((name, units, number_text(least), "all alike", *"------", "-", count))
         elif np.isfinite(least):
             fine = digits_of(least, most)
             ends = _ends(analysis[f"{name}_interval"].values[0], fine)
             others = [number_text(v, fine) for v in (*quantiles, least, most)]
-            rows.append(
-                (name, units, number_text(mean, fine), ends, number_text(deviation), *others, count)
-            )
+            rows.append((
+                name, units, number_text(mean, fine), ends, number_text(deviation), *others,
+                worst_of(analysis, name), count,
+            ))  # fmt: skip
     head = (
         "output", "unit", "mean", "95 % interval", "std. dev.", "5 %", "median", "95 %", "least",
-        "most", "used",
+        "most", "worst sample", "used",
     )  # fmt: skip
     return Table(head, rows)
+
+
+def worst_of(analysis: xr.Dataset, name: str) -> str:
+    """The sample with an output's worst value; a dash where neither end is the worse one, and of
+    analyses that do not tell it.
+    """
+    sample = int(analysis.get(f"{name}_worst_sample", -1))
+    return "-" if sample < 0 else str(sample)
 
 
 def digits_of(least: float, most: float) -> int:

@@ -82,12 +82,12 @@ def judged_by(campaign: xr.Dataset) -> str:
 
 
 def median_and_worst(campaign: xr.Dataset) -> tuple[int, int] | None:
-    """The samples in the middle and at the end of that order; None if no sample is used."""
+    """The samples in the middle and at the worst end of that order; None if no sample is used."""
     if not (name := judged_by(campaign)):
         samples = used(campaign)["sample"].to_numpy()
         return (int(samples[0]), int(samples[0])) if len(samples) else None
     samples, values = values_of(campaign, name)
-    order = np.argsort(values, kind="stable")
+    order = np.argsort(VARIABLES[name].badness * values, kind="stable")
     return int(samples[order[(len(order) - 1) // 2]]), int(samples[order[-1]])
 
 

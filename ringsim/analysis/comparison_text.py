@@ -86,13 +86,25 @@ def _outputs(found: xr.Dataset) -> Iterator[str]:
             name, "" if variable.units == "1" else variable.units, number_text(first, fine),
             number_text(second, fine), number_text(apart),
             interval_text(*found[f"{name}_difference_interval"].values.tolist()),
+            _worse(found, name),
             str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
             largest, place,
         ))  # fmt: skip
     head = (
-        "output", "unit", "first", "second", "difference", "95 % interval", "samples",
+        "output", "unit", "first", "second", "difference", "95 % interval", "worse", "samples",
         "largest of a pair", "in sample",
     )  # fmt: skip
     if rows:
-        columns = 5 if found.attrs["pairs"] == 1 else len(head)
+        columns = 7 if found.attrs["pairs"] == 1 else len(head)
         yield from slim(Table(head[:columns], [row[:columns] for row in rows])).lines()
+
+
+def _worse(found: xr.Dataset, name: str) -> str:
+    """Which side an output is worse on, where the interval of the difference leaves out zero; of
+    two runs by the difference itself.
+    """
+    ends = found[f"{name}_difference_interval"].values
+    if found.attrs["pairs"] == 1:
+        ends = np.full(2, found[f"{name}_difference"].item())
+    ends = np.sort(quantities()[name].badness * ends)
+    return "second" if ends[0] > 0.0 else "first" if ends[1] < 0.0 else "-"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.brief import digits_of
+from ringsim.analysis.brief import digits_of, worst_of
 from ringsim.analysis.campaign_samples import (
     NUMERICAL,
     distribution_of,
@@ -65,10 +65,11 @@ def statistics(campaign: xr.Dataset, analysis: xr.Dataset) -> Table:
             cells.append(number_text(value, fine) + "".join(f" ({sample})" for sample in first))
         used, lost, absent = (str(counts.sel(counted=c).item()) for c in _COUNTS)
         unit = str(says.get("units", "1"))
+        cells.append(worst_of(analysis, name) if least < most else "-")
         rows.append([str(says.get("long_name", name)), unit, *cells, used, lost, absent])
-    extremes = ("Least (sample)", "Largest (sample)", "n used", "Lost", "No value")
+    extremes = ("Least (sample)", "Largest (sample)", "Worst sample", "Used", "Lost", "No value")
     notes = (
-        ["In brackets intervals of 95 %"] if any("(" in c for r in rows for c in r[2:-5]) else []
+        ["In brackets intervals of 95 %"] if any("(" in c for r in rows for c in r[2:-6]) else []
     )
     return Table(("Number", "Unit", *moments.values(), *extremes), rows, notes)
 

@@ -130,7 +130,7 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
     good = campaign["peak_tension"].values[[0, 1, 3, 4, 6]]
     at = next(k for k, cell in enumerate(cells) if cell.startswith("largest tension"))
     assert cells[at + 1 : at + 3] == ["N", f"{good.mean():.4g}"]
-    assert cells[at + 7 : at + 12] == ["20 (0)", "26 (6)", "5", "2", "0"]
+    assert cells[at + 7 : at + 13] == ["20 (0)", "26 (6)", "6", "5", "2", "0"]
     # Shares of outcomes have intervals, those of the analysis.
     at = cells.index("deployed")
     low, high = share_interval(4, 5)
