@@ -11,15 +11,16 @@ import xarray as xr
 from ringsim.analysis.brief import digits_of, worst_of
 from ringsim.analysis.campaign_samples import (
     NUMERICAL,
+    called,
     distribution_of,
     endings,
     inputs,
+    paths_of,
     scalars,
     values_of,
 )
 from ringsim.analysis.quantities import CHECKED
 from ringsim.refusal import show
-from ringsim.report.model import paths_of
 from ringsim.tables import Table, interval_text, number_text
 from ringsim.variables import GOALS, Cause
 
@@ -100,12 +101,13 @@ def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
 
 
 def drawn(campaign: xr.Dataset) -> Rows:
-    """Path, unit, places, distribution, and the values that came out."""
+    """Name, unit, places, distribution, the values that came out, and the scene's paths that take
+    them: a row an input.
+    """
     rows = []
     for name in inputs(campaign):
         variable = campaign[name]
         says, values = distribution_of(variable), variable.to_numpy()
-        paths = paths_of(variable)
         says.pop("shared", None)
         says.pop("each_section", None)
         kind = says.pop("kind", says.pop("text", ""))
@@ -117,7 +119,8 @@ def drawn(campaign: xr.Dataset) -> Rows:
             extent = f"{number(float(values.min()))} to {number(float(values.max()))}"
         places = variable.shape[1] if variable.ndim > 1 else 1
         unit = str(variable.attrs.get("units", "-"))
-        rows.append([", ".join(paths), unit, str(places), law, extent])
+        paths = ", ".join(paths_of(variable))
+        rows.append([called(variable), unit, str(places), law, extent, paths])
     return rows
 
 
