@@ -84,8 +84,8 @@ def what_matters(analysis: xr.Dataset) -> Table:
     notes = measure_notes(analysis)
     if rows and "input" in analysis.dims and "factor" not in analysis.dims:
         notes.append(
-            f"told is what the largest of all {analysis.sizes['input']} inputs would reach by "
-            "chance in fewer than one output of 20"
+            "an input is told if by chance the largest of all "
+            f"{analysis.sizes['input']} would reach as much in fewer than one output of 20"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if doubtful:
@@ -94,7 +94,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
             f"rank correlation is within chance): {', '.join(doubtful)}"
         )
     if quiet:
-        notes.append(f"nothing that chance would not explain: {', '.join(quiet)}")
+        notes.append(f"no input stands out of chance for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
     head = ("what matters for", "input", index, "95 % interval", *_RANKS.values())
     return Table(head, rows, notes, left=2)

@@ -33,7 +33,8 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> list[str]:
         counts = one[f"{word}_compared"].tolist()
         low, high = one[f"{word}_share_difference_interval"].tolist()
         rows.append((
-            str(name), *map(str, one[f"{word}_samples"]),
+            str(name).replace("_", " ") if word == "kind" else str(name),
+            *map(str, one[f"{word}_samples"]),
             *(number_text(share, 3) for share in one[f"{word}_share"]),
             number_text(one[f"{word}_share_difference"].item(), 3),
             interval_text(low, high, 3),
@@ -63,7 +64,7 @@ def _outcomes(found: xr.Dataset) -> Iterator[str]:
         if (changed := changed - 1) == found.sizes["change"] - _NAMED - 1:
             yield "  ..., all of them in the file of --out"
             return
-        yield f"  sample {sample}: {first}, then {second}"
+        yield f"  sample {sample}: {first}, then {second}".replace("_", " ")
 
 
 def _outputs(found: xr.Dataset) -> Iterator[str]:

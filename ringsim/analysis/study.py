@@ -29,6 +29,7 @@ from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge
+from ringsim.analysis.worst import worst
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status
 
@@ -67,8 +68,9 @@ def analyse(
         ``NAME_convergence`` (part, statistic), ``NAME_error_of_mean`` (source), all in its unit,
         ``NAME_samples`` (counted) and ``NAME_worst_sample``; ``outcome_...`` along ``kind``;
         verdicts along ``requirement``; what matters along ``input`` and ``output``, see
-        ``influence`` and ``sensitivity``.  NaN stands for what the samples do not tell;
-        ``intervals`` among the attributes says what intervals are from, or why there are none.
+        ``influence`` and ``sensitivity``; the worst samples along ``worst``.  NaN
+        stands for what the samples do not tell; ``intervals`` among the attributes says what
+        intervals are from, or why there are none.
 
     InputError if it is no campaign, or a requirement cannot be judged by it.
     """
@@ -108,6 +110,7 @@ def analyse(
             found = found.assign(_output(stand, name, placed))
     found = found.assign(tail(campaign))
     more = [outcomes(stand, placed), influence(stand, wanted, placed)]
+    more += [worst(stand, wanted)]
     more += [judge(stand, wanted, placed)] if wanted else []
     more += [sensitivity(campaign, wanted, placed)]
     if reweighted:
