@@ -1,5 +1,6 @@
 """What every dataset of ringsim can be asked as ``dataset.ring``."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
@@ -53,6 +54,36 @@ class Ring:
         }  # fmt: skip
         return xr.Dataset({k: ("kind", v.to_numpy()) for k, v in table.items()},
                           coords={"kind": found["kind"]}).to_dataframe()  # fmt: skip
+
+    def worst(self) -> "pd.DataFrame":
+        """The worst samples of each failure of a campaign, the worst first: of requirements of its
+        file that are violated, of outcomes that fall short, of runs that were lost.
+
+        ``failure`` in words, ``failed`` samples ``of`` so many, then ``sample``, what was
+        ``found``, what is unusual in its ``inputs``, and the command that runs it again,
+        ``replay``, in the folder that the dataset was opened from, by default runs/NAME; empty
+        without failures.
+
+        InputError if it is no campaign, or its requirements cannot be judged.
+        """
+        import pandas as pd
+
+        from ringsim.analysis.blocks import population_of
+        from ringsim.analysis.campaign_samples import requirements_of
+        from ringsim.analysis.requirements import read_requirements
+        from ringsim.analysis.worst import COLUMNS, command, worst
+
+        self._require_samples("worst samples")
+        wanted = read_requirements(requirements_of(self._dataset), "requirements")
+        found = worst(population_of(self._dataset), wanted)
+        columns: dict[str, Any] = {
+            name: found[f"worst_{name}"].to_numpy() if found else [] for name in COLUMNS
+        }
+        source = str(self._dataset.encoding.get("source", ""))
+        name = self._dataset.attrs.get("campaign_name", "")
+        folder = str(Path(source).parent) if source else f"runs/{name}"
+        again = [command(folder, sample) for sample in columns["sample"]]
+        return pd.DataFrame(columns | {"replay": again})
 
     def fan(self, quantiles: tuple[float, ...] = (0.0, 0.05, 0.5, 0.95, 1.0)) -> xr.DataArray:
         """Quantiles over the samples of each V-joint's deviation from the mean opening angle.

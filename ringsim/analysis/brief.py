@@ -23,7 +23,7 @@ _CHANCE = {"given_data_index": "chance_level"}
 
 
 def output_table(analysis: xr.Dataset, names: list[str]) -> Table:
-    """Mean with its interval, scatter, quantiles and range of each output."""
+    """Mean with its interval, scatter, quantiles and range of each output, and its worst sample."""
     rows = []
     for name in names:
         values, counts = analysis[name].values, analysis[f"{name}_samples"].values
@@ -33,19 +33,28 @@ def output_table(analysis: xr.Dataset, names: list[str]) -> Table:
         units = analysis[name].attrs["units"]
         units = "" if units == "1" else units
         if least == most:
-            rows.append((name, units, number_text(least), "all alike", *"-----", "-", count))
+            rows.append((name, units, number_text(least), "all alike", *"------", "-", count))
         elif np.isfinite(least):
             fine = digits_of(least, most)
             ends = _ends(analysis[f"{name}_interval"].values[0], fine)
             others = [number_text(v, fine) for v in (*quantiles, least, most)]
-            rows.append(
-                (name, units, number_text(mean, fine), ends, number_text(deviation), *others, count)
-            )
+            rows.append((
+                name, units, number_text(mean, fine), ends, number_text(deviation), *others,
+                worst_of(analysis, name), count,
+            ))  # fmt: skip
     head = (
         "output", "unit", "mean", "95 % interval", "std. dev.", "5 %", "median", "95 %", "least",
-        "most", "used",
+        "most", "worst sample", "used",
     )  # fmt: skip
     return Table(head, rows)
+
+
+def worst_of(analysis: xr.Dataset, name: str) -> str:
+    """The sample with an output's worst value; a dash where neither end is the worse one, and of
+    analyses that do not tell it.
+    """
+    sample = int(analysis.get(f"{name}_worst_sample", -1))
+    return "-" if sample < 0 else str(sample)
 
 
 def digits_of(least: float, most: float) -> int:
@@ -75,8 +84,8 @@ def what_matters(analysis: xr.Dataset) -> Table:
     notes = measure_notes(analysis)
     if rows and "input" in analysis.dims and "factor" not in analysis.dims:
         notes.append(
-            f"told is what the largest of all {analysis.sizes['input']} inputs would reach by "
-            "chance in fewer than one output of 20"
+            "an input is told if by chance the largest of all "
+            f"{analysis.sizes['input']} would reach as much in fewer than one output of 20"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if doubtful:
@@ -85,7 +94,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
             f"rank correlation is within chance): {', '.join(doubtful)}"
         )
     if quiet:
-        notes.append(f"nothing that chance would not explain: {', '.join(quiet)}")
+        notes.append(f"no input stands out of chance for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
     head = ("what matters for", "input", index, "95 % interval", *_RANKS.values())
     return Table(head, rows, notes, left=2)

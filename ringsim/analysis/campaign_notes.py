@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ringsim.analysis.blocks import population_of
 from ringsim.analysis.design import placement
-from ringsim.analysis.quantities import used
+from ringsim.analysis.quantities import used, worst_sample
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.summary import summary
 from ringsim.variables import GOALS, Fate, Status
@@ -142,7 +142,9 @@ def restart_lines(campaign: xr.Dataset) -> list[str]:
 
 
 def peak_lines(campaign: xr.Dataset) -> list[str]:
-    """The largest value of all samples that ended well, when and where, for outputs that tell it.
+    """The worst value of all samples that ended well, when and where, for outputs that tell it.
+
+    Which end is the worst the output knows: margins and latch rates the least, loads the largest.
 
     Places have no names where samples differ in the ends at which the winches are.
     """
@@ -153,14 +155,13 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
     sound, lines = used(campaign), []
     for output in OUTPUTS:
         for variable in output.variables:
-            if variable.summary is None or variable.name not in sound:
+            if variable.summary is None or (sample := worst_sample(sound, variable)) < 0:
                 continue
-            known = sound[variable.name].dropna("sample")
-            worst = sound.sel(sample=known.idxmax()) if known.size else sound
+            worst = sound.sel(sample=sample)
             values = {str(n): each.values for n, each in worst.items() if not each.dims}
             if output().told(values, spans):
                 # Series tell which places are alike.
                 values = {str(n): each.values for n, each in worst.variables.items()}
                 told = " ".join(summary(values, spans)[variable.name].split())
-                lines.append(f"{variable.summary[0]} in sample {worst.sample.item()}: {told}")
+                lines.append(f"{variable.summary[0]} in sample {sample}: {told}")
     return lines

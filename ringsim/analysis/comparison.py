@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
 from ringsim.analysis.blocks import population_of
+from ringsim.analysis.campaign_samples import called
 from ringsim.analysis.comparison_shares import differences_of_shares, ends, has_means
 from ringsim.analysis.design import Placement, placement
 from ringsim.analysis.intervals import NONE, Array
@@ -108,14 +109,14 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
         keys = [list(each[seeds].to_numpy().tolist()) for each in (first, second)]
         if (found := _matched(*keys))[0].size:
             other = [
-                first[name].attrs.get("path", name) for name in inputs
+                called(first[name]) for name in inputs
                 if not np.array_equal(
                     first[name].to_numpy()[found[0]], second[name].to_numpy()[found[1]]
                 )
             ]  # fmt: skip
             told = "samples are paired by their seeds"
             if other:
-                told += f"; their inputs differ in {', '.join(map(str, other))}"
+                told += f"; their inputs differ in {', '.join(dict.fromkeys(other))}"
             return Pairs(*found, told)
     rows = [_rows(each, inputs) for each in (first, second)]
     if inputs and all(len(set(each)) == len(each) for each in rows):

@@ -62,7 +62,7 @@ def _correlated(analysis: xr.Dataset, outputs: Collection[str]) -> Table:
             f"the intervals of about {(1 - LEVEL) * len(names):.2g} of them leave out zero"
             if certain else f"one in twenty reaches {1.96 / (least - 1) ** 0.5:.2g}"
         )  # fmt: skip
-        notes.append(f"the largest of {len(names)} inputs; by chance alone {chance}")
+        notes.append(f"told are the largest of {len(names)} inputs: by chance alone {chance}")
         notes += confounding_notes(analysis, named)
     head = ("rank correlation", "correlation", "95 % interval", "partial", "95 % interval")
     return Table((*head, "used"), rows, notes)
@@ -75,7 +75,7 @@ def _separated(analysis: xr.Dataset) -> Table:
         one = analysis.sel(group=group)
         first, *others = str(group).split("; ")
         if others:
-            notes.append(f"{first} are the same samples as: {', '.join(others)}")
+            notes.append(f"{first}: the same samples as {', '.join(others)}")
         middle, ends = one["separation"].values, one["separation_interval"].values
         rows += [
             (f"{first}: {names[k]}", *_told(middle, ends, k), str(one["group_samples"].item()))

@@ -9,6 +9,7 @@ import xarray as xr
 from pydantic import ValidationError
 
 from ringsim.analysis import weighted
+from ringsim.analysis.campaign_samples import called, inputs, paths_of
 from ringsim.analysis.design import Placement
 from ringsim.analysis.intervals import NONE, Array
 from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
@@ -76,16 +77,16 @@ def weights_of(campaign: xr.Dataset, wanted: Mapping[str, Distribution]) -> Arra
     An input of many places has the new distribution in each of them, independently.  InputError
     where an input was not drawn by itself, or its samples do not cover the new distribution.
     """
-    paths = {
-        str(v.attrs.get("path")): v
-        for v in campaign.data_vars.values() if v.attrs.get("role") == "input"
-    }  # fmt: skip
+    known = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
     logarithm = np.zeros(campaign.sizes["sample"])
     for path, new in wanted.items():
-        if path not in paths:
-            hint = known_or_nearest(path, paths) if paths else "none is drawn"
+        if path not in known:
+            hint = known_or_nearest(path, known) if known else "none is drawn"
+            # Of paths that share one drawn value none has a distribution of its own.
+            whole = (f"did you mean {n}?" for n, each in known.items() if path in paths_of(each))
+            hint = next(whole, hint)
             raise InputError(f"--reweight {path}: is no drawn input of this campaign ({hint})")
-        values, old = paths[path].to_numpy(), _drawn_from(campaign, path, paths[path])
+        values, old = known[path].to_numpy(), _drawn_from(campaign, path, known[path])
         _check_cover(path, old, new, len(values))
         ratio = new.log_density(values) - old.log_density(values)
         logarithm += ratio if ratio.ndim == 1 else ratio.sum(axis=1)

@@ -14,13 +14,22 @@ from ringsim.analysis.blocks import population_of
 from ringsim.analysis.design import Placement, placement
 from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import NONE, Array, Interval
-from ringsim.analysis.quantities import CHECKED, good, lost, numbers, quantities, ran
+from ringsim.analysis.quantities import (
+    CHECKED,
+    good,
+    lost,
+    numbers,
+    quantities,
+    ran,
+    worst_sample,
+)
 from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
 from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge
+from ringsim.analysis.worst import worst
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status
 
@@ -57,10 +66,11 @@ def analyse(
     xarray.Dataset
         For every output NAME ``NAME`` (statistic), ``NAME_interval`` (statistic, bound),
         ``NAME_convergence`` (part, statistic), ``NAME_error_of_mean`` (source), all in its unit,
-        and ``NAME_samples`` (counted); ``outcome_...`` along ``kind``; verdicts along
-        ``requirement``; what matters along ``input`` and ``output``, see ``influence`` and
-        ``sensitivity``.  NaN stands for what the samples do not tell; ``intervals`` among the
-        attributes says what intervals are from, or why there are none.
+        ``NAME_samples`` (counted) and ``NAME_worst_sample``; ``outcome_...`` along ``kind``;
+        verdicts along ``requirement``; what matters along ``input`` and ``output``, see
+        ``influence`` and ``sensitivity``; the worst samples along ``worst``.  NaN
+        stands for what the samples do not tell; ``intervals`` among the attributes says what
+        intervals are from, or why there are none.
 
     InputError if it is no campaign, or a requirement cannot be judged by it.
     """
@@ -100,6 +110,7 @@ def analyse(
             found = found.assign(_output(stand, name, placed))
     found = found.assign(tail(campaign))
     more = [outcomes(stand, placed), influence(stand, wanted, placed)]
+    more += [worst(stand, wanted)]
     more += [judge(stand, wanted, placed)] if wanted else []
     more += [sensitivity(campaign, wanted, placed)]
     if reweighted:
@@ -139,6 +150,11 @@ def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any
             told("samples") | {"units": "1"},
         ),
         f"{name}_error_of_mean": ("source", errors, told("error of the mean by its source")),
+        f"{name}_worst_sample": (
+            (), worst_sample(campaign, quantities()[name]),
+            told("sample with the worst value; -1 where neither end is the worse one")
+            | {"units": "1"},
+        ),
     }  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
 from ringsim.analysis.tails import tail, tail_lines
 from ringsim.analysis.verdicts import Verdict, judge
+from ringsim.analysis.worst import worst_lines
 from ringsim.refusal import InputError
 from ringsim.tables import Table, counted, interval_text, number_text, slim
 
@@ -26,8 +27,9 @@ _HINT = (
 )
 
 
-def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
-    """Outcomes, outputs, errors, what matters; verdicts last, where they are seen.
+def told(analysis: xr.Dataset, folder: str = "DIR", *, full: bool = False) -> list[str]:
+    """Outcomes, outputs, errors, what matters, the worst samples; verdicts last, where they are
+    seen.  ``folder`` is the campaign's, for the commands that run samples again.
 
     ``full`` has the interval and the convergence of every statistic, and every measure of what
     matters, whatever chance would explain.
@@ -54,6 +56,7 @@ def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
         tables += [output_table(analysis, outputs_in(analysis)), _known_errors(analysis)]
         tables += [what_matters(analysis), *refusals(analysis), what_separates(analysis)]
     parts = [table.lines() if full else slim(table).lines() for table in tables]
+    parts += [worst_lines(analysis, folder)]
     parts += [slim(verdict_table(analysis)).lines(), list(reweighting_lines(analysis))]
     for more in filter(None, parts):
         lines += ["", *more]
@@ -130,7 +133,8 @@ def outcome_table(analysis: xr.Dataset) -> Table:
     """What the antenna did, and how runs were lost, with shares."""
     rows = [
         (
-            str(kind), f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}",
+            str(kind).replace("_", " "),
+            f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}",
             number_text(one["outcome_share"].item()),
             interval_text(*one["outcome_share_interval"].values),
             *map(number_text, one["outcome_share_convergence"].values[:-1]),

@@ -14,6 +14,7 @@ from ringsim.analysis.requirements import Requirements
 from ringsim.choice import kind_of, kinds_of
 from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
+from ringsim.outputs.extremes import instead_of
 from ringsim.outputs.family import VARIABLES, holds
 from ringsim.overrides import place_of
 from ringsim.refusal import InputError, explain, known_or_nearest, show
@@ -136,6 +137,8 @@ class Specification(Model):
                 "give both"
             )
         for name in self.max_difference if isinstance(self.max_difference, dict) else ():
+            if name in VARIABLES and VARIABLES[name].dims:
+                raise ValueError(f"max_difference.{instead_of(name)}")
             if name not in quantities():
                 raise ValueError(
                     f"max_difference.{name}: there is no such output to compare engines by "

@@ -34,7 +34,7 @@ class CableTension(Output):
                 "largest tension", safety=1.2, of_one_element=0.001,
                 between_readings=2.0 * TENSION_BEND / 8.0,
             ),
-            summary=("largest tension", "10.3f"),
+            summary=("largest tension", "10.3f"), worse="larger", largest_of="cable_tension",
         ),
         *PEAK.variables,
     )  # fmt: skip

@@ -20,7 +20,7 @@ class EnergyBalance(Output):
         Variable("dissipation", ("time",), "J", "energy lost in joints, dampers and stops"),
         Variable(
             "energy_error", (), "1", "largest energy imbalance over the largest energy exchanged",
-            summary=("energy error", "10.1e"),
+            summary=("energy error", "10.1e"), worse="larger",
         ),
     )  # fmt: skip
 

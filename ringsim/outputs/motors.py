@@ -28,15 +28,15 @@ class Motors(Output):
         ),
         Variable(
             "peak_motor_torque", (), "N m", "largest torque of any motor's shaft at any step",
-            summary=("largest motor torque", "10.3g"),
+            summary=("largest motor torque", "10.3g"), worse="larger", largest_of="motor_torque",
         ),
         Variable(
             "peak_motor_power", (), "W", "largest power of any motor's shaft at any step",
-            summary=("largest motor power", "10.3g"),
+            summary=("largest motor power", "10.3g"), worse="larger", largest_of="motor_power",
         ),
         Variable(
             "total_motor_energy", (), "J", "energy that the shafts of all motors gave by the end",
-            summary=("energy of all motors", "10.3g"),
+            summary=("energy of all motors", "10.3g"), worse="larger",
         ),
     )  # fmt: skip
 

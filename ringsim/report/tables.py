@@ -8,18 +8,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.brief import digits_of
+from ringsim.analysis.brief import digits_of, worst_of
 from ringsim.analysis.campaign_samples import (
     NUMERICAL,
+    called,
     distribution_of,
     endings,
     inputs,
+    paths_of,
     scalars,
     values_of,
 )
 from ringsim.analysis.quantities import CHECKED
 from ringsim.refusal import show
-from ringsim.report.model import paths_of
 from ringsim.tables import Table, interval_text, number_text
 from ringsim.variables import GOALS, Cause
 
@@ -65,10 +66,11 @@ def statistics(campaign: xr.Dataset, analysis: xr.Dataset) -> Table:
             cells.append(number_text(value, fine) + "".join(f" ({sample})" for sample in first))
         used, lost, absent = (str(counts.sel(counted=c).item()) for c in _COUNTS)
         unit = str(says.get("units", "1"))
+        cells.append(worst_of(analysis, name) if least < most else "-")
         rows.append([str(says.get("long_name", name)), unit, *cells, used, lost, absent])
-    extremes = ("Least (sample)", "Largest (sample)", "n used", "Lost", "No value")
+    extremes = ("Least (sample)", "Largest (sample)", "Worst sample", "Used", "Lost", "No value")
     notes = (
-        ["In brackets intervals of 95 %"] if any("(" in c for r in rows for c in r[2:-5]) else []
+        ["In brackets intervals of 95 %"] if any("(" in c for r in rows for c in r[2:-6]) else []
     )
     return Table(("Number", "Unit", *moments.values(), *extremes), rows, notes)
 
@@ -99,12 +101,13 @@ def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
 
 
 def drawn(campaign: xr.Dataset) -> Rows:
-    """Path, unit, places, distribution, and the values that came out."""
+    """Name, unit, places, distribution, the values that came out, and the scene's paths that take
+    them: a row an input.
+    """
     rows = []
     for name in inputs(campaign):
         variable = campaign[name]
         says, values = distribution_of(variable), variable.to_numpy()
-        paths = paths_of(variable)
         says.pop("shared", None)
         says.pop("each_section", None)
         kind = says.pop("kind", says.pop("text", ""))
@@ -116,7 +119,8 @@ def drawn(campaign: xr.Dataset) -> Rows:
             extent = f"{number(float(values.min()))} to {number(float(values.max()))}"
         places = variable.shape[1] if variable.ndim > 1 else 1
         unit = str(variable.attrs.get("units", "-"))
-        rows.append([", ".join(paths), unit, str(places), law, extent])
+        paths = ", ".join(paths_of(variable))
+        rows.append([called(variable), unit, str(places), law, extent, paths])
     return rows
 
 

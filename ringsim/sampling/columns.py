@@ -33,6 +33,9 @@ class Column:
     """Shape (samples,), or (samples, k) with a value for each place."""
     places: tuple[str, ...] = ()
     """Names of the k places, if they have some."""
+    input: str = ""
+    """The campaign file's name of what was drawn, which several paths may share; empty: the path.
+    """
 
     @property
     def in_words(self) -> bool:
@@ -108,6 +111,7 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
             variable.units = column.units
         variable.setncatts(
             {"path": column.path, "role": role, "distribution": column.origin}
+            | ({"input": column.input or column.path} if column.path else {})
             | ({"dtype": "bool"} if values.dtype.kind == "b" else {})
         )
         if values.dtype.kind == "O":
@@ -154,5 +158,6 @@ def read_inputs(file: Any) -> tuple[Column, ...]:
             named = says.get("coordinates")
             places = tuple(file[named][:]) if named else ()
             values = values.astype(kind)
-            columns.append(Column(name, says["path"], dim, units, origin, values, places))
+            own = says.get("input", "")
+            columns.append(Column(name, says["path"], dim, units, origin, values, places, own))
     return tuple(columns)
