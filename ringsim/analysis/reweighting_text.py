@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import xarray as xr
 
+from ringsim.analysis.losses import LOST, MARK, NOTE, marked
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.reweighting import LEAST_REPLICATES, SOBOL, STATISTICS
 from ringsim.analysis.verdicts import Verdict
@@ -20,6 +21,7 @@ def reweighting_lines(analysis: xr.Dataset) -> Iterator[str]:
     """Which distributions, how many effective samples, then the estimates beside the old ones."""
     if "reweighted_to" not in analysis:
         return
+    bent = MARK * bool(analysis.attrs.get(NOTE))
     laws = json.loads(analysis["reweighted_to"].item())
     told = ", ".join(f"{path} = {label_of(law)}" for path, law in laws.items())
     yield (
@@ -37,7 +39,7 @@ def reweighting_lines(analysis: xr.Dataset) -> Iterator[str]:
             few = decisive < (LEAST_OF_MEAN if statistic == "mean" else LEAST_OF_SHARE)
             thin |= few
             rows.append((
-                f"{name}{THIN * few}", "" if variable.units == "1" else variable.units,
+                f"{name}{THIN * few}{bent}", "" if variable.units == "1" else variable.units,
                 statistic.replace("_", " "),
                 number_text(one[name].item()), number_text(one[f"{name}_reweighted"].item()),
                 interval_text(low, high), number_text(one[f"{name}_effective_samples"].item(), 3),
@@ -54,7 +56,8 @@ def reweighting_lines(analysis: xr.Dataset) -> Iterator[str]:
         few = decisive < LEAST_OF_SHARE
         thin |= few
         shares.append((
-            f"{event}{THIN * few}", number_text(one["reweighted_share"].item()),
+            f"{event}{THIN * few}{'' if event == LOST else bent}",
+            number_text(one["reweighted_share"].item()),
             interval_text(*one["reweighted_share_interval"].values.tolist()),
             number_text(decisive, 3),
         ))  # fmt: skip
@@ -91,4 +94,4 @@ def _verdicts(analysis: xr.Dataset) -> Table:
         ))  # fmt: skip
     head = ("requirement, reweighted", "probability", "confidence", "verdict", "estimate",
             "one-sided bounds")  # fmt: skip
-    return Table(head, rows)
+    return marked(Table(head, rows), analysis, head.index("estimate"))
