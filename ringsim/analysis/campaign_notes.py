@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ringsim.analysis.blocks import population_of
 from ringsim.analysis.design import placement
+from ringsim.analysis.losses import losses
 from ringsim.analysis.quantities import used, worst_sample
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.summary import summary
@@ -91,6 +92,7 @@ def budget_lines(campaign: xr.Dataset) -> list[str]:
     compared with the standard error as it is.  Samples that did not end well are left out.
     """
     sound, placed, lines = used(population_of(campaign)), placement(campaign), []
+    mark = losses(campaign).mark
     for name in map(str, sound.data_vars):
         of = name.removesuffix("_error")
         if of == name or of not in sound or sound[of].dims != ("sample",):
@@ -110,6 +112,7 @@ def budget_lines(campaign: xr.Dataset) -> list[str]:
                 + (f"standard error {sampling:.2g}, " if np.isfinite(sampling) else "")
                 + f"numerical error at most {numerical:.2g} ({len(bars)} of {len(values)} samples)"
                 + (f": {larger} error dominates the mean" if np.isfinite(sampling) else "")
+                + mark
             )
     return lines
 
@@ -152,7 +155,7 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
     if "span_name" in campaign:
         names = campaign.span_name.transpose("plane", "span").values.tolist()
         spans = dict(zip(campaign.plane.values.tolist(), names, strict=True))
-    sound, lines = used(campaign), []
+    sound, lines, mark = used(campaign), [], losses(campaign).mark
     for output in OUTPUTS:
         for variable in output.variables:
             if variable.summary is None or (sample := worst_sample(sound, variable)) < 0:
@@ -163,5 +166,5 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                 # Series tell which places are alike.
                 values = {str(n): each.values for n, each in worst.variables.items()}
                 told = " ".join(summary(values, spans)[variable.name].split())
-                lines.append(f"{variable.summary[0]} in sample {sample}: {told}")
+                lines.append(f"{variable.summary[0]} in sample {sample}: {told}{mark}")
     return lines

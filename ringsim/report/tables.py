@@ -19,6 +19,7 @@ from ringsim.analysis.campaign_samples import (
     scalars,
     values_of,
 )
+from ringsim.analysis.losses import losses, marked
 from ringsim.analysis.quantities import CHECKED
 from ringsim.refusal import show
 from ringsim.tables import Table, interval_text, number_text
@@ -72,7 +73,7 @@ def statistics(campaign: xr.Dataset, analysis: xr.Dataset) -> Table:
     notes = (
         ["In brackets intervals of 95 %"] if any("(" in c for r in rows for c in r[2:-6]) else []
     )
-    return Table(("Number", "Unit", *moments.values(), *extremes), rows, notes)
+    return marked(Table(("Number", "Unit", *moments.values(), *extremes), rows, notes), analysis)
 
 
 _COUNTS = ("used", "lost", "without_value")
@@ -130,7 +131,7 @@ def _short(value: Any) -> str:
 
 def truth(campaign: xr.Dataset) -> Rows:
     """What, samples, typical and largest size: errors of balance, error bars, second engines."""
-    rows = []
+    rows: Rows = []
     for name in NUMERICAL:
         if name in campaign:
             samples, values = values_of(campaign, name)
@@ -146,7 +147,8 @@ def truth(campaign: xr.Dataset) -> Rows:
                 rows += _row(campaign[name], words, samples, values, _rms)
             else:
                 rows += _row(campaign[other], words, samples, values, _rms)
-    return rows
+    mark = losses(campaign).mark
+    return [[f"{what}{mark}", *others] for what, *others in rows]
 
 
 def _rms(values: Any) -> float:

@@ -144,8 +144,10 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
     assert cells[at + 7 : at + 13] == ["20 (0)", "26 (6)", "6", "5", "2", "0"]
     # Shares of outcomes have intervals, those of the analysis.
     at = cells.index("deployed")
-    low, high = share_interval(4, 5)
-    assert cells[at + 1 : at + 4] == ["4 of 5", "0.8", f"{low:.4g} .. {high:.4g}"]
+    low, high = share_interval(4, 7)[0], share_interval(6, 7)[1]
+    assert cells[at + 1 : at + 4] == [
+        "4 of 7 (2 lost)", f"{4 / 7:.4g}", f"{low:.4g} .. {high:.4g}"
+    ]  # fmt: skip
     at = cells.index("outcome is deployed")
     assert cells[at + 6 : at + 9] == ["5", "1", "2"]
 
