@@ -166,6 +166,8 @@ class Variable:
     """Label and number format in what ``ringsim run`` prints, if it stands there."""
     until: str = "final_time"
     """Number up to which all output times have a value; the run's end where that is missing."""
+    gaps: bool = False
+    """Whether sound runs lack values at some times, too."""
 
 
 @dataclass(frozen=True)
