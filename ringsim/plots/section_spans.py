@@ -52,8 +52,8 @@ def section_spans(dataset: xr.Dataset, plane: str) -> SectionSpans:
     """What the opening angles and tensions of a recorded run of a ring say of a cable's sections.
 
     Nothing else is taken from the run: hinge pulleys stand in one line along each section, and its
-    V pulley where ``ringsim.cable.bracket`` puts it at the section's opening angle.  ``dataset`` has
-    ``cable_tension`` and ``opening_angle``; ``plane`` is one with a cable.
+    V pulley where ``ringsim.cable.bracket`` puts it at the section's opening angle.  ``dataset``
+    has ``cable_tension`` and ``opening_angle``; ``plane`` is one with a cable.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
     ring = scene.structure
@@ -88,9 +88,9 @@ def pulley_forces(dataset: xr.Dataset, plane: str) -> xr.DataArray:
     """Forces of a cable on its pulleys, from measured angles and tensions alone.
 
     The sum of the two pulls on a pulley, T_behind u_behind - T_before u_before: with the
-    inclination gamma of the spans of eq. 20 they are paper 000's eqs 28 to 31 with the signs of docs/cables.md.
-    The rope comes to the first pulley, and goes to a winch at its other end, along the boom; where
-    it ends at the last hinge, the force is on its end.
+    inclination gamma of the spans of eq. 20 they are paper 000's eqs 28 to 31 with the signs of
+    docs/cables.md.  The rope comes to the first pulley, and goes to a winch at its other end, along
+    the boom; where it ends at the last hinge, the force is on its end.
 
     Returns
     -------
