@@ -55,6 +55,11 @@ def refuse_if_not_ideal(scene: Scene) -> None:
                 f'faults[{number}].kind = "{fault.kind}": with rigid rods the other latches hold '
                 f"that joint, too, so the ideal fidelity does not support it {cure}"
             )
+    if scene.loads is not None and scene.loads.reversal_time is not None:
+        raise InputError(
+            f"loads.reversal_time = {scene.loads.reversal_time:g} s: loads of the ideal fidelity "
+            f"keep their sign {cure}"
+        )
     if scene.latch is not None and np.ptp(scene.latch.min_rate) > 0.0:
         raise InputError(
             "latch.min_rate: latches of the ideal fidelity catch all together: give one value for "
