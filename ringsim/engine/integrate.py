@@ -24,6 +24,7 @@ from ringsim.engine.settings import newton_norm, solver_settings
 from ringsim.engine.shape import ShapeMeter
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
+from ringsim.parts.faults.family import AT_ONCE
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Instant
@@ -81,7 +82,7 @@ class Integration:
         self._latches = Latches(scene)
         locks = Locks(angles, stowed, scene.structure.planes, self._latches)
         self._locks = locks if scene.structure.locks else None
-        self._fresh, self._refused = True, False
+        self._fresh, self._refused, self._turn = True, False, scene.loads_turn_at
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
         self.history = Recorder(scene, coordinates)
@@ -93,6 +94,7 @@ class Integration:
             self._locks,
             limits=scene.limits,
             follow_deviations=scene.record.stress,
+            turn=scene.loads_turn_at,
         )
 
     def run(self) -> Recorder:
@@ -214,7 +216,9 @@ class Integration:
 
         ``self._chain`` holds the cables at the state that was measured last, which is this one.
         """
-        if self._built.faults.strike(now.time, now.angles, self._chain):
+        struck = self._built.faults.strike(now.time, now.angles, self._chain)
+        if struck | self._turn_loads(now.time):
+            self._energy.go_on_from(now.energies.work, self._state)
             after = self._measure(now.time)
             # What a fault lets go is lost; nothing moves while it strikes.
             lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
@@ -237,6 +241,14 @@ class Integration:
             )
         )
         return now
+
+    def _turn_loads(self, time: float) -> bool:
+        """Turn the loads round if it is time (s); returns whether it was."""
+        due = self._turn <= time + AT_ONCE
+        if due:
+            self._turn = math.inf
+            self._built.model.turn_loads()
+        return due
 
     def _measure(self, time: float) -> Instant:
         """The state that was refreshed last."""

@@ -68,6 +68,7 @@ class Integration(Remembering):
         self._easy = False
         self._steps: list[tuple[float, Array]] = []
         self._faults = sorted(scene.faults, key=lambda fault: fault.time)
+        self._turn = scene.loads_turn_at
         self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
         self._readings = Readings(model)
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
@@ -84,6 +85,7 @@ class Integration(Remembering):
             self._locks,
             limits=scene.limits,
             follow_deviations=scene.record.stress,
+            turn=scene.loads_turn_at,
         )
 
     def run(self) -> Recorder:
@@ -230,7 +232,8 @@ class Integration(Remembering):
 
     def _read(self, now: Instant) -> Instant:
         """Note a state that the run goes on from; returns it as faults that strike leave it."""
-        if self._strike(now):
+        if self._strike(now) | self._turn_loads(now.time):
+            self._energy.go_on_from(now.energies.work, self._now)
             after = self._measure(now.time, self._now)
             # What a fault lets go is lost; nothing moves while it strikes.
             lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
@@ -239,6 +242,14 @@ class Integration(Remembering):
         self._energy.keep()
         self.history.note(self._readings.read(now, self._now, self._strains))
         return now
+
+    def _turn_loads(self, time: float) -> bool:
+        """Turn the loads round if it is time (s); returns whether it was."""
+        due = self._turn <= time + AT_ONCE
+        if due:
+            self._turn = math.inf
+            self._model.turn_loads()
+        return due
 
     def _strike(self, now: Instant) -> bool:
         """Strike all faults that are due; returns whether there was one."""
