@@ -15,6 +15,7 @@ from ringsim.cable.ropes import Ropes
 from ringsim.layout.pose import Array
 from ringsim.parts.limits import Limits
 from ringsim.scene import Scene
+from ringsim.stepping.events import Events
 from ringsim.stepping.rest import GROWTH, MOVED, WINDOW, resting
 from ringsim.stepping.run_control import TOLD, overstrained
 from ringsim.theory.ideal_motion import IdealMotion, IdealState
@@ -107,10 +108,10 @@ class Course:
 
     def run(self) -> "Course":
         """Integrate to the end; never raises."""
-        faults, cables = self._scene.faults, self.motion.cables
-        breaks = [] if cables is None else cables.breaks
+        faults = self._scene.faults
+        marks = {fault.time for fault in faults} | {*Events(self._scene).times, math.inf}
         try:
-            for mark in sorted({fault.time for fault in faults} | {*breaks, math.inf}):
+            for mark in sorted(marks):
                 self.motion.under(until=mark)
                 self._begin()
                 while self._time < min(mark, self._end) * (1.0 - _ALIKE):

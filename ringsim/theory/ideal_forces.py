@@ -165,12 +165,6 @@ class IdealCables:
         ]
 
     @property
-    def breaks(self) -> list[float]:
-        """Times at which a winch is switched on or off, s."""
-        switched = [(w.start_time, w.stop_time) for w in self._winches.values()]
-        return [time for times in switched for time in times if time is not None and time > 0.0]
-
-    @property
     def nudges(self) -> tuple[float, float]:
         """Increments of a length (m) and a rate (1/s) over which tensions are nearly linear."""
         # A slack rope becomes taut within this strain; friction turns within the slip speed.
