@@ -127,7 +127,9 @@ class RunControl(Remembering):
     def next_step(self, next_event: float = math.inf) -> float:
         """The next step, s; it must not pass the time ``next_event`` (s), as of a fault."""
         self._steps.step = min([self._steps.step, *(one.limit for one in self._indicators)])
-        end = min(self._solver.end_time, next_event, self._settled_at, self._turn)
+        end = min(self._solver.end_time, self._settled_at)
+        # What comes at once with the end is left to it: no step is as short as that.
+        end = next_event if next_event < end - AT_ONCE else end
         return self._steps.towards(end - self.now.time)
 
     def retry(self, shorter: float) -> float:
