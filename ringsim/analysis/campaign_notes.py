@@ -13,7 +13,7 @@ from ringsim.analysis.design import placement
 from ringsim.analysis.quantities import used
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.summary import summary
-from ringsim.variables import GOALS, Fate, Status
+from ringsim.variables import GOALS, Fate, Status, Variable
 
 _NAMED = 6
 """Samples that a line names at most."""
@@ -144,13 +144,14 @@ def restart_lines(campaign: xr.Dataset) -> list[str]:
 def peak_lines(campaign: xr.Dataset) -> list[str]:
     """The largest value of all samples that ended well, when and where, for outputs that tell it.
 
-    Places have no names where samples differ in the ends at which the winches are.
+    Places have no names where samples differ in the ends at which the winches are.  Of outputs that
+    can have an error bar the line says how large that is in this sample.
     """
     spans = {}
     if "span_name" in campaign:
         names = campaign.span_name.transpose("plane", "span").values.tolist()
         spans = dict(zip(campaign.plane.values.tolist(), names, strict=True))
-    sound, lines = used(campaign), []
+    sound, lines, unknown = used(campaign), [], False
     for output in OUTPUTS:
         for variable in output.variables:
             if variable.summary is None or variable.name not in sound:
@@ -162,5 +163,28 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                 # Series tell which places are alike.
                 values = {str(n): each.values for n, each in worst.variables.items()}
                 told = " ".join(summary(values, spans)[variable.name].split())
-                lines.append(f"{variable.summary[0]} in sample {worst.sample.item()}: {told}")
+                error = _numerical(sound, variable, worst) if variable.error_bar else ""
+                unknown |= bool(variable.error_bar and not error)
+                lines.append(
+                    f"{variable.summary[0]} in sample {worst.sample.item()}: {told}{error}"
+                )
+    if unknown:
+        lines.append(
+            "no sample states its numerical error: give error_bars_every, or see what "
+            "solver.error_bars = true says of the samples named here"
+        )
     return lines
+
+
+def _numerical(sound: xr.Dataset, variable: Variable, worst: xr.Dataset) -> str:
+    """How large the numerical error of a sample's value is; empty if no sample tells."""
+    if (name := f"{variable.name}_error") not in sound or not sound[name].notnull().any():
+        return ""
+    unit = "" if variable.units == "1" else f" {variable.units}"
+    if np.isfinite(own := float(worst[name])):
+        return f"; numerical error at most {own:.2g}{unit}"
+    stated = sound[name].dropna("sample")
+    return (
+        f"; its numerical error is not stated, at most {float(stated.max()):.2g}{unit} in the "
+        f"{stated.size} samples that state theirs"
+    )

@@ -62,7 +62,8 @@ def statistics(campaign: xr.Dataset, analysis: xr.Dataset) -> Table:
                 cells[-1] += f" ({interval_text(low, high, fine)})"
         for value in (least, most):
             first = samples[values == value][:1]
-            cells.append(number_text(value, fine) + "".join(f" ({sample})" for sample in first))
+            more = "".join(f" ({sample}{_error_bar(campaign, name, sample)})" for sample in first)
+            cells.append(number_text(value, fine) + more)
         used, lost, absent = (str(counts.sel(counted=c).item()) for c in _COUNTS)
         unit = str(says.get("units", "1"))
         rows.append([str(says.get("long_name", name)), unit, *cells, used, lost, absent])
@@ -70,7 +71,17 @@ def statistics(campaign: xr.Dataset, analysis: xr.Dataset) -> Table:
     notes = (
         ["In brackets intervals of 95 %"] if any("(" in c for r in rows for c in r[2:-5]) else []
     )
+    if any("±" in c for r in rows for c in r[-5:-3]):
+        notes.append("± what the named sample states as its numerical error")
     return Table(("Number", "Unit", *moments.values(), *extremes), rows, notes)
+
+
+def _error_bar(campaign: xr.Dataset, name: str, sample: int) -> str:
+    """The numerical error that a sample states of an output; empty if it states none."""
+    if (bars := f"{name}_error") not in campaign:
+        return ""
+    own = float(campaign[bars].sel(sample=sample))
+    return f", ± {own:.2g}" if np.isfinite(own) else ""
 
 
 _COUNTS = ("used", "lost", "without_value")
