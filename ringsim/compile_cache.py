@@ -18,6 +18,8 @@ from collections.abc import Callable, Hashable, Iterator
 from importlib.metadata import version
 from pathlib import Path
 
+from ringsim.build import digest_of
+
 VARIABLE = "NUMBA_CACHE_DIR"
 PACKING = "NUMBA_SLP_VECTORIZE"
 SOURCES = Path(__file__).parent / "frame"
@@ -100,10 +102,7 @@ def _private(folder: Path) -> bool:
 
 def _sources() -> str:
     """Of what is compiled: numba looks at a function's own file, not at those that it calls."""
-    digest = hashlib.blake2b(version("ringsim").encode(), digest_size=6)
-    for source in sorted(SOURCES.glob("*.py")):
-        digest.update(source.read_bytes())
-    return digest.hexdigest()
+    return digest_of(SOURCES.glob("*.py"))
 
 
 def _processor() -> str:

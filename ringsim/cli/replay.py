@@ -8,7 +8,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.campaign.folder import open_folder
+from ringsim.campaign.folder import open_folder, other_build
 from ringsim.cli.options import FOLDER, PATH
 from ringsim.execution.solve import load_solver, solve
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
@@ -57,6 +57,8 @@ def command(folder: Path, sample: int, *, scene: bool, check: bool, save: Path |
         click.echo(exact.to_toml())
         return EXIT_DONE
     faulthandler.enable()
+    if told := other_build(campaign):
+        click.echo(told)
     for path, value in values.items():
         click.echo(f"{path} = {value}")
     result = solve(load_solver(solver), campaign.scene, number, values)

@@ -175,5 +175,9 @@ def _row(variable: xr.DataArray, words: str, samples: Any, values: Any, typical:
 def provenance(campaign: xr.Dataset) -> Iterator[tuple[str, str]]:
     """Who computed it, when, with what."""
     for name, value in campaign.attrs.items():
-        if name in _SHOWN or name.endswith("_version") or name in ("history", "git_commit"):
+        if (
+            name in _SHOWN
+            or name.endswith("_version")
+            or name in ("history", "git_commit", "sources")
+        ):
             yield name.replace("_", " "), str(value)
