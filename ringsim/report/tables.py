@@ -64,7 +64,8 @@ def statistics(campaign: xr.Dataset, analysis: xr.Dataset) -> Table:
                 cells[-1] += f" ({interval_text(low, high, fine)})"
         for value in (least, most):
             first = samples[values == value][:1]
-            cells.append(number_text(value, fine) + "".join(f" ({sample})" for sample in first))
+            more = "".join(f" ({sample}{_error_bar(campaign, name, sample)})" for sample in first)
+            cells.append(number_text(value, fine) + more)
         used, lost, absent = (str(counts.sel(counted=c).item()) for c in _COUNTS)
         unit = str(says.get("units", "1"))
         cells.append(worst_of(analysis, name) if least < most else "-")
@@ -73,7 +74,17 @@ def statistics(campaign: xr.Dataset, analysis: xr.Dataset) -> Table:
     notes = (
         ["In brackets intervals of 95 %"] if any("(" in c for r in rows for c in r[2:-6]) else []
     )
+    if any("±" in c for r in rows for c in r[-6:-4]):
+        notes.append("± what the named sample states as its numerical error")
     return marked(Table(("Number", "Unit", *moments.values(), *extremes), rows, notes), analysis)
+
+
+def _error_bar(campaign: xr.Dataset, name: str, sample: int) -> str:
+    """The numerical error that a sample states of an output; empty if it states none."""
+    if (bars := f"{name}_error") not in campaign:
+        return ""
+    own = float(campaign[bars].sel(sample=sample))
+    return f", ± {own:.2g}" if np.isfinite(own) else ""
 
 
 _COUNTS = ("used", "lost", "without_value")
@@ -170,5 +181,9 @@ def _row(variable: xr.DataArray, words: str, samples: Any, values: Any, typical:
 def provenance(campaign: xr.Dataset) -> Iterator[tuple[str, str]]:
     """Who computed it, when, with what."""
     for name, value in campaign.attrs.items():
-        if name in _SHOWN or name.endswith("_version") or name in ("history", "git_commit"):
+        if (
+            name in _SHOWN
+            or name.endswith("_version")
+            or name in ("history", "git_commit", "sources")
+        ):
             yield name.replace("_", " "), str(value)
