@@ -8,9 +8,9 @@ sections, driven by forces or by cables with a winch at one end or at both, free
 and stiff, slow and fast, with and without friction, damping and latches, at tolerances from 3e-4
 to 3e-3.  One in three is ended before it has deployed.  The frame engine runs them, or the full
 one: both have the same integrator and bars.  The truth of a scene is a run with steps shorter by 6
-to 16, four or six times the elements and a hundredth of Newton's tolerance: the finest that is not too
-dear for its scene.  Printed per output: how often the bar covers the error, and the ratios of error
-to bar; of the asynchrony over time, at the output time where its bar is worst.
+to 16, four or six times the elements and a hundredth of Newton's tolerance: the finest that is not
+too dear for its scene.  Printed per output: how often the bar covers the error, and the ratios of
+error to bar; of the asynchrony over time, at the output time where its bar is worst.
 
 What every scene gave is kept in the file (runs/error-bars-FIRST.json) as it comes; scenes that are
 there are not run again, so that other factors (``ErrorBar`` in ringsim/outputs) are judged at once.

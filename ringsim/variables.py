@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
@@ -117,7 +117,6 @@ class Fidelity(Code):
     """Which model answered."""
 
     FULL = 0
-    IDEAL = 1
     FRAME = 2
 
     @property
@@ -125,9 +124,15 @@ class Fidelity(Code):
         """What it is, in words."""
         return {
             Fidelity.FULL: "multibody simulation with exudyn",
-            Fidelity.IDEAL: "ideal ring of rigid rods",
             Fidelity.FRAME: "flexible rods in joint coordinates, compiled with numba",
         }[self]
+
+
+GONE = {
+    "ideal": "a ring of rigid rods, which knew neither asynchrony nor stress, is no fidelity any "
+    'more: choose fidelity = "frame"'
+}
+"""Fidelities that there were, with what to do."""
 
 
 @dataclass(frozen=True)
@@ -162,6 +167,19 @@ class Variable:
     """Label and number format in what ``ringsim run`` prints, if it stands there."""
     until: str = "final_time"
     """Number up to which all output times have a value; the run's end where that is missing."""
+    gaps: bool = False
+    """Whether sound runs lack values at some times, too."""
+    worse: Literal["larger", "smaller", "neither"] = "neither"
+    """Which of two values of a number an engineer fears more: what is told as worst follows it."""
+    largest_of: str = ""
+    """Variable with dimensions whose largest value, or magnitude, this number is."""
+    least_of: str = ""
+    """Variable with dimensions whose smallest value this number is."""
+
+    @property
+    def badness(self) -> int:
+        """What values are multiplied by so that the worst is the largest; 0 if neither is worse."""
+        return {"larger": 1, "smaller": -1, "neither": 0}[self.worse]
 
 
 @dataclass(frozen=True)

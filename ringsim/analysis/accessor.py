@@ -1,5 +1,6 @@
 """What every dataset of ringsim can be asked as ``dataset.ring``."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
@@ -26,18 +27,20 @@ class Ring:
         apart (degree).  Of a campaign ``leads`` and ``lags``, (plane, section): in how many of the
         samples whose numbers hold the joint was the one when they were farthest apart.
 
-        InputError if opening angles are not there, as of the ideal ring asynchrony.
+        InputError if opening angles are not there.
         """
         from ringsim.analysis import leaders
 
         found = leaders.often if "sample" in self._dataset.dims else leaders.over_time
-        return found(self._dataset)
+        return found(self._dataset).assign_attrs(self._losses())
 
     def outcomes(self) -> "pd.DataFrame":
         """What became of the samples of a campaign: a row for each kind of outcome and of loss.
 
-        ``samples`` are of the kind, of the ``of`` that count; ``share`` with its exact interval of
-        95 %, ``lower`` and ``upper``, as the design allows it, else NaN; see ``ringsim.analyse``.
+        ``samples`` are of the kind, ``of`` all that ran, of which ``lost`` ones may be, too;
+        ``share`` with its exact interval of 95 %, ``lower`` and ``upper``, from none to all of
+        these, as the design allows it, else NaN; see ``ringsim.analyse``.  Where which runs are
+        lost goes with inputs, ``attrs`` say so as ``lost_runs``.
 
         InputError if it is no campaign.
         """
@@ -49,10 +52,43 @@ class Ring:
         ends = found["outcome_share_interval"]
         table: dict[str, Any] = {
             "samples": found["outcome_samples"], "of": found["outcome_of"],
-            "share": found["outcome_share"], "lower": ends[:, 0], "upper": ends[:, 1],
+            "lost": found["outcome_lost"], "share": found["outcome_share"],
+            "lower": ends[:, 0], "upper": ends[:, 1],
         }  # fmt: skip
-        return xr.Dataset({k: ("kind", v.to_numpy()) for k, v in table.items()},
+        rows = xr.Dataset({k: ("kind", v.to_numpy()) for k, v in table.items()},
                           coords={"kind": found["kind"]}).to_dataframe()  # fmt: skip
+        rows.attrs |= self._losses()
+        return rows
+
+    def worst(self) -> "pd.DataFrame":
+        """The worst samples of each failure of a campaign, the worst first: of requirements of its
+        file that are violated, of outcomes that fall short, of runs that were lost.
+
+        ``failure`` in words, ``failed`` samples ``of`` so many, then ``sample``, what was
+        ``found``, what is unusual in its ``inputs``, and the command that runs it again,
+        ``replay``, in the folder that the dataset was opened from, by default runs/NAME; empty
+        without failures.
+
+        InputError if it is no campaign, or its requirements cannot be judged.
+        """
+        import pandas as pd
+
+        from ringsim.analysis.blocks import population_of
+        from ringsim.analysis.campaign_samples import requirements_of
+        from ringsim.analysis.requirements import read_requirements
+        from ringsim.analysis.worst import COLUMNS, command, worst
+
+        self._require_samples("worst samples")
+        wanted = read_requirements(requirements_of(self._dataset), "requirements")
+        found = worst(population_of(self._dataset), wanted)
+        columns: dict[str, Any] = {
+            name: found[f"worst_{name}"].to_numpy() if found else [] for name in COLUMNS
+        }
+        source = str(self._dataset.encoding.get("source", ""))
+        name = self._dataset.attrs.get("campaign_name", "")
+        folder = str(Path(source).parent) if source else f"runs/{name}"
+        again = [command(folder, sample) for sample in columns["sample"]]
+        return pd.DataFrame(columns | {"replay": again})
 
     def fan(self, quantiles: tuple[float, ...] = (0.0, 0.05, 0.5, 0.95, 1.0)) -> xr.DataArray:
         """Quantiles over the samples of each V-joint's deviation from the mean opening angle.
@@ -71,7 +107,17 @@ class Ring:
         found = courses(self._dataset, quantiles)
         if not len(found.samples):
             raise InputError("a fan needs a sample that has run, and none has")
-        return found.bands
+        return found.bands.assign_attrs(self._losses())
+
+    def _losses(self) -> dict[str, str]:
+        """The attribute that marks what lost runs bend; none for a run, and where they do not."""
+        from ringsim.analysis.losses import NOTE, losses
+
+        dataset = self._dataset
+        note = (
+            losses(dataset).note if {"sample"} <= set(dataset.dims) and "status" in dataset else ""
+        )
+        return {NOTE: note} if note else {}
 
     def _require_samples(self, what: str) -> None:
         from ringsim.refusal import InputError

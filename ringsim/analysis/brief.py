@@ -10,6 +10,7 @@ from scipy.stats import norm
 from ringsim.analysis import ranks
 from ringsim.analysis.confounded import confounding_notes, partners
 from ringsim.analysis.intervals import Array
+from ringsim.analysis.losses import marked
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.sensitivity_text import HEADS, SETS, measure_notes
 from ringsim.tables import Table, interval_text, number_text
@@ -23,7 +24,7 @@ _CHANCE = {"given_data_index": "chance_level"}
 
 
 def output_table(analysis: xr.Dataset, names: list[str]) -> Table:
-    """Mean with its interval, scatter, quantiles and range of each output."""
+    """Mean with its interval, scatter, quantiles and range of each output, and its worst sample."""
     rows = []
     for name in names:
         values, counts = analysis[name].values, analysis[f"{name}_samples"].values
@@ -33,19 +34,28 @@ def output_table(analysis: xr.Dataset, names: list[str]) -> Table:
         units = analysis[name].attrs["units"]
         units = "" if units == "1" else units
         if least == most:
-            rows.append((name, units, number_text(least), "all alike", *"-----", "-", count))
+            rows.append((name, units, number_text(least), "all alike", *"------", "-", count))
         elif np.isfinite(least):
             fine = digits_of(least, most)
             ends = _ends(analysis[f"{name}_interval"].values[0], fine)
             others = [number_text(v, fine) for v in (*quantiles, least, most)]
-            rows.append(
-                (name, units, number_text(mean, fine), ends, number_text(deviation), *others, count)
-            )
+            rows.append((
+                name, units, number_text(mean, fine), ends, number_text(deviation), *others,
+                worst_of(analysis, name), count,
+            ))  # fmt: skip
     head = (
         "output", "unit", "mean", "95 % interval", "std. dev.", "5 %", "median", "95 %", "least",
-        "most", "used",
+        "most", "worst sample", "used",
     )  # fmt: skip
-    return Table(head, rows)
+    return marked(Table(head, rows), analysis)
+
+
+def worst_of(analysis: xr.Dataset, name: str) -> str:
+    """The sample with an output's worst value; a dash where neither end is the worse one, and of
+    analyses that do not tell it.
+    """
+    sample = int(analysis.get(f"{name}_worst_sample", -1))
+    return "-" if sample < 0 else str(sample)
 
 
 def digits_of(least: float, most: float) -> int:
@@ -75,8 +85,8 @@ def what_matters(analysis: xr.Dataset) -> Table:
     notes = measure_notes(analysis)
     if rows and "input" in analysis.dims and "factor" not in analysis.dims:
         notes.append(
-            f"told is what the largest of all {analysis.sizes['input']} inputs would reach by "
-            "chance in fewer than one output of 20"
+            "an input is told if by chance the largest of all "
+            f"{analysis.sizes['input']} would reach as much in fewer than one output of 20"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if doubtful:
@@ -85,10 +95,10 @@ def what_matters(analysis: xr.Dataset) -> Table:
             f"rank correlation is within chance): {', '.join(doubtful)}"
         )
     if quiet:
-        notes.append(f"nothing that chance would not explain: {', '.join(quiet)}")
+        notes.append(f"no input stands out of chance for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
     head = ("what matters for", "input", index, "95 % interval", *_RANKS.values())
-    return Table(head, rows, notes, left=2)
+    return marked(Table(head, rows, notes, left=2), analysis, 1)
 
 
 def _indexed(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
@@ -219,7 +229,7 @@ def what_separates(analysis: xr.Dataset) -> Table:
             for n, k in enumerate(chosen[:_MOST])
         ]  # fmt: skip
     head = ("what separates", "input", "probability that it is larger", "95 % interval")
-    return Table(head, rows, left=2)
+    return marked(Table(head, rows, left=2), analysis, 1)
 
 
 def _beyond(values: Array, ends: Array, chance: Array | float) -> NDArray[np.bool_]:

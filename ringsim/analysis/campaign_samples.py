@@ -82,18 +82,36 @@ def judged_by(campaign: xr.Dataset) -> str:
 
 
 def median_and_worst(campaign: xr.Dataset) -> tuple[int, int] | None:
-    """The samples in the middle and at the end of that order; None if no sample is used."""
+    """The samples in the middle and at the worst end of that order; None if no sample is used."""
     if not (name := judged_by(campaign)):
         samples = used(campaign)["sample"].to_numpy()
         return (int(samples[0]), int(samples[0])) if len(samples) else None
     samples, values = values_of(campaign, name)
-    order = np.argsort(values, kind="stable")
+    order = np.argsort(VARIABLES[name].badness * values, kind="stable")
     return int(samples[order[(len(order) - 1) // 2]]), int(samples[order[-1]])
 
 
 def inputs(campaign: xr.Dataset) -> list[str]:
-    """Names of the drawn inputs."""
-    return [str(n) for n, v in campaign.data_vars.items() if v.attrs.get("role") == "input"]
+    """A variable for each drawn input: the first of those that share its values."""
+    found: dict[str, str] = {}
+    for name, variable in campaign.data_vars.items():
+        if variable.attrs.get("role") == "input":
+            # Files of older runs tell the paths that share values, and no name.
+            told = str(variable.attrs.get("input") or paths_of(variable))
+            found.setdefault(told, str(name))
+    return [*found.values()]
+
+
+def called(variable: xr.DataArray) -> str:
+    """The campaign file's own name of an input, which is its path where it has no other."""
+    says = variable.attrs
+    return str(says.get("input") or says.get("path") or variable.name)
+
+
+def paths_of(variable: xr.DataArray) -> list[str]:
+    """The scene's paths that take the values of an input: one, or all that share it."""
+    shared = distribution_of(variable).get("shared")
+    return shared or [str(variable.attrs.get("path") or variable.name)]
 
 
 def campaign_file(campaign: xr.Dataset) -> dict[str, Any]:

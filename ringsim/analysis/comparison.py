@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from ringsim.analysis import intervals
 from ringsim.analysis.blocks import population_of
+from ringsim.analysis.campaign_samples import called
 from ringsim.analysis.comparison_shares import differences_of_shares, ends, has_means
 from ringsim.analysis.design import Placement, placement
 from ringsim.analysis.intervals import NONE, Array
+from ringsim.analysis.losses import NOTE, losses
 from ringsim.analysis.quantities import good, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.tails import subset_simulation
@@ -52,6 +54,7 @@ def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
     single = "sample" not in first.dims
     one, other = (_numbered(each) for each in (first, second))
     placed = placement(one), placement(other)
+    notes = {side: losses(each).note for side, each in zip(SIDES, (one, other), strict=True)}
     one, other = population_of(one), population_of(other)
     pairs = _alone() if single else paired(one, other)
     found = xr.Dataset(
@@ -62,6 +65,7 @@ def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
             "intervals": next(
                 (p.told for p in placed if not single and (not p.has_intervals or p.block > 1)), ""
             ),
+            NOTE: "; ".join(f"{side}: {each}" for side, each in notes.items() if each),
         },
     )  # fmt: skip
     for name in quantities():
@@ -108,14 +112,14 @@ def paired(first: xr.Dataset, second: xr.Dataset) -> Pairs:
         keys = [list(each[seeds].to_numpy().tolist()) for each in (first, second)]
         if (found := _matched(*keys))[0].size:
             other = [
-                first[name].attrs.get("path", name) for name in inputs
+                called(first[name]) for name in inputs
                 if not np.array_equal(
                     first[name].to_numpy()[found[0]], second[name].to_numpy()[found[1]]
                 )
             ]  # fmt: skip
             told = "samples are paired by their seeds"
             if other:
-                told += f"; their inputs differ in {', '.join(map(str, other))}"
+                told += f"; their inputs differ in {', '.join(dict.fromkeys(other))}"
             return Pairs(*found, told)
     rows = [_rows(each, inputs) for each in (first, second)]
     if inputs and all(len(set(each)) == len(each) for each in rows):

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.losses import NOTE, marked
 from ringsim.analysis.quantities import quantities
 from ringsim.tables import Table, interval_text, number_text, slim
 
@@ -17,6 +18,7 @@ def compared(found: xr.Dataset) -> list[str]:
     pairs = f" ({found.attrs['pairs']} pairs)" if found.attrs["pairs"] > 1 else ""
     lines = [f"{side}: {found.attrs[side]}" for side in ("first", "second") if found.attrs[side]]
     lines.append(f"{found.attrs['pairing']}{pairs}")
+    lines += [*filter(None, [found.attrs[NOTE]])]
     if found.attrs["intervals"]:
         lines.append(found.attrs["intervals"])
     for part in (_outcomes, _requirements, _outputs):
@@ -33,7 +35,8 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> list[str]:
         counts = one[f"{word}_compared"].tolist()
         low, high = one[f"{word}_share_difference_interval"].tolist()
         rows.append((
-            str(name), *map(str, one[f"{word}_samples"]),
+            str(name).replace("_", " ") if word == "kind" else str(name),
+            *map(str, one[f"{word}_samples"]),
             *(number_text(share, 3) for share in one[f"{word}_share"]),
             number_text(one[f"{word}_share_difference"].item(), 3),
             interval_text(low, high, 3),
@@ -44,7 +47,7 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> list[str]:
         "samples",
     )  # fmt: skip
     columns = 3 if found.attrs["pairs"] == 1 else len(names)
-    return slim(Table(names[:columns], [row[:columns] for row in rows])).lines()
+    return slim(marked(Table(names[:columns], [row[:columns] for row in rows]), found)).lines()
 
 
 def _requirements(found: xr.Dataset) -> Iterator[str]:
@@ -63,7 +66,7 @@ def _outcomes(found: xr.Dataset) -> Iterator[str]:
         if (changed := changed - 1) == found.sizes["change"] - _NAMED - 1:
             yield "  ..., all of them in the file of --out"
             return
-        yield f"  sample {sample}: {first}, then {second}"
+        yield f"  sample {sample}: {first}, then {second}".replace("_", " ")
 
 
 def _outputs(found: xr.Dataset) -> Iterator[str]:
@@ -86,13 +89,26 @@ def _outputs(found: xr.Dataset) -> Iterator[str]:
             name, "" if variable.units == "1" else variable.units, number_text(first, fine),
             number_text(second, fine), number_text(apart),
             interval_text(*found[f"{name}_difference_interval"].values.tolist()),
+            _worse(found, name),
             str(counts[0]) if found.attrs["pairs"] else " and ".join(map(str, counts)),
             largest, place,
         ))  # fmt: skip
     head = (
-        "output", "unit", "first", "second", "difference", "95 % interval", "samples",
+        "output", "unit", "first", "second", "difference", "95 % interval", "worse", "samples",
         "largest of a pair", "in sample",
     )  # fmt: skip
     if rows:
-        columns = 5 if found.attrs["pairs"] == 1 else len(head)
-        yield from slim(Table(head[:columns], [row[:columns] for row in rows])).lines()
+        columns = 7 if found.attrs["pairs"] == 1 else len(head)
+        table = Table(head[:columns], [row[:columns] for row in rows])
+        yield from slim(marked(table, found)).lines()
+
+
+def _worse(found: xr.Dataset, name: str) -> str:
+    """Which side an output is worse on, where the interval of the difference leaves out zero; of
+    two runs by the difference itself.
+    """
+    ends = found[f"{name}_difference_interval"].values
+    if found.attrs["pairs"] == 1:
+        ends = np.full(2, found[f"{name}_difference"].item())
+    ends = np.sort(quantities()[name].badness * ends)
+    return "second" if ends[0] > 0.0 else "first" if ends[1] < 0.0 else "-"

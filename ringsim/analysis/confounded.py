@@ -71,8 +71,8 @@ def _apart(inputs: Drawn) -> NDArray[np.bool_]:
     """Which pairs of inputs nothing but the design makes correlate, shape (input, input): not a
     mean with its own places, nor words of one input.
     """
-    path, place = np.array(inputs.path), np.array(inputs.level) == "place"
-    return np.asarray((path[:, None] != path) | (place[:, None] & place))
+    own, place = np.array(inputs.input), np.array(inputs.level) == "place"
+    return np.asarray((own[:, None] != own) | (place[:, None] & place))
 
 
 def confounded(inputs: Drawn, used: NDArray[np.bool_]) -> dict[str, Any]:

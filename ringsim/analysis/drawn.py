@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.campaign_samples import called, inputs
 from ringsim.analysis.intervals import Array
 from ringsim.sampling.designs.grouped import stretches
 
@@ -23,49 +24,55 @@ class Drawn:
     values: Array
     level: tuple[str, ...]
     """Of each column: "input"; of one that has many places "mean", "quarter" and "place"."""
-    path: tuple[str, ...]
-    """Of each column the scene path of its input."""
+    input: tuple[str, ...]
+    """Of each column the name of its input."""
 
 
 def drawn(campaign: xr.Dataset) -> Drawn:
-    """All drawn inputs; one that several paths share is one column, named after the first."""
+    """All drawn inputs by the names that the campaign's file gives them: one that several paths
+    share is one column; inputs of other names that are alike in all samples are one, too, which has
+    both names, since nothing tells them apart.
+    """
     found: dict[str, tuple[Array, str, str]] = {}
-    for name, variable in campaign.data_vars.items():
-        says = variable.attrs
-        if says.get("role") != "input" or says.get("path") == "solver.error_bars":
+    for variable in (campaign[name] for name in inputs(campaign)):
+        if variable.attrs.get("path") == "solver.error_bars":
             continue
-        path, values = str(says.get("path", name)), variable.to_numpy()
+        own, values = called(variable), variable.to_numpy()
         if values.dtype.kind in "OUS":
             words = np.unique(values.astype(str))
             if values.ndim == 1 and len(words) <= _MOST_WORDS:
                 for word in words[: 1 if len(words) == 2 else None]:
                     is_so = (values.astype(str) == word).astype(float)
-                    found[f"{path} = {word}"] = is_so, "input", path
+                    found[f"{own} = {word}"] = is_so, "input", own
         elif values.ndim == 1:
-            found[path] = values.astype(float), "input", path
+            found[own] = values.astype(float), "input", own
         else:
             numbers = values.astype(float)
-            found[f"mean of {path}"] = numbers.mean(axis=1), "mean", path
+            found[f"mean of {own}"] = numbers.mean(axis=1), "mean", own
             if (count := numbers.shape[1]) >= _LEAST_QUARTERED:
                 for low, high in stretches(count, 4):
                     mean = numbers[:, low:high].mean(axis=1)
-                    found[f"mean of {path}[{low + 1}..{high}]"] = mean, "quarter", path
-            for k, place in enumerate(_places(campaign, variable)):
-                found[f"{path}[{place}]"] = numbers[:, k], "place", path
-    seen: set[bytes] = set()
-    kept = {}
-    for name, column in found.items():
-        key = hashlib.blake2b(column[0].tobytes()).digest()
-        if np.ptp(column[0]) > 0 and key not in seen:
-            seen.add(key)
-            kept[name] = column
+                    found[f"mean of {own}[{low + 1}..{high}]"] = mean, "quarter", own
+            for k, place in enumerate(place_names(campaign, variable)):
+                found[f"{own}[{place}]"] = numbers[:, k], "place", own
+    kept: dict[bytes, tuple[list[str], Array, str, list[str]]] = {}
+    for name, (column, level, own) in found.items():
+        if np.ptp(column) > 0:
+            key = hashlib.blake2b(column.tobytes()).digest()
+            names, _, _, owners = kept.setdefault(key, ([], column, level, []))
+            if own not in owners:  # the mean of one place is that place
+                names.append(name)
+                owners.append(own)
     count = campaign.sizes["sample"]
-    values = np.array([each[0] for each in kept.values()]).reshape(-1, count).T
-    levels, paths = (tuple(str(each[k]) for each in kept.values()) for k in (1, 2))
-    return Drawn(tuple(kept), values, levels, paths)
+    values = np.array([column for _, column, _, _ in kept.values()]).reshape(-1, count).T
+    return Drawn(
+        tuple(" and ".join(names) for names, *_ in kept.values()), values,
+        tuple(level for _, _, level, _ in kept.values()),
+        tuple(owners[0] for *_, owners in kept.values()),
+    )  # fmt: skip
 
 
-def _places(campaign: xr.Dataset, variable: xr.DataArray) -> list[str]:
+def place_names(campaign: xr.Dataset, variable: xr.DataArray) -> list[str]:
     """Names of the places of an input: those of its coordinate if it has one, else numbers."""
     (dim,) = variable.dims[1:]
     for name, coordinate in variable.coords.items():

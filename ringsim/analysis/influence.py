@@ -156,7 +156,7 @@ def groups_of(
     found = {"lost": (gone, ok | gone)}
     for fate in Fate:
         if fate not in GOALS and fate != Fate.NONE and OUTCOME in campaign:
-            found[fate.word] = (ok & (campaign[OUTCOME].to_numpy() == fate), ok)
+            found[fate.word.replace("_", " ")] = (ok & (campaign[OUTCOME].to_numpy() == fate), ok)
     for name, wanted in requirements.items():
         found[f"violates {wanted.told(name)}"] = (violations(campaign, name, wanted), ok)
     alike: dict[bytes, list[str]] = {}

@@ -7,6 +7,7 @@ import xarray as xr
 
 from ringsim.analysis.confounded import confounding_notes
 from ringsim.analysis.intervals import LEVEL, Array
+from ringsim.analysis.losses import marked
 from ringsim.analysis.quantities import quantities
 from ringsim.tables import Table, interval_text, number_text
 
@@ -62,10 +63,10 @@ def _correlated(analysis: xr.Dataset, outputs: Collection[str]) -> Table:
             f"the intervals of about {(1 - LEVEL) * len(names):.2g} of them leave out zero"
             if certain else f"one in twenty reaches {1.96 / (least - 1) ** 0.5:.2g}"
         )  # fmt: skip
-        notes.append(f"the largest of {len(names)} inputs; by chance alone {chance}")
+        notes.append(f"told are the largest of {len(names)} inputs: by chance alone {chance}")
         notes += confounding_notes(analysis, named)
     head = ("rank correlation", "correlation", "95 % interval", "partial", "95 % interval")
-    return Table((*head, "used"), rows, notes)
+    return marked(Table((*head, "used"), rows, notes), analysis)
 
 
 def _separated(analysis: xr.Dataset) -> Table:
@@ -75,14 +76,14 @@ def _separated(analysis: xr.Dataset) -> Table:
         one = analysis.sel(group=group)
         first, *others = str(group).split("; ")
         if others:
-            notes.append(f"{first} are the same samples as: {', '.join(others)}")
+            notes.append(f"{first}: the same samples as {', '.join(others)}")
         middle, ends = one["separation"].values, one["separation_interval"].values
         rows += [
             (f"{first}: {names[k]}", *_told(middle, ends, k), str(one["group_samples"].item()))
             for k in _largest(middle - 0.5, place)
         ]  # fmt: skip
     head = ("what separates", "probability that it is larger", "95 % interval", "samples")
-    return Table(head, rows, notes)
+    return marked(Table(head, rows, notes), analysis)
 
 
 def _largest(values: Array, place: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[int]:

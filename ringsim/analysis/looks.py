@@ -15,6 +15,8 @@ from pydantic import Field, model_validator
 
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.requirements import Requirement
+from ringsim.outputs import VARIABLES
+from ringsim.outputs.extremes import instead_of
 from ringsim.refusal import known_or_nearest
 from ringsim.units import Model
 
@@ -48,6 +50,8 @@ class Condition(Model):
             )
         if self.of is not None and self.half_width is None:
             raise ValueError(f"of = {self.of} needs half_width, in the unit of that output")
+        if self.of in VARIABLES and VARIABLES[self.of].dims:
+            raise ValueError(f"of = {instead_of(self.of)}")
         if self.of is not None and self.of not in quantities():
             hint = known_or_nearest(self.of, quantities())
             raise ValueError(f"of = {self.of} is no output with an interval ({hint})")

@@ -65,3 +65,14 @@ def ran(campaign: xr.Dataset) -> Mask:
 def used(campaign: xr.Dataset) -> xr.Dataset:
     """The samples whose numbers hold; the others are told, and never counted."""
     return campaign.isel(sample=np.flatnonzero(good(campaign)))
+
+
+def worst_sample(campaign: xr.Dataset, variable: Variable) -> int:
+    """The sample whose numbers hold with the worst value; -1 without a value, or where neither end
+    is the worse one.  Of equal ones the first.
+    """
+    values = variable.badness * numbers(campaign, variable.name)
+    known = good(campaign) & np.isfinite(values)
+    if not variable.badness or not known.any():
+        return -1
+    return int(campaign["sample"].to_numpy()[np.argmax(np.where(known, values, -np.inf))])

@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 
 from ringsim.analysis.quantities import quantities
 from ringsim.outputs import VARIABLES
+from ringsim.outputs.extremes import instead_of
 from ringsim.refusal import InputError, explain, known_or_nearest, show
 from ringsim.units import Model
 from ringsim.variables import Fate
@@ -48,11 +49,10 @@ def _check(requirements: dict[str, Requirement]) -> dict[str, Requirement]:
     for name, each in requirements.items():
         if name not in known:
             why = f"is no output that can be required ({known_or_nearest(name, known)})"
-            if name in VARIABLES and (dims := VARIABLES[name].dims):
-                ends = tuple(f"{most}_{name}" for most in ("least", "peak", "total"))
-                near = [n for n in quantities() if n in ends or n.startswith(f"{name}_")]
-                hint = f", like {near[0]}" if near else f" ({known_or_nearest(name, known)})"
-                why = f"has a value for each {' and '.join(dims)}: require a number{hint}"
+            if name in VARIABLES and VARIABLES[name].dims:
+                senses = {"largest": each.max, "least": each.min}
+                asked = [sense for sense, bound in senses.items() if bound is not None]
+                raise ValueError(instead_of(name, *asked))
             raise ValueError(f"{name} {why}")
         if name == OUTCOME:
             if each.is_ not in _WORDS or each.max is not None or each.min is not None:

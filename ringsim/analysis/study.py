@@ -14,13 +14,23 @@ from ringsim.analysis.blocks import population_of
 from ringsim.analysis.design import Placement, placement
 from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import NONE, Array, Interval
-from ringsim.analysis.quantities import CHECKED, good, lost, numbers, quantities, ran
+from ringsim.analysis.losses import LOST, NOTE, losses
+from ringsim.analysis.quantities import (
+    CHECKED,
+    good,
+    lost,
+    numbers,
+    quantities,
+    ran,
+    worst_sample,
+)
 from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
 from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge
+from ringsim.analysis.worst import worst
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status
 
@@ -57,10 +67,11 @@ def analyse(
     xarray.Dataset
         For every output NAME ``NAME`` (statistic), ``NAME_interval`` (statistic, bound),
         ``NAME_convergence`` (part, statistic), ``NAME_error_of_mean`` (source), all in its unit,
-        and ``NAME_samples`` (counted); ``outcome_...`` along ``kind``; verdicts along
-        ``requirement``; what matters along ``input`` and ``output``, see ``influence`` and
-        ``sensitivity``.  NaN stands for what the samples do not tell; ``intervals`` among the
-        attributes says what intervals are from, or why there are none.
+        ``NAME_samples`` (counted) and ``NAME_worst_sample``; ``outcome_...`` along ``kind``;
+        verdicts along ``requirement``; what matters along ``input`` and ``output``, see
+        ``influence`` and ``sensitivity``; the worst samples along ``worst``.  NaN
+        stands for what the samples do not tell; ``intervals`` among the attributes says what
+        intervals are from, or why there are none.
 
     InputError if it is no campaign, or a requirement cannot be judged by it.
     """
@@ -87,7 +98,7 @@ def analyse(
             "campaign_identity": campaign.attrs.get("identity", ""),
             "samples": campaign.sizes["sample"], "samples_run": int(ran(campaign).sum()),
             "design": placed.kind, "intervals": placed.told,
-            "stopping": "".join(stopping_lines(campaign, placed)),
+            "stopping": "".join(stopping_lines(campaign, placed)), NOTE: losses(campaign).note,
         },
     )  # fmt: skip
     found["part"].attrs = {
@@ -100,13 +111,40 @@ def analyse(
             found = found.assign(_output(stand, name, placed))
     found = found.assign(tail(campaign))
     more = [outcomes(stand, placed), influence(stand, wanted, placed)]
+    more += [worst(stand, wanted)]
     more += [judge(stand, wanted, placed)] if wanted else []
     more += [sensitivity(campaign, wanted, placed)]
     if reweighted:
         more += [reweight(stand, wanted, placed, read_distributions(reweighted))]
     for part in more:
         found = found.merge(part, combine_attrs="override")
+    if note := found.attrs[NOTE]:
+        for name in _bent(found):
+            found[name].attrs[NOTE] = note
     return found
+
+
+def _bent(found: xr.Dataset) -> list[str]:
+    """The variables that lost runs bend if these go with inputs: those that the others alone tell.
+
+    Verdicts, their bounds and shares of outcomes count lost runs, and counts are what they are.
+    """
+    of_all = (
+        "verdict",
+        "outcome",
+        "tail",
+        "samples",
+        "missing",
+        "group",
+        "index_used",
+        "index_lost",
+    )
+    safe = ("_samples", "_lower", "_upper", "_required", "_bounds", "_verdict", "_text", "_units")
+    return [
+        str(name) for name, each in found.data_vars.items()
+        if not str(name).startswith(of_all) and not str(name).endswith(safe)
+        and each.dtype.kind == "f"
+    ]  # fmt: skip
 
 
 def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any]:
@@ -139,6 +177,11 @@ def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any
             told("samples") | {"units": "1"},
         ),
         f"{name}_error_of_mean": ("source", errors, told("error of the mean by its source")),
+        f"{name}_worst_sample": (
+            (), worst_sample(campaign, quantities()[name]),
+            told("sample with the worst value; -1 where neither end is the worse one")
+            | {"units": "1"},
+        ),
     }  # fmt: skip
 
 
@@ -209,27 +252,33 @@ def _root_mean_square(values: Array) -> float:
 def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
     """Counts and shares of what the antenna did, and of how runs were lost, along ``kind``.
 
-    Shares of outcomes are of the samples whose numbers hold, those of lost ones of all that ran.
+    Shares are of all that ran.  What lost ones would have done nobody knows: they are told beside
+    each outcome (``outcome_lost``), and its interval reaches from none of them to all.
     """
     ok, gone, index = good(campaign), lost(campaign), campaign["sample"].to_numpy()
     fates = campaign[OUTCOME].to_numpy() if OUTCOME in campaign else np.full(len(ok), Fate.NONE)
     status = campaign["status"].to_numpy()
+    of = ok | gone
     rows: dict[str, tuple[NDArray[np.bool_], NDArray[np.bool_]]] = {}
     for fate in Fate:
         word = fate.word if fate != Fate.NONE else "unknown"
-        rows[word] = (ok & (np.maximum(fates, 0) == fate), ok)
+        own = ok & (np.maximum(fates, 0) == fate)
+        rows[word] = own, own | gone
     for code in Status:
-        rows[f"lost: {code.word}"] = (gone & (status == code), ok | gone)
-    rows = {word: (own, of) for word, (own, of) in rows.items() if own.any()}
+        rows[f"{LOST}: {code.word}"] = (own := gone & (status == code)), own
+    rows = {word: (own, most) for word, (own, most) in rows.items() if own.any()}
     shares = np.full((len(rows), len(PARTS)), np.nan)
     ends, run = np.full((len(rows), 2), np.nan), np.flatnonzero(ran(campaign))
-    for k, (own, of) in enumerate(rows.values()):
+    for k, (own, most) in enumerate(rows.values()):
         for part, share in enumerate(PARTS):
             first = run[: round(share * len(run))]
             if of[first].any():
                 shares[k, part] = own[first].sum() / of[first].sum()
-        ends[k] = _share_interval(own[of], index[of], placed)
-    counts = [(own.sum(), of.sum()) for own, of in rows.values()]
+        ends[k] = [
+            _share_interval(each[of], index[of], placed)[side]
+            for side, each in enumerate((own, most))
+        ]
+    counts = [(own.sum(), most.sum() - own.sum()) for own, most in rows.values()]
     of_kind = {"long_name": "share of the kind", "units": "1"}
     population = placed.population
     return xr.Dataset(
@@ -239,13 +288,17 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
                 {"long_name": "samples of the kind", "units": "1"},
             ),
             "outcome_of": (
+                "kind", np.full(len(rows), of.sum(), dtype="i8"),
+                {"long_name": "samples of which the share is, all that ran", "units": "1"},
+            ),
+            "outcome_lost": (
                 "kind", np.array([n for _, n in counts], dtype="i8"),
-                {"long_name": "samples of which the share is", "units": "1"},
+                {"long_name": "lost samples, which may be of the kind, too", "units": "1"},
             ),
             "outcome_share": ("kind", shares[:, -1] if population else ends[:, 0], of_kind),
             "outcome_share_interval": (
                 ("kind", "bound"), ends,
-                {"long_name": "interval of 95 % of the share", "units": "1"},
+                {"long_name": "interval of 95 % of the share, lost samples or not", "units": "1"},
             ),
             "outcome_share_convergence": (
                 ("kind", "part"), shares if population else np.full_like(shares, np.nan),

@@ -10,6 +10,7 @@ from ringsim.analysis.blocks import population_of
 from ringsim.analysis.brief import digits_of, output_table, what_matters, what_separates
 from ringsim.analysis.design import placement
 from ringsim.analysis.influence_text import influence_tables
+from ringsim.analysis.losses import MARK, NOTE, losses, marked
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.requirements import OUTCOME, read_requirements
 from ringsim.analysis.reweighting_text import reweighting_lines
@@ -18,6 +19,7 @@ from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS
 from ringsim.analysis.tails import tail, tail_lines
 from ringsim.analysis.verdicts import Verdict, judge
+from ringsim.analysis.worst import worst_lines
 from ringsim.refusal import InputError
 from ringsim.tables import Table, counted, interval_text, number_text, slim
 
@@ -26,8 +28,9 @@ _HINT = (
 )
 
 
-def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
-    """Outcomes, outputs, errors, what matters; verdicts last, where they are seen.
+def told(analysis: xr.Dataset, folder: str = "DIR", *, full: bool = False) -> list[str]:
+    """Outcomes, outputs, errors, what matters, the worst samples; verdicts last, where they are
+    seen.  ``folder`` is the campaign's, for the commands that run samples again.
 
     ``full`` has the interval and the convergence of every statistic, and every measure of what
     matters, whatever chance would explain.
@@ -37,7 +40,8 @@ def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
         counts += f", of which {run} have run"
     counts += f", design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
-    lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
+    lines = [f"{title}: {counts}" if title else counts]
+    lines += [*filter(None, [analysis.attrs[NOTE]]), analysis.attrs["intervals"]]
     if "tail_probability" in analysis:
         lines.append(
             "no input is told to matter: samples of a chain repeat each other, and levels lie "
@@ -45,7 +49,9 @@ def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
         )
     if not full:
         lines.append("all statistics with intervals and convergence, and all inputs: --full")
-    lines += [*filter(None, [analysis.attrs["stopping"]]), *tail_lines(analysis)]
+    if stopping := analysis.attrs["stopping"]:
+        lines.append(stopping + MARK * bool(analysis.attrs[NOTE]))
+    lines += tail_lines(analysis)
     tables = [outcome_table(analysis)]
     if full:
         tables += [_outputs(analysis), error_table(analysis)]
@@ -54,6 +60,7 @@ def told(analysis: xr.Dataset, *, full: bool = False) -> list[str]:
         tables += [output_table(analysis, outputs_in(analysis)), _known_errors(analysis)]
         tables += [what_matters(analysis), *refusals(analysis), what_separates(analysis)]
     parts = [table.lines() if full else slim(table).lines() for table in tables]
+    parts += [worst_lines(analysis, folder)]
     parts += [slim(verdict_table(analysis)).lines(), list(reweighting_lines(analysis))]
     for more in filter(None, parts):
         lines += ["", *more]
@@ -70,16 +77,17 @@ def _known_errors(analysis: xr.Dataset) -> Table:
 def verdict_lines(campaign: xr.Dataset) -> list[str]:
     """The verdicts on the requirements of a merged campaign's own file; none without any."""
     own = json.loads(campaign.attrs.get("requirements", "{}"))
-    placed = placement(campaign)
+    placed, lost = placement(campaign), losses(campaign)
     found = xr.Dataset(tail(campaign), attrs={"samples": campaign.sizes["sample"]})
-    lines = stopping_lines(campaign, placed) + tail_lines(found)
+    lines = [*filter(None, [lost.note])]
+    lines += [line + lost.mark for line in stopping_lines(campaign, placed)] + tail_lines(found)
     if not own:
         return lines
     try:
         found = judge(population_of(campaign), read_requirements(own, "requirements"), placed)
     except InputError as error:
         return [*lines, f"the requirements cannot be judged: {error}"]
-    return [*lines, *verdict_table(found).lines()]
+    return [*lines, *verdict_table(found.assign_attrs({NOTE: lost.note})).lines()]
 
 
 def verdict_table(analysis: xr.Dataset) -> Table:
@@ -87,20 +95,25 @@ def verdict_table(analysis: xr.Dataset) -> Table:
     rows, notes = [], list[str]()
     for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
         one = {str(n): v.item() for n, v in analysis.sel(requirement=name).items() if not v.dims}
-        verdict, worst = Verdict(one["verdict"]), Verdict(one["verdict_worst_case"])
+        verdict, alone = Verdict(one["verdict"]), Verdict(one["verdict_of_used"])
         further = one["further_samples"]
         rows.append((
             one["requirement_text"], f"{one['probability_required']:g}",
             f"{one['confidence_required']:g}", _words(verdict), number_text(one["probability"]),
             interval_text(one["probability_lower"], one["probability_upper"]),
             str(one["samples_used"]), str(one["samples_violating"]), str(one["samples_lost"]),
-            _words(worst) if one["samples_lost"] else "-", str(further) if further > 0 else "-",
+            _words(alone) if one["samples_lost"] else "-", str(further) if further > 0 else "-",
         ))  # fmt: skip
         if further > 0:
-            lost = counted(one["samples_lost"], "lost sample")
-            kept = f", if {lost} would not have violated it" * bool(one["samples_lost"])
             more = counted(further, "further sample")
+            taken = counted(one["samples_lost"], "lost sample")
+            kept = f", with {taken} as violations" * bool(one["samples_lost"])
             notes.append(f"{name}: {more} without a violation would show it{kept}")
+        if verdict != alone:
+            notes.append(
+                f"{name}: it would be {_words(alone)} if lost samples were as the others, which "
+                "nobody knows: run them again (ringsim campaign --retry-failed)"
+            )
         if not one["samples_used"]:
             notes.append(f"{name}: no sample has numbers that tell of it")
         if short := one.get("samples_short"):
@@ -117,9 +130,9 @@ def verdict_table(analysis: xr.Dataset) -> Table:
     head = (
         f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
         "verdict", "estimate", "one-sided bounds", "used", "violating", "lost",
-        "if lost ones violate", "further",
+        "if lost ones were as the others", "further",
     )  # fmt: skip
-    return Table(head, rows, notes)
+    return marked(Table(head, rows, notes), analysis, head.index("estimate"))
 
 
 def _words(verdict: Verdict) -> str:
@@ -130,7 +143,9 @@ def outcome_table(analysis: xr.Dataset) -> Table:
     """What the antenna did, and how runs were lost, with shares."""
     rows = [
         (
-            str(kind), f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}",
+            str(kind).replace("_", " "),
+            f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}"
+            + f" ({one['outcome_lost'].item()} lost)" * bool(one["outcome_lost"].item()),
             number_text(one["outcome_share"].item()),
             interval_text(*one["outcome_share_interval"].values),
             *map(number_text, one["outcome_share_convergence"].values[:-1]),
@@ -171,7 +186,7 @@ def _outputs(analysis: xr.Dataset) -> Table:
         "output", "unit", "statistic", "estimate", "95 % interval", *_parts(), "used", "lost",
         "no value",
     )  # fmt: skip
-    return Table(head, rows)
+    return marked(Table(head, rows), analysis)
 
 
 def outputs_in(analysis: xr.Dataset) -> list[str]:
@@ -198,7 +213,7 @@ def error_table(analysis: xr.Dataset, names: Collection[str] | None = None) -> T
         "error of the mean of", "unit", "sampling (standard error)", "numerical (error bars)",
         "engines (difference)", "dominates",
     )  # fmt: skip
-    return Table(head, rows)
+    return marked(Table(head, rows), analysis)
 
 
 def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:

@@ -14,6 +14,7 @@ from ringsim.analysis.requirements import Requirements
 from ringsim.choice import kind_of, kinds_of
 from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
+from ringsim.outputs.extremes import instead_of
 from ringsim.outputs.family import VARIABLES, holds
 from ringsim.overrides import place_of
 from ringsim.refusal import InputError, explain, known_or_nearest, show
@@ -24,11 +25,11 @@ from ringsim.sampling.table import AnyDesign, AnyDistribution, draw, first_insid
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import OutputTable
 from ringsim.units import Model
+from ringsim.variables import GONE
 
 SOLVERS = {
     "full": "ringsim.simulation:run",
     "frame": "ringsim.simulation:run_frame",
-    "ideal": "ringsim.simulation:run_ideal",
 }
 """What maps a scene to its outcome, by fidelity."""
 
@@ -54,6 +55,12 @@ def flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
             path = prefix if name == "default" else f'{prefix}["{name}"]'
         found |= flat(inner, whole, path)
     return found
+
+
+def _not_gone(fidelity: Any) -> Any:
+    if isinstance(fidelity, str) and fidelity in GONE:
+        raise ValueError(f"fidelity = {show(fidelity)}: {GONE[fidelity]}")
+    return fidelity
 
 
 _Share = Annotated[float, Field(gt=0.0, le=1e3)]
@@ -89,9 +96,9 @@ class Specification(Model):
     """How the samples are placed."""
     limits: Allowance = Allowance()
     """What one run may use before it is ended."""
-    fidelity: Literal["full", "frame", "ideal"] = "full"
+    fidelity: Annotated[Literal["full", "frame"], BeforeValidator(_not_gone)] = "full"
     """full: the flexible multibody model; frame: the same in joint coordinates, several times as
-    fast; ideal: rigid rods."""
+    fast."""
     check_every: Annotated[int, Field(ge=0)] = 0
     """One sample in so many runs with the full model, too, as a check of the frame engine: samples
     0, check_every, 2 check_every, ...; 0 for none."""
@@ -130,6 +137,8 @@ class Specification(Model):
                 "give both"
             )
         for name in self.max_difference if isinstance(self.max_difference, dict) else ():
+            if name in VARIABLES and VARIABLES[name].dims:
+                raise ValueError(f"max_difference.{instead_of(name)}")
             if name not in quantities():
                 raise ValueError(
                     f"max_difference.{name}: there is no such output to compare engines by "

@@ -55,7 +55,8 @@ def command(
             found = analyse(campaign, judged, others)
         except InputError as error:
             raise InputError(f"{source}: {error}") from None
-    for line in told(found, full=full):
+    folder = source if source.is_dir() else source.parent
+    for line in told(found, str(folder), full=full):
         click.echo(line)
     if out is not None:
         save(found, out)

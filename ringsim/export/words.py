@@ -26,6 +26,7 @@ def units_of(variable: xr.DataArray) -> str:
 
 
 def meaning_of(variable: xr.DataArray) -> str:
-    """What it is, with the scene path of an input."""
-    words = str(variable.attrs.get("long_name", ""))
-    return str(variable.attrs.get("path", "")) or words
+    """What it is: of an input its scene path, and its name if it has another one."""
+    words, path = (str(variable.attrs.get(name, "")) for name in ("long_name", "path"))
+    own = str(variable.attrs.get("input", path))
+    return words if not path else path if own == path else f"{own}: {path}"

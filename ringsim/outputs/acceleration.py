@@ -21,7 +21,8 @@ class PeakAcceleration(Output):
         ),
         Variable(
             "peak_acceleration_max", (), "m/s^2", "largest acceleration of any corner at any step",
-            summary=("largest acceleration", "10.3g"),
+            summary=("largest acceleration", "10.3g"), worse="larger",
+            largest_of="peak_acceleration",
         ),
     )  # fmt: skip
 

@@ -28,7 +28,7 @@ class Asynchrony(Output):
         Variable(
             "asynchrony_max", (), "degree", "largest asynchrony up to the deployment time",
             error_bar=ErrorBar("largest asynchrony", safety=2.0),
-            summary=("largest asynchrony", "10.4f"),
+            summary=("largest asynchrony", "10.4f"), worse="larger", largest_of="asynchrony",
         ),
         Variable("asynchrony_max_time", (), "s", "time of the largest asynchrony"),
         *(

@@ -23,11 +23,11 @@ class BaseReaction(Output):
         ),
         Variable(
             "peak_base_force", (), "N", "largest force at the base at any step",
-            summary=("largest base force", "10.3g"),
+            summary=("largest base force", "10.3g"), worse="larger", largest_of="base_force",
         ),
         Variable(
             "peak_base_torque", (), "N m", "largest torque at the base at any step",
-            summary=("largest base torque", "10.3g"),
+            summary=("largest base torque", "10.3g"), worse="larger", largest_of="base_torque",
         ),
     )  # fmt: skip
 
@@ -59,7 +59,7 @@ class BaseRotation(Output):
         ),
         Variable(
             "base_rotation_max", (), "degree", "largest rotation of the base at any step",
-            summary=("largest base rotation", "10.3g"),
+            summary=("largest base rotation", "10.3g"), worse="larger", largest_of="base_rotation",
         ),
     )  # fmt: skip
 

@@ -17,7 +17,7 @@ class BendingStrain(Output):
         ),
         Variable(
             "peak_bending_strain", (), "1", "largest bending strain of the upper beam at any step",
-            summary=("largest strain", "10.2e"),
+            summary=("largest strain", "10.2e"), worse="larger", largest_of="bending_strain",
         ),
     )  # fmt: skip
 

@@ -28,7 +28,7 @@ class CableTension(Output):
             "peak_tension", (), "N",
             "largest tension of any span of any cable up to the deployment time",
             error_bar=ErrorBar("largest tension", safety=1.2),
-            summary=("largest tension", "10.3f"),
+            summary=("largest tension", "10.3f"), worse="larger", largest_of="cable_tension",
         ),
         *PEAK.variables,
     )  # fmt: skip

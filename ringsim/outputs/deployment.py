@@ -13,12 +13,14 @@ class Deployment(Output):
         Variable(
             "deployment_time", (), "s", "time at which the last V-joint reached 180 deg",
             error_bar=ErrorBar("deployment time", safety=1.0),
-            summary=("deployment time", "10.4f"),
+            summary=("deployment time", "10.4f"), worse="larger", largest_of="lock_time",
         ),
         Variable(
             "lock_time", ("plane", "section"), "s", "time at which the V-joint reached 180 deg"
         ),
-        Variable("locked_joints", (), "1", "V-joints that have reached 180 deg", "i4"),
+        Variable(
+            "locked_joints", (), "1", "V-joints that have reached 180 deg", "i4", worse="smaller"
+        ),
     )  # fmt: skip
 
     def reduce(self, run: Run, series: Series) -> Values:

@@ -39,7 +39,7 @@ class DriveMargins(Output):
         Variable(
             "least_drive_margin", (), "1",
             "smallest static margin of the drive at any angle that the run passed",
-            summary=("least drive margin", "10.3f"),
+            summary=("least drive margin", "10.3f"), worse="smaller", least_of="drive_margin",
         ),
         Variable("least_drive_margin_time", (), "s", "time of least_drive_margin"),
         Variable("least_drive_margin_angle", (), "degree", "mean opening angle then"),

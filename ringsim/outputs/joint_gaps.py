@@ -12,7 +12,8 @@ class JointGaps(Output):
         Variable("constraint_violation", ("time",), "m", "largest gap in any joint"),
         Variable(
             "constraint_error", (), "m", "largest gap in any joint at any step",
-            summary=("constraint error", "10.1e"),
+            summary=("constraint error", "10.1e"), worse="larger",
+            largest_of="constraint_violation",
         ),
     )  # fmt: skip
 

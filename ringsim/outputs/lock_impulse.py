@@ -23,7 +23,7 @@ class LockImpulse(Output):
         Variable(
             "peak_lock_impulse", (), "N m s",
             "largest angular impulse of a stop at a lock; missing if no V-joint has locked",
-            summary=("largest lock impulse", "10.3g"),
+            summary=("largest lock impulse", "10.3g"), worse="larger", largest_of="lock_impulse",
         ),
     )  # fmt: skip
 

@@ -23,7 +23,7 @@ class NetTension(Output):
         ),
         Variable(
             "peak_net_tension", (), "N", "largest tension of any cable along the net's edge",
-            summary=("largest net tension", "10.4f"),
+            summary=("largest net tension", "10.4f"), worse="larger", largest_of="net_tension",
         ),
         *PEAK.variables,
     )  # fmt: skip

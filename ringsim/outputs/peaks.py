@@ -50,6 +50,17 @@ class Peak:
             found[f"{self.name}_{dim}"] = run.coordinates[dim][place]
         return found
 
+    def at(self, run: Run, times: Array, values: Array) -> Values:
+        """Of values that each place has at a time of its own, both of shape (*dims); nothing where
+        all are NaN.
+        """
+        if not np.isfinite(values).any():
+            return {}
+        where = np.unravel_index(int(np.nanargmax(values)), values.shape)
+        places = zip(self.dims, where, strict=True)
+        found: Values = {f"{self.name}_{dim}": run.coordinates[dim][k] for dim, k in places}
+        return found | {f"{self.name}_time": times[where]}
+
     def told(self, values: Values, span_names: SpanNames) -> str:
         """As "at 0.3 s: upper, span 1 (winch to section 1 first hinge)"; empty if it is unknown."""
         found = [values.get(f"{self.name}_{dim}", np.nan) for dim in ("time", *self.dims)]

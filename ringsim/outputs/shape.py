@@ -25,7 +25,7 @@ class Shape(Output):
         ),
         Variable(
             "best_fit_rms", (), "m", "root of the mean square of all corners' deviations",
-            summary=("best-fit rms", "10.3e"),
+            summary=("best-fit rms", "10.3e"), worse="larger",
         ),
     )  # fmt: skip
 

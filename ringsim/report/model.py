@@ -6,16 +6,10 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from ringsim.analysis.campaign_samples import campaign_file, distribution_of, inputs
+from ringsim.analysis.campaign_samples import campaign_file, inputs, paths_of
 from ringsim.campaign.specification import flat
 from ringsim.refusal import show
 from ringsim.scene import builtin_scenes
-
-
-def paths_of(variable: xr.DataArray) -> list[str]:
-    """The scene's paths that take the values of an input: one, or all that share it."""
-    shared = distribution_of(variable).get("shared")
-    return shared or [str(variable.attrs.get("path") or variable.name)]
 
 
 class Value(NamedTuple):

@@ -11,17 +11,21 @@ from ringsim.analysis.campaign_notes import budget_lines, override_lines, peak_l
 from ringsim.analysis.campaign_samples import campaign_file, endings, scalars
 from ringsim.analysis.design import placement
 from ringsim.analysis.influence_text import influence_tables
+from ringsim.analysis.losses import losses
 from ringsim.analysis.quantities import good
 from ringsim.analysis.sensitivity_text import sensitivity_tables
 from ringsim.analysis.stopping import stopping_lines
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import error_table, outcome_table, verdict_table
+from ringsim.analysis.unusual import NOTE
+from ringsim.analysis.worst import worst_tables
 from ringsim.files import write_text
 from ringsim.plots.campaign.figures import figures_of
 from ringsim.plots.inline import inline
 from ringsim.report import model, tables
 from ringsim.report.player import player
 from ringsim.report.tail import rare_event
+from ringsim.tables import slim
 
 LARGEST = 2_000_000
 """Bytes of a page: it is to go by mail."""
@@ -48,6 +52,8 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     analysis = analyse(campaign) if analysis is None else analysis
     wanted = campaign_file(campaign)
     failures, more = tables.failures(campaign, folder)
+    shown = player(campaign, analysis)
+    places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
     values, head = model.values(campaign)
     figures = [(p.name, p.words, inline(f, p.name, p.words)) for p, f in figures_of(campaign)]
     notes = [*restart_lines(campaign), *override_lines(campaign), *budget_lines(campaign)]
@@ -55,8 +61,10 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         loader=jinja2.PackageLoader("ringsim.report", ""), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
+    shell.filters["sentence"] = _sentence
     placed = placement(campaign)
-    stopping = stopping_lines(campaign, placed)
+    lost = losses(campaign)
+    stopping = [line + lost.mark for line in stopping_lines(campaign, placed)]
     names = scalars(campaign)
     design = dict(wanted.get("design", {}))
     design.pop("samples", None)  # a call with --samples changes it
@@ -68,16 +76,26 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "design": design.pop("kind", "unknown"), "design_more": design,
         "seed": campaign.attrs.get("seed", ""), "scene": wanted.get("scene", ""),
         "outcomes": outcome_table(analysis), "tail": rare_event(campaign),
-        "statistics": tables.statistics(campaign, analysis), "errors": error_table(analysis, names),
+        "statistics": tables.statistics(campaign, analysis),
+        "errors": slim(error_table(analysis, names)),
         "no_population": "" if placed.population or not placed.kind else placed.told,
-        "verdicts": verdict_table(analysis),
-        "brief": [what_matters(analysis), what_separates(analysis)],
+        "verdicts": slim(verdict_table(analysis)),
+        "brief": [slim(what_matters(analysis)), slim(what_separates(analysis))],
         "matters": [*influence_tables(analysis, names), *sensitivity_tables(analysis, names)],
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
-        "peaks": peak_lines(campaign), "stopping": stopping,
-        "figures": figures, "player": player(campaign), "failures": failures, "more": more,
+        "peaks": peak_lines(campaign), "stopping": stopping, "lost": lost.note,
+        "figures": figures, "player": shown, "failures": failures, "more": more,
+        "worst": worst_tables(analysis, folder), "worst_note": NOTE,
+        "players": {str(sample): k for sample, k in places.items()},
         "truth": tables.truth(campaign), "notes": notes, "inputs": tables.drawn(campaign),
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),
         "provenance": list(tables.provenance(campaign)),
     }  # fmt: skip
     return shell.get_template("page.html.j2").render(context)
+
+
+def _sentence(line: str) -> str:
+    """A line of a terminal as a sentence: with a capital, but where a name begins it."""
+    first = line.split(maxsplit=1)[0].strip(":,") if line else ""
+    named = not first.isalpha() or first != first.lower()
+    return f"{line if named else line[0].upper() + line[1:]}."

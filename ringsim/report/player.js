@@ -199,6 +199,13 @@
     time = Math.min(time, end());
     draw();
   });
+  for (const show of document.querySelectorAll("button.show")) {
+    show.addEventListener("click", () => {
+      byId("sample").value = show.dataset.place;
+      byId("sample").dispatchEvent(new Event("change"));
+      byId("player").scrollIntoView();
+    });
+  }
   slider.addEventListener("input", () => { time = (slider.value / 1000) * end(); draw(); });
   let held = null;
   canvas.addEventListener("pointerdown", (event) => {

@@ -1,6 +1,7 @@
 """What the page's player draws: a few samples' opening angles, and the lines of the ring."""
 
 import base64
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -17,20 +18,24 @@ from ringsim.structures.pantograph_ring import PantographRing
 
 POSES = 25
 """Mean opening angles at which the ring is tabled: between two, lines are off by about 2 mm."""
-MOST_FRAMES, MOST_OTHERS = 240, 5
+MOST_FRAMES, MOST_OTHERS = 240, 8
 UNKNOWN = -32768
 """An opening angle that was not recorded."""
 _LARGEST = 32767
-_MOST_BYTES, _LEAST_FRAMES = 60_000, 30
-"""Of the positions of a sample: seven samples and all figures are to fit into one mail."""
+_MOST_BYTES, _LEAST_FRAMES = 42_000, 30
+"""Of the positions of a sample: ten samples and all figures are to fit into one mail."""
 
 
-def player(campaign: xr.Dataset) -> dict[str, Any] | None:
-    """Data of the player for JSON; None if the structure is no ring, or nothing was recorded."""
+def player(campaign: xr.Dataset, analysis: xr.Dataset) -> dict[str, Any] | None:
+    """Data of the player for JSON; None if the structure is no ring, or nothing was recorded.
+
+    Shown are the median and the worst sample, the worst of each failure in ``analysis``, then
+    others that failed.
+    """
     scene = scene_from_toml(str(campaign.attrs["scene"]), source="attribute scene")
     if not isinstance(scene.structure, PantographRing) or "opening_angle" not in campaign:
         return None
-    shown = [_course(campaign, *each) for each in _chosen(campaign)]
+    shown = [_course(campaign, *each) for each in _chosen(campaign, analysis)]
     if not shown:
         return None
     lowest = min(each.pop("lowest") for each in shown)
@@ -43,24 +48,45 @@ def player(campaign: xr.Dataset) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def _chosen(campaign: xr.Dataset) -> list[tuple[int, str]]:
-    """Samples with what they stand for: the median, the worst, then those that failed."""
+def _chosen(campaign: xr.Dataset, analysis: xr.Dataset) -> list[tuple[int, str]]:
+    """Samples with what they stand for: the median, the worst, the worst of each failure in turn,
+    then others that failed.
+    """
     words, samples = endings(campaign), campaign["sample"].to_numpy()
-    good, found = np.isin(samples, used(campaign)["sample"]), dict[int, str]()
+    good, found = np.isin(samples, used(campaign)["sample"]), dict[int, list[str]]()
     if (both := median_and_worst(campaign)) is not None:
         by = f" by {name}" if (name := judged_by(campaign)) else ""
         for sample, word in zip(both, ("median", "worst"), strict=True):
-            found.setdefault(sample, f"{word}{by}")
+            found.setdefault(sample, [f"{word}{by}"])
     fell_short = np.flatnonzero(~good | ~np.isin(words, ("deployed", "folded", "finished", "ok")))
     # Those whose numbers do not hold first: nothing else on the page shows them.
-    for place in fell_short[np.argsort(good[fell_short], kind="stable")]:
-        if len(found) < 2 + MOST_OTHERS:
-            found.setdefault(int(samples[place]), "")
+    fell_short = fell_short[np.argsort(good[fell_short], kind="stable")]
+    # A failure is no ending: what ended as "stalled" need not be told so twice.
+    violating = "violates "
+    for sample, failure in [*_in_turn(analysis), *((int(samples[k]), "") for k in fell_short)]:
+        if sample in found or len(found) < 2 + MOST_OTHERS:
+            own = found.setdefault(sample, [])
+            own += [each for each in failure.split("; ") if each.startswith(violating)]
     ends = dict(zip(samples.tolist(), words.tolist(), strict=True))
     return [
-        (sample, f"sample {sample}: {', '.join(filter(None, (word, ends[sample])))}")
+        (sample, f"sample {sample}: {', '.join([*word, ends[sample]])}")
         for sample, word in found.items() if _recorded(campaign, sample)
     ]  # fmt: skip
+
+
+def _in_turn(analysis: xr.Dataset) -> list[tuple[int, str]]:
+    """The worst sample of each failure, then the second of each, ..., with their failures."""
+    if "worst" not in analysis.dims:
+        return []
+    rows = zip(
+        analysis["worst_sample"].values.tolist(), analysis["worst_failure"].values.tolist(),
+        strict=True,
+    )  # fmt: skip
+    turns, ordered = Counter[str](), list[tuple[int, int, str]]()
+    for sample, failure in rows:
+        ordered.append((turns[failure], sample, failure))
+        turns[failure] += 1
+    return [(sample, failure) for _, sample, failure in sorted(ordered, key=lambda each: each[0])]
 
 
 def _recorded(campaign: xr.Dataset, sample: int) -> bool:
@@ -77,7 +103,7 @@ def _course(campaign: xr.Dataset, sample: int, name: str) -> dict[str, Any]:
     angle = angle.isel(time=places)
     rows = angle.to_numpy().reshape(len(places), -1)
     return {
-        "name": name, "times": np.round(angle["time"].to_numpy(), 4).tolist(),
+        "name": name, "sample": sample, "times": np.round(angle["time"].to_numpy(), 4).tolist(),
         "angles": packed(np.clip(100.0 * rows, UNKNOWN, _LARGEST)),
         "lowest": float(rows.mean(axis=1).min()),
         "places": _places(campaign, sample),

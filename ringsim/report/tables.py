@@ -8,18 +8,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.brief import digits_of
+from ringsim.analysis.brief import digits_of, worst_of
 from ringsim.analysis.campaign_samples import (
     NUMERICAL,
+    called,
     distribution_of,
     endings,
     inputs,
+    paths_of,
     scalars,
     values_of,
 )
+from ringsim.analysis.losses import losses, marked
 from ringsim.analysis.quantities import CHECKED
 from ringsim.refusal import show
-from ringsim.report.model import paths_of
 from ringsim.tables import Table, interval_text, number_text
 from ringsim.variables import GOALS, Cause
 
@@ -62,15 +64,27 @@ def statistics(campaign: xr.Dataset, analysis: xr.Dataset) -> Table:
                 cells[-1] += f" ({interval_text(low, high, fine)})"
         for value in (least, most):
             first = samples[values == value][:1]
-            cells.append(number_text(value, fine) + "".join(f" ({sample})" for sample in first))
+            more = "".join(f" ({sample}{_error_bar(campaign, name, sample)})" for sample in first)
+            cells.append(number_text(value, fine) + more)
         used, lost, absent = (str(counts.sel(counted=c).item()) for c in _COUNTS)
         unit = str(says.get("units", "1"))
+        cells.append(worst_of(analysis, name) if least < most else "-")
         rows.append([str(says.get("long_name", name)), unit, *cells, used, lost, absent])
-    extremes = ("Least (sample)", "Largest (sample)", "n used", "Lost", "No value")
+    extremes = ("Least (sample)", "Largest (sample)", "Worst sample", "Used", "Lost", "No value")
     notes = (
-        ["In brackets intervals of 95 %"] if any("(" in c for r in rows for c in r[2:-5]) else []
+        ["In brackets intervals of 95 %"] if any("(" in c for r in rows for c in r[2:-6]) else []
     )
-    return Table(("Number", "Unit", *moments.values(), *extremes), rows, notes)
+    if any("±" in c for r in rows for c in r[-6:-4]):
+        notes.append("± what the named sample states as its numerical error")
+    return marked(Table(("Number", "Unit", *moments.values(), *extremes), rows, notes), analysis)
+
+
+def _error_bar(campaign: xr.Dataset, name: str, sample: int) -> str:
+    """The numerical error that a sample states of an output; empty if it states none."""
+    if (bars := f"{name}_error") not in campaign:
+        return ""
+    own = float(campaign[bars].sel(sample=sample))
+    return f", ± {own:.2g}" if np.isfinite(own) else ""
 
 
 _COUNTS = ("used", "lost", "without_value")
@@ -99,12 +113,13 @@ def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
 
 
 def drawn(campaign: xr.Dataset) -> Rows:
-    """Path, unit, places, distribution, and the values that came out."""
+    """Name, unit, places, distribution, the values that came out, and the scene's paths that take
+    them: a row an input.
+    """
     rows = []
     for name in inputs(campaign):
         variable = campaign[name]
         says, values = distribution_of(variable), variable.to_numpy()
-        paths = paths_of(variable)
         says.pop("shared", None)
         says.pop("each_section", None)
         kind = says.pop("kind", says.pop("text", ""))
@@ -116,7 +131,8 @@ def drawn(campaign: xr.Dataset) -> Rows:
             extent = f"{number(float(values.min()))} to {number(float(values.max()))}"
         places = variable.shape[1] if variable.ndim > 1 else 1
         unit = str(variable.attrs.get("units", "-"))
-        rows.append([", ".join(paths), unit, str(places), law, extent])
+        paths = ", ".join(paths_of(variable))
+        rows.append([called(variable), unit, str(places), law, extent, paths])
     return rows
 
 
@@ -126,7 +142,7 @@ def _short(value: Any) -> str:
 
 def truth(campaign: xr.Dataset) -> Rows:
     """What, samples, typical and largest size: errors of balance, error bars, second engines."""
-    rows = []
+    rows: Rows = []
     for name in NUMERICAL:
         if name in campaign:
             samples, values = values_of(campaign, name)
@@ -142,7 +158,8 @@ def truth(campaign: xr.Dataset) -> Rows:
                 rows += _row(campaign[name], words, samples, values, _rms)
             else:
                 rows += _row(campaign[other], words, samples, values, _rms)
-    return rows
+    mark = losses(campaign).mark
+    return [[f"{what}{mark}", *others] for what, *others in rows]
 
 
 def _rms(values: Any) -> float:
@@ -164,5 +181,9 @@ def _row(variable: xr.DataArray, words: str, samples: Any, values: Any, typical:
 def provenance(campaign: xr.Dataset) -> Iterator[tuple[str, str]]:
     """Who computed it, when, with what."""
     for name, value in campaign.attrs.items():
-        if name in _SHOWN or name.endswith("_version") or name in ("history", "git_commit"):
+        if (
+            name in _SHOWN
+            or name.endswith("_version")
+            or name in ("history", "git_commit", "sources")
+        ):
             yield name.replace("_", " "), str(value)

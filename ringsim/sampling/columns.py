@@ -33,6 +33,9 @@ class Column:
     """Shape (samples,), or (samples, k) with a value for each place."""
     places: tuple[str, ...] = ()
     """Names of the k places, if they have some."""
+    input: str = ""
+    """The campaign file's name of what was drawn, which several paths may share; empty: the path.
+    """
 
     @property
     def in_words(self) -> bool:
@@ -96,6 +99,9 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
     for column in table.columns:
         values, text = column.values, column.in_words
         kind: Any = str if text else {"b": "i1"}.get(values.dtype.kind, values.dtype)
+        if column.dim in file.dimensions and file.dimensions[column.dim].size != values.shape[1]:
+            # Of the pulleys of a result, there are as many as the cable with most of them has.
+            column = replace(column, dim=f"{column.dim}_of_one_winch")
         if column.dim and column.dim not in file.dimensions:
             file.createDimension(column.dim, values.shape[1])
         dims = ("sample", column.dim) if column.dim else ("sample",)
@@ -108,6 +114,7 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
             variable.units = column.units
         variable.setncatts(
             {"path": column.path, "role": role, "distribution": column.origin}
+            | ({"input": column.input or column.path} if column.path else {})
             | ({"dtype": "bool"} if values.dtype.kind == "b" else {})
         )
         if values.dtype.kind == "O":
@@ -128,7 +135,7 @@ def _is_number(value: Any) -> bool:
 
 def _add_names(file: Any, column: Column, table: Table) -> str:
     """The coordinate with the names of a column's places; its own where columns differ in them."""
-    shared = len({each.places for each in table.columns if each.dim == column.dim}) == 1
+    shared = len({each.places for each in table.columns if each.dim == column.dim}) <= 1
     name = f"{column.dim}_name" if shared else f"{column.name}_{column.dim}_name"
     if name not in file.variables:
         file.createVariable(name, str, (column.dim,))[:] = np.array(column.places, dtype=object)
@@ -154,5 +161,6 @@ def read_inputs(file: Any) -> tuple[Column, ...]:
             named = says.get("coordinates")
             places = tuple(file[named][:]) if named else ()
             values = values.astype(kind)
-            columns.append(Column(name, says["path"], dim, units, origin, values, places))
+            own = says.get("input", "")
+            columns.append(Column(name, says["path"], dim, units, origin, values, places, own))
     return tuple(columns)

@@ -3,6 +3,7 @@
 import contextlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -70,7 +71,9 @@ def draw(
             values = drawn[name]
         words = distribution.model_dump_json(exclude_none=True)
         paths = _paths_of(name, distribution)
-        columns += [_column(base, path, values, words, design) for path in paths]
+        columns += [
+            replace(_column(base, path, values, words, design), input=name) for path in paths
+        ]
     for name in () if inputs else drawn:
         if not is_label(name):
             refuse_fixed(base, name)

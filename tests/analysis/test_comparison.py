@@ -227,7 +227,7 @@ def test_two_runs_are_compared(tmp_path):
     assert done.exit_code == 0
     assert xr.load_dataset(arguments[2]).asynchrony_max_difference.item() == 0.5
     line = next(line for line in done.output.splitlines() if line.startswith("asynchrony_max"))
-    assert line.split() == ["asynchrony_max", "degree", "2", "2.5", "0.5"]
+    assert line.split() == ["asynchrony_max", "degree", "2", "2.5", "0.5", "second"]
 
 
 def test_a_run_and_a_campaign_are_not_compared(tmp_path):

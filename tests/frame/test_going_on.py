@@ -136,7 +136,8 @@ def test_what_a_motor_gave_before_a_change_stays(change: dict[str, float], tmp_p
     upper = {"plane": "upper", "winch": 1}
     for name in ("motor_torque", "motor_speed", "motor_energy"):
         old, new = (found[name].sel(upper).values for found in (before, run))
-        np.testing.assert_array_equal(new[:10], old[:10], err_msg=name)
+        # To 16 ms: the curve through the last step before the change knows the step behind it.
+        np.testing.assert_array_equal(new[:9], old[:9], err_msg=name)
     assert run["motor_torque"].sel(upper).values[5] > 0.0
     # Without losses of the gear it is what the rope takes: tension times rope wound.
     after = run.sel(plane="upper").isel(time=slice(11, None))
@@ -200,9 +201,8 @@ def test_what_cannot_go_on_is_refused_with_the_cure(tmp_path: Path) -> None:
     ended = _ended(tmp_path)
     with pytest.raises(InputError, match="same: take an earlier state"):
         simulate(ended.scene, start=ended)
-    for fidelity in ("full", "ideal"):
-        with pytest.raises(InputError, match=f'"{fidelity}" stores no states'):
-            simulate(truss(), fidelity)
+    with pytest.raises(InputError, match='"full" stores no states'):
+        simulate(truss(), "full")
 
 
 def _ended(folder: Path) -> StoredState:
@@ -254,7 +254,6 @@ def test_the_command_goes_on(tmp_path: Path) -> None:
         (["--at", "0.01"], "--at 0.01: says nothing without --from"),
         (["--from", first, "--at", "0.015"], "it has 0.01, 0.02 s"),
         (["--from", first, "--fidelity", "both"], 'choose fidelity = "frame"'),
-        (["--from", first, "--fidelity", "ideal"], 'choose fidelity = "frame"'),
     ):
         lines = called(*words, *short[:6], "--out", again, code=2).strip().splitlines()
         assert len(lines) == 1

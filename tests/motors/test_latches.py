@@ -16,6 +16,7 @@ from ringsim.analysis.campaign_samples import endings
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.requirements import Requirement
 from ringsim.analysis.verdicts import violations
+from ringsim.outputs.latching import FastestLatch, Latching
 from ringsim.outputs.series import Run, Series
 from ringsim.parts.latch import Latch
 from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
@@ -62,28 +63,20 @@ def test_resistance_is_that_of_all_ramps() -> None:
         assert resisting["springs"] == pytest.approx(-springs, rel=1e-12)
 
 
-def test_the_ideal_ring_meets_its_latches_as_the_quadrature_says() -> None:
-    scene = latched()
-    ring, found = OneCoordinate(scene), simulate(scene, "ideal")
+def test_a_ring_of_stiff_rods_meets_its_latches_as_the_quadrature_says() -> None:
+    """Usual rods swing in the last degrees, which makes the rates 4 % larger."""
+    scene = latched(rods__young_modulus=1.2e13)
+    ring, found = OneCoordinate(scene), simulate(scene, "frame")
     start = scene.structure.coordinate
     time = opening_time(ring, start, panels=200).time
-    assert float(found.deployment_time) == pytest.approx(time, rel=1e-6)
+    assert float(found.deployment_time) == pytest.approx(time, rel=1e-3)
     folding = math.sqrt(2.0 * (ring.work(0.0) - ring.work(start)) / ring.motion(0.0).inertia)
     # What the springs give over 20 deg, less what the ramps take.
     gained = 6 * (0.3 * math.radians(20.0) + 0.01 * math.radians(20.0) ** 2 - 0.2 * REACH)
     assert ring.work(0.0) - ring.work(start) == pytest.approx(gained, rel=1e-9)
-    np.testing.assert_allclose(found.latch_rate, 2.0 * folding, rtol=1e-6)
+    np.testing.assert_allclose(found.latch_rate, 2.0 * folding, rtol=5e-3)
     assert found.latched.values.tolist() == [[1] * 3] * 2
     assert int(found.latched_joints) == 6
-
-
-def test_a_ring_of_stiff_rods_meets_its_latches_as_the_ideal_one_does() -> None:
-    """Usual rods swing in the last degrees, which makes the rates 4 % larger."""
-    scene = latched(rods__young_modulus=1.2e13)
-    truth, found = simulate(scene, "ideal"), simulate(scene, "frame")
-    np.testing.assert_allclose(found.deployment_time, truth.deployment_time, rtol=1e-3)
-    np.testing.assert_allclose(found.latch_rate, truth.latch_rate, rtol=5e-3)
-    assert found.latched.values.tolist() == truth.latched.values.tolist()
     assert float(found.energy_error) < 1e-3
 
 
@@ -92,11 +85,11 @@ def test_both_engines_meet_latches_alike() -> None:
     frame, full = (simulate(latched(), fidelity) for fidelity in ("frame", "full"))
     np.testing.assert_allclose(frame.deployment_time, full.deployment_time, rtol=1e-4)
     np.testing.assert_allclose(frame.latch_rate, full.latch_rate, rtol=2e-3)
+    for run in (frame, full):
+        places_of_rates(run)
 
 
-@pytest.mark.parametrize(
-    "fidelity", ["ideal", "frame", pytest.param("full", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("fidelity", ["frame", pytest.param("full", marks=pytest.mark.slow)])
 def test_joints_that_come_too_slowly_leave_again(fidelity: str) -> None:
     """Springs hold the joints at their stops; here they fold again, as they have come."""
     scene = latched(
@@ -165,6 +158,7 @@ def test_a_winch_pulls_until_the_latches_of_its_plane_hold(pressed: xr.Dataset) 
 def test_numbers_of_a_run_are_the_extremes_of_its_places(pressed: xr.Dataset) -> None:
     for name, value in {
         "least_latch_rate": pressed.latch_rate.min(),
+        "peak_latch_rate": pressed.latch_rate.max(),
         "peak_lock_impulse": pressed.lock_impulse.max(),
         "peak_acceleration_max": pressed.peak_acceleration.max(),
         "peak_motor_torque": pressed.motor_torque.max(),
@@ -175,7 +169,44 @@ def test_numbers_of_a_run_are_the_extremes_of_its_places(pressed: xr.Dataset) ->
     # Of all steps, between which output times lie; energies grow a little after the last of these.
     most = MOTOR["stall_torque"] * MOTOR["no_load_speed"] / 4.0
     assert float(pressed.motor_power.max()) <= float(pressed.peak_motor_power) <= most
-    assert {"least_latch_rate", "total_motor_energy"} < set(quantities())
+    assert {"least_latch_rate", "peak_latch_rate", "total_motor_energy"} < set(quantities())
+
+
+def places_of_rates(run: xr.Dataset) -> None:
+    """Times and places of the extreme latch rates lead back to them."""
+    for name in ("least_latch_rate", "peak_latch_rate"):
+        plane, section = (str(run[f"{name}_plane"].values), int(run[f"{name}_section"]))
+        place = {"plane": plane, "section": section}
+        assert float(run.latch_rate.sel(place)) == float(run[name])
+        assert float(run.lock_time.sel(place)) == float(run[f"{name}_time"])
+
+
+def test_extreme_latch_rates_have_time_and_place(pressed: xr.Dataset) -> None:
+    places_of_rates(pressed)
+    assert float(pressed.least_latch_rate) < float(pressed.peak_latch_rate)
+
+
+def test_the_largest_latch_rate_is_known_where_joints_did_not_come() -> None:
+    """Of rates made by hand: a place that was not met has no part in it."""
+    times = np.linspace(0.0, 2.0, 201)
+    slopes = np.array([[0.5, 0.8, 0.01], [0.4, 0.2, 0.01]])  # rad/s; the last come to 171 deg
+    angles = math.pi - 0.15 + times[:, None, None] * slopes
+    rates = np.broadcast_to(slopes, angles.shape)
+    locks = np.where(slopes > 0.1, 0.15 / slopes, np.nan)
+    for sure in (True, False):
+        shown = angles if sure else angles - 2.0
+        series = [Series(times, each, times) for each in (shown, rates)]
+        known = {"plane": np.array(["upper", "lower"]), "section": np.arange(1, 4)}
+        run = Run(latched(), *series, locks if sure else locks * np.nan, {}, known)
+        found = FastestLatch().reduce(run, series[0]) | Latching().reduce(run, series[0])
+        assert np.isnan(found["least_latch_rate"])
+        if not sure:
+            assert np.isnan(found["peak_latch_rate"])
+            assert "peak_latch_rate_time" not in found
+            continue
+        assert found["peak_latch_rate"] == pytest.approx(0.8, rel=1e-6)
+        assert found["peak_latch_rate_time"] == pytest.approx(0.15 / 0.8)
+        assert (found["peak_latch_rate_plane"], found["peak_latch_rate_section"]) == ("upper", 2)
 
 
 def test_a_ring_that_is_not_latched_falls_short(pressed: xr.Dataset) -> None:
@@ -220,18 +251,6 @@ def test_latches_that_cannot_be_are_refused(values: dict[str, object], text: str
         latched().with_values(values)
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"faults": [{"kind": "failed-latch", "section": 1, "time": 0.0}]},
-        {"latch.min_rate": [1.0, 2.0, 3.0]},
-    ],
-)
-def test_the_ideal_ring_refuses_latches_that_differ(values: dict[str, object]) -> None:
-    with pytest.raises(InputError, match="ideal fidelity"):
-        simulate(latched().with_values(values), "ideal")
-
-
 def test_rings_without_latches_tell_no_rate() -> None:
     short = {
         "solver.end_time": 0.05,
@@ -239,4 +258,4 @@ def test_rings_without_latches_tell_no_rate() -> None:
         "record.interval": 0.01,
         "structure.sections": 3,
     }
-    assert "latch_rate" not in simulate(load_scene("ring18").with_values(short), "ideal")
+    assert "latch_rate" not in simulate(load_scene("ring18").with_values(short), "frame")

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from ringsim.analysis.campaign_samples import endings, inputs, judged_by
+from ringsim.analysis.campaign_samples import called, endings, inputs, judged_by
 from ringsim.analysis.quantities import good, numbers, ran
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, head
@@ -94,7 +94,7 @@ def _scatter(axes: Axes, x: Any, y: Any, words: NDArray[np.str_]) -> None:
 
 def _label(variable: xr.DataArray) -> str:
     units = str(variable.attrs.get("units", "1"))
-    words = str(variable.attrs.get("path") or variable.name)
+    words = called(variable)
     what = ", mean" if variable.ndim > 1 else ""
     what += "" if units == "1" else f" ({units})"
     words = in_lines(words)

@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsim.analysis.campaign_samples import (
-    distribution_of,
+    called,
     endings,
     inputs,
     scalars,
@@ -39,13 +39,8 @@ def moves(campaign: xr.Dataset) -> tuple[list[str], list[str]]:
     "base" and "" of the first.
     """
     count = campaign.sizes["sample"]
-    found, moved, seen = [list[str]() for _ in range(count)], [""] * count, set[str]()
+    found, moved = [list[str]() for _ in range(count)], [""] * count
     for name in inputs(campaign):
-        # Paths that share one drawn value move together.
-        shared = distribution_of(campaign[name]).get("shared")
-        if shared and str(shared) in seen:
-            continue
-        seen.add(str(shared))
         values = campaign[name].to_numpy()
         rows = values.reshape(len(values), -1)
         for sample, place in zip(*np.nonzero(rows != rows[0]), strict=True):
@@ -82,7 +77,7 @@ def _word(variable: xr.DataArray, value: object, base: object, place: int) -> st
         if named in variable.coords:
             return str(variable[named].values[place])
         return f"{dim} {place + 1}"
-    last = str(variable.attrs.get("path") or variable.name).rpartition(".")[2]
+    last = called(variable).rpartition(".")[2]
     if isinstance(value, float):
         return f"{last} {value:.4g}"
     old = set(re.split(r"[(),]+ ?", str(base)))

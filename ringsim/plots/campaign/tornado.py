@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ringsim.analysis.blocks import population_of
-from ringsim.analysis.campaign_samples import scalars, told, values_of
+from ringsim.analysis.campaign_samples import requirements_of, scalars, told, values_of
 from ringsim.analysis.dependence import LEVEL
 from ringsim.analysis.design import placement
 from ringsim.analysis.drawn import drawn
@@ -148,7 +148,10 @@ def explained(campaign: xr.Dataset) -> bool:
 @style.styled
 def tornado(campaign: xr.Dataset) -> Figure:
     """A panel a main number, a bar an input or group; whiskers are intervals of 95 %."""
-    found = list(bars_of(campaign))[:_MOST_PANELS]
+    # Those that something is required of first: a page has no room for all.
+    wanted = requirements_of(campaign)
+    every = sorted(bars_of(campaign), key=lambda each: each[0] not in wanted)
+    found = every[:_MOST_PANELS]
     found = found or [("", Bars("", [], *_NONE, np.nan, "no measure is known"))]
     rows = max(len(bars.names) for _, bars in found)
     figure, panels, _ = style.new_panels(len(found), 5.2, 0.9 + 0.34 * rows, 1.1, most=2)
@@ -170,6 +173,8 @@ def tornado(campaign: xr.Dataset) -> Figure:
         whiskers += " Bars without: the interval is not known, as of a perfect correlation."
     most = max((len(values_of(campaign, name)[0]) for name in scalars(campaign)), default=0)
     caption = f"{told(campaign, most)}. {whiskers} The longest {_MOST} bars at most."
+    if others := [name for name, _ in every[_MOST_PANELS:]]:
+        caption += f" Not drawn: {', '.join(others)}."
     head(figure, campaign, "What matters", caption)
     return figure
 

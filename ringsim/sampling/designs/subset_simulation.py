@@ -7,6 +7,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from scipy.special import ndtr
 
 from ringsim.outputs import VARIABLES
+from ringsim.outputs.extremes import instead_of
 from ringsim.refusal import known_or_nearest
 from ringsim.sampling.designs.family import Design, Factors
 from ringsim.sampling.distributions.family import Array, inside
@@ -48,6 +49,9 @@ class SubsetSimulation(Design):
     @model_validator(mode="after")
     def _consistent(self) -> "SubsetSimulation":
         known = [n for n, v in VARIABLES.items() if not v.dims and v.dtype == "f8"]
+        if self.of in VARIABLES and VARIABLES[self.of].dims:
+            sense = "largest" if self.below is None else "least"
+            raise ValueError(f"of = {instead_of(self.of, sense)}")
         if self.of not in known:
             raise ValueError(
                 f"of = {self.of} is no output with one number a run "

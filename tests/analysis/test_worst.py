@@ -1,0 +1,116 @@
+"""What is told as worst is what an engineer fears: every output knows its bad end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from made_campaign import made_campaign, with_motors
+
+from made import campaign
+from ringsim.analysis.brief import output_table
+from ringsim.analysis.campaign_notes import peak_lines
+from ringsim.analysis.campaign_samples import median_and_worst
+from ringsim.analysis.comparison import compare
+from ringsim.analysis.comparison_text import compared
+from ringsim.analysis.quantities import quantities, worst_sample
+from ringsim.analysis.requirements import read_requirements
+from ringsim.analysis.study import analyse
+from ringsim.outputs import VARIABLES
+from ringsim.refusal import InputError
+
+BOUND = {"probability": 0.9, "confidence": 0.9}
+
+
+def test_names_and_bad_ends_agree() -> None:
+    """What an output calls itself says which end is feared."""
+    for name, variable in quantities().items():
+        if variable.dtype == "str" or name.endswith("_time") or "_time_" in name:
+            continue
+        if name.startswith("least_") and not name.endswith("_angle"):
+            assert variable.worse == "smaller", name
+        if name.startswith(("peak_", "total_")) or name.endswith("_max"):
+            assert variable.worse == "larger", name
+        if variable.largest_of or variable.least_of:
+            assert variable.worse != "neither", name
+            assert VARIABLES[variable.largest_of or variable.least_of].dims, name
+
+
+def test_the_least_margin_of_all_samples_is_told_not_the_largest() -> None:
+    made = with_motors(made_campaign(8, failed=(0,)))
+    made["least_drive_margin_time"] = made["least_drive_margin"] * 0.0 + 1.5
+    made["least_drive_margin_angle"] = made["least_drive_margin"] * 0.0 + 20.0
+    # Sample 0 has -0.5, and is lost.
+    [line] = [each for each in peak_lines(made) if each.startswith("least drive margin")]
+    assert line == "least drive margin in sample 1: -0.400 at 20 deg and 1.5 s: NOT enough"
+    found = analyse(made)
+    assert int(found["least_drive_margin_worst_sample"]) == 1
+    assert int(found["peak_tension_worst_sample"]) == 7
+    table = output_table(found, ["least_drive_margin", "peak_tension"])
+    at = list(table.head).index("worst sample")
+    assert [row[at] for row in table.rows] == ["1", "7"]
+
+
+def test_equal_values_take_the_first_sample_and_places_in_time_have_no_worst() -> None:
+    made = campaign([2.0, 5.0, 5.0, np.nan], outcome=[1, 1, 1, 3])
+    assert worst_sample(made, quantities()["asynchrony_max"]) == 1
+    assert worst_sample(made, quantities()["least_drive_margin"]) == -1
+    made["asynchrony_max_time"] = made["asynchrony_max"]
+    assert worst_sample(made, quantities()["asynchrony_max_time"]) == -1
+    assert median_and_worst(made) == (1, 2)
+
+
+@pytest.mark.parametrize(("name", "sense"), [("peak_tension", 1), ("least_drive_margin", -1)])
+def test_a_comparison_says_which_side_is_worse(name: str, sense: int) -> None:
+    random = np.random.default_rng(0)
+    values, seeds = random.normal(size=40), random.integers(0, 2**62, 40)
+
+    def side(shift: float) -> xr.Dataset:
+        more = {name: values + shift + 0.01 * random.normal(size=40), "sample_seed": seeds}
+        return campaign(values, **more)
+
+    for shift in (0.1, -0.1):
+        [row] = [line for line in compared(compare(side(0.0), side(shift))) if name in line]
+        assert ("second" in row.split()) == (sense * shift > 0.0)
+        assert ("first" in row.split()) == (sense * shift < 0.0)
+    [row] = [line for line in compared(compare(side(0.0), side(0.0))) if name in line]
+    assert not {"first", "second"} & set(row.split())
+
+
+SENSES = {
+    "latch_rate": ("peak_latch_rate", "least_latch_rate"),
+    "drive_margin": (None, "least_drive_margin"),
+    "cable_tension": ("peak_tension", None),
+    "rod_stress": ("peak_rod_stress", None),
+    "asynchrony": ("asynchrony_max", None),
+    "motor_torque": ("peak_motor_torque", None),
+    "lock_impulse": ("peak_lock_impulse", None),
+    "peak_acceleration": ("peak_acceleration_max", None),
+    "lock_time": ("deployment_time", None),
+    "slack_duration": (None, None),
+}
+
+
+@pytest.mark.parametrize("name", SENSES)
+def test_a_limit_is_led_to_the_number_that_it_limits(name: str) -> None:
+    """Never to the other end: it may keep to a limit that nearly all values break."""
+    for key, wanted, other in zip(("max", "min"), SENSES[name], SENSES[name][::-1], strict=True):
+        with pytest.raises(InputError) as refused:
+            read_requirements({name: {key: 0.45, **BOUND}}, "m.toml")
+        told = str(refused.value).replace(",", " ").replace(";", " ").split()
+        word = "largest" if key == "max" else "least"
+        assert (wanted in told) if wanted else f"no output tells its {word}" in str(refused.value)
+        assert other is None or other == wanted or other not in told
+
+
+def test_no_variable_is_led_to_a_number_of_another_sense() -> None:
+    for name, variable in VARIABLES.items():
+        if not variable.dims:
+            continue
+        for key, attribute in (("max", "largest_of"), ("min", "least_of")):
+            with pytest.raises(InputError) as refused:
+                read_requirements({name: {key: 0.45, **BOUND}}, "m.toml")
+            words = str(refused.value).replace(",", " ").replace(";", " ").split()
+            for other, one in VARIABLES.items():
+                if not one.dims and other in words and (one.largest_of or one.least_of):
+                    assert getattr(one, attribute) == name, (name, key, other)

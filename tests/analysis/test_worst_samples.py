@@ -1,0 +1,132 @@
+"""The worst samples of each failure, and what is unusual in their inputs."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from made_campaign import made_campaign
+
+from made import campaign
+from ringsim.analysis.requirements import read_requirements
+from ringsim.analysis.study import analyse
+from ringsim.analysis.study_text import told
+from ringsim.analysis.unusual import unusual
+from ringsim.analysis.worst import worst, worst_lines
+from ringsim.refusal import InputError
+from ringsim.variables import Fate, Status
+
+BOUND = {"probability": 0.9, "confidence": 0.9}
+VALUES = np.array([5.0, 1.0, 9.0, np.nan, 7.0, 8.0, 2.0, np.nan])
+
+
+def made() -> xr.Dataset:
+    """Samples 3 and 7 have no asynchrony: one has stalled, one is lost."""
+    status, outcome = np.full(8, Status.OK), np.full(8, Fate.DEPLOYED)
+    status[7], outcome[3], outcome[7] = Status.DIVERGED, Fate.STALLED, Fate.NONE
+    found = campaign(
+        VALUES, status=status, outcome=outcome, least_drive_margin=0.1 * VALUES - 0.35,
+        locked_joints=np.array([8, 8, 8, 2, 8, 8, 8, 0]), final_time=np.full(8, 4.0),
+    )  # fmt: skip
+    return found.assign(reason=("sample", [f"ended so; in run {k}" for k in range(8)]))
+
+
+def found(**requirements: dict[str, float]) -> dict[str, list[tuple[int, str]]]:
+    wanted = read_requirements({k: v | BOUND for k, v in requirements.items()}, "file")
+    one, rows = worst(made(), wanted), dict[str, list[tuple[int, str]]]()
+    for words, sample, value in zip(
+        one.worst_failure.values, one.worst_sample.values, one.worst_found.values, strict=True
+    ):
+        rows.setdefault(words, []).append((int(sample), str(value)))
+    return rows
+
+
+def test_each_failure_has_its_worst_samples_in_order() -> None:
+    rows = found(asynchrony_max={"max": 6.0}, least_drive_margin={"min": 0.2})
+    degree = "violates asynchrony_max <= 6 degree"
+    assert rows == {
+        degree: [(2, "9 degree"), (5, "8 degree"), (4, "7 degree")],
+        "violates least_drive_margin >= 0.2": [(1, "-0.25"), (6, "-0.15"), (0, "0.15")],
+        "stalled": [(3, "ended so")],
+        "lost: diverged": [(7, "ended so")],
+    }
+    # Without a value it is violated, too, and comes after those that tell by how much.
+    assert found(asynchrony_max={"max": 8.5})["violates asynchrony_max <= 8.5 degree"] == [
+        (2, "9 degree"), (3, "no value: ended so"),
+    ]  # fmt: skip
+    both = found(asynchrony_max={"min": 1.5, "max": 8.9})
+    assert [s for s, _ in both["violates asynchrony_max <= 8.9 degree and >= 1.5 degree"]] == [
+        1, 2, 3,
+    ]  # fmt: skip
+
+
+def test_failures_of_the_same_samples_are_one() -> None:
+    wanted = read_requirements({"outcome": {"is": "deployed", **BOUND}}, "file")
+    one = worst(made(), wanted)
+    assert list(one.worst_failure.values) == ["violates outcome is deployed; stalled",
+                                              "lost: diverged"]  # fmt: skip
+    assert one.worst_failed.values.tolist() == [1, 1]
+    assert one.worst_of.values.tolist() == [7, 8]
+    assert not worst(made().isel(sample=[0, 1]), {})
+    with pytest.raises(InputError, match="no such output"):
+        worst(made(), read_requirements({"peak_tension": {"max": 1.0, **BOUND}}, "file"))
+
+
+def inputs(**columns: np.ndarray) -> xr.Dataset:
+    one = xr.Dataset(coords={"sample": np.arange(20)})
+    for name, values in columns.items():
+        units = "K" if name == "temperature" else "m"
+        says = {"role": "input", "path": f"a.{name}", "input": name, "units": units}
+        one[name] = ("sample", "section")[: values.ndim], values, says
+    return one
+
+
+def test_what_is_far_out_is_told_in_words() -> None:
+    even = np.linspace(-1.0, 1.0, 20)
+    places = 1e-3 * (1.0 + 0.01 * np.outer(even, [1.0, -1.0, 1.0, -1.0]))
+    places[9, 3] = 1.5e-3
+    one = inputs(
+        temperature=293.15 + 50.0 * even, friction=places, word=np.array(["a"] * 19 + ["b"]),
+        alike=np.full(20, 3.0),
+    )  # fmt: skip
+    cold, usual, odd, word = unusual(one, [1, 10, 9, 19])
+    value = 50.0 * (1 - 1 / 9.5) - 0.0
+    assert cold == f"cold: temperature {293.15 - value:.4g} K ({20 - value:+.0f} C)"
+    assert usual == "nothing unusual"
+    assert odd == "friction of section 4 0.0015 m (+50 %, the highest)"
+    assert "word = b (as in 1 of 20)" in word
+    assert "hot: temperature 343.1 K (+70 C, the highest)" in word
+
+
+def test_chance_makes_one_sample_in_five_unusual_on_either_side() -> None:
+    """Also of many places: some place is always far out."""
+    random = np.random.default_rng(3)
+    values = random.random((2000, 17))
+    one = xr.Dataset(coords={"sample": np.arange(2000)})
+    says = {"role": "input", "path": "a", "units": "m"}
+    one["single"] = "sample", values[:, 0], says
+    shares = [np.mean(np.array(unusual(one, [*range(2000)])) != "nothing unusual")]
+    one = one.drop_vars("single").assign(many=(("sample", "section"), values, says))
+    far = np.array(unusual(one, [*range(2000)]))
+    # Places alone: 1 - (1 - 0.4 / 17)^17 = 0.33; with the mean, which goes with them, more.
+    shares.append(np.mean([each.startswith("a of section") for each in far]))
+    assert shares[0] == pytest.approx(0.4, abs=0.002)
+    assert 0.2 < shares[1] < 0.4
+
+
+def test_analysis_and_accessor_tell_the_same_and_how_to_run_them() -> None:
+    one = made_campaign(8, failed=(2,), stalled=(4,))
+    table, known = one.ring.worst(), analyse(one)
+    assert isinstance(table, pd.DataFrame)
+    assert table["sample"].tolist() == known.worst_sample.values.tolist()
+    assert table["found"].tolist() == known.worst_found.values.tolist()
+    assert table["replay"][0] == "ringsim replay runs/made 7"
+    lines = told(known, "here/my runs")
+    at = lines.index(worst_lines(known, "here/my runs")[0])
+    assert lines[at] == "worst of: violates asynchrony_max <= 3 degree (5 of 7 samples)"
+    assert lines[at + 3] == "    ringsim replay 'here/my runs' 7"
+    one.attrs["requirements"] = json.dumps({})
+    assert len(made_campaign(3, kind="grid").assign_attrs(requirements="{}").ring.worst()) == 0
