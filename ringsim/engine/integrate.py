@@ -101,13 +101,15 @@ class Integration:
         solver.SetUserFunctionUpdateCurrentTime(system, self._update_time)
         system.SetPostStepUserFunction(self._after_step)
         model = self._built.model
-        assembly, newton = model.assembly, Newton(solver, model.layout)
+        assembly, newton, boom = model.assembly, Newton(solver, model.layout), self._built.boom
         predictor = Predictor(assembly, solver)
 
         def before_residual(system: Any, time: float, count: int, discontinuous: int) -> None:
             # The rods' dampers read the state that the step starts from, before it is moved.
             assembly.dampers.prepare(system, time, count, discontinuous)
             predictor.apply(time, count, discontinuous)
+            if boom is not None:
+                boom.settle()
             assembly.dry_joints.follow()
             newton.apply()
 

@@ -75,7 +75,10 @@ class FrameModel:
         if scene.cables is not None:
             self.cables = FrameCables(scene.cables, skeleton, mesh, parts)
         self._stiffest = stiffest = float(mesh.stiffness[:, 0].max())
-        slides = [RigidSlide(mesh, *pair, STIFFNESS * stiffest) for pair in skeleton.slides]
+        slides = [
+            RigidSlide(mesh, top, low, STIFFNESS * stiffest, turns * scene.structure.reach)
+            for top, low, turns in skeleton.slides
+        ]
         self._beam_slides: list[Slide] = []
         if beam is not None:
             nodes = [(end.frame, end.axes) for end in skeleton.beam]
@@ -118,6 +121,7 @@ class FrameModel:
             hung=np.array(lines_on, dtype=np.int64),
             top=np.array([slide.top for slide in slides], dtype=np.int64),
             low=np.array([slide.low for slide in slides], dtype=np.int64),
+            reach=np.array([slide.reach for slide in slides]),
             stiffness=STIFFNESS * stiffest,
             damping=self.laws.damping,
             weighs=self.layout.gravity is not None,

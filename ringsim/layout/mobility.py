@@ -33,9 +33,7 @@ def internal_mobility(layout: Layout) -> int:
     The motions of each section (of its joints) by itself are joined at the bodies that sections
     share.  A boom counts as rigid; supports do not count.
     """
-    joints = [joint for joint in layout.joints if not isinstance(joint.first, InSpace)]
-    if layout.boom is not None:
-        joints.append(Joint("sleeve", "", 0, layout.boom.top, layout.boom.low))
+    joints = [joint for joint in layout.all_joints if not isinstance(joint.first, InSpace)]
     size = max(rod.length for rod in layout.rods)
     motions: dict[tuple[bool, int], list[tuple[int, Array]]] = {}  # of a part: first column, twists
     columns = 0

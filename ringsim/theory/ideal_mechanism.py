@@ -1,7 +1,8 @@
 """A structure with rigid rods as a mechanism: its coordinates, its mass, its equations of motion.
 
 A closed ring has one coordinate, the fold q; an open arc the swings psi of its four end assemblies
-besides (ringsim.theory.ideal_points), three of them free where a boom joins two.
+besides (ringsim.theory.ideal_points), three of them free where a boom joins two, and two where its
+joint is prismatic.
 
 The structure moves as one rigid body (velocity V, rotation W, along its own axes), folds and
 swings.  For masses m at r(p), p = (q, psi),
@@ -48,7 +49,7 @@ def _trace(w: Array) -> Array:
 class Mechanism:
     """Coordinates, masses and equations of a scene's structure; arguments are those of ``Points``.
 
-    ``freedom`` is the number of free coordinates, q the first: 1, or 4 or 5 for an open arc;
+    ``freedom`` is the number of free coordinates, q the first: 1, or 3 to 5 for an open arc;
     ``fixed`` is whether a body is held: the first upper assembly by the base of a boom.
     """
 
@@ -82,7 +83,9 @@ class Mechanism:
             self._weighed = self._weighed - np.tensordot(taken, lines, 1)
         swings = len(points.swinging)
         self._on_boom = swings > 0 and scene.boom is not None
-        self.freedom = 1 + swings - self._on_boom
+        # A prismatic joint on a boom holds the tilts of both its assemblies.
+        self._upright = self._on_boom and any(j.kind == "prismatic" for j in points.layout.joints)
+        self.freedom = 1 + swings - self._on_boom - self._upright
         if self._on_boom:
             pins = points.pins
             self._height = pins[0, 2] - pins[1, 2]
@@ -231,7 +234,12 @@ class Mechanism:
             sin(psi_1) h = a (1 - cos b),   psi_2 = psi_1 + b,
 
         of which bias is the second derivative.  NaN where the boom blocks the lower assembly.
+        With a prismatic joint b is zero and not among the arguments, and so are psi_1 and psi_2.
         """
+        if self._upright:
+            slopes = np.zeros((5, 3))
+            slopes[0, 0] = slopes[3, 1] = slopes[4, 2] = 1.0
+            return slopes @ free, slopes, np.zeros(5)
         h, h_slope, h_bend = self.points.basis(float(free[0])) @ self._height
         offset = self._offset
         b, b_rate, q_rate = free[1], rates[1], rates[0]
