@@ -26,7 +26,7 @@ from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
-from ringsim.stepping.instant import Instant
+from ringsim.stepping.instant import Instant, Strained
 from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
@@ -93,6 +93,7 @@ class Integration:
             self._locks,
             limits=scene.limits,
             follow_deviations=scene.record.stress,
+            strained=Strained(self._energy.strain_energy(), model.prestress),
         )
 
     def run(self) -> Recorder:

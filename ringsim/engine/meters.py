@@ -51,7 +51,7 @@ class EnergyMeter:
         Opening angles and their rates have the shape (planes, sections), rad and rad/s.
         """
         kinetic = sum(self._output(body, _KIND.KineticEnergy) for body in self._assembly.bodies)
-        elastic = sum(self._output(element, _KIND.PotentialEnergy) for element in self._elements)
+        elastic = self.strain_energy()
         forces, resisted = [np.zeros(0)], [np.zeros(0)]
         for connector in self._connectors:
             reaction, resisting = connector(state, angles, rates)
@@ -76,6 +76,10 @@ class EnergyMeter:
             self._lifted = done if self._lifted is None else self._lifted
             work += done - self._lifted
         return Energies(float(kinetic), float(elastic), work, lost, driven)
+
+    def strain_energy(self) -> float:
+        """Of rods and boom at the current state, J."""
+        return sum(float(self._output(each, _KIND.PotentialEnergy)) for each in self._elements)
 
     def keep(self) -> None:
         """Count from the last reading on."""

@@ -42,12 +42,14 @@ class BuiltJoint(NamedTuple):
 
 class Multibody:
     """Bodies (each with its node), rods, joints and loads of a scene's layout at the start, in the
-    layout's order; ``loose`` are nodes of neither, by the names of ``ringsim.layout.points``.
+    layout's order; ``loose`` are nodes of neither, by the names of ``ringsim.layout.points``;
+    ``prestress`` is what putting them together has left in the rods, J.
     """
 
     def __init__(self, scene: Scene) -> None:
         drawn = layout_of(scene)
-        self.scene, self.layout = scene, assembled(drawn, scene.rods).layout
+        self.scene = scene
+        self.layout, self.prestress = assembled(drawn, scene.rods)
         self.formulation = formulation = FORMULATIONS[type(scene.rods)]
         self.assembly = assembly = Assembly()
         self.ideal = OneCoordinate(scene, drawn)

@@ -20,7 +20,7 @@ from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.scene import Scene
 from ringsim.stepping.extrapolation import extrapolated
-from ringsim.stepping.instant import Instant
+from ringsim.stepping.instant import Instant, Strained
 from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.memory import Remembering
@@ -84,6 +84,7 @@ class Integration(Remembering):
             self._locks,
             limits=scene.limits,
             follow_deviations=scene.record.stress,
+            strained=Strained(self._energy.strain_energy(model.start), model.prestress),
         )
 
     def run(self) -> Recorder:

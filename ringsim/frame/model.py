@@ -41,6 +41,8 @@ class FrameModel:
         The structure with rigid rods, at the start.
     moving
         Its acceleration then.
+    prestress
+        What putting the structure together has left in its rods, J.
     with_hub, size
         Whether a net has a hub; number of unknowns: those of the mesh and the hub's three.
     reaction
@@ -51,7 +53,8 @@ class FrameModel:
         if not isinstance(scene.rods, GeometricallyExactRods):
             raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
         drawn = layout_of(scene)
-        self.scene, self.layout = scene, assembled(drawn, scene.rods).layout
+        self.scene = scene
+        self.layout, self.prestress = assembled(drawn, scene.rods)
         self.ideal = OneCoordinate(scene, drawn)
         self.gravity = np.zeros(3) if self.layout.gravity is None else self.layout.gravity
         self.moving = first_acceleration(self.layout, self.ideal, scene.structure.coordinate)

@@ -40,8 +40,8 @@ def add_boom(draft: "Draft") -> BoomBeam | None:
     _add_lump(draft, top.body, line._replace(inertia=line.inertia + sections))
     # A sleeve slides along z, a prismatic joint along x.
     axes = SPACE if boom.joint == "sleeve" else _UPWARDS
-    ends = (end._replace(axes=axes) for end in (top, low))
-    draft.joints.append(Joint(boom.joint, "", 0, *ends))
+    first, second = (end._replace(axes=axes) for end in (top, low))
+    draft.joints.append(Joint(boom.joint, "", 0, first, second))
     return None
 
 

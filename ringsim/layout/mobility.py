@@ -2,8 +2,9 @@
 
 A section of a pantograph ring folds, and each of its four hinge assemblies tilts about the common
 axis of its two rods.  Where two sections meet, their normals differ: no tilt is left.  A closed
-ring has one freedom, an open arc five (four if a boom joins two end assemblies).  At 180 deg the
-bars lie straight, and each of the 2 N V-joints can start to move by itself.
+ring has one freedom, an open arc five (four if a boom joins two end assemblies, three if its joint
+is prismatic).  At 180 deg the bars lie straight, and each of the 2 N V-joints can start to move by
+itself.
 """
 
 from itertools import pairwise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from ringsim.theory.assembled import assembled
 from ringsim.theory.deployed import deployed
 from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 from ringsim.theory.screws import strains
+from ringsim.variables import Cause
 
 NAMES = tuple(LengthError.model_fields)
 
@@ -231,6 +233,31 @@ def test_a_boom_that_starts_in_a_strained_ring_rests() -> None:
         values = solve(scene).values
         assert values["elastic_energy"][0] == pytest.approx(prestress, rel=1e-6)
         assert np.nanmax(values["kinetic_energy"]) < 1e-3 * prestress
+
+
+@pytest.mark.parametrize("solve", [by_exudyn, by_frames], ids=["exudyn", "frames"])
+def test_a_start_that_assembly_does_not_account_for_is_told(
+    solve: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A rod is built longer by 1e-4 than the one that the structure was put together with: nothing
+    else would say so.
+    """
+    scene = ring(boom={"kind": "rigid", "base": "fixed"}, rods__length_error=scattered(1e-4),
+                 solver__end_time=0.3, record__interval=0.1)  # fmt: skip
+    assert solve(scene).status.word == "ok"
+
+    def wrong(layout: Layout, rods: Any) -> Any:
+        made = assembled(layout, rods)
+        first, *others = made.layout.rods
+        longer = replace(first, strain=first.strain + 1e-4)
+        return made._replace(layout=replace(made.layout, rods=(longer, *others)))
+
+    engine = {by_exudyn: "ringsim.engine.model", by_frames: "ringsim.frame.model"}[solve]
+    monkeypatch.setattr(f"{engine}.assembled", wrong)
+    found = solve(scene)
+    assert found.status.word == "diverged"
+    assert found.cause is Cause.STRAINED
+    assert "at the start" in found.reason
 
 
 def test_sections_are_held_at_their_own_angles_until_they_are_released() -> None:

@@ -124,7 +124,12 @@ def test_the_full_model_with_stiff_rods_opens_in_the_same_time(sections, values)
     assert float(ideal.values["deployment_time"]) == pytest.approx(mean, rel=5e-4)
 
 
-@pytest.mark.parametrize("boom", ["none", {"kind": "rigid"}, {"kind": "rigid", "base": "fixed"}])
+PRISMATIC = {"kind": "rigid", "joint": "prismatic"}
+
+
+@pytest.mark.parametrize(
+    "boom", ["none", {"kind": "rigid"}, {"kind": "rigid", "base": "fixed"}, PRISMATIC]
+)
 def test_nothing_is_lost_or_won_without_forces(boom):
     """Accelerations of the equations keep the kinetic energy, whatever the motion."""
     mechanism = Mechanism(arc(2, boom=boom, **HEAVY))
@@ -152,7 +157,7 @@ def end_centres(layout: Layout) -> tuple[Any, Any]:
     return np.array([p.place for p in poses]), np.array([p.rate for p in poses])
 
 
-@pytest.mark.parametrize("boom", ["none", {"kind": "rigid"}])
+@pytest.mark.parametrize("boom", ["none", {"kind": "rigid"}, PRISMATIC])
 def test_coordinates_of_the_ends_fit_their_rates(boom):
     scene = arc(1, boom=boom, **HEAVY)
     mechanism = Mechanism(scene)
