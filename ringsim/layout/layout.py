@@ -85,7 +85,8 @@ class Hung(NamedTuple):
 class BoomBeam(NamedTuple):
     """A flexible boom: clamped at ``top``, while ``low`` slides along it.
 
-    ``lump`` is what it would be as a rigid part of the body at its top.
+    ``lump`` is what it would be as a rigid part of the body at its top, but for the inertia of its
+    sections when they turn, which that body has.
     """
 
     top: OnBody
@@ -222,6 +223,13 @@ class Layout:
         folded = opening.sense * float(np.arctan2(cross(y, other) @ z, y @ other))
         folded += 2.0 * np.pi if folded < -0.5 * np.pi else 0.0
         return np.pi - folded, -opening.sense * float((second.turn - first.turn) @ z)
+
+    @property
+    def all_joints(self) -> tuple[Joint, ...]:
+        """Joints, with that of a body that slides along a flexible boom as along a rigid one."""
+        if self.boom is None:
+            return self.joints
+        return (*self.joints, Joint("sleeve", "", 0, self.boom.top, self.boom.low))
 
     @property
     def supports(self) -> tuple[Joint, ...]:
