@@ -4,10 +4,11 @@ goal, and of each way in which runs were lost.
 
 import shlex
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsim.analysis.intervals import Array
 from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
@@ -54,17 +55,26 @@ def worst(campaign: xr.Dataset, requirements: Mapping[str, Requirement]) -> xr.D
             chosen.append(place)
     if not rows:
         return xr.Dataset()
-    words, failed, of, found = zip(*rows, strict=True)
-    about = {
-        "failure": (np.array(words, dtype=object), "what failed"),
+    failures, failed, of, found = zip(*rows, strict=True)
+    about: dict[str, tuple[NDArray[Any], str]] = {
+        "failure": (np.array(failures, dtype=object), "what failed"),
         "failed": (np.array(failed), "samples that failed so"),
         "of": (np.array(of), "samples of which these are"),
         "sample": (campaign["sample"].to_numpy()[chosen], "one of the worst of them"),
         "found": (np.array(found, dtype=object), "its value, or why it ended"),
-        "inputs": (np.array(unusual(campaign, chosen), dtype=object), "what is unusual in its"
-                   " inputs"),
+        "inputs": (
+            np.array(unusual(campaign, chosen), dtype=object), "what is unusual in its inputs",
+        ),
     }  # fmt: skip
-    return xr.Dataset({f"worst_{n}": ("worst", v, {"long_name": w}) for n, (v, w) in about.items()})
+    return xr.Dataset(
+        {
+            f"worst_{name}": (
+                "worst", values,
+                {"long_name": words} | ({} if values.dtype.kind == "O" else {"units": "1"}),
+            )
+            for name, (values, words) in about.items()
+        }
+    )  # fmt: skip
 
 
 def _failures(
