@@ -58,7 +58,7 @@ class Checkout:
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
             env=os.environ | {"PYTHONPATH": str(self.tree)}, cwd=self.tree,
         )  # fmt: skip
-        for fidelity in ("full", "ideal"):  # imports are no part of the first scene's time
+        for fidelity in ("full", "frame"):  # imports are no part of the first scene's time
             short = {"solver.end_time": 0.1, "record.interval": 0.1}
             found = self.solve({"scene": "truss2", "values": short, "fidelity": fidelity})
         if Path(found["home"]) != self.tree:

@@ -20,7 +20,7 @@ FAMILIES = (
     "cables-ring",
     "cables-arc",
     "cable-faults",
-    "ideal",
+    "frames",
     "planar-truss",
     "ancf-or-constant",
 )
@@ -62,16 +62,14 @@ def random_scene(seed: int) -> Values:
                             closed=closed)  # fmt: skip
         if family == "cable-faults":
             values["faults"] = faults(draw, values["structure.sections"])
-    elif family == "ideal":
-        fidelity, closed = "ideal", draw.maybe(0.5)
+    elif family == "frames":
+        fidelity, closed = "frame", draw.maybe(0.5)
         if turn % 2:
             base, values = "ring18", force_ring(draw, closed=closed)
         else:
             law = WINDINGS[(turn // 2 + 1) % 5]
             base, values = "truss2", cable_ring(draw, FRICTIONS[turn % 4], law, closed=closed)
         values |= {"record.stress": False}
-        if values.get("net") != "none":
-            values["net.damping"] = 0.0  # an unbalanced net's hub has none in this fidelity
     elif family == "ancf-or-constant":
         base, name = "ring18", "ancf" if turn % 2 else "constant-steps"
         values = force_ring(draw, closed=draw.maybe(0.5), largest=4)

@@ -27,7 +27,7 @@ from ringsim.sampling.subset_levels import Repetition, levels
 from ringsim.scene import scene_from_toml
 from ringsim.theory.drive import Drive
 from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.theory.resistances.family import Opening, folding, resistances
+from ringsim.theory.resistances.family import Opening, resistances
 from ringsim.variables import PLANES
 
 NEVER = 66.0
@@ -101,7 +101,7 @@ def static_margins(campaign: xr.Dataset) -> np.ndarray:
     scene = scene_from_toml(campaign.attrs["scene"], source="attribute scene")
     mechanism = Mechanism(scene)
     drive, start = Drive(scene, mechanism), math.pi - 2.0 * scene.structure.coordinate
-    now = folding(mechanism, scene.structure.coordinate)
+    now = mechanism.at(scene.structure.coordinate)
     friction = campaign["cables_upper_friction_coefficient"].to_numpy()
     driving = np.zeros(len(friction))
     for plane, cable, reeved in zip(PLANES, drive.cables, drive.reeved(now), strict=True):

@@ -1,8 +1,8 @@
 """A small campaign: how uncertain forces and friction spread the deployment time of a ring.
 
 Writes a campaign file, runs its 16 samples on two cores and merges them into one netCDF file.  The
-"ideal" fidelity (rigid rods) keeps a sample below a second; leave that line out for the full
-model.  Interrupted, the same command goes on where it stopped.
+"frame" fidelity keeps a sample near a second; leave that line out for the full model.
+Interrupted, the same command goes on where it stopped.
 """
 
 import subprocess
@@ -14,7 +14,7 @@ name = "friction"
 seed = 1
 scene = "ring18"
 design = { kind = "latin-hypercube", samples = 16 }
-fidelity = "ideal"
+fidelity = "frame"
 
 [set]
 "structure.sections" = 6

@@ -4,7 +4,7 @@ Its public words are loaded when they are used, so that importing ringsim costs 
 
 >>> import ringsim
 >>> ring = ringsim.load_scene("ring18").with_values({"structure.sections": 6})
->>> run = ringsim.simulate(ring, fidelity="ideal")
+>>> run = ringsim.simulate(ring, fidelity="frame")
 >>> run.attrs["reason"]
 'all V-joints have reached 180 deg'
 >>> run["opening_angle"].dims

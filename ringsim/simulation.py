@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ringsim.cable import regularisation
 from ringsim.choice import kind_of
 from ringsim.compile_cache import compile_once
 from ringsim.outputs.error_bars import error_bars
@@ -26,15 +27,14 @@ from ringsim.scene.substituted import substituted
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.restarts import run_with_restarts
 from ringsim.stored_state import require_fit
-from ringsim.theory.ideal_fidelity import run_ideal, with_remark
 from ringsim.theory.margin_along import with_margin
 from ringsim.threads import one_thread
-from ringsim.variables import Cause, Fidelity, Outcome, Status
+from ringsim.variables import GONE, PLANES, Cause, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIDELITIES", "run", "run_frame", "run_ideal", "simulate", "why_not_frame"]
+__all__ = ["FIDELITIES", "run", "run_frame", "simulate", "why_not_frame"]
 
 Watch = Callable[[Instant], None]
 """What is shown every accepted state of a run."""
@@ -176,15 +176,43 @@ def _run(
     bars = partial(error_bars, elements=scene.rods.elements)
     outcome = run_with_restarts(start, scene.solver, bars)
     outcome.values["fidelity"] = np.array(int(fidelity))
-    return with_remark(with_margin(outcome, scene, before), scene)
+    return _with_remark(with_margin(outcome, scene, before), scene)
 
 
-FIDELITIES: dict[str, Callable[[Scene], Outcome]] = {
-    "full": run, "frame": run_frame, "ideal": run_ideal,
-}  # fmt: skip
-"""What answers a scene: the full multibody model; the same rods, joints and cables in joint
-coordinates, several times as fast; or the ideal ring of rigid rods, which knows neither asynchrony
-nor stress and costs a fraction."""
+def _with_remark(outcome: Outcome, scene: Scene) -> Outcome:
+    """The outcome; its reason ends with the cables whose pulley friction is reduced, if any.
+
+    A law with feedback finds its speed in the run, and a scene may set the slip speed, so this is
+    judged afterwards, by the length wound until deployed; see ``ringsim.cable.regularisation``.
+    """
+    values = outcome.values
+    if scene.cables is None or outcome.status.failed or "wound_length" not in values:
+        return outcome
+    times, faded = outcome.coordinates["time"], dict[str, tuple[float, float, float]]()
+    before = ~(times > values.get("deployment_time", np.nan))
+    for plane, cable in scene.cables.present():
+        pulleys = scene.pulleys_of(cable)
+        slip = cable.slip_speed_over(pulleys)
+        speed = regularisation.usual_winding(times[before], values["wound_length"][plane, before])
+        right_angle = np.full(pulleys, 0.5 * np.pi)
+        decay = -cable.friction.log_decay(right_angle, cable.pulley_radius).min(initial=0.0)
+        excess = regularisation.excess(slip, speed, pulleys, float(decay))
+        if speed > 0.0 and excess > regularisation.TOLERATED:
+            most = regularisation.slip_speed(speed, pulleys)
+            faded[f"cables.{PLANES[plane]}.slip_speed"] = slip, most, 100.0 * excess
+    if not faded:
+        return outcome
+    slips, bounds, excesses = zip(*faded.values(), strict=True)
+    remark = (
+        f"; pulley friction fades, tension up to {max(excesses):.0f} % too high: "
+        f"{' and '.join(faded)} = {max(slips):.2g} m/s must be at most {min(bounds):.2g} m/s"
+    )
+    return replace(outcome, reason=outcome.reason + remark)
+
+
+FIDELITIES: dict[str, Callable[[Scene], Outcome]] = {"full": run, "frame": run_frame}
+"""What answers a scene: the full multibody model; or the same rods, joints and cables in joint
+coordinates, several times as fast."""
 
 
 def simulate(
@@ -193,12 +221,11 @@ def simulate(
     """Run a scene and return its dataset (see ``ringsim.dataset.to_dataset``).
 
     ``scene`` is a scene, or what ``load_scene`` reads: the name of a built-in one or a file.
-    ``fidelity`` is "full", which it is if left out, "frame" or "ideal".  From a stored state
-    ``start``, see :func:`ringsim.read_state`, the run goes on to the end with the engine of that
-    state, and its dataset tells of all from the very beginning.
+    ``fidelity`` is "full", which it is if left out, or "frame".  From a stored state ``start``, see
+    :func:`ringsim.read_state`, the run goes on to the end with the engine of that state, and its
+    dataset tells of all from the very beginning.
 
-    InputError if one of them is refused, or if the frame engine or the ideal ring cannot represent
-    the scene.
+    InputError if one of them is refused, or if the frame engine cannot represent the scene.
 
     >>> from ringsim.scene import load_scene
     >>> scene = load_scene("truss2").with_values({"solver.end_time": 0.5})
@@ -213,7 +240,8 @@ def simulate(
     fidelity = fidelity or ("full" if start is None else start.engine)
     if fidelity not in FIDELITIES:
         hint = known_or_nearest(fidelity, FIDELITIES)
-        raise InputError(f"fidelity = {show(fidelity)}: there is no such model ({hint})")
+        why = GONE.get(fidelity, f"there is no such model ({hint})")
+        raise InputError(f"fidelity = {show(fidelity)}: {why}")
     chosen = load_scene(scene) if isinstance(scene, (str, Path)) else scene
     require_fit(start, chosen, fidelity)
     if start is None:

@@ -111,10 +111,7 @@ def _told(times: np.ndarray[Any, Any]) -> str:
     return f"{', '.join(words)} s"
 
 
-_CANNOT = {
-    "full": "what exudyn's integrator, dampers and connectors remember is not stored",
-    "ideal": "it is solved anew in a moment",
-}
+_CANNOT = {"full": "what exudyn's integrator, dampers and connectors remember is not stored"}
 """Why fidelities store no states."""
 
 

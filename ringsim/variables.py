@@ -117,7 +117,6 @@ class Fidelity(Code):
     """Which model answered."""
 
     FULL = 0
-    IDEAL = 1
     FRAME = 2
 
     @property
@@ -125,9 +124,15 @@ class Fidelity(Code):
         """What it is, in words."""
         return {
             Fidelity.FULL: "multibody simulation with exudyn",
-            Fidelity.IDEAL: "ideal ring of rigid rods",
             Fidelity.FRAME: "flexible rods in joint coordinates, compiled with numba",
         }[self]
+
+
+GONE = {
+    "ideal": "a ring of rigid rods, which knew neither asynchrony nor stress, is no fidelity any "
+    'more: choose fidelity = "frame"'
+}
+"""Fidelities that there were, with what to do."""
 
 
 @dataclass(frozen=True)

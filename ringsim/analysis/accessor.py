@@ -27,7 +27,7 @@ class Ring:
         apart (degree).  Of a campaign ``leads`` and ``lags``, (plane, section): in how many of the
         samples whose numbers hold the joint was the one when they were farthest apart.
 
-        InputError if opening angles are not there, as of the ideal ring asynchrony.
+        InputError if opening angles are not there.
         """
         from ringsim.analysis import leaders
 

@@ -13,8 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from ringsim.analysis.errors import GROUPS, OUTPUTS, Array, Errors, largest
-from ringsim.analysis.ladder import FRAME, IDEAL, PATHS, STANDING, Rung
+from ringsim.analysis.errors import GROUPS, OUTPUTS, Array, Errors
+from ringsim.analysis.ladder import FRAME, PATHS, STANDING, Rung
 from ringsim.outputs import VARIABLES
 
 TARGETS = (1e-2, 1e-3, 1e-4)
@@ -23,7 +23,7 @@ _COUNTS = ("cpu_time", "steps", "newton_iterations", "jacobians")
 WORTH_A_CHANGE = 0.9
 """Cost of another setting over that of the scene's own up to which it is worth a change: smaller
 differences are within the fit of the cost and the luck of single steps."""
-_OTHER_MODELS = ("fidelity", "formulation", "constant step")
+_OTHER_MODELS = ("formulation", "constant step")
 """Ladders without the scene's own model, rods and step control: they are not recommended.  The
 frame engine's model is the scene's own."""
 _SAME = ("solver.step_control", "rods.kind")
@@ -34,12 +34,11 @@ NEEDED = (*OUTPUTS, *_COUNTS, "asynchrony_max", "energy_error", "status", "outco
 
 
 class Truth(NamedTuple):
-    """A value that does not come from the multibody model: one of ``OUTPUTS`` in its unit."""
+    """A value that does not come from the multibody model: a number of ``OUTPUTS`` in its unit."""
 
     output: str
     source: str
-    value: Any
-    """Of the opening angle the mean one over time, shape (time,)."""
+    value: float
 
 
 def judge(results: xr.Dataset, rungs: Sequence[Rung], truths: Sequence[Truth]) -> xr.Dataset:
@@ -181,11 +180,7 @@ def _distances(errors: Errors, truth: Truth) -> Array:
     """How far every rung, and last the reference, is from a value of other origin, relative."""
     values, best = errors.until_the_end(truth.output), errors.best_of(truth.output).value
     both = xr.concat([values, best.expand_dims("rung")], "rung")
-    if truth.output != "opening_angle":
-        return np.asarray(np.abs(both.to_numpy() / truth.value - 1.0))
-    expected = xr.DataArray(truth.value, dims="time", coords={"time": errors.results.time})
-    apart = largest(both.mean(("plane", "section")) - expected)
-    return apart / errors.scale(truth.output, best)
+    return np.asarray(np.abs(both.to_numpy() / truth.value - 1.0))
 
 
 def bounds(error: Array, rungs: Sequence[Rung], uncertainty: Array) -> Array:
@@ -214,11 +209,11 @@ def typical_cost(seconds: Array, work: Array, rungs: Sequence[Rung]) -> Array:
 
     Every piece of work costs the same within an engine, but for a factor for the rods' formulation
     and elements: fitted to the measured ``seconds``, shape (rung,), and the counts of ``work``,
-    shape (rung, kinds).  The ideal ring keeps its own time.
+    shape (rung, kinds).
     """
     cost, measured = seconds.copy(), np.isfinite(seconds)
     sizes = [(r.fidelity, r.values["rods.kind"], r.values["rods.elements"]) for r in rungs]
-    for engine in {rung.fidelity for rung in rungs} - {IDEAL}:
+    for engine in {rung.fidelity for rung in rungs}:
         mine = [size for size in sizes if size[0] == engine]
         commonest = max(mine, key=mine.count)
         own = np.array([size == commonest for size in sizes]) & measured

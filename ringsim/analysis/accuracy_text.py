@@ -5,7 +5,7 @@ import xarray as xr
 
 from ringsim.analysis.accuracy import settings_at
 from ringsim.analysis.errors import GROUPS, OUTPUTS
-from ringsim.analysis.ladder import FRAME, IDEAL, STANDING
+from ringsim.analysis.ladder import FRAME, STANDING
 from ringsim.tables import markdown_table
 from ringsim.variables import Status
 
@@ -66,24 +66,20 @@ def in_words(found: xr.Dataset, rung: int) -> str:
     """A setting as the overrides that give it."""
     standing, fidelity = settings_at(found, _standing(found)), found.fidelity.values[rung]
     picked = {p: v for p, v in settings_at(found, rung).items() if v != standing[p]}
-    words = [f"`--fidelity {fidelity}`"] if fidelity in (FRAME, IDEAL) else []
+    words = [f"`--fidelity {fidelity}`"] if fidelity == FRAME else []
     words += [f"`--set {path}={value}`" for path, value in picked.items()]
     return " ".join(words) or STANDING
 
 
 def _advice(found: xr.Dataset) -> str:
-    ideal = np.flatnonzero(found.fidelity.values == IDEAL)
     targets, rows = found.target.values.tolist(), []
     for name, column in zip(_names(found), found.output, strict=True):
         of = found.sel(output=column)
         rows.append([name])
         for target, cheapest in zip(targets, of.cheapest.values, strict=True):
-            most = of.cost.values[cheapest] if cheapest >= 0 else np.inf
-            worth = (of.bound.values <= target) & (of.cost.values < most)
-            picked = [cheapest, *ideal[worth[ideal]]]
-            words = [f"{in_words(of, k)}, {of.cost.values[k]:.3g} s" for k in picked if k >= 0]
             otherwise = "reference too coarse" if of.uncertainty >= target else "none tried"
-            rows[-1].append("; or ".join(words) or otherwise)
+            words = f"{in_words(of, cheapest)}, {of.cost.values[cheapest]:.3g} s"
+            rows[-1].append(words if cheapest >= 0 else otherwise)
     return markdown_table(["error of", *(f"{target:g}" for target in targets)], rows)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.ladder import IDEAL, Rung, references
+from ringsim.analysis.ladder import Rung, references
 from ringsim.variables import GOALS
 
 Array = NDArray[np.float64]
@@ -144,8 +144,7 @@ class Errors:
         for name in (name for name in OUTPUTS if name in results):
             if np.isfinite(largest(self.until_the_end(name).isel(rung=places))).all():
                 self._judge(name)
-        flexible = np.array([rung.fidelity != IDEAL for rung in rungs])
-        self.of["energy"] = np.where(flexible & self.good, results.energy_error, np.nan)
+        self.of["energy"] = np.where(self.good, results.energy_error, np.nan)
         self.uncertainty["energy"] = 0.0
         for group, members in GROUPS.items():
             if present := [m for m in members if m in self.of]:

@@ -26,7 +26,7 @@ PATHS = (
 )  # fmt: skip
 """Scene paths that a ladder varies."""
 STANDING = "as it stands"
-FRAME, IDEAL = "frame", "ideal"
+FRAME = "frame"
 GRADED = ("steps", "elements")
 """Ladders that the reference is made of."""
 _HALVINGS = {"x 2": -1, "x 1": 0, "x 1/2": 1, "x 1/4": 2, "x 1/8": 3, "x 1/16": 4}
@@ -54,7 +54,7 @@ class Rung:
     """One setting: a value for each of ``PATHS``, and a fidelity.
 
     ``ladder`` says what it varies ("as it stands", "steps", "constant step", "elements",
-    "formulation", "dissipation", "newton", "setting", or "fidelity"), ``label`` is unique in a
+    "formulation", "dissipation", "newton" or "setting"), ``label`` is unique in a
     ladder, and ``size`` is what an order of convergence refers to: a step in s or over that of the
     scene, or 1 / elements; 0 where none does.
     """

@@ -11,7 +11,6 @@ import xarray as xr
 from ringsim.analysis.accuracy import NEEDED, Truth, judge
 from ringsim.analysis.ladder import (
     FRAME,
-    IDEAL,
     PATHS,
     Rung,
     by_frames,
@@ -20,14 +19,12 @@ from ringsim.analysis.ladder import (
     left_out,
     references,
     shortened,
-    standing,
 )  # fmt: skip
 from ringsim.campaign.cases import run_cases
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.simulation import why_not_frame
-from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 from ringsim.theory.one_coordinate import OneCoordinate, opening_time
 from ringsim.variables import GOALS, Fate, Status
 
@@ -47,14 +44,13 @@ def run_ladder(
 
     A setting that fails is a failed rung: nothing starts anew with smaller steps here.  The
     cheapest run of the reference goes first, then the whole reference, then the rest, so that a
-    scene which cannot be studied costs little.  The frame engine and the ideal fidelity are
-    settings too, where they can represent the scene.  ``folder`` holds the campaigns, and a study
-    that was interrupted goes on, also with rungs that took longer than ``timeout``, the longest
-    time of one rung, s; ``most_elements`` (4 or 8) is how many times more than the scene's are
-    tried; ``brief`` is for a quarter of the cost (``shortened``).  ``fidelity`` "frame" tries that
-    engine alone, whose limit is then the reference.  What the study had to do without is in the
-    attribute ``remarks``.  InputError if the scene is refused, ReferenceRunError if too few runs
-    for a reference end well.
+    scene which cannot be studied costs little.  The frame engine is a setting too, where it can
+    represent the scene.  ``folder`` holds the campaigns, and a study that was interrupted goes on,
+    also with rungs that took longer than ``timeout``, the longest time of one rung, s;
+    ``most_elements`` (4 or 8) is how many times more than the scene's are tried; ``brief`` is for a
+    quarter of the cost (``shortened``).  ``fidelity`` "frame" tries that engine alone, whose limit
+    is then the reference.  What the study had to do without is in the attribute ``remarks``.
+    InputError if the scene is refused, ReferenceRunError if too few runs for a reference end well.
     """
     plain = {"solver.restarts": 0, "solver.error_bars": False, "solver.step_limit": _STEP_LIMIT}
     scene = scene.with_values(plain)
@@ -87,16 +83,7 @@ def run_ladder(
     results = study.run("settings", rungs)
     failed |= _failures(rungs, results)
     _require_references(rungs, failed, fidelity)
-    truths = _quadrature(scene)
-    if (ideal := study.ideal()) is not None:
-        results = xr.concat([ideal, results], "rung")
-        rungs = [Rung("fidelity", IDEAL, 0.0, standing(scene), IDEAL), *rungs]
-        if np.isfinite(ideal.deployment_time.item()):
-            source = "one-coordinate equation of the ideal ring"
-            mean = ideal.opening_angle.isel(rung=0).mean(("plane", "section")).to_numpy()
-            truths.append(Truth("deployment_time", source, ideal.deployment_time.item()))
-            truths.append(Truth("opening_angle", f"{source}, mean angle", mean))
-    judged = judge(results, rungs, truths)
+    judged = judge(results, rungs, _quadrature(scene))
     return judged.assign_attrs(remarks="\n".join(f"- {each}" for each in remarks))
 
 
@@ -161,16 +148,6 @@ class _Study:
             return f"{stage}-elements-{rung.values['rods.elements']}", False, rung.fidelity
         stressed = rung.values["rods.kind"] != "ancf"  # whose elements report no forces
         return stage if stressed else f"{stage}-unstressed", stressed, rung.fidelity
-
-    def ideal(self) -> xr.Dataset | None:
-        """The ideal fidelity's answer as one rung; None if it cannot represent the scene."""
-        plain = self.scene.with_values({"record.stress": False})
-        try:
-            refuse_if_not_ideal(plain)
-        except InputError:
-            return None
-        case, title = {"solver.tolerance": plain.solver.tolerance}, f"{plain.name} with rigid rods"
-        return _needed(self.cases("ideal", plain, [case], title=title, fidelity=IDEAL))
 
 
 def _needed(file: Path) -> xr.Dataset:

@@ -30,7 +30,7 @@ def run_cases(
 
     An ordinary campaign called ``name`` goes into ``folder``, which is created, file and all.
     ``cases`` are values by scene path, the same paths in each, one value (no lists) to a path;
-    ``timeout`` is the longest time of one run, s; ``fidelity`` is "full" or "ideal".
+    ``timeout`` is the longest time of one run, s; ``fidelity`` is "full" or "frame".
 
     Cases that ended with a status of ``again`` run again.
 

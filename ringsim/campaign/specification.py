@@ -25,11 +25,11 @@ from ringsim.sampling.table import AnyDesign, AnyDistribution, draw, first_insid
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import OutputTable
 from ringsim.units import Model
+from ringsim.variables import GONE
 
 SOLVERS = {
     "full": "ringsim.simulation:run",
     "frame": "ringsim.simulation:run_frame",
-    "ideal": "ringsim.simulation:run_ideal",
 }
 """What maps a scene to its outcome, by fidelity."""
 
@@ -55,6 +55,12 @@ def flat(table: Any, whole: str | None = None, prefix: str = "") -> Any:
             path = prefix if name == "default" else f'{prefix}["{name}"]'
         found |= flat(inner, whole, path)
     return found
+
+
+def _not_gone(fidelity: Any) -> Any:
+    if isinstance(fidelity, str) and fidelity in GONE:
+        raise ValueError(f"fidelity = {show(fidelity)}: {GONE[fidelity]}")
+    return fidelity
 
 
 _Share = Annotated[float, Field(gt=0.0, le=1e3)]
@@ -90,9 +96,9 @@ class Specification(Model):
     """How the samples are placed."""
     limits: Allowance = Allowance()
     """What one run may use before it is ended."""
-    fidelity: Literal["full", "frame", "ideal"] = "full"
+    fidelity: Annotated[Literal["full", "frame"], BeforeValidator(_not_gone)] = "full"
     """full: the flexible multibody model; frame: the same in joint coordinates, several times as
-    fast; ideal: rigid rods."""
+    fast."""
     check_every: Annotated[int, Field(ge=0)] = 0
     """One sample in so many runs with the full model, too, as a check of the frame engine: samples
     0, check_every, 2 check_every, ...; 0 for none."""

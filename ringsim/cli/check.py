@@ -25,7 +25,7 @@ MOST_SECTIONS_FOR_MOBILITY = 72
 @SETTINGS
 @click.option(
     "--deploys-in", "time", type=click.FloatRange(0.0, min_open=True), metavar="SECONDS",
-    help="Find the initial opening angle from which the ideal fidelity deploys in this time.",
+    help="Find the initial opening angle from which the scene deploys in this time (frame engine).",
 )  # fmt: skip
 @click.option(
     "--margin", is_flag=True,
@@ -38,12 +38,10 @@ def command(scene: str, settings: dict[str, Any], time: float | None, margin: bo
     """
     loaded = load_scene(scene).with_values(settings)
     if time is not None:
-        from ringsim.theory.calibration import opening_angle_for
+        from ringsim.calibration import opening_angle_for
 
         angle = opening_angle_for(loaded, time)
-        click.echo(
-            f"structure.opening_angle = {angle:.6g} deg: the ideal ring deploys in {time:g} s"
-        )
+        click.echo(f"structure.opening_angle = {angle:.6g} deg: the ring deploys in {time:g} s")
         return
     if margin:
         from ringsim.cli.margin_table import margin_lines

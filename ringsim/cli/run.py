@@ -22,9 +22,18 @@ from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
+from ringsim.variables import GONE
 
 if TYPE_CHECKING:
     from ringsim.outputs.stored import StoredState
+
+
+class _Fidelity(click.Choice[str]):
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """Refuse what there was with what to do."""
+        if value in GONE:
+            raise InputError(f"--fidelity {value}: {GONE[value]}")
+        return super().convert(value, param, ctx)
 
 
 @click.command()
@@ -32,10 +41,9 @@ if TYPE_CHECKING:
 @SETTINGS
 @click.option("--out", metavar="FILE", type=PATH, help="netCDF file to write (default SCENE.nc).")
 @click.option(
-    "--fidelity", type=click.Choice(["full", "frame", "ideal", "both"]),
+    "--fidelity", type=_Fidelity(["full", "frame", "both"]),
     help="Full model; the same in joint coordinates (frame: closed and open rings, several times "
-    "as fast); the ideal ring of rigid rods (no asynchrony, no stress); full and frame (both), "
-    "with a table of their differences.  [default: full, or what --accuracy picks]",
+    "as fast); both, with a table of their differences.  [default: full, or what --accuracy picks]",
 )  # fmt: skip
 @click.option(
     "--accuracy", metavar="ERROR", type=click.FloatRange(1e-8, 1.0),
@@ -80,24 +88,15 @@ def command(
     require_plot(formats, plot=plot)
     require_animate(colour, animate=animate)
     chosen = chosen.with_values(settings)
-    if colour == "stress" and not (chosen.record.stress and fidelity != "ideal"):
-        raise InputError(
-            "--colour stress: needs the stresses: give --set record.stress=true, too, and a "
-            "fidelity with elastic rods"
-        )
-    if fidelity == "ideal" and chosen.record.stress:
-        chosen = chosen.with_values({"record.stress": False})
-        click.echo("stress is left out: the rods of the ideal ring are rigid")
-    if fidelity == "ideal" and chosen.record.positions:
-        chosen = chosen.with_values({"record.positions": False})
-        click.echo("positions are left out: those of the ideal ring follow from its angle")
+    if colour == "stress" and not chosen.record.stress:
+        raise InputError("--colour stress: needs the stresses: give --set record.stress=true, too")
     target = out or Path(f"{chosen.name}.nc")
 
     from ringsim.cli.progress import watched
     from ringsim.dataset import require_file, save, to_dataset
     from ringsim.outputs import VARIABLES
     from ringsim.outputs.summary import summary
-    from ringsim.simulation import run, run_frame, run_ideal
+    from ringsim.simulation import run, run_frame
     from ringsim.stored_state import require_fit
 
     require_file(target)
@@ -111,8 +110,6 @@ def command(
     }  # fmt: skip
     if start is not None:  # told once nothing has refused it
         click.echo(outcomes[fidelity].began)
-    # Solved in seconds, the ideal ring needs no bar.
-    outcomes = outcomes or {"ideal": run_ideal(chosen)}
     datasets = [to_dataset(outcome, chosen) for outcome in outcomes.values()]
     dataset, lines = datasets[-1], []
     if fidelity == "both":
@@ -145,14 +142,14 @@ def command(
             click.echo(f"wrote {picture}")
         ring = kind_of(chosen.structure) == "pantograph-ring" and kind_of(chosen.rods) != "ancf"
         # Not recorded for the figure: steps that resolve the rods' vibration are another run.
-        if ring and fidelity != "ideal" and not chosen.record.stress:
+        if ring and not chosen.record.stress:
             click.echo("stresses are drawn with --set record.stress=true")
     if animate:
         from ringsim.plots.animation import animate as write_animation
 
         moving = write_animation(dataset, target.with_suffix(".gif"), colour or "lag")
         click.echo(f"wrote {moving}")
-        if not chosen.record.positions and fidelity != "ideal":
+        if not chosen.record.positions:
             click.echo("it shows computed positions with --set record.positions=true")
     failed = any(outcome.status.failed for outcome in outcomes.values())
     return EXIT_FAILED if failed else EXIT_DONE
@@ -191,7 +188,7 @@ def _with_accuracy(
     from ringsim.analysis.evidence import CHOICES, JUDGED_BY, evidence_for, read_evidence
     from ringsim.simulation import why_not_frame
 
-    if fidelity in ("ideal", "both"):
+    if fidelity == "both":
         raise InputError(
             f"--accuracy {accuracy:g}: its settings were measured with the full model and the "
             f"frame engine, not with --fidelity {fidelity}: leave out one of the two"

@@ -1,9 +1,9 @@
 """The net of an ideal ring: springs from the upper corners to a massless hub.
 
 The hub lies where the springs' pulls balance, sum k_i s_i u_i = 0 (s_i the stretch, u_i the
-direction from the hub): the least of a convex energy while they only pull.  The springs' work is
-then that of the corners alone.  Where dampers act too, the hub is taken along as the corners
-move, dx_hub = A^-1 sum A_i dx_i, A_i = k_i (u_i u_i^T + (s_i / L_i) (1 - u_i u_i^T)).
+direction from the hub): the least of a convex energy while they only pull, found by Newton's
+method with A_i = k_i (u_i u_i^T + (s_i / L_i) (1 - u_i u_i^T)), the pulls' derivatives after its
+place.  The springs' work is then that of the corners alone.
 """
 
 from typing import NamedTuple
@@ -21,12 +21,11 @@ _BALANCED = 1e-14
 """Pull on the hub over the largest string's, or its movement over the net's size, taken as zero."""
 
 
-class NetForces(NamedTuple):
-    """Generalised force of the net (N m), its energy (J) and the power lost in it (W)."""
+class NetForce(NamedTuple):
+    """Generalised force of a net at rest on a coordinate (N m), and its energy (J)."""
 
-    force: Array
+    force: float
     energy: float
-    loss: float
 
 
 class FreeHub:
@@ -40,25 +39,13 @@ class FreeHub:
         """Where it lies, shape (3,), m: midway while all is slack."""
         return self._balance(corners)[0]
 
-    def forces(self, corners: Array, slopes: Array, rates: Array) -> NetForces:
-        """Generalised forces on coordinates with rates in rad/s, after which ``slopes`` are the
-        corners' derivatives, shape (corners, 3, coordinates), m/rad.
+    def force(self, corners: Array, slopes: Array) -> NetForce:
+        """On a coordinate after which ``slopes`` are the corners' derivatives, shape (corners, 3),
+        m/rad.
         """
-        _, lengths, units, string = self._balance(corners)
-        longer = np.einsum("ia,iaj->ij", units, slopes)
-        if self._net.damping > 0.0:
-            matrices = self._rates(lengths, units, string)
-            carried = np.einsum("iab,ibj->aj", matrices, slopes)
-            longer -= units @ np.linalg.lstsq(matrices.sum(axis=0), carried, rcond=1e-9)[0]
-            string = self._net.tension(lengths - self._net.neutral_length, longer @ rates)
-        loss = float(np.sum(string.damping * (longer @ rates)))
-        return NetForces(-string.total @ longer, float(np.sum(string.stored)), loss)
-
-    def imbalance(self, corners: Array) -> float:
-        """Pull on a hub in the middle over the sum of the strings' pulls."""
-        arms = corners - corners.mean(axis=0)
-        units = arms / np.linalg.norm(arms, axis=1)[:, None]
-        return float(np.linalg.norm(self._stiffness @ units) / self._stiffness.sum())
+        _, _, units, still = self._balance(corners)
+        longer = np.sum(units * slopes, axis=1)
+        return NetForce(-float(still.elastic @ longer), float(np.sum(still.stored)))
 
     def _balance(self, corners: Array) -> tuple[Array, Array, Array, Reaction]:
         """The hub, and the strings' lengths, directions and reaction at rest there."""

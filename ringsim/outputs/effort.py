@@ -25,7 +25,7 @@ class Effort(Output):
         _number("total_jacobians", "Jacobian factorisations of all attempts"),
         _number(
             "fidelity",
-            "model: 0 full multibody, 1 ideal ring of rigid rods, 2 rods in joint coordinates",
+            "model: 0 full multibody, 2 rods in joint coordinates",
         ),
         Variable("step_used", (), "s", "largest step allowed, solver.step, of the last attempt"),
         Variable("tolerance_used", (), "1", "solver.tolerance of the last attempt"),

@@ -29,8 +29,8 @@ def accuracy(found: xr.Dataset) -> Figure:
     """One panel an output: relative error over processor time.
 
     The line is the frontier of both engines: what settings are good for, which is no less than the
-    error of any finer one.  Hollow marks are runs of the frame engine.  The ideal ring is named in
-    words: it is too cheap for the axis.  ``found`` is from ``ringsim.analysis.accuracy.judge``.
+    error of any finer one.  Hollow marks are runs of the frame engine.  ``found`` is from
+    ``ringsim.analysis.accuracy.judge``.
     """
     titles = OUTPUTS | {"energy": "energy balance"}
     outputs = [name for name in titles if name in found.output.values]
@@ -71,8 +71,7 @@ def _panel(axes: Axes, found: xr.Dataset) -> None:
         best.cost, best.bound, where="post", color=style.INK, linewidth=1.1,
         label="frontier: good for", zorder=2,
     )  # fmt: skip
-    floor, ideal = float(found.uncertainty), found.fidelity.values == "ideal"
-    known = error[drawn & ~ideal]
+    floor, known = float(found.uncertainty), error[drawn]
     if known.size or floor > 0.0:
         lowest = min(known.min(initial=np.inf), 0.5 * floor or np.inf)
         axes.set_ylim(0.4 * lowest, 30.0 * max(known.max(initial=0.0), floor))
@@ -84,9 +83,4 @@ def _panel(axes: Axes, found: xr.Dataset) -> None:
         axes.axhline(
             float(found.engines_differ), color=style.GREY, linewidth=0.9, linestyle=":", zorder=1,
             label="engines differ by",
-        )  # fmt: skip
-    for k in np.flatnonzero(ideal & np.isfinite(error)):
-        axes.text(
-            0.97, 0.88, f"ideal ring: {error[k]:.1e} in {cost[k]:.2g} s", ha="right", va="top",
-            transform=axes.transAxes, fontsize="small", color=style.INK,
         )  # fmt: skip

@@ -83,10 +83,10 @@ class Structure(Model):
         """Functions s of the coordinate in which all places are linear, if a kind has some, so
         that theory need not build a layout at each coordinate: every place is P s with constant P.
 
-        Shape (3, functions): s, of which the first is 1, its first and its second derivative.
+        Shape (2, functions): s, of which the first is 1, and its derivative.
         """
         del coordinate
-        return np.zeros((3, 0))
+        return np.zeros((2, 0))
 
     def describe(self) -> dict[str, str]:
         """Its shape and size in words, by label, for ``ringsim check``."""

@@ -209,8 +209,7 @@ class PantographRing(Structure):
         rest = 1.0 - ratio * c * c
         h = math.sqrt(rest) if rest > 0.0 else math.nan
         slope = ratio * c * s / h
-        bend = (ratio * (c * c - s * s) - slope * slope) / h
-        return np.array([[1.0, c, s, h], [0.0, -s, c, slope], [0.0, -c, -s, bend]])
+        return np.array([[1.0, c, s, h], [0.0, -s, c, slope]])
 
     def layout(self, scene: Any, coordinate: Any) -> Layout:
         """See ``Structure``; the coordinate is phi, and every point that of ``RingGeometry``."""

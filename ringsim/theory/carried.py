@@ -26,7 +26,7 @@ class Lines(NamedTuple):
 
 
 class Carried:
-    """The corners that hang on lines, of a ring that folds without swings.
+    """The corners that hang on lines, of a ring that folds.
 
     Beside the body that is held, or, of a ring that floats, without momentum along the grid and at
     the height that leaves the sum of the pulls: its weight stays as it is.
@@ -39,16 +39,14 @@ class Carried:
         self._corners = mechanism.points.places([OnBody(body) for body in layout.hung.bodies])
         held = [body_of(support.second) for support in layout.supports]
         self._base = mechanism.points.frame(held[0])[0] if held else None
-        free = np.eye(mechanism.freedom)[0]
-        start = mechanism.configuration(scene.structure.coordinate * free, free)
-        self._start = self._height(start)
+        self._start = self._height(mechanism.at(scene.structure.coordinate))
 
     def at(self, now: Configuration) -> Lines:
-        """At a configuration that folds at the unit rate."""
+        """At a coordinate."""
         places, rates = now.places(self._corners), now.velocities(self._corners)
-        rigid = self._mechanism.rigid_rates(now)
+        rigid = self._mechanism.rates(now)
         # The angle opens by two for one that the coordinate falls.
-        moving = -0.5 * (rigid[:3] + np.cross(rigid[3:], places) + rates)
+        moving = -0.5 * (rigid[:3] + np.cross(rigid[3:6], places) + rates)
         up, law = self._up(now), self._hung.law
         climbs = moving @ up
         level = moving - climbs[:, None] * up

@@ -62,7 +62,7 @@ class Drive:
         return [cable for _, cable in self._cables]
 
     def reeved(self, now: Configuration) -> list[Reeved]:
-        """All cables on a mechanism that folds at the unit rate."""
+        """All cables on a mechanism at its coordinate."""
         found = []
         for path in self._paths:
             places, slopes = now.places(path), now.velocities(path)

@@ -18,7 +18,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.theory.drive import Drive
 from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.theory.resistances.family import Opening, folding, resistances
+from ringsim.theory.resistances.family import Opening, resistances
 from ringsim.theory.section_loads import SectionLoads
 
 MOST = 1e6
@@ -76,7 +76,7 @@ class DriveMargin:
         """At an opening angle (rad), with what is whole and on at a time (s): at rest, or with
         ``keep_speed`` at the speed that the winches are commanded to.
         """
-        standard, now = self.standard, folding(self.mechanism, 0.5 * (math.pi - angle))
+        standard, now = self.standard, self.mechanism.at(0.5 * (math.pi - angle))
         over, state = self._drive.reeved(now), self.conditions.at(time)
         opening = Opening(angle, self._drive.speed(over, state), 0.0, now, state.sprung)
         ideal, usual, factored = (

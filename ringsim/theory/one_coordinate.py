@@ -6,8 +6,8 @@ With rigid rods every point is a function of q, so
 
 I = sum m |dr/dq|^2 over all masses with the rigid-body motion taken out, W the work of the loads
 less the energy of the net.  A free structure keeps momentum and angular momentum at zero (its loads
-turn with it here; ringsim.theory.ideal_motion keeps them vertical); a support holds its body.  The
-end assemblies of an open arc are held upright.  From rest at q_0 the time until q_1 is
+turn with it); a support holds its body.  The end assemblies of an open arc are held upright.  From
+rest at q_0 the time until q_1 is
 
     T = integral from q_1 to q_0 of sqrt(I / (2 (W - W(q_0)))) dq.
 
@@ -57,31 +57,28 @@ class OneCoordinate:
     def motion(self, q: float) -> Motion:
         """Inertia and rigid-body part of the motion at ``q`` (rad)."""
         mechanism, now = self._at(q)
-        rigid = mechanism.rigid_rates(now)
-        rates = np.concatenate([rigid, now.rate])
-        return Motion(float(rates @ now.matrix @ rates), -rigid[:3], -rigid[3:])
+        rates = mechanism.rates(now)
+        return Motion(mechanism.inertia(now), -rates[:3], -rates[3:6])
 
     def work(self, q: float) -> float:
         """Work function W(q) in J, up to a constant."""
         mechanism, now = self._at(q)
         done = np.tensordot(*mechanism.points.forces, 2) @ now.values
         done += mechanism.weight_work(now)
-        stored = mechanism.net(now, 0.0 * now.rate).energy + self._springs.at(2.0 * q)[1]
+        stored = mechanism.net(now).energy + self._springs.at(2.0 * q)[1]
         return float(done) - stored
 
     def work_rate(self, q: float) -> float:
         """Generalised force dW/dq, J/rad."""
         mechanism, now = self._at(q)
-        done = np.tensordot(*mechanism.points.forces, 2) @ now.by_place[:, 0]
-        done += np.concatenate([mechanism.rigid_rates(now), now.rate]) @ mechanism.weight(now)
-        pulled = done + mechanism.net(now, 0.0 * now.rate).force[0]
+        done = np.tensordot(*mechanism.points.forces, 2) @ now.slopes
+        done += mechanism.rates(now) @ mechanism.weight(now)
+        pulled = done + mechanism.net(now).force
         return float(pulled - 2.0 * self._springs.at(2.0 * q)[0])
 
     def _at(self, q: float) -> tuple[Mechanism, Configuration]:
-        """The mechanism, folding at rate 1 without swings."""
         mechanism = self._mechanism(q)
-        folding = np.eye(mechanism.freedom)[0]
-        return mechanism, mechanism.configuration(q * folding, folding)
+        return mechanism, mechanism.at(q)
 
 
 class OpeningTime(NamedTuple):

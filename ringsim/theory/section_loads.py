@@ -18,8 +18,8 @@ class SectionLoads:
         self._sections = np.array([layout.joints[one].section for one, _ in layout.forces], int)
 
     def at(self, now: Configuration) -> Array:
-        """Generalised forces on the opening angle, N m, of a mechanism that folds at the unit rate;
-        shape (sections + 1,), positive where they open.
+        """Generalised forces on the opening angle, N m, shape (sections + 1,), positive where they
+        open.
         """
         if not len(self._sections):
             return np.zeros(1)

@@ -41,8 +41,3 @@ class SpringEnergy:
         reaction = self._law.torque(np.full(self.alive.shape, folded))
         torque = float(np.sum(self.alive * reaction.elastic))
         return torque, float(np.sum(self.alive * reaction.stored))
-
-    def fail(self, plane: str, section: int) -> None:
-        """Remove the spring of a V-joint; sections count from 1."""
-        self.alive = self.alive.copy()  # what has happened before is read with the old one
-        self.alive[self._planes.index(plane), section - 1] = 0.0

@@ -71,7 +71,6 @@ def test_the_full_engine_runs_where_the_cheaper_one_cannot_or_may_not(
         (["--accuracy", "0.05", "--of", "peak_tension"], "ring18 has no such output"),
         (["--of", "loads"], "without --accuracy"),
         (["--accuracy", "0.05", "--set", "solver.step_control=constant"], "step_control"),
-        (["--accuracy", "0.05", "--fidelity", "ideal"], "leave out one"),
         (["--accuracy", "0.05", "--fidelity", "both"], "leave out one"),
         (["--accuracy", "0.05", "--set", "solver.tolerance=1e-3"], "--accuracy chooses it"),
         (["--evidence", "none.toml"], "without --accuracy"),

@@ -59,7 +59,6 @@ def study(tmp_path, monkeypatch):
             return tmp_path / f"{name}.nc"
 
         monkeypatch.setattr(accuracy, "run_cases", run_cases)
-        monkeypatch.setattr(accuracy._Study, "ideal", lambda _: None)
         return run_ladder(tmp_path, SCENE, 1, 60.0, most, **how)
 
     return study

@@ -19,7 +19,6 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.theory.assembled import assembled
 from ringsim.theory.deployed import deployed
-from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 from ringsim.theory.screws import strains
 
 NAMES = tuple(LengthError.model_fields)
@@ -253,13 +252,6 @@ def test_a_scene_without_errors_is_as_it_was() -> None:
 def test_bad_input_is_refused(scene: str, values: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         load_scene(scene).with_values(values)
-
-
-def test_the_ideal_ring_refuses_what_strains_it() -> None:
-    with pytest.raises(InputError, match=r"rods\.length_error: rods"):
-        refuse_if_not_ideal(ring(rods__length_error=scattered(1e-4)))
-    with pytest.raises(InputError, match=r"record\.shape = true"):
-        refuse_if_not_ideal(ring(record__shape=True))
 
 
 @pytest.mark.parametrize("errors", [

@@ -12,7 +12,7 @@ from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
-from ringsim.simulation import run, run_frame, run_ideal
+from ringsim.simulation import run, run_frame
 from ringsim.variables import Fate, Outcome, Status
 
 
@@ -104,24 +104,6 @@ def test_a_winch_that_pulls_on_a_locked_plane_loads_its_rope_and_joints() -> Non
     assert peaks[1] > 2.0 * peaks[0]
     assert "past its stop" not in stopped.reason
     assert "V-joint upper 1 was up to" in pulling.reason
-
-
-@pytest.mark.parametrize("after_lock", ["stop", "pull"])
-def test_the_ideal_ring_stops_its_winches_at_the_lock(after_lock: str) -> None:
-    scene = load_scene("ring18-cable").with_values(
-        {
-            "structure.sections": 4,
-            "structure.opening_angle": 170.0,
-            "boom": "none",
-            "solver.settling_time": 0.5,
-        }
-        | {f"cables.{plane}.winch.after_lock": after_lock for plane in ("upper", "lower")}
-    )
-    found = run_ideal(scene.with_values({"record.interval": 0.02}))
-    times, lock = found.coordinates["time"], float(found.values["deployment_time"])
-    wound = found.values["wound_length"][0, times > lock]
-    wound = wound[np.isfinite(wound)]
-    assert bool(np.ptp(wound) > 1e-12) is (after_lock == "pull")
 
 
 def test_limits_that_a_run_passes_are_told_with_value_and_time() -> None:

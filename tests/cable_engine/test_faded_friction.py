@@ -8,7 +8,7 @@ import pytest
 
 from driven import outcome, truss
 from ringsim.scene import Scene
-from ringsim.simulation import run_frame, run_ideal
+from ringsim.simulation import run_frame
 from ringsim.variables import Fate
 
 SLOW = 5e-4
@@ -26,9 +26,7 @@ def slowly(**values: Any) -> Scene:
     return truss(**(fields | values))
 
 
-@pytest.mark.parametrize(
-    "fidelity", [outcome, run_frame, run_ideal], ids=["full", "frame", "ideal"]
-)
+@pytest.mark.parametrize("fidelity", [outcome, run_frame], ids=["full", "frame"])
 def test_too_fast_a_slip_speed_is_named_with_its_cure(fidelity: Any) -> None:
     found = fidelity(slowly(cables__upper__slip_speed=2e-4))
     assert found.fate is Fate.CUT_OFF

@@ -7,7 +7,7 @@ import pytest
 
 from driven import Bench, truss
 from ringsim.refusal import InputError
-from ringsim.simulation import run_ideal
+from ringsim.simulation import run_frame
 
 ROUND_OFF = 1e-12
 """Sums and exponentials of some ten spans in doubles, relative; points are 1 m from the origin."""
@@ -61,7 +61,7 @@ def test_the_last_hinge_pulley_has_a_coefficient_a_fault_and_a_span_of_its_own()
     assert scene.cables.upper.friction.coefficients.tolist() == [4e-4] * 5 + [0.002]
     assert Bench(scene).drive.path.per_cable == [8, 8]
     mixed = truss(cables__upper__end="both", solver__end_time=1.0)
-    tension = run_ideal(mixed).values["cable_tension"]
+    tension = run_frame(mixed).values["cable_tension"]
     assert tension.shape[1] == 7
     assert np.isfinite(tension[0]).all()
     # The lower cable has one winch and one span less.

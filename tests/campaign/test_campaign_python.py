@@ -27,7 +27,7 @@ from ringsim.sampling.distributions.uniform import Uniform
 from ringsim.storage.locks import locked
 
 TABLE: dict[str, Any] = {
-    "name": "small", "seed": 5, "scene": "ring18", "fidelity": "ideal",
+    "name": "small", "seed": 5, "scene": "ring18", "fidelity": "full",
     "set": {"structure.sections": 6, "boom": "none", "net": "none", "solver.end_time": 20.0},
     "inputs": {"loads.force": {"kind": "uniform", "low": 0.02, "high": 0.05}},
     "design": {"kind": "random", "samples": 4},
@@ -38,7 +38,7 @@ TABLE: dict[str, Any] = {
 def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A folder of its own, and the quick stand-in for the solver."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(SOLVERS, "ideal", "fake_solver:run")
+    monkeypatch.setitem(SOLVERS, "full", "fake_solver:run")
 
 
 def small(**more: Any) -> Campaign:

@@ -6,8 +6,7 @@ import pytest
 
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
-from ringsim.simulation import run, run_ideal, simulate
-from ringsim.theory import ideal_fidelity
+from ringsim.simulation import run, simulate
 from ringsim.threads import thread_counts
 
 SHORT = load_scene("truss2").with_values({"solver.end_time": 0.2})
@@ -43,20 +42,7 @@ def test_a_run_has_one_thread_and_gives_back_two() -> None:
     assert counts() == {2}
 
 
-def test_the_ideal_ring_has_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen, judge = list[set[int]](), ideal_fidelity.refuse_if_not_ideal
-
-    def watched(scene: object) -> None:
-        seen.append(counts())
-        judge(scene)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(ideal_fidelity, "refuse_if_not_ideal", watched)
-    run_ideal(SHORT)
-    assert seen == [{1}]
-    assert counts() == {2}
-
-
 def test_a_refused_run_gives_back_two_threads() -> None:
     with pytest.raises(InputError):
-        simulate(SHORT.with_values({"record.stress": True}), "ideal")
+        simulate(SHORT.with_values({"rods.kind": "ancf"}), "frame")
     assert counts() == {2}

@@ -12,9 +12,7 @@ from ringsim.engine.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.layout.layout import layout_of
 from ringsim.parts.offload import Offload
-from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.theory.ideal_fidelity import refuse_if_not_ideal
 from ringsim.theory.one_coordinate import OneCoordinate
 from test_base_reaction import ring
 
@@ -108,8 +106,3 @@ def test_a_trolley_rubs_along_the_grid() -> None:
     assert hold.friction[0] == pytest.approx(-0.1 * tension * np.array([0.6, -0.8, 0.0]), rel=1e-9)
     assert hold.force[0, 2] == pytest.approx(tension)
     assert hold.stored == pytest.approx(0.5 * 5.0 * 0.1**2)
-
-
-def test_the_ideal_ring_refuses_lines() -> None:
-    with pytest.raises(InputError, match="offload"):
-        refuse_if_not_ideal(ground({}).with_values({"record.stress": False}))

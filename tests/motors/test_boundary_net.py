@@ -42,8 +42,8 @@ def sprung(**values: object) -> Scene:
 
 
 @functools.cache
-def opened() -> xr.Dataset:
-    return simulate(sprung(), "ideal")
+def opened(fidelity: str = "frame") -> xr.Dataset:
+    return simulate(sprung(), fidelity)
 
 
 def tension(angle: float, strain: float = STRAIN) -> float:
@@ -67,23 +67,28 @@ def test_resistance_is_that_of_virtual_work() -> None:
 
 def test_cables_of_every_section_and_of_one_plane() -> None:
     strains = [0.02, -0.01, 0.0]
-    scene = sprung(net__strain=strains, net__planes="upper", solver__end_time=0.05)
+    scene = sprung(
+        net__strain=strains, net__planes="upper", solver__end_time=0.05,
+        rods__young_modulus=1.2e13,
+    )  # fmt: skip
     edge = layout_of(scene).edge
     assert edge is not None
     natural = natural_lengths(scene, edge)
     np.testing.assert_allclose(natural[0], FARTHEST / (1.0 + np.array(strains)), rtol=1e-12)
     assert np.isnan(natural[1]).all()
-    run = simulate(scene, "ideal")
+    run = simulate(scene, "frame")
     last = run.dropna("time", how="all", subset=["net_tension"]).isel(time=-1)
-    angle = math.radians(float(last.opening_angle[0, 0]))
-    expected = [tension(angle, strain) for strain in strains]
+    angles = np.radians(last.opening_angle.sel(plane="upper").values)
+    expected = [tension(*both) for both in zip(angles, strains, strict=True)]
     assert expected[0] > 0.0 == expected[1]
-    np.testing.assert_allclose(last.net_tension.sel(plane="upper"), expected, rtol=1e-9)
+    # The corners of rods that hardly give are as far apart as each section's own angle says.
+    np.testing.assert_allclose(last.net_tension.sel(plane="upper"), expected, rtol=1e-3)
     assert np.isnan(run.net_tension.sel(plane="lower")).all()
     assert int(run.peak_net_tension_section) == 1
 
 
-def test_the_ring_opens_in_the_time_of_the_quadrature() -> None:
+@pytest.mark.parametrize("fidelity", ["frame", "full"])
+def test_the_ring_opens_in_the_time_of_the_quadrature(fidelity: str) -> None:
     """Springs give their energy, cables take theirs: T = integral of sqrt(I / (2 W)) dphi."""
     scene = sprung()
     free, start = OneCoordinate(scene.with_values({"net": "none"})), scene.structure.coordinate
@@ -96,10 +101,15 @@ def test_the_ring_opens_in_the_time_of_the_quadrature() -> None:
     taut = brentq(lambda phi: tension(math.pi - 2.0 * phi) - 1e-9, 0.01, start)
     kink = math.sqrt(1.0 - taut / start)
     time = quad(slowness, 0.0, kink)[0] + quad(slowness, kink, 1.0)[0]
-    found = opened()
-    assert float(found.deployment_time) == pytest.approx(time, rel=1e-6)
-    assert float(found.peak_net_tension) == pytest.approx(STIFFNESS * STRAIN, rel=1e-6)
-    assert float(found.energy_error) < 1e-6
+    found = opened(fidelity)
+    assert float(found.deployment_time) == pytest.approx(time, rel=2e-3)
+    before = found.time.values < time - 2e-3
+    angles = np.radians(found.opening_angle.values[..., before])
+    expected = np.vectorize(tension)(angles)
+    assert expected[..., -1].min() > 15.0
+    # Bars give by 1 % of it.
+    np.testing.assert_allclose(found.net_tension.values[..., before], expected, atol=0.2)
+    assert float(found.energy_error) < 1e-3
 
 
 def test_springs_that_are_too_weak_stop_where_the_cables_hold_them() -> None:
@@ -117,17 +127,6 @@ def test_springs_that_are_too_weak_stop_where_the_cables_hold_them() -> None:
     # Usual rods give, so that it opens by 0.07 deg more: these are a hundred times as stiff.
     last = found.opening_angle.dropna("time").isel(time=-1)
     np.testing.assert_allclose(last, math.degrees(held), atol=2e-3)
-
-
-@pytest.mark.parametrize("fidelity", ["frame", "full"])
-def test_engines_agree_with_the_ideal_ring(fidelity: str) -> None:
-    truth, found = opened(), simulate(sprung(), fidelity)
-    np.testing.assert_allclose(found.deployment_time, truth.deployment_time, rtol=2e-3)
-    before = truth.time.values < float(truth.deployment_time) - 2e-3
-    ours, theirs = (each.net_tension.values[..., before] for each in (found, truth))
-    assert theirs[..., -1].min() > 15.0
-    np.testing.assert_allclose(ours, theirs, atol=0.1)
-    assert float(found.energy_error) < 1e-3
 
 
 def test_drawings_tell_taut_cables_from_slack_ones() -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
 import pytest
-import xarray as xr
 from pydantic import ValidationError
+from rigid_motion import RigidRing
 from scipy.integrate import quad
 
 from motor_rings import ring
@@ -58,12 +57,11 @@ def test_a_table_gives_its_torques() -> None:
     assert law.torque(0.5 * math.pi).elastic == pytest.approx(0.01)
 
 
-def test_the_ideal_ring_opens_in_the_time_of_the_quadrature() -> None:
-    scene = sprung(solver__end_time=10.0)
-    found = simulate(scene, "ideal")
+def test_stiff_rods_open_in_the_time_of_the_quadrature() -> None:
+    scene = sprung(solver__end_time=10.0, rods__young_modulus=1.2e13)
+    found = simulate(scene, "frame")
     truth = opening_time(OneCoordinate(scene), scene.structure.coordinate)
-    assert float(found.deployment_time) == pytest.approx(truth.time, rel=1e-6)
-    assert float(found.energy_error) < 1e-7
+    assert float(found.lock_time.mean()) == pytest.approx(truth.time, rel=1e-4)
 
 
 def test_virtual_work() -> None:
@@ -77,32 +75,28 @@ def test_virtual_work() -> None:
         assert now.margin == pytest.approx(0.8 * torque / (2.0 * 3.0 * 0.001) - 1.0, rel=1e-9)
 
 
-@functools.cache
-def uneven(fidelity: str) -> xr.Dataset:
-    """Run of a ring with a spring of each section, of which one fails on the way."""
+@pytest.mark.parametrize("fidelity", ["frame", "full"])
+def test_a_ring_goes_on_without_a_spring_that_fails(fidelity: str) -> None:
+    """One of each section, the middle one of which gives no torque from 0.2 s on."""
     fault = {"kind": "failed-spring", "plane": "lower", "section": 2, "time": 0.2}
     scene = sprung(
         hinge_spring={"kind": "linear", "stiffness": [0.004, 0.005, 0.003], "preload": 0.01},
         faults=[fault], solver__end_time=0.4, solver__tolerance=1e-4,
     )  # fmt: skip
-    return simulate(scene, fidelity)
+    found = simulate(scene, fidelity)
 
+    def gone(time: float, q: float, _: float) -> float:
+        return 2.0 * (0.01 + 0.005 * 2.0 * q) * (time > 0.2)
 
-@pytest.mark.parametrize("fidelity", ["frame", "full"])
-def test_engines_agree_with_the_ideal_ring(fidelity: str) -> None:
-    truth, found = uneven("ideal"), uneven(fidelity)
+    rigid = RigidRing(scene, gone).course(found.time.values)
+    assert rigid.angle[-1] > 75.0
     opened = found.opening_angle.mean(("plane", "section"))
-    ideal = truth.opening_angle.mean(("plane", "section"))
-    assert float(ideal[-1]) > 75.0
-    np.testing.assert_allclose(opened, ideal, atol=0.02)
-    np.testing.assert_allclose(found.dissipation[-1], truth.dissipation[-1], rtol=2e-3)
+    np.testing.assert_allclose(opened, rigid.angle, atol=0.02)
     # 0.01 N m of preload and what the stiffness has left at that time.
-    folded = math.radians(180.0 - float(ideal.sel(time=0.2)))
-    assert float(truth.dissipation[-1]) == pytest.approx(
-        0.01 * folded + 0.5 * 0.005 * folded**2, rel=1e-4
-    )
+    folded = math.radians(180.0 - np.interp(0.2, rigid.times, rigid.angle))
+    lost = 0.01 * folded + 0.5 * 0.005 * folded**2
+    assert float(found.dissipation[-1]) == pytest.approx(lost, rel=2e-3)
     assert float(found.energy_error) < 1e-3
-    assert float(truth.energy_error) < 1e-6
 
 
 @pytest.mark.parametrize("fidelity", ["frame", "full"])

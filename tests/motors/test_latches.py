@@ -63,28 +63,20 @@ def test_resistance_is_that_of_all_ramps() -> None:
         assert resisting["springs"] == pytest.approx(-springs, rel=1e-12)
 
 
-def test_the_ideal_ring_meets_its_latches_as_the_quadrature_says() -> None:
-    scene = latched()
-    ring, found = OneCoordinate(scene), simulate(scene, "ideal")
+def test_a_ring_of_stiff_rods_meets_its_latches_as_the_quadrature_says() -> None:
+    """Usual rods swing in the last degrees, which makes the rates 4 % larger."""
+    scene = latched(rods__young_modulus=1.2e13)
+    ring, found = OneCoordinate(scene), simulate(scene, "frame")
     start = scene.structure.coordinate
     time = opening_time(ring, start, panels=200).time
-    assert float(found.deployment_time) == pytest.approx(time, rel=1e-6)
+    assert float(found.deployment_time) == pytest.approx(time, rel=1e-3)
     folding = math.sqrt(2.0 * (ring.work(0.0) - ring.work(start)) / ring.motion(0.0).inertia)
     # What the springs give over 20 deg, less what the ramps take.
     gained = 6 * (0.3 * math.radians(20.0) + 0.01 * math.radians(20.0) ** 2 - 0.2 * REACH)
     assert ring.work(0.0) - ring.work(start) == pytest.approx(gained, rel=1e-9)
-    np.testing.assert_allclose(found.latch_rate, 2.0 * folding, rtol=1e-6)
+    np.testing.assert_allclose(found.latch_rate, 2.0 * folding, rtol=5e-3)
     assert found.latched.values.tolist() == [[1] * 3] * 2
     assert int(found.latched_joints) == 6
-
-
-def test_a_ring_of_stiff_rods_meets_its_latches_as_the_ideal_one_does() -> None:
-    """Usual rods swing in the last degrees, which makes the rates 4 % larger."""
-    scene = latched(rods__young_modulus=1.2e13)
-    truth, found = simulate(scene, "ideal"), simulate(scene, "frame")
-    np.testing.assert_allclose(found.deployment_time, truth.deployment_time, rtol=1e-3)
-    np.testing.assert_allclose(found.latch_rate, truth.latch_rate, rtol=5e-3)
-    assert found.latched.values.tolist() == truth.latched.values.tolist()
     assert float(found.energy_error) < 1e-3
 
 
@@ -97,9 +89,7 @@ def test_both_engines_meet_latches_alike() -> None:
         places_of_rates(run)
 
 
-@pytest.mark.parametrize(
-    "fidelity", ["ideal", "frame", pytest.param("full", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("fidelity", ["frame", pytest.param("full", marks=pytest.mark.slow)])
 def test_joints_that_come_too_slowly_leave_again(fidelity: str) -> None:
     """Springs hold the joints at their stops; here they fold again, as they have come."""
     scene = latched(
@@ -265,18 +255,6 @@ def test_latches_that_cannot_be_are_refused(values: dict[str, object], text: str
         latched().with_values(values)
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"faults": [{"kind": "failed-latch", "section": 1, "time": 0.0}]},
-        {"latch.min_rate": [1.0, 2.0, 3.0]},
-    ],
-)
-def test_the_ideal_ring_refuses_latches_that_differ(values: dict[str, object]) -> None:
-    with pytest.raises(InputError, match="ideal fidelity"):
-        simulate(latched().with_values(values), "ideal")
-
-
 def test_rings_without_latches_tell_no_rate() -> None:
     short = {
         "solver.end_time": 0.05,
@@ -284,4 +262,4 @@ def test_rings_without_latches_tell_no_rate() -> None:
         "record.interval": 0.01,
         "structure.sections": 3,
     }
-    assert "latch_rate" not in simulate(load_scene("ring18").with_values(short), "ideal")
+    assert "latch_rate" not in simulate(load_scene("ring18").with_values(short), "frame")

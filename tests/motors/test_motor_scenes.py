@@ -13,7 +13,7 @@ from ringsim.scene import scene_from_toml
 from ringsim.simulation import simulate
 from ringsim.theory.drive_margin import PULLEYS
 from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.theory.resistances.family import Opening, folding, resistances
+from ringsim.theory.resistances.family import Opening, resistances
 from ringsim.variables import Fate
 
 STIFFNESS, NEUTRAL = 300.0, 0.4
@@ -21,21 +21,27 @@ STIFFNESS, NEUTRAL = 300.0, 0.4
 
 @pytest.fixture(scope="module")
 def stalled() -> xr.Dataset:
-    """Motors that meet a net; they crawl against the joints' friction as they come to it."""
+    """Motors that meet a net; they crawl against the joints' friction as they come to it.
+
+    The net is in one plane alone, and its rods as stiff as can be: usual ones let the other plane
+    open 5 deg further.
+    """
     scene = ring(
-        net__stiffness=STIFFNESS, net__neutral_length=NEUTRAL, solver__end_time=20.0,
-        record__interval=0.5, cables__upper__friction={"kind": "none"},
+        net__stiffness=STIFFNESS, net__neutral_length=NEUTRAL, solver__end_time=100.0,
+        record__interval=0.5, rods__young_modulus=1e15, cables__upper__friction={"kind": "none"},
         cables__lower__friction={"kind": "none"}, joints__vjoint__viscous=2.0,
         margin=PLAIN.model_dump(),
     )  # fmt: skip
-    return simulate(scene, "ideal")
+    return simulate(scene, "frame")
 
 
 @pytest.fixture(scope="module")
 def opening() -> xr.Dataset:
     """The first two seconds of a usual ring."""
-    scene = ring(solver__end_time=2.0, record__interval=0.02, margin=PLAIN.model_dump())
-    return simulate(scene, "ideal")
+    scene = ring(
+        solver__end_time=2.0, solver__step=0.02, record__interval=0.02, margin=PLAIN.model_dump()
+    )
+    return simulate(scene, "frame")
 
 
 def test_motors_stall_where_they_meet_the_net(stalled: xr.Dataset) -> None:
@@ -65,7 +71,8 @@ def test_the_margin_vanishes_where_a_run_stalls_and_a_run_tells_it(stalled: xr.D
     least = float(found.least_drive_margin)
     assert least <= found.drive_margin.min()
     assert least == pytest.approx(float(found.drive_margin.min()), abs=1e-6)
-    assert found.least_drive_margin_time == pytest.approx(float(found.time[-1]), abs=1.0)
+    # It crawls for its last seconds.
+    assert found.least_drive_margin_time == pytest.approx(float(found.time[-1]), abs=2.0)
     assert list(found.resistance.values) == [PULLEYS, "inertia", "joint friction", "net"]
     assert found.drive_resistance.attrs["units"] == found.drive_available.attrs["units"] == "N m"
     # It counts neither the viscous friction of this motion nor its inertia.
@@ -82,7 +89,7 @@ def test_along_a_run_work_is_drive_less_resistance(opening: xr.Dataset) -> None:
     mechanism = Mechanism(scene)
     kinds, resisting = resistances(scene, mechanism), []
     for row in zip(angle, rate, bend, strict=True):
-        now = folding(mechanism, 0.5 * (np.pi - row[0]))
+        now = mechanism.at(0.5 * (np.pi - row[0]))
         resisting.append(sum(one.force(Opening(*map(float, row), now)) for one in kinds))
     tension = found.motor_torque.isel(plane=0, winch=0) / MOTOR["stall_torque"]
     lost = found.drive_resistance.sel(resistance=PULLEYS)
@@ -138,8 +145,9 @@ def test_a_motor_winds_as_commanded_and_gives_nothing_while_it_is_off() -> None:
         }
         for plane in ("upper", "lower")
     }  # fmt: skip
-    scene = ring(structure__sections=3, solver__end_time=0.55).with_values(values)
-    found = simulate(scene, "ideal").isel(plane=0, winch=0)
+    scene = ring(structure__sections=3, solver__end_time=1.0).with_values(values)
+    found = simulate(scene, "frame").isel(plane=0, winch=0)
+    found = found.dropna("time", subset=["motor_torque"])
     torque = found.motor_torque
     off = np.concatenate([torque.sel(time=slice(None, 0.05)), torque.sel(time=slice(0.45, None))])
     assert (off == 0.0).all()

@@ -12,7 +12,7 @@ import pytest
 from ringsim.layout.layout import layout_of
 from ringsim.scene import load_scene
 from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.theory.resistances.family import Opening, folding, resistances
+from ringsim.theory.resistances.family import Opening, resistances
 from ringsim.theory.resistances.weight import WeightResistance
 
 VECTOR = np.array([0.3, -0.5, -9.0])
@@ -24,7 +24,7 @@ def test_weight_resists_with_its_virtual_work(degrees: float) -> None:
         {"structure.sections": 6, "boom.base": "fixed", "gravity.vector": VECTOR.tolist()}
     )
     mechanism, angle = Mechanism(scene), math.radians(degrees)
-    now = folding(mechanism, 0.5 * (math.pi - angle))
+    now = mechanism.at(0.5 * (math.pi - angle))
     found = WeightResistance(scene, mechanism).force(Opening(angle, 0.0, 0.0, now))
 
     def work(at: float) -> float:
@@ -77,7 +77,7 @@ def test_trolleys_and_lines_resist_with_their_virtual_work(base: str, degrees: f
     lines = slice(-len(hung.lifts), None)
     pulls = (lifts - 3.0 * risen.ravel())[lines]
 
-    now = folding(mechanism, 0.5 * (math.pi - angle))
+    now = mechanism.at(0.5 * (math.pi - angle))
     found = {
         one.kind: one.force(Opening(angle, 0.0, 2.0, now)) for one in resistances(scene, mechanism)
     }

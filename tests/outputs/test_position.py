@@ -11,7 +11,6 @@ import xarray as xr
 
 from ringsim.layout.layout import layout_of
 from ringsim.layout.points import Points, points_of
-from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
 
@@ -125,9 +124,3 @@ def test_nobody_asked() -> None:
     run = simulate(load_scene("truss2").with_values({"solver.end_time": 0.1}))
     assert "position" not in run
     assert not {"point", "axis"} & {*run.dims}
-
-
-def test_the_ideal_ring_refuses_them() -> None:
-    scene = load_scene("truss2").with_values({"record.positions": True})
-    with pytest.raises(InputError, match=r"record\.positions = true: .*\(set it to false"):
-        simulate(scene, "ideal")

@@ -134,7 +134,7 @@ def test_friction_never_gives_energy_and_knows_no_sense(law, rate):
 
 @given(FRICTION)
 def test_friction_is_smooth_below_its_characteristic_rate(law):
-    """The ideal fidelity differentiates over a thousandth of it."""
+    """Over a thousandth of it the torque is linear."""
     least = min(law.characteristic_rate(), 1e3)
     slope = [float(law.torque(1e-3 * share * least)) / share for share in (0.5, 1.0)]
     assert slope[0] == pytest.approx(slope[1], abs=1e-5 * float(law.torque(least)))

@@ -169,7 +169,7 @@ def test_campaigns_in_which_nothing_deployed(
     assert names == {f"campaign-fig-{name}" for name in expected}
 
 
-def test_the_ideal_ring_has_no_fan() -> None:
+def test_a_campaign_without_asynchrony_has_no_fan() -> None:
     campaign = made_campaign(2)
     campaign["asynchrony"][:] = np.nan
     names = {picture.name for picture, _ in figures_of(campaign)}

@@ -13,7 +13,6 @@ from ringsim.sampling.subset_levels import Answer, Repetition, _simulation
 from ringsim.scene import load_scene
 from ringsim.theory.drive import Drive
 from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.theory.resistances.family import folding
 
 AXES = 18
 
@@ -123,7 +122,7 @@ def test_brute_force_agrees_on_the_drive_of_a_ring_whose_pulleys_differ():
     """Statics of a cable of ``ring18-motor``: what scatter of 53 bearings leaves of its drive."""
     scene = load_scene("ring18-motor")
     mechanism, cable = Mechanism(scene), scene.cables.upper
-    reeved, _ = Drive(scene, mechanism).reeved(folding(mechanism, scene.structure.coordinate))
+    reeved, _ = Drive(scene, mechanism).reeved(mechanism.at(scene.structure.coordinate))
 
     def lost(points):
         """Share of the drive that pulleys take, each sample with a friction of its own each."""

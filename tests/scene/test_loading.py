@@ -42,9 +42,7 @@ def test_nothing_heavy_is_loaded() -> None:
     assert loaded_by(scene + "".join(calling(*words) for words in verbs)) == set()
 
 
-@pytest.mark.parametrize(
-    ("fidelity", "engine"), [("full", {"exudyn"}), ("frame", {"numba"}), ("ideal", set())]
-)
+@pytest.mark.parametrize(("fidelity", "engine"), [("full", {"exudyn"}), ("frame", {"numba"})])
 def test_a_run_loads_its_own_engine_only(fidelity: str, engine: set[str], tmp_path: Path) -> None:
     out = str(tmp_path / "run.nc")
     words = "run", "truss2", "--fidelity", fidelity, "--set", "solver.end_time=0.2", "--out", out

@@ -22,7 +22,7 @@ from ringsim.refusal import InputError
 
 CAMPAIGN = """name = "mine"
 scene = "truss2"
-fidelity = "ideal"
+fidelity = "frame"
 set = { solver.end_time = 0.5 }
 design = { kind = "random", samples = 4 }
 [inputs]
@@ -72,17 +72,26 @@ def test_simulate_takes_a_name_or_a_file(tmp_path: Path) -> None:
     short = load_scene("truss2").with_values({"solver.end_time": 0.2})
     path = tmp_path / "short.toml"
     path.write_text(short.to_toml())
-    expected = simulate(short, "ideal")
+    expected = simulate(short, "frame")
     for given in (path, str(path)):
-        found = simulate(given, "ideal")
+        found = simulate(given, "frame")
         np.testing.assert_array_equal(found["opening_angle"], expected["opening_angle"])
 
 
 def test_simulate_refuses_what_it_does_not_know() -> None:
     with pytest.raises(InputError, match="did you mean ring18"):
         simulate("ring81")
-    with pytest.raises(InputError, match=r'fidelity = "idael": .*did you mean ideal\?'):
-        simulate("truss2", fidelity="idael")
+    with pytest.raises(InputError, match=r'fidelity = "frmae": .*did you mean frame\?'):
+        simulate("truss2", fidelity="frmae")
+
+
+def test_rigid_rods_are_no_fidelity_any_more(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(CAMPAIGN.replace('"frame"', '"ideal"'))
+    for line in (refused("run", "truss2", "--fidelity", "ideal"), refused("campaign", path)):
+        assert line.endswith('no fidelity any more: choose fidelity = "frame"')
+    with pytest.raises(InputError, match=r'fidelity = "ideal": .* choose fidelity = "frame"'):
+        simulate("truss2", fidelity="ideal")
 
 
 def test_angle_in_radians_is_refused_with_the_degrees_it_means() -> None:
@@ -108,18 +117,10 @@ def test_other_suffix_than_nc_is_refused_before_the_run(tmp_path: Path) -> None:
 
 
 def test_a_run_says_that_it_replaces_a_file(tmp_path: Path) -> None:
-    words = "run", "truss2", "--fidelity", "ideal", "--set", "solver.end_time=0.2", "--out"
+    words = "run", "truss2", "--fidelity", "frame", "--set", "solver.end_time=0.2", "--out"
     path = tmp_path / "t.nc"
     assert f"wrote {path}" in ringsim(*words, path)
     assert f"replaced {path}" in ringsim(*words, path)
-
-
-def test_ideal_run_tells_no_asynchrony(tmp_path: Path) -> None:
-    dataset = simulate(load_scene("truss2").with_values({"solver.end_time": 0.5}), "ideal")
-    assert "asynchrony" not in dataset
-    assert np.isnan(dataset["asynchrony_max"])
-    words = "run", "truss2", "--fidelity", "ideal", "--set", "solver.end_time=0.2"
-    assert "asynchrony" not in ringsim(*words, "--out", tmp_path / "t.nc")
 
 
 def test_stress_of_a_planar_truss_is_that_of_its_bending_strain() -> None:

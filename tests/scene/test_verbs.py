@@ -102,7 +102,7 @@ def test_help_lists_the_verb(verb: str) -> None:
 def test_a_reader_that_stops_reading_costs_no_result(verb: str, tmp_path: Path) -> None:
     """As ``ringsim run ... | head -1`` does."""
     out = tmp_path / "pipe.nc"
-    quick = ["--fidelity", "ideal", "--set", "solver.end_time=0.2", "--out", str(out)]
+    quick = ["--fidelity", "frame", "--set", "solver.end_time=0.2", "--out", str(out)]
     with subprocess.Popen(
         [sys.executable, "-m", "ringsim", verb, "ring18", *(quick if verb == "run" else [])],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

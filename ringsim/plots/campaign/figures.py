@@ -60,7 +60,7 @@ class Picture(NamedTuple):
 
 
 _COURSES = ("asynchrony", "opening_angle", "final_time", "deployment_time")
-"""Asynchrony first: the ideal ring has none, and its angles are equal by assumption."""
+"""Asynchrony first: without a value of it there is nothing to draw."""
 PICTURES = (
     Picture(
         "rare_event", rare_event, "Probability of what levels reached, up to the rare event",

@@ -3,8 +3,6 @@
 from functools import cached_property
 from typing import ClassVar, NamedTuple
 
-import numpy as np
-
 from ringsim.choice import load_package
 from ringsim.layout.pose import Array
 from ringsim.parts.margin.family import Category
@@ -17,7 +15,7 @@ from ringsim.theory.ideal_mechanism import Mechanism
 class Opening(NamedTuple):
     """The ring at an opening angle (rad) while it opens at a rate (rad/s) and an acceleration.
 
-    ``now`` is the mechanism folding at the unit rate of its coordinate q = (pi - angle) / 2;
+    ``now`` is the mechanism at its coordinate q = (pi - angle) / 2;
     ``sprung`` is 1 where the spring of a V-joint is whole, one for all or shape (planes, sections).
     """
 
@@ -26,12 +24,6 @@ class Opening(NamedTuple):
     acceleration: float
     now: Configuration
     sprung: Array | float = 1.0
-
-
-def folding(mechanism: Mechanism, q: float) -> Configuration:
-    """The mechanism at a coordinate (rad), folding at 1 rad/s with its end assemblies upright."""
-    free = np.eye(mechanism.freedom)[0]
-    return mechanism.configuration(q * free, free)
 
 
 class Resistance:

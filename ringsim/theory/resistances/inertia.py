@@ -1,9 +1,7 @@
 """Inertia of all moving parts, trolleys of a ground test among them."""
 
-import numpy as np
-
 from ringsim.theory.configuration import Configuration
-from ringsim.theory.resistances.family import Opening, Resistance, folding
+from ringsim.theory.resistances.family import Opening, Resistance
 
 _STEP = 1e-4
 """Change of the coordinate for the slope of the inertia, rad: 1e-8 of it is left."""
@@ -19,8 +17,8 @@ class InertiaResistance(Resistance):
         """See ``Resistance``."""
         if opening.rate == 0.0 and opening.acceleration == 0.0:
             return 0.0
-        q = float(opening.now.place[0])
-        beside = [self._inertia(folding(self.mechanism, q + by)) for by in (-_STEP, _STEP)]
+        q = opening.now.place
+        beside = [self._inertia(self.mechanism.at(q + by)) for by in (-_STEP, _STEP)]
         slope = -0.5 * (beside[1] - beside[0]) / (2.0 * _STEP)
         own = self._inertia(opening.now)
         # Half of the coordinate's rate goes with the angle's: a quarter of the inertia.
@@ -28,8 +26,7 @@ class InertiaResistance(Resistance):
         return max(force, 0.0)
 
     def _inertia(self, now: Configuration) -> float:
-        rates = np.concatenate([self.mechanism.rigid_rates(now), now.rate])
-        found = float(rates @ now.matrix @ rates)
+        found = self.mechanism.inertia(now)
         if (offload := self.scene.offload) is not None and offload.trolley_mass > 0.0:
             ways = 2.0 * self.carried.at(now).ways
             found += offload.trolley_mass * float(ways @ ways)

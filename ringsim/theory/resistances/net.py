@@ -16,5 +16,5 @@ class NetResistance(Resistance):
 
     def force(self, opening: Opening) -> float:
         """See ``Resistance``."""
-        folding = opening.now.rate
-        return 0.5 * float(self.mechanism.net(opening.now, 0.0 * folding).force @ folding)
+        # The angle opens by two for one that the coordinate falls.
+        return 0.5 * self.mechanism.net(opening.now).force

@@ -1,7 +1,5 @@
 """Gravity."""
 
-import numpy as np
-
 from ringsim.theory.resistances.family import Opening, Resistance
 
 
@@ -19,5 +17,4 @@ class WeightResistance(Resistance):
     def force(self, opening: Opening) -> float:
         """See ``Resistance``; the held body stays where it is."""
         mechanism, now = self.mechanism, opening.now
-        rates = np.concatenate([mechanism.rigid_rates(now), now.rate])
-        return 0.5 * float(rates @ mechanism.weight(now))
+        return 0.5 * float(mechanism.rates(now) @ mechanism.weight(now))

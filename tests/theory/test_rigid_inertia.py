@@ -1,4 +1,4 @@
-"""Inertia of the ideal ring against its rods cut into pieces on the fold's own points."""
+"""Inertia of a ring of rigid rods against its rods cut into pieces on the fold's own points."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from fold_rates import fold_rate
 
-from ideal_cases import pulled
 from ringsim.scene import Scene
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.theory.one_coordinate import OneCoordinate
+from small_rings import pulled
 
 PIECES = 200
 
@@ -77,7 +77,7 @@ class RingWithoutBasis(PantographRing):
     kind: Literal["ring-without-basis"] = "ring-without-basis"  # type: ignore[assignment]
 
     def basis(self, coordinate: float) -> np.ndarray:
-        return np.zeros((3, 0))
+        return np.zeros((2, 0))
 
 
 class RingWithTooSmallBasis(PantographRing):

@@ -1,4 +1,4 @@
-"""Scenes for the ideal fidelity: small rings with cables, and what drives them."""
+"""Small rings with cables, and what drives them."""
 
 from __future__ import annotations
 

@@ -1,0 +1,12 @@
+"""Which values of other origin are truths of an accuracy study."""
+
+from __future__ import annotations
+
+from ringsim.campaign.accuracy import _quadrature
+from ringsim.scene import load_scene
+
+
+def test_the_quadrature_is_no_truth_of_a_damped_net() -> None:
+    scene = load_scene("ring18").with_values({"structure.sections": 6})
+    assert _quadrature(scene)
+    assert not _quadrature(scene.with_values({"net.damping": 0.05}))
