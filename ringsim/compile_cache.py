@@ -18,6 +18,8 @@ from collections.abc import Callable, Hashable, Iterator
 from importlib.metadata import version
 from pathlib import Path
 
+from ringsim.build import digest_of
+
 VARIABLE = "NUMBA_CACHE_DIR"
 PACKING = "NUMBA_SLP_VECTORIZE"
 SOURCES = Path(__file__).parent / "frame"
@@ -27,20 +29,23 @@ def choose_folder() -> Path:
     """The folder of compiled code, in the environment from now on, for child processes, too.
 
     That of ``NUMBA_CACHE_DIR`` if it is set; else one of the user's cache folder (XDG_CACHE_HOME,
-    or ~/.cache) for these sources and this processor; else, told in a line, a temporary one.
+    or ~/.cache) for these sources and this processor.  Where files cannot be written to it, or
+    others could write what is executed here, a temporary one, told in a line.
     """
-    if given := os.environ.get(VARIABLE):
-        return Path(given)
     made = f"ringsim-{_sources()}-numba-{version('numba')}-{_processor()}"
     made += "" if packs() else "-unpacked"
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    folder = Path(cache) / "ringsim" / made
-    if not _usable(folder):
+    given = os.environ.get(VARIABLE)
+    folder = Path(given) if given else Path(cache) / "ringsim" / made
+    if why := _why_not(folder):
         wanted, folder = folder, Path(tempfile.gettempdir()) / f"ringsim-cache-{os.getuid()}-{made}"
-        # What lies there is executed: a folder that others can write to is not ours to use.
-        if not _usable(folder) or not _private(folder):
+        if _why_not(folder):
             folder = Path(tempfile.mkdtemp(prefix="ringsim-cache-"))
-        print(f"{wanted}: cannot be written: compiled code goes to {folder}", file=sys.stderr)
+        print(
+            f"{wanted}: {why}, or set {VARIABLE} to a folder of your own: compiled code goes to "
+            f"{folder}, which takes a minute wherever that is empty",
+            file=sys.stderr,
+        )
     os.environ[VARIABLE] = str(folder)
     if (loaded := sys.modules.get("numba")) is not None:  # by a script, before ringsim was
         loaded.config.CACHE_DIR = str(folder)
@@ -65,7 +70,7 @@ def compile_once(kind: Hashable, compiling: Callable[[], object]) -> None:
     mark = folder / f"compiled-{hashlib.blake2b(made, digest_size=12).hexdigest()}"
     if mark.exists():
         return
-    with _alone(folder / "lock"):
+    with alone():
         if not mark.exists():
             compiling()
             with contextlib.suppress(OSError):
@@ -73,37 +78,53 @@ def compile_once(kind: Hashable, compiling: Callable[[], object]) -> None:
 
 
 @contextlib.contextmanager
-def _alone(path: Path) -> Iterator[None]:
-    """Hold a lock, if the file system has locks: without one, several compile the same."""
+def alone() -> Iterator[None]:
+    """Keep other processes from compiling meanwhile, if the file system has locks: without one,
+    several compile the same.  A process that has the lock may ask for it again.
+    """
+    path = choose_folder() / "lock"
     with contextlib.ExitStack() as held:
-        with contextlib.suppress(OSError):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            fcntl.flock(held.enter_context(path.open("wb")), fcntl.LOCK_EX)
+        if path not in _held:
+            with contextlib.suppress(OSError):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                fcntl.flock(held.enter_context(path.open("wb")), fcntl.LOCK_EX)
+            _held.add(path)
+            held.callback(_held.discard, path)
         yield
 
 
-def _usable(folder: Path) -> bool:
-    """Whether files can be written to a folder, which is made if it is not there."""
+_held = set[Path]()
+
+
+def tell_damage(folder: str) -> None:
+    """Say, once in a process, that compiled code could not be read."""
+    if folder not in _told:
+        _told.add(folder)
+        print(f"{folder}: compiled code is damaged: it is compiled anew", file=sys.stderr)
+
+
+_told = set[str]()
+
+
+def _why_not(folder: Path) -> str:
+    """Why a folder, made if it is not there, is not to be used, with the cure; or nothing."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.stat()
+        # What lies there is executed: a folder that others can write to is not ours to use.
+        if found.st_uid != os.getuid():
+            return "belongs to another user, whose code would run: let it be yours (chown)"
+        if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            return "others can write to it, whose code would run: chmod go-w"
         tempfile.TemporaryFile(dir=folder).close()
     except OSError:
-        return False
-    return True
-
-
-def _private(folder: Path) -> bool:
-    found = folder.lstat()
-    others = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not others
+        return "cannot be written: make room, or let it be written to"
+    return ""
 
 
 def _sources() -> str:
     """Of what is compiled: numba looks at a function's own file, not at those that it calls."""
-    digest = hashlib.blake2b(version("ringsim").encode(), digest_size=6)
-    for source in sorted(SOURCES.glob("*.py")):
-        digest.update(source.read_bytes())
-    return digest.hexdigest()
+    return digest_of(SOURCES.glob("*.py"))
 
 
 def _processor() -> str:

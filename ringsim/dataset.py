@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ringsim import build
 from ringsim.files import require_place, whole, writing
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME, axes, holds, span_names
@@ -142,7 +143,8 @@ def _attributes(outcome: Outcome, scene: Scene) -> dict[str, str]:
         "source": f"{software}: {fidelity.model}{engines.get(fidelity, '')}",
         "fidelity": fidelity.word,
         "creator_name": "ringsim",
-        **{f"{name}_version": version(name) for name in ("ringsim", "exudyn", "numba", "numpy")},
+        **build.provenance(),
+        **{f"{name}_version": version(name) for name in ("exudyn", "numba", "numpy")},
         "python_version": platform.python_version(),
         "scene": scene.to_toml(),
         **({"began": outcome.began} if outcome.began else {}),

@@ -45,7 +45,6 @@ _COMPILING_STEPS = 5
 """Steps of the run that compiles: predictor and damping take three to be complete."""
 
 
-@one_thread()
 def run(
     scene: Scene, watch: Watch | None = None, start: StoredState | None = None
 ) -> Outcome:  # fmt: skip
@@ -149,6 +148,7 @@ def _refuse_other_rods(scene: Scene) -> None:
         )
 
 
+@one_thread()
 def _run(
     solve: Solve, fidelity: Fidelity, scene: Scene, watch: Watch | None,
     refusal: tuple[type[InputError], ...] = (), before: Sequence[tuple[float, Scene]] = (),

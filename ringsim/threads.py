@@ -1,13 +1,27 @@
-"""One thread of linear algebra while a run lasts."""
+"""One thread of linear algebra, whoever runs what: the same bits from every command and process."""
 
 import contextlib
 import ctypes
+import importlib
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+ENVIRONMENT = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""What libraries of linear algebra ask for their number of threads, once, when they are loaded."""
 _PREFIXES = ("scipy_openblas", "openblas")
 _SUFFIXES = ("64_", "")
 """How builds of OpenBLAS name their functions: numpy's and scipy's wheels, and Linux packages."""
+
+
+def one_thread_from_here_on() -> None:
+    """Give one thread to what this process and its children load from now on.
+
+    For commands, before numpy is loaded.  Whatever the user has set is replaced, as for the solver
+    processes of campaigns: other sums in other threads end in other digits, and results are to be
+    the same wherever they were computed.
+    """
+    os.environ.update(dict.fromkeys(ENVIRONMENT, "1"))
 
 
 def thread_counts() -> list[tuple[Callable[[], int], Callable[[int], None]]]:
@@ -30,10 +44,14 @@ def thread_counts() -> list[tuple[Callable[[], int], Callable[[int], None]]]:
 def one_thread() -> Iterator[None]:
     """Give OpenBLAS one thread, and back what it had.
 
-    The matrices of a run have at most some hundred rows: threads that wait for each other cost more
-    than they save, on a busy machine many times the run.  The command ``ringsim`` sets the
-    environment instead, which only helps before numpy is loaded.
+    For runs that a script calls, which has loaded numpy with as many threads as there are cores:
+    sums in several threads end in other digits.  The matrices of a run have at most some hundred
+    rows: threads that wait for each other cost more than they save, on a busy machine many times
+    the run.
     """
+    importlib.import_module(
+        "scipy.linalg"
+    )  # else its OpenBLAS may come later, with all its threads
     counts = [(give, get()) for get, give in thread_counts()]
     try:
         for give, _ in counts:

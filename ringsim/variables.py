@@ -171,6 +171,8 @@ class Variable:
     """Label and number format in what ``ringsim run`` prints, if it stands there."""
     until: str = "final_time"
     """Number up to which all output times have a value; the run's end where that is missing."""
+    gaps: bool = False
+    """Whether sound runs lack values at some times, too."""
     worse: Literal["larger", "smaller", "neither"] = "neither"
     """Which of two values of a number an engineer fears more: what is told as worst follows it."""
     largest_of: str = ""

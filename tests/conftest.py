@@ -1,10 +1,8 @@
 """Settings that all tests share."""
 
-import os
+from ringsim.threads import one_thread_from_here_on
 
-# As the command does, before numpy is loaded.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
+one_thread_from_here_on()  # as the command does, before numpy is loaded
 
 from hypothesis import settings  # noqa: E402
 

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 from ring_rods import RODS
 
+from ringsim.build import sources
 from ringsim.dataset import save, to_dataset
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import InputError
@@ -133,6 +134,7 @@ def test_origin_is_in_the_file():
     assert attributes["python_version"] == sys.version.split()[0]
     assert attributes["exudyn_version"].startswith("1.13")
     assert attributes["ringsim_version"] in attributes["source"]
+    assert attributes["sources"] == sources()
     assert attributes["date_created"].endswith("Z")
     assert attributes["date_created"] in attributes["history"]
     assert "bench" in attributes["summary"]

@@ -32,13 +32,15 @@ class Ring:
         from ringsim.analysis import leaders
 
         found = leaders.often if "sample" in self._dataset.dims else leaders.over_time
-        return found(self._dataset)
+        return found(self._dataset).assign_attrs(self._losses())
 
     def outcomes(self) -> "pd.DataFrame":
         """What became of the samples of a campaign: a row for each kind of outcome and of loss.
 
-        ``samples`` are of the kind, of the ``of`` that count; ``share`` with its exact interval of
-        95 %, ``lower`` and ``upper``, as the design allows it, else NaN; see ``ringsim.analyse``.
+        ``samples`` are of the kind, ``of`` all that ran, of which ``lost`` ones may be, too;
+        ``share`` with its exact interval of 95 %, ``lower`` and ``upper``, from none to all of
+        these, as the design allows it, else NaN; see ``ringsim.analyse``.  Where which runs are
+        lost goes with inputs, ``attrs`` say so as ``lost_runs``.
 
         InputError if it is no campaign.
         """
@@ -50,10 +52,13 @@ class Ring:
         ends = found["outcome_share_interval"]
         table: dict[str, Any] = {
             "samples": found["outcome_samples"], "of": found["outcome_of"],
-            "share": found["outcome_share"], "lower": ends[:, 0], "upper": ends[:, 1],
+            "lost": found["outcome_lost"], "share": found["outcome_share"],
+            "lower": ends[:, 0], "upper": ends[:, 1],
         }  # fmt: skip
-        return xr.Dataset({k: ("kind", v.to_numpy()) for k, v in table.items()},
+        rows = xr.Dataset({k: ("kind", v.to_numpy()) for k, v in table.items()},
                           coords={"kind": found["kind"]}).to_dataframe()  # fmt: skip
+        rows.attrs |= self._losses()
+        return rows
 
     def worst(self) -> "pd.DataFrame":
         """The worst samples of each failure of a campaign, the worst first: of requirements of its
@@ -102,7 +107,17 @@ class Ring:
         found = courses(self._dataset, quantiles)
         if not len(found.samples):
             raise InputError("a fan needs a sample that has run, and none has")
-        return found.bands
+        return found.bands.assign_attrs(self._losses())
+
+    def _losses(self) -> dict[str, str]:
+        """The attribute that marks what lost runs bend; none for a run, and where they do not."""
+        from ringsim.analysis.losses import NOTE, losses
+
+        dataset = self._dataset
+        note = (
+            losses(dataset).note if {"sample"} <= set(dataset.dims) and "status" in dataset else ""
+        )
+        return {NOTE: note} if note else {}
 
     def _require_samples(self, what: str) -> None:
         from ringsim.refusal import InputError

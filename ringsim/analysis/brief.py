@@ -10,6 +10,7 @@ from scipy.stats import norm
 from ringsim.analysis import ranks
 from ringsim.analysis.confounded import confounding_notes, partners
 from ringsim.analysis.intervals import Array
+from ringsim.analysis.losses import marked
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.sensitivity_text import HEADS, SETS, measure_notes
 from ringsim.tables import Table, interval_text, number_text
@@ -46,7 +47,7 @@ def output_table(analysis: xr.Dataset, names: list[str]) -> Table:
         "output", "unit", "mean", "95 % interval", "std. dev.", "5 %", "median", "95 %", "least",
         "most", "worst sample", "used",
     )  # fmt: skip
-    return Table(head, rows)
+    return marked(Table(head, rows), analysis)
 
 
 def worst_of(analysis: xr.Dataset, name: str) -> str:
@@ -97,7 +98,7 @@ def what_matters(analysis: xr.Dataset) -> Table:
         notes.append(f"no input stands out of chance for {', '.join(quiet)}")
     index = "index" if measure is None else HEADS[measure]
     head = ("what matters for", "input", index, "95 % interval", *_RANKS.values())
-    return Table(head, rows, notes, left=2)
+    return marked(Table(head, rows, notes, left=2), analysis, 1)
 
 
 def _indexed(analysis: xr.Dataset, measure: str) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
@@ -228,7 +229,7 @@ def what_separates(analysis: xr.Dataset) -> Table:
             for n, k in enumerate(chosen[:_MOST])
         ]  # fmt: skip
     head = ("what separates", "input", "probability that it is larger", "95 % interval")
-    return Table(head, rows, left=2)
+    return marked(Table(head, rows, left=2), analysis, 1)
 
 
 def _beyond(values: Array, ends: Array, chance: Array | float) -> NDArray[np.bool_]:

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from ringsim.analysis.blocks import population_of
 from ringsim.analysis.design import placement
+from ringsim.analysis.losses import losses
 from ringsim.analysis.quantities import used, worst_sample
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.summary import summary
-from ringsim.variables import GOALS, Fate, Status
+from ringsim.variables import GOALS, Fate, Status, Variable
 
 _NAMED = 6
 """Samples that a line names at most."""
@@ -91,6 +92,7 @@ def budget_lines(campaign: xr.Dataset) -> list[str]:
     compared with the standard error as it is.  Samples that did not end well are left out.
     """
     sound, placed, lines = used(population_of(campaign)), placement(campaign), []
+    mark = losses(campaign).mark
     for name in map(str, sound.data_vars):
         of = name.removesuffix("_error")
         if of == name or of not in sound or sound[of].dims != ("sample",):
@@ -110,6 +112,7 @@ def budget_lines(campaign: xr.Dataset) -> list[str]:
                 + (f"standard error {sampling:.2g}, " if np.isfinite(sampling) else "")
                 + f"numerical error at most {numerical:.2g} ({len(bars)} of {len(values)} samples)"
                 + (f": {larger} error dominates the mean" if np.isfinite(sampling) else "")
+                + mark
             )
     return lines
 
@@ -146,13 +149,14 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
 
     Which end is the worst the output knows: margins and latch rates the least, loads the largest.
 
-    Places have no names where samples differ in the ends at which the winches are.
+    Places have no names where samples differ in the ends at which the winches are.  Of outputs that
+    can have an error bar the line says how large that is in this sample.
     """
     spans = {}
     if "span_name" in campaign:
         names = campaign.span_name.transpose("plane", "span").values.tolist()
         spans = dict(zip(campaign.plane.values.tolist(), names, strict=True))
-    sound, lines = used(campaign), []
+    sound, lines, unknown, mark = used(campaign), [], False, losses(campaign).mark
     for output in OUTPUTS:
         for variable in output.variables:
             if variable.summary is None or (sample := worst_sample(sound, variable)) < 0:
@@ -163,5 +167,26 @@ def peak_lines(campaign: xr.Dataset) -> list[str]:
                 # Series tell which places are alike.
                 values = {str(n): each.values for n, each in worst.variables.items()}
                 told = " ".join(summary(values, spans)[variable.name].split())
-                lines.append(f"{variable.summary[0]} in sample {sample}: {told}")
+                error = _numerical(sound, variable, worst) if variable.error_bar else ""
+                unknown |= bool(variable.error_bar and not error)
+                lines.append(f"{variable.summary[0]} in sample {sample}: {told}{error}{mark}")
+    if unknown:
+        lines.append(
+            "no sample states its numerical error: give error_bars_every, or see what "
+            "solver.error_bars = true says of the samples named here"
+        )
     return lines
+
+
+def _numerical(sound: xr.Dataset, variable: Variable, worst: xr.Dataset) -> str:
+    """How large the numerical error of a sample's value is; empty if no sample tells."""
+    if (name := f"{variable.name}_error") not in sound or not sound[name].notnull().any():
+        return ""
+    unit = "" if variable.units == "1" else f" {variable.units}"
+    if np.isfinite(own := float(worst[name])):
+        return f"; numerical error at most {own:.2g}{unit}"
+    stated = sound[name].dropna("sample")
+    return (
+        f"; its numerical error is not stated, at most {float(stated.max()):.2g}{unit} in the "
+        f"{stated.size} samples that state theirs"
+    )

@@ -13,6 +13,7 @@ from ringsim.analysis.campaign_samples import called
 from ringsim.analysis.comparison_shares import differences_of_shares, ends, has_means
 from ringsim.analysis.design import Placement, placement
 from ringsim.analysis.intervals import NONE, Array
+from ringsim.analysis.losses import NOTE, losses
 from ringsim.analysis.quantities import good, numbers, quantities
 from ringsim.analysis.requirements import OUTCOME
 from ringsim.analysis.tails import subset_simulation
@@ -53,6 +54,7 @@ def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
     single = "sample" not in first.dims
     one, other = (_numbered(each) for each in (first, second))
     placed = placement(one), placement(other)
+    notes = {side: losses(each).note for side, each in zip(SIDES, (one, other), strict=True)}
     one, other = population_of(one), population_of(other)
     pairs = _alone() if single else paired(one, other)
     found = xr.Dataset(
@@ -63,6 +65,7 @@ def compare(first: xr.Dataset, second: xr.Dataset) -> xr.Dataset:
             "intervals": next(
                 (p.told for p in placed if not single and (not p.has_intervals or p.block > 1)), ""
             ),
+            NOTE: "; ".join(f"{side}: {each}" for side, each in notes.items() if each),
         },
     )  # fmt: skip
     for name in quantities():

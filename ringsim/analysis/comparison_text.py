@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
+from ringsim.analysis.losses import NOTE, marked
 from ringsim.analysis.quantities import quantities
 from ringsim.tables import Table, interval_text, number_text, slim
 
@@ -17,6 +18,7 @@ def compared(found: xr.Dataset) -> list[str]:
     pairs = f" ({found.attrs['pairs']} pairs)" if found.attrs["pairs"] > 1 else ""
     lines = [f"{side}: {found.attrs[side]}" for side in ("first", "second") if found.attrs[side]]
     lines.append(f"{found.attrs['pairing']}{pairs}")
+    lines += [*filter(None, [found.attrs[NOTE]])]
     if found.attrs["intervals"]:
         lines.append(found.attrs["intervals"])
     for part in (_outcomes, _requirements, _outputs):
@@ -45,7 +47,7 @@ def _shares(found: xr.Dataset, word: str, dim: str, head: str) -> list[str]:
         "samples",
     )  # fmt: skip
     columns = 3 if found.attrs["pairs"] == 1 else len(names)
-    return slim(Table(names[:columns], [row[:columns] for row in rows])).lines()
+    return slim(marked(Table(names[:columns], [row[:columns] for row in rows]), found)).lines()
 
 
 def _requirements(found: xr.Dataset) -> Iterator[str]:
@@ -97,7 +99,8 @@ def _outputs(found: xr.Dataset) -> Iterator[str]:
     )  # fmt: skip
     if rows:
         columns = 7 if found.attrs["pairs"] == 1 else len(head)
-        yield from slim(Table(head[:columns], [row[:columns] for row in rows])).lines()
+        table = Table(head[:columns], [row[:columns] for row in rows])
+        yield from slim(marked(table, found)).lines()
 
 
 def _worse(found: xr.Dataset, name: str) -> str:

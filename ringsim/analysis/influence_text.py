@@ -7,6 +7,7 @@ import xarray as xr
 
 from ringsim.analysis.confounded import confounding_notes
 from ringsim.analysis.intervals import LEVEL, Array
+from ringsim.analysis.losses import marked
 from ringsim.analysis.quantities import quantities
 from ringsim.tables import Table, interval_text, number_text
 
@@ -65,7 +66,7 @@ def _correlated(analysis: xr.Dataset, outputs: Collection[str]) -> Table:
         notes.append(f"told are the largest of {len(names)} inputs: by chance alone {chance}")
         notes += confounding_notes(analysis, named)
     head = ("rank correlation", "correlation", "95 % interval", "partial", "95 % interval")
-    return Table((*head, "used"), rows, notes)
+    return marked(Table((*head, "used"), rows, notes), analysis)
 
 
 def _separated(analysis: xr.Dataset) -> Table:
@@ -82,7 +83,7 @@ def _separated(analysis: xr.Dataset) -> Table:
             for k in _largest(middle - 0.5, place)
         ]  # fmt: skip
     head = ("what separates", "probability that it is larger", "95 % interval", "samples")
-    return Table(head, rows, notes)
+    return marked(Table(head, rows, notes), analysis)
 
 
 def _largest(values: Array, place: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[int]:

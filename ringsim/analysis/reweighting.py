@@ -10,9 +10,11 @@ from pydantic import ValidationError
 
 from ringsim.analysis import weighted
 from ringsim.analysis.campaign_samples import called, inputs, paths_of
+from ringsim.analysis.capped import Cap, Pair
 from ringsim.analysis.design import Placement
-from ringsim.analysis.intervals import NONE, Array
-from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
+from ringsim.analysis.intervals import LEVEL, NONE, Array, Interval
+from ringsim.analysis.looks import rule_of
+from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import OUTCOME, Requirement
 from ringsim.analysis.verdicts import Verdict, verdict_of, violations
 from ringsim.choice import kind_of
@@ -71,14 +73,16 @@ def parse_reweighted(texts: Iterable[str]) -> dict[str, Any]:
     return found
 
 
-def weights_of(campaign: xr.Dataset, wanted: Mapping[str, Distribution]) -> Array:
-    """Weight of each sample, shape (samples,), the largest 1: the ratio of the densities.
+def weights_of(
+    campaign: xr.Dataset, wanted: Mapping[str, Distribution]
+) -> tuple[Array, dict[str, Pair]]:
+    """Weight of each sample, shape (samples,), the ratio of the densities; and these by path.
 
     An input of many places has the new distribution in each of them, independently.  InputError
     where an input was not drawn by itself, or its samples do not cover the new distribution.
     """
     known = {called(campaign[name]): campaign[name] for name in inputs(campaign)}
-    logarithm = np.zeros(campaign.sizes["sample"])
+    logarithm, pairs = np.zeros(campaign.sizes["sample"]), dict[str, Pair]()
     for path, new in wanted.items():
         if path not in known:
             hint = known_or_nearest(path, known) if known else "none is drawn"
@@ -90,8 +94,8 @@ def weights_of(campaign: xr.Dataset, wanted: Mapping[str, Distribution]) -> Arra
         _check_cover(path, old, new, len(values))
         ratio = new.log_density(values) - old.log_density(values)
         logarithm += ratio if ratio.ndim == 1 else ratio.sum(axis=1)
-    largest = logarithm.max()
-    return np.exp(logarithm - largest) if np.isfinite(largest) else np.zeros(len(logarithm))
+        pairs[path] = Pair(old, new, ratio[:1].size)
+    return np.exp(np.minimum(logarithm, 700.0)), pairs
 
 
 def _drawn_from(campaign: xr.Dataset, path: str, variable: xr.DataArray) -> Distribution:
@@ -160,12 +164,12 @@ def reweight(
     """
     if not placed.population:
         raise InputError(f"--reweight: {placed.told}")
-    weights = weights_of(campaign, wanted)
+    weights, pairs = weights_of(campaign, wanted)
     ok, gone, index = good(campaign), lost(campaign), campaign["sample"].to_numpy()
-    ran = ok | gone
-    if (count := weighted.effective(weights[ran])) < LEAST_EFFECTIVE:
+    run = ok | gone
+    if (count := weighted.effective(weights[run])) < LEAST_EFFECTIVE:
         raise InputError(
-            f"--reweight {', '.join(wanted)}: {ran.sum()} samples count as {count:.2g} effective "
+            f"--reweight {', '.join(wanted)}: {run.sum()} samples count as {count:.2g} effective "
             f"ones, must be at least {LEAST_EFFECTIVE:g}: choose a distribution nearer to the old "
             "one, reweight fewer inputs, or run a campaign with it"
         )
@@ -181,28 +185,44 @@ def reweight(
         ])  # fmt: skip
         about = {"long_name": f"reweighted estimates of: {name}", "units": variable.units}
         found[f"{name}_reweighted"] = "reweighted_statistic", rows[:, 0], about
-        found[f"{name}_reweighted_interval"] = ("reweighted_statistic", "bound"), rows[:, 1:], about
+        found[f"{name}_reweighted_interval"] = (
+            ("reweighted_statistic", "bound"),
+            rows[:, 1:3],
+            about,
+        )
+        found[f"{name}_decisive_samples"] = (
+            "reweighted_statistic", rows[:, 3],
+            {"long_name": "effective samples that decide each estimate", "units": "1"},
+        )  # fmt: skip
         found[f"{name}_effective_samples"] = (
             (), weighted.effective(weights[known]), {"long_name": "effective samples", "units": "1"}
         )  # fmt: skip
-    shares, words = list[tuple[float, ...]](), list[str]()
+    cap, shares, words = None, list[tuple[float, ...]](), list[str]()
     for word, (own, of) in _events(campaign, requirements, ok, gone).items():
-        of = of & (weights > 0)
         share, ends = weighted.mean(own[of].astype(float), weights[of]), NONE
-        if has_share_intervals(placed):
+        decisive = weighted.decisive_of_share(own[of], weights[of])
+        if has_share_intervals(placed) and decisive >= weighted.LEAST_OF_SHARE:
             ends = weighted.share_interval(own[of], weights[of], placed.replicate_of(index[of]))
+        elif has_share_intervals(placed):
+            cap = cap or Cap(pairs, int(run.sum()), (1 - LEVEL) / 2)
+            apart = own[run], (of & ~own)[run]
+            ends = _rarer(cap, *apart, weights[run], placed.replicate_of(index[run]))
         words.append(word)
-        shares.append((share, *ends))
-    told = np.array(shares).reshape(-1, 3)
+        shares.append((share, *ends, decisive))
+    told = np.array(shares).reshape(-1, 4)
     about = {"long_name": "share if inputs had the other distributions", "units": "1"}
     found["reweighted_share"] = "event", told[:, 0], about
-    found["reweighted_share_interval"] = ("event", "bound"), told[:, 1:], about
+    found["reweighted_share_interval"] = ("event", "bound"), told[:, 1:3], about
+    found["reweighted_share_decisive"] = (
+        "event", told[:, 3],
+        {"long_name": "effective samples of the event, or of the others if fewer", "units": "1"},
+    )  # fmt: skip
     if requirements and ok.any():
-        found |= _verdicts(campaign, requirements, placed, weights)
+        found |= _verdicts(campaign, requirements, placed, weights, pairs)
     found["effective_samples"] = (
         (), count, {"long_name": "effective samples of all that ran", "units": "1"}
     )  # fmt: skip
-    found["reweighted_samples"] = (), int(ran.sum()), {"long_name": "samples that ran"}
+    found["reweighted_samples"] = (), int(run.sum()), {"long_name": "samples that ran"}
     laws = {
         path: {"kind": kind_of(law), **law.model_dump(exclude_defaults=True)}
         for path, law in wanted.items()
@@ -215,20 +235,41 @@ def reweight(
     return xr.Dataset(found, coords=coords)
 
 
+def _rarer(
+    cap: Cap, own: Mask, others: Mask, weights: Array, replicate: weighted.Replicate
+) -> Interval:
+    """Interval of the share of some samples, whatever those that are neither own nor others would
+    have done, from bounds of the rarer ones.
+    """
+    rare, rest = (own, others) if weights @ own < weights @ others else (others, own)
+    low, high = (cap.bounds(each, weights, replicate) for each in (rare, ~rest))
+    ends = low[0], high[1]
+    return ends if rare is own else (1.0 - ends[1], 1.0 - ends[0])
+
+
 def _verdicts(
-    campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement, weights: Array
-) -> dict[str, Any]:
-    """Verdicts along ``requirement`` for the other distributions, by one-sided bounds."""
-    held, index = good(campaign) & (weights > 0), campaign["sample"].to_numpy()
-    rows = []
+    campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement,
+    weights: Array, pairs: Mapping[str, Pair],
+) -> dict[str, Any]:  # fmt: skip
+    """Verdicts along ``requirement`` for the other distributions, by one-sided bounds that count
+    lost runs as violating for the lower one and as keeping to it for the upper one.
+    """
+    held, run = good(campaign), ran(campaign)
+    replicate, rows = placed.replicate_of(campaign["sample"].to_numpy()[run]), []
+    rule = rule_of(campaign.attrs)
     for name, wanted in requirements.items():
-        kept, ends = ~violations(campaign, name, wanted)[held], NONE
+        broken, ends = violations(campaign, name, wanted), NONE
+        levels = wanted.confidence, wanted.confidence
+        if rule is not None:  # it ended the campaign by its results
+            levels = rule.levels(name, wanted, int(run.sum()), placed.replicates)
         if has_share_intervals(placed):
-            ends = weighted.share_bounds(
-                kept, weights[held], placed.replicate_of(index[held]), wanted.confidence
+            most, least = (
+                Cap(pairs, int(run.sum()), 1.0 - level).bounds(own[run], weights[run], replicate)
+                for level, own in zip(levels, (broken | ~held, broken), strict=True)
             )
+            ends = 1.0 - most[1], 1.0 - least[0]
         verdict = verdict_of(*ends, wanted.probability)
-        rows.append((verdict, weighted.mean(kept.astype(float), weights[held]), *ends))
+        rows.append((verdict, weighted.mean((~broken[held]).astype(float), weights[held]), *ends))
     told = np.array(rows)
     about = "probability to keep to it if inputs had the other distributions"
     return {
@@ -257,17 +298,21 @@ def has_share_intervals(placed: Placement) -> bool:
 
 def _told(
     values: Array, weights: Array, level: float | None, placed: Placement, replicate: Any
-) -> tuple[float, float, float]:
-    """Estimate of the mean, or of a quantile, and its interval if the design has some."""
+) -> tuple[float, ...]:
+    """Estimate of the mean, or of a quantile, its interval if the design has some, and how many
+    effective samples decide it.
+    """
     if level is None:
         middle, ends = weighted.mean(values, weights), NONE
         if placed.has_intervals:
             ends = weighted.mean_interval(values, weights, replicate)
-    else:
-        middle, ends = weighted.quantile(values, weights, level), NONE
-        if has_share_intervals(placed):
-            ends = weighted.quantile_interval(values, weights, level, replicate)
-    return (middle, *ends)
+        return (middle, *ends, weighted.decisive_of_mean(values, weights))
+    middle, ends = weighted.quantile(values, weights, level), NONE
+    if has_share_intervals(placed):
+        ends = weighted.quantile_interval(values, weights, level, replicate)
+    # Beyond the outermost weights there is no estimate, and nothing that would decide one.
+    decisive = weighted.decisive_of_share(values <= middle, weights) if np.isfinite(middle) else 0.0
+    return (middle, *ends, decisive)
 
 
 def _events(

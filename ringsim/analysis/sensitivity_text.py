@@ -8,6 +8,7 @@ import xarray as xr
 from ringsim.analysis.confounded import confounding_notes
 from ringsim.analysis.dependence import LEVEL
 from ringsim.analysis.intervals import Array
+from ringsim.analysis.losses import marked
 from ringsim.analysis.quantities import quantities
 from ringsim.tables import Table, counted, interval_text, number_text
 
@@ -70,7 +71,7 @@ def _told(analysis: xr.Dataset, names: tuple[str, ...], outputs: Outputs) -> Tab
             rows.append([*row, str(one["index_used"].item()), str(one["index_lost"].item())])
     notes = measure_notes(analysis)
     notes += confounding_notes(analysis, named) if dim == "input" else []
-    return Table([*head, f"{of} used", "lost"], rows, notes)
+    return marked(Table([*head, f"{of} used", "lost"], rows, notes), analysis)
 
 
 def _gate(analysis: xr.Dataset, only: Outputs) -> Iterator[str]:
@@ -188,4 +189,5 @@ def _second(analysis: xr.Dataset, outputs: Outputs) -> Table:
             ends = one["second_order_index_interval"].values[j, k]
             rows.append((f"{output} by {factors[k]} with {factors[j]}",
                          number_text(values[j, k], 2), _ends(ends)))  # fmt: skip
-    return Table(("what explains", "second-order index", "95 % interval"), rows)
+    head = ("what explains", "second-order index", "95 % interval")
+    return marked(Table(head, rows), analysis)

@@ -14,6 +14,7 @@ from ringsim.analysis.blocks import population_of
 from ringsim.analysis.design import Placement, placement
 from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import NONE, Array, Interval
+from ringsim.analysis.losses import LOST, NOTE, losses
 from ringsim.analysis.quantities import (
     CHECKED,
     good,
@@ -97,7 +98,7 @@ def analyse(
             "campaign_identity": campaign.attrs.get("identity", ""),
             "samples": campaign.sizes["sample"], "samples_run": int(ran(campaign).sum()),
             "design": placed.kind, "intervals": placed.told,
-            "stopping": "".join(stopping_lines(campaign, placed)),
+            "stopping": "".join(stopping_lines(campaign, placed)), NOTE: losses(campaign).note,
         },
     )  # fmt: skip
     found["part"].attrs = {
@@ -117,7 +118,33 @@ def analyse(
         more += [reweight(stand, wanted, placed, read_distributions(reweighted))]
     for part in more:
         found = found.merge(part, combine_attrs="override")
+    if note := found.attrs[NOTE]:
+        for name in _bent(found):
+            found[name].attrs[NOTE] = note
     return found
+
+
+def _bent(found: xr.Dataset) -> list[str]:
+    """The variables that lost runs bend if these go with inputs: those that the others alone tell.
+
+    Verdicts, their bounds and shares of outcomes count lost runs, and counts are what they are.
+    """
+    of_all = (
+        "verdict",
+        "outcome",
+        "tail",
+        "samples",
+        "missing",
+        "group",
+        "index_used",
+        "index_lost",
+    )
+    safe = ("_samples", "_lower", "_upper", "_required", "_bounds", "_verdict", "_text", "_units")
+    return [
+        str(name) for name, each in found.data_vars.items()
+        if not str(name).startswith(of_all) and not str(name).endswith(safe)
+        and each.dtype.kind == "f"
+    ]  # fmt: skip
 
 
 def _output(campaign: xr.Dataset, name: str, placed: Placement) -> dict[str, Any]:
@@ -225,27 +252,33 @@ def _root_mean_square(values: Array) -> float:
 def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
     """Counts and shares of what the antenna did, and of how runs were lost, along ``kind``.
 
-    Shares of outcomes are of the samples whose numbers hold, those of lost ones of all that ran.
+    Shares are of all that ran.  What lost ones would have done nobody knows: they are told beside
+    each outcome (``outcome_lost``), and its interval reaches from none of them to all.
     """
     ok, gone, index = good(campaign), lost(campaign), campaign["sample"].to_numpy()
     fates = campaign[OUTCOME].to_numpy() if OUTCOME in campaign else np.full(len(ok), Fate.NONE)
     status = campaign["status"].to_numpy()
+    of = ok | gone
     rows: dict[str, tuple[NDArray[np.bool_], NDArray[np.bool_]]] = {}
     for fate in Fate:
         word = fate.word if fate != Fate.NONE else "unknown"
-        rows[word] = (ok & (np.maximum(fates, 0) == fate), ok)
+        own = ok & (np.maximum(fates, 0) == fate)
+        rows[word] = own, own | gone
     for code in Status:
-        rows[f"lost: {code.word}"] = (gone & (status == code), ok | gone)
-    rows = {word: (own, of) for word, (own, of) in rows.items() if own.any()}
+        rows[f"{LOST}: {code.word}"] = (own := gone & (status == code)), own
+    rows = {word: (own, most) for word, (own, most) in rows.items() if own.any()}
     shares = np.full((len(rows), len(PARTS)), np.nan)
     ends, run = np.full((len(rows), 2), np.nan), np.flatnonzero(ran(campaign))
-    for k, (own, of) in enumerate(rows.values()):
+    for k, (own, most) in enumerate(rows.values()):
         for part, share in enumerate(PARTS):
             first = run[: round(share * len(run))]
             if of[first].any():
                 shares[k, part] = own[first].sum() / of[first].sum()
-        ends[k] = _share_interval(own[of], index[of], placed)
-    counts = [(own.sum(), of.sum()) for own, of in rows.values()]
+        ends[k] = [
+            _share_interval(each[of], index[of], placed)[side]
+            for side, each in enumerate((own, most))
+        ]
+    counts = [(own.sum(), most.sum() - own.sum()) for own, most in rows.values()]
     of_kind = {"long_name": "share of the kind", "units": "1"}
     population = placed.population
     return xr.Dataset(
@@ -255,13 +288,17 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
                 {"long_name": "samples of the kind", "units": "1"},
             ),
             "outcome_of": (
+                "kind", np.full(len(rows), of.sum(), dtype="i8"),
+                {"long_name": "samples of which the share is, all that ran", "units": "1"},
+            ),
+            "outcome_lost": (
                 "kind", np.array([n for _, n in counts], dtype="i8"),
-                {"long_name": "samples of which the share is", "units": "1"},
+                {"long_name": "lost samples, which may be of the kind, too", "units": "1"},
             ),
             "outcome_share": ("kind", shares[:, -1] if population else ends[:, 0], of_kind),
             "outcome_share_interval": (
                 ("kind", "bound"), ends,
-                {"long_name": "interval of 95 % of the share", "units": "1"},
+                {"long_name": "interval of 95 % of the share, lost samples or not", "units": "1"},
             ),
             "outcome_share_convergence": (
                 ("kind", "part"), shares if population else np.full_like(shares, np.nan),

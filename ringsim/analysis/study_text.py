@@ -10,6 +10,7 @@ from ringsim.analysis.blocks import population_of
 from ringsim.analysis.brief import digits_of, output_table, what_matters, what_separates
 from ringsim.analysis.design import placement
 from ringsim.analysis.influence_text import influence_tables
+from ringsim.analysis.losses import MARK, NOTE, losses, marked
 from ringsim.analysis.quantities import quantities
 from ringsim.analysis.requirements import OUTCOME, read_requirements
 from ringsim.analysis.reweighting_text import reweighting_lines
@@ -39,7 +40,8 @@ def told(analysis: xr.Dataset, folder: str = "DIR", *, full: bool = False) -> li
         counts += f", of which {run} have run"
     counts += f", design {analysis.attrs['design'] or 'unknown'}"
     title = analysis.attrs["title"]
-    lines = [f"{title}: {counts}" if title else counts, analysis.attrs["intervals"]]
+    lines = [f"{title}: {counts}" if title else counts]
+    lines += [*filter(None, [analysis.attrs[NOTE]]), analysis.attrs["intervals"]]
     if "tail_probability" in analysis:
         lines.append(
             "no input is told to matter: samples of a chain repeat each other, and levels lie "
@@ -47,7 +49,9 @@ def told(analysis: xr.Dataset, folder: str = "DIR", *, full: bool = False) -> li
         )
     if not full:
         lines.append("all statistics with intervals and convergence, and all inputs: --full")
-    lines += [*filter(None, [analysis.attrs["stopping"]]), *tail_lines(analysis)]
+    if stopping := analysis.attrs["stopping"]:
+        lines.append(stopping + MARK * bool(analysis.attrs[NOTE]))
+    lines += tail_lines(analysis)
     tables = [outcome_table(analysis)]
     if full:
         tables += [_outputs(analysis), error_table(analysis)]
@@ -73,16 +77,17 @@ def _known_errors(analysis: xr.Dataset) -> Table:
 def verdict_lines(campaign: xr.Dataset) -> list[str]:
     """The verdicts on the requirements of a merged campaign's own file; none without any."""
     own = json.loads(campaign.attrs.get("requirements", "{}"))
-    placed = placement(campaign)
+    placed, lost = placement(campaign), losses(campaign)
     found = xr.Dataset(tail(campaign), attrs={"samples": campaign.sizes["sample"]})
-    lines = stopping_lines(campaign, placed) + tail_lines(found)
+    lines = [*filter(None, [lost.note])]
+    lines += [line + lost.mark for line in stopping_lines(campaign, placed)] + tail_lines(found)
     if not own:
         return lines
     try:
         found = judge(population_of(campaign), read_requirements(own, "requirements"), placed)
     except InputError as error:
         return [*lines, f"the requirements cannot be judged: {error}"]
-    return [*lines, *verdict_table(found).lines()]
+    return [*lines, *verdict_table(found.assign_attrs({NOTE: lost.note})).lines()]
 
 
 def verdict_table(analysis: xr.Dataset) -> Table:
@@ -90,20 +95,25 @@ def verdict_table(analysis: xr.Dataset) -> Table:
     rows, notes = [], list[str]()
     for name in analysis["requirement"].values if "requirement" in analysis.dims else ():
         one = {str(n): v.item() for n, v in analysis.sel(requirement=name).items() if not v.dims}
-        verdict, worst = Verdict(one["verdict"]), Verdict(one["verdict_worst_case"])
+        verdict, alone = Verdict(one["verdict"]), Verdict(one["verdict_of_used"])
         further = one["further_samples"]
         rows.append((
             one["requirement_text"], f"{one['probability_required']:g}",
             f"{one['confidence_required']:g}", _words(verdict), number_text(one["probability"]),
             interval_text(one["probability_lower"], one["probability_upper"]),
             str(one["samples_used"]), str(one["samples_violating"]), str(one["samples_lost"]),
-            _words(worst) if one["samples_lost"] else "-", str(further) if further > 0 else "-",
+            _words(alone) if one["samples_lost"] else "-", str(further) if further > 0 else "-",
         ))  # fmt: skip
         if further > 0:
-            lost = counted(one["samples_lost"], "lost sample")
-            kept = f", if {lost} would not have violated it" * bool(one["samples_lost"])
             more = counted(further, "further sample")
+            taken = counted(one["samples_lost"], "lost sample")
+            kept = f", with {taken} as violations" * bool(one["samples_lost"])
             notes.append(f"{name}: {more} without a violation would show it{kept}")
+        if verdict != alone:
+            notes.append(
+                f"{name}: it would be {_words(alone)} if lost samples were as the others, which "
+                "nobody knows: run them again (ringsim campaign --retry-failed)"
+            )
         if not one["samples_used"]:
             notes.append(f"{name}: no sample has numbers that tell of it")
         if short := one.get("samples_short"):
@@ -120,9 +130,9 @@ def verdict_table(analysis: xr.Dataset) -> Table:
     head = (
         f"requirement{', as drawn' * ('reweighted_to' in analysis)}", "probability", "confidence",
         "verdict", "estimate", "one-sided bounds", "used", "violating", "lost",
-        "if lost ones violate", "further",
+        "if lost ones were as the others", "further",
     )  # fmt: skip
-    return Table(head, rows, notes)
+    return marked(Table(head, rows, notes), analysis, head.index("estimate"))
 
 
 def _words(verdict: Verdict) -> str:
@@ -134,7 +144,8 @@ def outcome_table(analysis: xr.Dataset) -> Table:
     rows = [
         (
             str(kind).replace("_", " "),
-            f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}",
+            f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}"
+            + f" ({one['outcome_lost'].item()} lost)" * bool(one["outcome_lost"].item()),
             number_text(one["outcome_share"].item()),
             interval_text(*one["outcome_share_interval"].values),
             *map(number_text, one["outcome_share_convergence"].values[:-1]),
@@ -175,7 +186,7 @@ def _outputs(analysis: xr.Dataset) -> Table:
         "output", "unit", "statistic", "estimate", "95 % interval", *_parts(), "used", "lost",
         "no value",
     )  # fmt: skip
-    return Table(head, rows)
+    return marked(Table(head, rows), analysis)
 
 
 def outputs_in(analysis: xr.Dataset) -> list[str]:
@@ -202,7 +213,7 @@ def error_table(analysis: xr.Dataset, names: Collection[str] | None = None) -> T
         "error of the mean of", "unit", "sampling (standard error)", "numerical (error bars)",
         "engines (difference)", "dominates",
     )  # fmt: skip
-    return Table(head, rows)
+    return marked(Table(head, rows), analysis)
 
 
 def dominating(errors: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:

@@ -1,4 +1,8 @@
-"""Verdicts on requirements: met, not met, or not yet shown, with exact bounds."""
+"""Verdicts on requirements: met, not met, or not yet shown, with exact bounds.
+
+They err on the safe side: nobody knows what lost runs would have done, so that they count as
+violating for "met", and as keeping to the requirement for "not met".
+"""
 
 from collections.abc import Mapping
 
@@ -89,7 +93,7 @@ def judge(
     found["requirement_text"] = (
         "requirement", np.array(told, dtype=object), {"long_name": "requirement in words"}
     )  # fmt: skip
-    for name in ("verdict", "verdict_worst_case"):
+    for name in ("verdict", "verdict_of_used"):
         found[name].attrs |= flags_of(Verdict)
     return found
 
@@ -99,11 +103,11 @@ _MEANING = {
     "confidence_required": ("confidence required of each bound", "f8"),
     "confidence_lower": ("confidence of the lower bound, more than required at many looks", "f8"),
     "confidence_upper": ("confidence of the upper bound, more than required at many looks", "f8"),
-    "verdict": ("verdict from the samples with numbers that hold", "i1"),
-    "verdict_worst_case": ("verdict if all lost samples violated the requirement", "i1"),
+    "verdict": ("verdict, whatever lost samples would have done", "i1"),
+    "verdict_of_used": ("verdict if lost samples were as the others", "i1"),
     "probability": ("share of the samples used that keep to the requirement", "f8"),
-    "probability_lower": ("one-sided lower bound of the probability", "f8"),
-    "probability_upper": ("one-sided upper bound of the probability", "f8"),
+    "probability_lower": ("one-sided lower bound of the probability, lost samples violating", "f8"),
+    "probability_upper": ("one-sided upper bound of the probability, lost samples keeping", "f8"),
     "samples_used": ("samples with numbers that hold", "i8"),
     "samples_lost": ("samples whose run failed", "i8"),
     "samples_violating": ("samples used that violate the requirement", "i8"),
@@ -144,28 +148,29 @@ def _judged(
     if rule is not None:
         levels = rule.levels(name, wanted, looked, placed.replicates)
     low, high = 0.0, 1.0
-    verdict = worst = Verdict.NOT_YET_SHOWN
+    verdict = alone = Verdict.NOT_YET_SHOWN
     if count:
-        low, high = bounds(~broken[used], place[used], levels, placed)
-        verdict = verdict_of(low, high, wanted.probability)
-    if count + missing:
+        alone = verdict_of(*bounds(~broken[used], place[used], levels, placed), wanted.probability)
         run = used | gone
-        ends = bounds(~(broken | gone)[run], place[run], levels, placed)
-        worst = verdict_of(*ends, wanted.probability)
+        low, high = (
+            bounds(kept[run], place[run], levels, placed)[k]
+            for k, kept in enumerate((~(broken | gone), ~broken))
+        )
+        verdict = verdict_of(low, high, wanted.probability)
     further = -1
     if count and verdict == Verdict.NOT_YET_SHOWN:
         if rule is not None and rule.judges(name):
-            further = rule.further_samples(name, wanted, looked, bad, placed.replicates)
+            further = rule.further_samples(name, wanted, looked, bad + missing, placed.replicates)
         else:
-            needed = samples_needed(bad, wanted.probability, wanted.confidence)
-            further = needed - count if needed > count else -1
+            needed = samples_needed(bad + missing, wanted.probability, wanted.confidence)
+            further = max(needed - count - missing, 0) or -1
     if not placed.population:
-        verdict = worst = Verdict.NO_POPULATION
+        verdict = alone = Verdict.NO_POPULATION
         low, high, further = np.nan, np.nan, -1
     return {
         "probability_required": wanted.probability, "confidence_required": wanted.confidence,
         "confidence_lower": levels[0], "confidence_upper": levels[1],
-        "verdict": verdict, "verdict_worst_case": worst,
+        "verdict": verdict, "verdict_of_used": alone,
         "probability": 1.0 - bad / count if count else np.nan,
         "probability_lower": low, "probability_upper": high,
         "samples_used": count, "samples_lost": missing, "samples_violating": bad,

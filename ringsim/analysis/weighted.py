@@ -10,13 +10,25 @@ from ringsim.analysis.ranks import replicate_interval
 
 _FEW = 10
 """Samples of a kind, and of the others, below which replicates do not tell its share."""
+LEAST_OF_SHARE = 10.0
+"""Effective samples on either side below which the scatter of weights tells no interval of a share
+or a quantile: what matters may be where there is hardly a sample.
+"""
+LEAST_OF_MEAN = 50.0
+"""Effective samples that decide a mean below which its interval is too short: with 300 samples and
+weights exp(0.6 x) it holds the mean of x in 94 of 100 campaigns (110 decide), that of exp(x) in 86
+(43), and with exp(1.2 x) in 85 (42) and 71 (18).
+"""
 Replicate = NDArray[np.int64] | None
 """The replicate that each sample belongs to; None if all are independent."""
 
 
 def effective(weights: Array) -> float:
     """Number of samples of equal weight that would tell as much; Kish, Survey Sampling (1965)."""
-    return float(weights.sum() ** 2 / (weights**2).sum()) if len(weights) else 0.0
+    if not len(weights) or weights.max() == 0.0:
+        return 0.0
+    own = weights / weights.max()  # squares of large ones would overflow
+    return float(own.sum() ** 2 / (own**2).sum())
 
 
 def mean(values: Array, weights: Array) -> float:
@@ -54,15 +66,6 @@ def _error(values: Array, weights: Array, centre: float) -> float:
     return float(np.sqrt(squares * (1 + 1 / free)) / weights.sum())
 
 
-def share_bounds(own: Mask, weights: Array, replicate: Replicate, confidence: float) -> Interval:
-    """The lower and the upper one-sided bound of the weighted share of some samples, each with the
-    confidence by itself, from 0.5 on: the ends of ``share_interval`` of the level that leaves out
-    as much on either side.
-    """
-    # At a confidence of one half the interval has no length, and its degrees of freedom no sense.
-    return share_interval(own, weights, replicate, max(2 * confidence - 1, 0.01))
-
-
 def share_interval(
     own: Mask, weights: Array, replicate: Replicate, level: float = LEVEL
 ) -> Interval:
@@ -91,6 +94,16 @@ def share_interval(
     return float(low), float(high)
 
 
+def decisive_of_mean(values: Array, weights: Array) -> float:
+    """Effective number of samples that decide the error of a weighted mean."""
+    return effective(np.abs(weights * (values - mean(values, weights))))
+
+
+def decisive_of_share(own: Mask, weights: Array) -> float:
+    """Effective number of samples of the kind, or of the others where these are fewer."""
+    return min(effective(weights[own]), effective(weights[~own]))
+
+
 def quantile(values: Array, weights: Array, probability: float) -> float:
     """Quantile of the weighted distribution; NaN beyond the middles of the outermost weights."""
     order = np.argsort(values)
@@ -108,7 +121,7 @@ def quantile_interval(
     Source: Woodruff, J. Am. Statistical Association 47 (1952).
     """
     middle = quantile(values, weights, probability)
-    if np.isnan(middle):
+    if np.isnan(middle) or decisive_of_share(values <= middle, weights) < LEAST_OF_SHARE:
         return NONE
     low, high = share_interval(values <= middle, weights, replicate)
     found = quantile(values, weights, low), quantile(values, weights, high)

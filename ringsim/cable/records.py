@@ -58,20 +58,32 @@ class Winch(Model):
             )
         return self
 
+    def breaks(self) -> list[float]:
+        """Times at which the winch starts or stops, or its law bends, s."""
+        bends = [self.start_time + time for time in (0.0, *self.winding.breaks())]
+        if self.stop_time is None:
+            return bends
+        return [*(time for time in bends if time < self.stop_time), self.stop_time]
+
     def turns(self, time: float) -> bool:
         """Whether the motor is switched on at a time (s)."""
         return self.start_time <= time and (self.stop_time is None or time < self.stop_time)
 
-    def at(self, time: float, held: float = 0.0) -> tuple[float, float]:
+    def at(
+        self, time: float, held: float = 0.0, *, moment: float | None = None
+    ) -> tuple[float, float]:
         """Rope wound (m) and its rate (m/s) at a time (s) by a prescribed law.
 
         A law with feedback prescribes neither: the drum holds the rope that it has, ``held``.
+        Where the rate jumps it is that of a ``moment`` (s) beside that time.
         """
+        moment = time if moment is None else moment
         if not isinstance(self.winding, PrescribedWinding):
             return held, 0.0
         last = time if self.stop_time is None else min(time, self.stop_time)
         clock = max(last - self.start_time, 0.0)
-        rate = self.winding.wound_rate(clock) if self.turns(time) else 0.0
+        running = max(moment - self.start_time, 0.0)
+        rate = self.winding.wound_rate(running) if self.turns(moment) else 0.0
         return self.winding.wound(clock), rate
 
     def locked(self, time: float, tension: float) -> Self:

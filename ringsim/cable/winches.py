@@ -5,12 +5,22 @@ end of the step, which depends on the rope wound during the step and on where th
 to: with V the speed of all such winches of a rope, h the time into the step, S its path and M its
 natural length without V,
 
-    V = sum_i command_i(r_i(V) q(y)),   y = EA (S / (M - V h) - 1 + t_d de/dt),
+    V = sum_i command_i(r_i(V) q(y)),   y = EA (S / (M - W(V)) - 1 + t_d de/dt),
 
 r_i(V) the ratio of the tension at a winch to the rope's mean tension, were the n winches of the
-rope to turn at V / n each while the structure moves as at the beginning of the step.  Commands
-fall with the tension and y grows with V, so there is one solution for any EA and step.  A law that
-follows the structure uses the path taken up so far in the step, S_0 - S, not the rate at its start.
+rope to turn at V / n each while the structure moves as at the beginning of the step.  The rope that
+they wind in the step follows from backward differences of second order, with g the mean speed of
+the step before and r = h over its length,
+
+    W(V) = h ((1 + r) V + r median(0, g, 2 V)) / (1 + 2 r);   W(V) = h V behind a jump.
+
+The median lets a drum that comes to a standstill wind nothing more: W has the sign of V.  Commands
+fall with the tension, W and y grow with V, so there is one solution for any EA and step.  A law
+that follows the structure takes the speed V* for its rate with which W(V*) is the path taken up so
+far in the step, S_0 - S: not the rate at its start.
+
+A step has the winches that turn behind its begin; where prescribed speeds jump, its end has those
+before the jump.  So steps must end where a law begins, bends or ends (``Winch.breaks``).
 """
 
 import math
@@ -24,6 +34,7 @@ from ringsim.cable.records import Cable, Winch
 from ringsim.cable.ropes import Array, Ropes
 from ringsim.cable.state import ChainState
 from ringsim.cable.winding.family import FeedbackWinding, WinchReading
+from ringsim.parts.faults.family import AT_ONCE
 
 _NUDGE = 1e-8
 """Change of path in m by which the answer of the winches to the structure is measured: a hundred
@@ -43,14 +54,43 @@ class _Rope:
     path: float
     material: list[float]
     """EA (N), Kelvin-Voigt time (s) and width of the passage from slack to taut (N)."""
-    members: dict[tuple[int, int], tuple[FeedbackWinding, WinchReading]]
-    """Laws and readings by cable and end (0 first, 1 far)."""
+    members: dict[tuple[int, int], tuple[FeedbackWinding, WinchReading, float]]
+    """Laws, readings and how fast ``path_slope`` changes (m/rad/s) by cable and end (0 first, 1
+    far)."""
     total: float
     """Speed of all members at which they last balanced the rope, m/s."""
+    before: tuple[float, float] | None = None
+    """Time (s) and rope wound (m) of the same members in the step before; None behind a jump."""
     gain: float = 1.0
     """How fast their excess over the commands rose with it there."""
     known: tuple[tuple[float, ...], Array] | None = None
     """The last question and its answer: a tangent asks what its residual has asked."""
+
+    def weights(self, elapsed: float) -> tuple[float, float, float]:
+        """So long after the beginning of the step (s): times (s) for which the speed V and the mean
+        speed g of the step before count, and g (m/s).
+        """
+        if self.before is None or elapsed == 0.0:
+            return elapsed, 0.0, 0.0
+        last, wound = self.before
+        ratio = elapsed / last
+        past = elapsed * ratio / (1.0 + 2.0 * ratio)
+        return elapsed - past, past, wound / last
+
+    def wound(self, elapsed: float, total: float) -> float:
+        """Rope that all members have wound since the beginning of the step, m."""
+        own, past, mean = self.weights(elapsed)
+        return own * total + past * _median(0.0, mean, 2.0 * total)
+
+    def takeup(self, elapsed: float, taken: float, rate: float) -> float:
+        """Speed (m/s) with which the members would have wound what the structure has given free
+        since the beginning of the step (m), or gives at this rate (m/s).
+        """
+        own, past, mean = self.weights(elapsed)
+        if elapsed == 0.0:
+            return rate
+        # W is the median of three rising lines, so that its inverse is the median of theirs.
+        return _median(taken / own, (taken - past * mean) / own, taken / (own + 2.0 * past))
 
     def speeds(
         self, elapsed: float, path: float, rate: float, natural: float, rest: float
@@ -70,14 +110,23 @@ class _Rope:
     ) -> Array:
         """The answer, by a search from the last one."""
         count, (stiffness, damping_time, width) = len(self.members), self.material
-        follow = (path - self.path) / elapsed if elapsed > 0.0 else rate
+        given = self.path - path - rest * elapsed
+        follow = -self.takeup(elapsed, given, -rate - rest)
         laws = [
-            (law, replace(reading, path_rate=(follow + rest) / count), law.limits())
-            for law, reading in self.members.values()
+            (
+                law,
+                replace(
+                    reading,
+                    path_rate=follow / count,
+                    path_slope=reading.path_slope + elapsed * bend,
+                ),
+                law.limits(),
+            )
+            for law, reading, bend in self.members.values()
         ]
 
         def commands(total: float) -> list[float]:
-            left = natural - total * elapsed
+            left = natural - self.wound(elapsed, total)
             strain_rate = (rate + path / left * (total + rest)) / left
             force = stiffness * (path / left - 1.0 + damping_time * strain_rate)
             # slack.tension of one number: numpy takes ten times as long in the root finder.
@@ -97,6 +146,10 @@ class _Rope:
         found = np.array(commands(total))
         # Steep commands amplify the last bits of the total: share these out.
         return np.asarray(found + (total - found.sum()) / count)
+
+
+def _median(a: float, b: float, c: float) -> float:
+    return max(min(a, b), min(max(a, b), c))
 
 
 def root_of_rising(
@@ -150,6 +203,8 @@ class Winches:
             for end, winch in enumerate(cable.winches)
         }
         self._start, self._held = 0.0, np.zeros((len(cables), 2))
+        self._slopes = np.zeros(len(cables))
+        self._turning: dict[tuple[int, int], FeedbackWinding] = {}
         self._ahead: dict[tuple[int, int], float] = {}
         self._ropes: dict[int, _Rope] = {}
 
@@ -181,16 +236,22 @@ class Winches:
         elapsed, asked = self._asked(time, ropes, paths, rates, wound, speed)
         for k, rope in self._ropes.items():
             answer = rope.speeds(elapsed, *asked[k])
+            total = float(answer.sum())
+            # All share what they wind together by their speeds.
+            lasting = rope.wound(elapsed, total) / total if total else elapsed
             for place, found in zip(rope.members, answer, strict=True):
                 speed[place] = found
-                wound[place] += found * elapsed
+                wound[place] += found * lasting
         return wound, speed
 
     def _prescribed(self, time: float) -> tuple[Array, Array]:
         """As ``at``, while all that answer to their ropes stand still."""
-        wound, speed = self._held.copy(), np.zeros_like(self._held)
+        wound, speed, begin = self._held.copy(), np.zeros_like(self._held), self._start
+        inside = max(time - AT_ONCE, 0.5 * (begin + time))
+        moment = inside if time > begin else time + AT_ONCE
         for place, winch in self._winches.items():
-            wound[place], speed[place] = winch.at(time, float(self._held[place]))
+            held = float(self._held[place])
+            wound[place], speed[place] = winch.at(time, held, moment=moment)
         for place, more in self._ahead.items():
             wound[place] += more
         return wound, speed
@@ -203,29 +264,41 @@ class Winches:
         asked = np.stack([paths, rates, natural, ropes.per_rope(speed)], axis=-1)
         return time - self._start, asked.tolist()
 
-    def memory(self) -> list[Any]:
-        """Every winch as it is by now: cable, end, table, and what it has wound beyond its law."""
-        return [
-            [*place, winch.model_dump(mode="json"), self._ahead.get(place, 0.0)]
+    def memory(self) -> dict[str, Any]:
+        """Every winch as it is by now: cable, end, table, what it has wound beyond its law, and
+        whether it answered in the last step; and from what that began.
+        """
+        rows = [
+            [*place, winch.model_dump(mode="json"), self._ahead.get(place, 0.0),
+             place in self._turning]
             for place, winch in self._winches.items()
-        ]
+        ]  # fmt: skip
+        return {"winches": rows, "begun": [self._start, self._held, self._slopes]}
 
     def go_on(
-        self, memory: list[Any], before: Sequence[Cable], time: float, wound: Array, rate: Array
+        self,
+        memory: dict[str, Any],
+        before: Sequence[Cable],
+        time: float,
+        wound: Array,
+        rate: Array,
     ) -> None:
         """Go on at a time (s) from a memory of winches that were those of the cables ``before``.
 
         Rope wound (m) and its rate (m/s) are of shape (cables, 2).  A winch that is another one now
         begins with the rope that is on its drum; its rate is entered.
         """
-        for number, end, table, ahead in memory:
+        self._start, self._held, self._slopes = memory["begun"]
+        for number, end, table, ahead, turning in memory["winches"]:
             place = number, end
             if self._winches[place] == before[number].winches[end]:
-                self._winches[place] = Winch.model_validate(table)
+                winch = self._winches[place] = Winch.model_validate(table)
+                if turning and isinstance(winch.winding, FeedbackWinding):
+                    self._turning[place] = winch.winding
             elif isinstance(self._winches[place].winding, FeedbackWinding):
                 continue
             else:
-                by_law, rate[place] = self._winches[place].at(time)
+                by_law, rate[place] = self._winches[place].at(time, moment=time + AT_ONCE)
                 ahead = float(wound[place]) - by_law
             if ahead and not isinstance(self._winches[place].winding, FeedbackWinding):
                 self._ahead[place] = ahead
@@ -239,7 +312,7 @@ class Winches:
 
     def driving(self, time: float, state: ChainState) -> bool:
         """Whether any winch turns or will turn on a rope that is whole."""
-        return driving(self._winches, time, state)
+        return driving(self._winches, time + AT_ONCE, state)
 
     def stiffness_left(self, time: float, ropes: Ropes, paths: Array, rates: Array) -> Array:
         """Share of a change of path that stretches the rope, not answered by its winches."""
@@ -247,22 +320,33 @@ class Winches:
         elapsed, asked = self._asked(time, ropes, paths, rates, *self._prescribed(time))
         for k, rope in self._ropes.items():
             path, *rest = asked[k]
-            near = rope.speeds(elapsed, path, *rest).sum()
-            far = rope.speeds(elapsed, path + _NUDGE, *rest).sum()
-            left[k] += elapsed * float(far - near) / _NUDGE
+            near, far = (
+                rope.wound(elapsed, float(rope.speeds(elapsed, at, *rest).sum()))
+                for at in (path, path + _NUDGE)
+            )
+            left[k] += (far - near) / _NUDGE
         return np.clip(left, 0.0, 1.0)
 
     def advance(self, time: float, state: ChainState, slopes: Array) -> None:
         """Begin a step at ``time`` (s) in a state of the chain.
 
-        ``slopes`` are those of ``path_slopes``.
+        ``slopes`` are those of ``path_slopes``.  Called twice at one time it begins anew, as behind
+        a jump: what turned before no longer counts.
         """
-        self._start, self._held, self._ropes = time, state.wound, {}
+        last, moved, past = time - self._start, state.wound - self._held, self._turning
+        bends = (slopes - self._slopes) / last if last > 0.0 else 0.0 * slopes
+        self._start, self._held, self._slopes, self._ropes = time, state.wound, slopes, {}
         for place, winch in self._winches.items():
-            if isinstance(winch.winding, FeedbackWinding) and winch.turns(time):
+            if isinstance(winch.winding, FeedbackWinding) and winch.turns(time + AT_ONCE):
                 k = int(state.ropes.of_end[place])
                 begun = _Rope(float(state.paths[k]), state.material[:, k].tolist(), {}, 0.0)
                 reading = state.reading(*place, float(slopes[place[0]]))
                 rope = self._ropes.setdefault(k, begun)
-                rope.members[place] = winch.winding, reading
+                rope.members[place] = winch.winding, reading, float(bends[place[0]])
                 rope.total += float(state.wound_rate[place])
+        self._turning = {}
+        for rope in self._ropes.values():
+            laws = {place: law for place, (law, *_) in rope.members.items()}
+            if last > 0.0 and all(past.get(place) is law for place, law in laws.items()):
+                rope.before = last, sum(float(moved[place]) for place in laws)
+            self._turning |= laws

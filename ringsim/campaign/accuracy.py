@@ -164,7 +164,9 @@ def _quadrature(scene: Scene) -> list[Truth]:
     conservative = not scene.joints.present() and (scene.net is None or scene.net.lossless)
     if kind_of(scene.structure) != "pantograph-ring" or not scene.structure.closed:
         return []  # the quadrature keeps an arc's end assemblies upright, but they swing
-    if not conservative or scene.cables is not None or scene.faults or scene.loads is None:
+    if not conservative or scene.cables is not None or scene.faults:
+        return []
+    if scene.loads is None or scene.loads.reversal_time is not None:
         return []
     try:
         found = opening_time(OneCoordinate(scene), scene.structure.coordinate)

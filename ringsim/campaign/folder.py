@@ -1,6 +1,7 @@
 """A campaign's folder: its design, its identity, whether it may be gone on with; its merging."""
 
 import contextlib
+import functools
 import hashlib
 import json
 import os
@@ -12,11 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim import build
 from ringsim.analysis.requirements import to_json
 from ringsim.campaign.specification import SOLVERS, Campaign, flat
 from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError, show
 from ringsim.sampling.columns import Table
+from ringsim.sampling.values import plain
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.journal import FOLDER, Survey, survey
 from ringsim.storage.locks import GO_ON, locked, tries
@@ -40,8 +43,15 @@ class Folder:
         return replace(self, table=self.table.first(samples))
 
     def survey(self, *, checks: bool = False) -> Survey:
-        """What it holds of every sample, or of every sample's check."""
-        return survey(self.path, self.attributes["identity"], self.table.samples, checks=checks)
+        """What it holds of every sample, or of every sample's check; InputError if something was
+        run with anything else than its design says.
+        """
+        return survey(self.path, self.run_with, checks=checks)
+
+    @functools.cached_property
+    def run_with(self) -> list[str]:
+        """For each sample the digest of what it is run with."""
+        return digests(self.table, self.attributes)
 
     @property
     def checked(self) -> NDArray[np.int64]:
@@ -62,6 +72,11 @@ class Folder:
 def open_folder(path: Path) -> Folder:
     """The campaign in a folder; InputError if there is none."""
     table, attributes = read_design(path)
+    if "sources" not in attributes:
+        raise InputError(
+            f"{path}: an older ringsim began this campaign, and its results do not say what they "
+            "were run with: read its campaign.nc, and choose another folder with --out to run it"
+        )
     scene = scene_from_toml(attributes["scene"], source=f"{path / DESIGN}: scene")
     return Folder(path, table, scene, attributes)
 
@@ -138,8 +153,7 @@ def _write(campaign: Campaign, path: Path, table: Table, solver: str, judge: str
             "check_every": wanted.check_every, "judge": judge,
             "max_difference": json.dumps(wanted.max_difference),
         }  # fmt: skip
-    content = json.dumps(_decisive(table, attributes), sort_keys=True)
-    attributes["identity"] = hashlib.sha256(content.encode()).hexdigest()[:32]
+    attributes["identity"] = _identity(table, attributes)
     for draft in path.glob(f".{DESIGN}.*{DRAFT}"):
         draft.unlink(missing_ok=True)
     write_design(path, table, attributes)
@@ -150,7 +164,7 @@ def _decisive(table: Table, attributes: dict[str, Any]) -> dict[str, Any]:
     return {
         "its scene": attributes["scene"],
         "its seed": int(attributes["seed"]),
-        "the version of ringsim": attributes["ringsim_version"],
+        "the build of ringsim": attributes["sources"],
         "the version of exudyn": attributes["exudyn_version"],
         "its inputs": [column.path for column in table.columns],
         "its solver": attributes["solver"],
@@ -159,15 +173,60 @@ def _decisive(table: Table, attributes: dict[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _identity(table: Table, attributes: dict[str, Any]) -> str:
+    content = json.dumps(_decisive(table, attributes), sort_keys=True)
+    return hashlib.sha256(content.encode()).hexdigest()[:32]
+
+
+def digests(table: Table, attributes: dict[str, Any]) -> list[str]:
+    """Digest of all that decides about the result of each sample of a table, its inputs too."""
+    key = _identity(table, attributes).encode()
+    columns = [(f"{column.path} ", column.values) for column in table.columns if column.path]
+    found = []
+    for sample in range(table.samples):
+        own = hashlib.blake2b(key=key, digest_size=8)
+        for path, values in columns:
+            own.update(path.encode())
+            if values.dtype.kind in "biuf":
+                own.update(values[sample].tobytes())
+            else:
+                own.update(json.dumps(plain(values[sample]), sort_keys=True).encode())
+        found.append(own.hexdigest())
+    return found
+
+
+def other_build(old: Folder) -> str:
+    """That another build began a folder, with the names of both; empty if it was this one."""
+    mine = build.provenance()
+    if old.attributes["sources"] == mine["sources"]:
+        return ""
+    return " began this campaign, and this is ".join(
+        f"ringsim {each['ringsim_version']} (sources {each['sources']}, commit "
+        f"{each['git_commit']})"
+        for each in (old.attributes, mine)
+    )
+
+
+def require_this_build(old: Folder) -> None:
+    """Refuse (InputError) to go on with what another build began: its models may differ."""
+    if told := other_build(old):
+        raise InputError(
+            f"{old.path}: {told}: results of different models do not go into one folder: go on "
+            "with that build, or choose another folder with --out"
+        )
+
+
 def opened_as(campaign: Campaign, path: Path, table: Table, solver: str) -> Folder | None:
     """The campaign's folder, None if it is not there yet; InputError if it is another one's."""
     if not (path / DESIGN).exists():
         return None
     old = open_folder(path)
+    require_this_build(old)
     held = _decisive(old.table, old.attributes)
     mine = {
         "scene": campaign.scene.to_toml(), "seed": campaign.specification.seed, "solver": solver,
-        **{f"{name}_version": version(name) for name in ("ringsim", "exudyn", "numba")},
+        "sources": build.sources(),
+        **{f"{name}_version": version(name) for name in ("exudyn", "numba")},
     }  # fmt: skip
     wanted = _decisive(table, mine)
     what = " and ".join(word for word in wanted if wanted[word] != held[word])

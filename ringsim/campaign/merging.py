@@ -16,9 +16,10 @@ from ringsim.variables import Fidelity
 
 _KEPT = (
     "identity", "seed", "solver", "campaign", "campaign_name", "scene", "output", "design",
-    "requirements", "check_every", "judge", "max_difference", "stop_when", "suspects",
+    "requirements", "check_every", "judge", "max_difference", "stop_when", "suspects", "source",
+    "ringsim_version", "git_commit", "sources", "exudyn_version", "numba_version",
 )  # fmt: skip
-"""Attributes of the design that a merged file has, too."""
+"""Attributes of the design that a merged file has, too: what it was run with, whoever merges."""
 
 
 def merge(campaign: Folder, *, execution: str, partly: bool) -> tuple[int, int, Path | None]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ringsim.analysis.confounded import pairs
 from ringsim.analysis.design import placement_of
-from ringsim.campaign.folder import opened_as
+from ringsim.campaign.folder import digests, opened_as
 from ringsim.campaign.growing import grown
 from ringsim.campaign.start import Order
 from ringsim.campaign.status import in_words
@@ -41,8 +41,8 @@ def plan(order: Order, workers: int) -> list[str]:
     campaign, share = grown(order.campaign, order.folder), order.share
     table = campaign.draw()
     old = opened_as(campaign, order.folder, table, order.solving)
-    identity = old.attributes["identity"] if old is not None else ""
-    found = survey(order.folder, identity, table.samples)
+    run_with = [""] * table.samples if old is None else digests(table, old.attributes)
+    found = survey(order.folder, run_with)
     todo = found.missing[share.holds(found.missing)]
     design = campaign.specification.design
     lines = [
@@ -75,7 +75,7 @@ def plan(order: Order, workers: int) -> list[str]:
         most = float(one) * (design.most_runs - done) / workers
     if every := campaign.specification.check_every:
         checked = np.arange(0, table.samples, every)
-        judged = survey(order.folder, identity, table.samples, checks=True)
+        judged = survey(order.folder, run_with, checks=True)
         open_ = np.intersect1d(checked, judged.missing)
         open_ = open_[share.holds(open_)]
         lines.append(

@@ -104,13 +104,15 @@ def run_campaign(folder: Path, choices: Choices) -> int:
 def _run_missing(campaign: Folder, choices: Choices, stop: StopRequest) -> None:
     scheduler = choices.scheduler
     writer = f"{choices.share.writer}-rank{scheduler.rank}"
-    journal = Journal(campaign.path, campaign.attributes["identity"], writer)
-    own = dict(choices.overrides)
+    journal = Journal(campaign.path, writer)
+    own, run_with = dict(choices.overrides), campaign.run_with
     work = Work(
         solver=campaign.attributes["solver"], scene=campaign.scene.to_table(),
         values_of=lambda number: campaign.table.values_of(sample_of(number)) | own,
         allowance=choices.allowance, judge=campaign.attributes.get("judge", ""),
-        keep=lambda result: journal.append(replace(result, overrides=own)),
+        keep=lambda result: journal.append(
+            replace(result, overrides=own, run_with=run_with[sample_of(result.sample)])
+        ),
         stop=lambda: stop.reason, more=choices.more,
     )  # fmt: skip
     samples: list[int] = []

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ringsim.campaign.folder import open_folder, prepare_folder
+from ringsim.campaign.folder import open_folder, prepare_folder, require_this_build
 from ringsim.campaign.growing import grown, grows, is_open
 from ringsim.campaign.retry import FAILED, check_settings
 from ringsim.campaign.run import Choices, Share, run_campaign
@@ -64,12 +64,16 @@ class Order(NamedTuple):
         if not (self.again and (self.folder / DESIGN).exists()):
             campaign = grown(self.campaign, self.folder)
             prepare_folder(campaign, self.folder, solver=self.solving, judge=self.judge)
+            open_folder(self.folder).survey()  # here, where a refusal reaches all ranks
             return grows(campaign) and not self.again and is_open(campaign)
-        if (begun := open_folder(self.folder).attributes["campaign_name"]) != name:
+        begun = open_folder(self.folder)
+        if (held := begun.attributes["campaign_name"]) != name:
             raise InputError(
-                f"{self.folder}: this folder holds the campaign {begun}, not {name}: choose its "
+                f"{self.folder}: this folder holds the campaign {held}, not {name}: choose its "
                 "folder with --out"
             )
+        require_this_build(begun)
+        begun.survey()
         return False
 
     @property

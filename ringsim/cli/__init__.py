@@ -110,12 +110,8 @@ class _Told:
 
 
 def main() -> None:
-    """Entry point of the command ``ringsim``."""
+    """The command ``ringsim``, see ``ringsim.__main__``."""
     sys.stdout = _Told(sys.stdout)
-    # Before numpy is loaded: its matrices are small here, and threads that wait for each other
-    # cost half as much again as the run.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
     try:
         code = cli(standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:

@@ -24,8 +24,10 @@ from ringsim.engine.settings import newton_norm, solver_settings
 from ringsim.engine.shape import ShapeMeter
 from ringsim.outputs.recorder import Recorder
 from ringsim.outputs.series import Reading
+from ringsim.parts.faults.family import AT_ONCE
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
+from ringsim.stepping.events import Events
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks
@@ -81,6 +83,7 @@ class Integration:
         self._latches = Latches(scene)
         locks = Locks(angles, stowed, scene.structure.planes, self._latches)
         self._locks = locks if scene.structure.locks else None
+        self._events, self._turn = Events(scene), scene.loads_turn_at
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
@@ -93,6 +96,7 @@ class Integration:
             self._locks,
             limits=scene.limits,
             follow_deviations=scene.record.stress,
+            turn=scene.loads_turn_at,
         )
 
     def run(self) -> Recorder:
@@ -150,25 +154,29 @@ class Integration:
 
     def _update_time(self, solver: Any, system: Any, settings: Any) -> None:
         """Set the step: the next one, or the reduced one of a retry."""
-        control, cables = self._control, self._built.cables
+        control = self._control
         if self._fresh:
-            solver.it.currentStepSize = control.next_step(self._built.faults.next_time)
+            solver.it.currentStepSize = control.next_step(self._events.after(control.now.time))
             self._fresh = False
-            if cables is not None and self._chain is not None:
-                now, slope, present = control.now, self._scene.structure.path_slope, cables.present
-
-                def slope_of(number: int) -> float:
-                    plane, cable = present[number]
-                    return slope(cable, now.angles[plane])
-
-                slopes = cables.winches.path_slopes(slope_of)
-                cables.advance(now.time, self._chain, slopes)
+            self._begin(control.now)
         else:
             solver.it.currentStepSize = control.retry(solver.it.currentStepSize)
         self._built.model.assembly.dry_joints.begin()
         self._weighed, self._refused = None, False
         solver.it.currentTime = solver.it.currentTime + solver.it.currentStepSize
         system.systemData.SetTime(solver.it.currentTime, exu.ConfigurationType.Current)
+
+    def _begin(self, now: Instant) -> None:
+        """Let winches begin a step."""
+        cables, slope = self._built.cables, self._scene.structure.path_slope
+        if cables is None or self._chain is None:
+            return
+
+        def path_slope(number: int) -> float:
+            plane, cable = cables.present[number]
+            return slope(cable, now.angles[plane])
+
+        cables.advance(now.time, self._chain, cables.winches.path_slopes(path_slope))
 
     def _weigh(self, system: Any, time: float) -> list[float]:
         """Have exudyn repeat a step that has converged to a state that is not good enough."""
@@ -210,11 +218,14 @@ class Integration:
                     cables.winches.lock(number, time, self._chain)
 
     def _read(self, now: Instant) -> Instant:
-        """Note a state that the run goes on from; returns it as faults that strike there leave it.
+        """Note a state that the run goes on from; returns it as events leave it.
 
         ``self._chain`` holds the cables at the state that was measured last, which is this one.
         """
-        if self._built.faults.strike(now.time, now.angles, self._chain):
+        struck = self._built.faults.strike(now.time, now.angles, self._chain)
+        if struck | self._turn_loads(now.time) or self._events.at(now.time):
+            self._energy.go_on_from(now.energies.work, self._state)
+            self._begin(now)
             after = self._measure(now.time)
             # What a fault lets go is lost; nothing moves while it strikes.
             lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
@@ -237,6 +248,14 @@ class Integration:
             )
         )
         return now
+
+    def _turn_loads(self, time: float) -> bool:
+        """Turn the loads round if it is time (s); returns whether it was."""
+        due = self._turn <= time + AT_ONCE
+        if due:
+            self._turn = math.inf
+            self._built.model.turn_loads()
+        return due
 
     def _measure(self, time: float) -> Instant:
         """The state that was refreshed last."""

@@ -36,7 +36,7 @@ class EnergyMeter:
         nodes = [model.joints[joint].nodes[0] for joint, _ in model.layout.forces]
         found = [model.assembly.coordinates_of(node)[:3] for node in nodes]
         self._loaded = np.array(found, dtype=np.int64)
-        self._forces = np.array([force for _, force in model.layout.forces])
+        self._forces, self._done = model.forces, 0.0
         self._weight = built.weight
         self._lifted: float | None = None
         self._untold = model.scene.rods.damping > 0.0 and not model.formulation.has_strains
@@ -70,12 +70,21 @@ class EnergyMeter:
             if chain is not None and chain_before is not None:
                 driven, lost_in_cables = work_between(chain_before, chain)
                 lost += lost_in_cables
+        work = self._done + self._work(state)
+        return Energies(float(kinetic), float(elastic), work, lost, driven)
+
+    def _work(self, state: State) -> float:
+        """Of loads and weight since the start, as they act now, J."""
         work = float(np.sum(self._forces * (state.position - state.begun)[self._loaded]))
         if self._weight is not None:
             done = self._weight.work(state)
             self._lifted = done if self._lifted is None else self._lifted
             work += done - self._lifted
-        return Energies(float(kinetic), float(elastic), work, lost, driven)
+        return work
+
+    def go_on_from(self, work: float, state: State) -> None:
+        """Let other forces act from this state on, up to which loads have done so much work, J."""
+        self._done = work - self._work(state)
 
     def keep(self) -> None:
         """Count from the last reading on."""

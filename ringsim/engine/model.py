@@ -42,7 +42,8 @@ class BuiltJoint(NamedTuple):
 
 class Multibody:
     """Bodies (each with its node), rods, joints and loads of a scene's layout at the start, in the
-    layout's order; ``loose`` are nodes of neither, by the names of ``ringsim.layout.points``.
+    layout's order; ``loose`` are nodes of neither, by the names of ``ringsim.layout.points``,
+    ``forces`` those of the loads as they act now, N, shape (loads, 3).
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -68,10 +69,19 @@ class Multibody:
             for station, mass, _ in part.masses:
                 formulation.add_mass(assembly, rod.nodes[station], mass)
         self.joints = [self._joint(joint) for joint in self.layout.joints]
+        self.forces = np.array([force for _, force in self.layout.forces])
+        self._loads = []
         for number, force in self.layout.forces:
             # Constant in space, not in the ring: bodyFixed is not set.
             load = partial(item.LoadForceVector, loadVector=list(force))
-            assembly.system.AddLoad(load(markerNumber=self.joints[number].markers[0]))
+            made = assembly.system.AddLoad(load(markerNumber=self.joints[number].markers[0]))
+            self._loads.append(made)
+
+    def turn_loads(self) -> None:
+        """Let the forces of ``Loads`` act the other way round."""
+        self.forces *= -1.0
+        for load, force in zip(self._loads, self.forces.tolist(), strict=True):
+            self.assembly.system.SetLoadParameter(load, "loadVector", force)
 
     def openings(self) -> list[list[tuple[BuiltJoint, float]]]:
         """Joints that open, with their senses, by plane and section; empty for other angles."""

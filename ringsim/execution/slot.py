@@ -21,6 +21,7 @@ from ringsim.execution.solve import LOG_CHARACTERS
 from ringsim.execution.work import Allowance, Work
 from ringsim.refusal import InputError
 from ringsim.storage.result import Result, plain
+from ringsim.threads import ENVIRONMENT
 from ringsim.variables import Cause, Status
 
 TICK = 0.2
@@ -46,7 +47,6 @@ _OF_MPI = ("PMI", "PMIX", "OMPI", "OPAL", "PRTE", "HYDRA", "HYDI", "MPI", "I_MPI
 _ADDRESS = re.compile(r"0x[0-9a-fA-F]+")
 _END_SECONDS = 10.0
 _PRINTING_SECONDS = 0.05
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def without_mpi() -> dict[str, str]:
@@ -61,7 +61,7 @@ class SolverProcess:
         self.ready, self.runs = False, 0
         mine, other = socket.socketpair()
         self.pipe = Connection(mine.detach())
-        environment = without_mpi() | dict.fromkeys(_ONE_THREAD, "1")
+        environment = without_mpi() | dict.fromkeys(ENVIRONMENT, "1")
         environment["PYTHONPATH"] = os.pathsep.join(os.path.abspath(path) for path in sys.path)
         # Unbuffered: a crash would take with it what has not been written.
         command = [sys.executable, "-P", "-u", "-m", "ringsim.execution.child"]

@@ -69,8 +69,8 @@ def solve(solver: Run, base: Scene, sample: int, values: dict[str, Any]) -> Resu
 def _not_finite(outcome: Outcome) -> str:
     """What is wrong with the numbers of a run that says it went well; empty if nothing is.
 
-    Values may be missing after the end of a run, for times that never came and in rows of things
-    that are not there.
+    Values may be missing after the end of a run, for times that never came, in rows of things that
+    are not there, and where a variable has gaps.
     """
     axis = outcome.coordinates.get("time")
     final = outcome.values.get("final_time")
@@ -80,6 +80,8 @@ def _not_finite(outcome: Outcome) -> str:
             continue
         if np.isinf(array).any():
             return f"{name} is infinite: try a smaller solver.step"
+        if VARIABLES[name].gaps:
+            continue
         dims = VARIABLES[name].dims
         if "time" in dims and axis is not None and final is not None:
             along = dims.index("time")

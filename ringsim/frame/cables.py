@@ -136,6 +136,7 @@ class FrameCables:
         cables' ideal paths after the opening angle, m/rad.
         """
         self._turning.forget()
+        self._turned_at = math.nan
         self.winches.advance(time, state, slopes)
 
     def pull(self, time: float, arms: Arms, places: Array, rates: Array, g: Array) -> None:

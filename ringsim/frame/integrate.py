@@ -19,6 +19,7 @@ from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.scene import Scene
+from ringsim.stepping.events import Events
 from ringsim.stepping.extrapolation import extrapolated
 from ringsim.stepping.instant import Instant
 from ringsim.stepping.latches import Latches
@@ -67,7 +68,8 @@ class Integration(Remembering):
         self._moves: list[tuple[float, Array]] = []
         self._easy = False
         self._steps: list[tuple[float, Array]] = []
-        self._faults = sorted(scene.faults, key=lambda fault: fault.time)
+        self._faults, self._events = sorted(scene.faults, key=lambda one: one.time), Events(scene)
+        self._turn = scene.loads_turn_at
         self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
         self._readings = Readings(model)
         stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
@@ -84,6 +86,7 @@ class Integration(Remembering):
             self._locks,
             limits=scene.limits,
             follow_deviations=scene.record.stress,
+            turn=scene.loads_turn_at,
         )
 
     def run(self) -> Recorder:
@@ -91,7 +94,7 @@ class Integration(Remembering):
         control, history = self._control, self.history
         while control.goes_on:
             step = control.next_step(self._next_event())
-            self._begin()
+            self._begin(control.now)
             while True:
                 try:
                     after, found = self._try(step)
@@ -113,21 +116,20 @@ class Integration(Remembering):
 
     def _next_event(self) -> float:
         """Time that no step may pass, s."""
-        return self._faults[0].time if self._faults else math.inf
+        return self._events.after(self._control.now.time)
 
-    def _begin(self) -> None:
+    def _begin(self, now: Instant) -> None:
         """Let joints and winches begin a step."""
         self._model.laws.begin()
-        cables, now = self._model.cables, self._control.now
-        if cables is not None and self._now.chain is not None:
-            slopes = cables.winches.path_slopes(self._path_slope)
-            cables.begin(now.time, self._now.chain, slopes)
+        cables, chain = self._model.cables, self._now.chain
+        if cables is None or chain is None:
+            return
 
-    def _path_slope(self, number: int) -> float:
-        """Derivative of a cable's ideal path after the opening angle, m/rad."""
-        assert self._model.cables is not None
-        plane, cable = self._model.cables.present[number]
-        return self._scene.structure.path_slope(cable, self._control.now.angles[plane])
+        def path_slope(number: int) -> float:
+            plane, cable = cables.present[number]
+            return self._scene.structure.path_slope(cable, now.angles[plane])
+
+        cables.begin(now.time, chain, cables.winches.path_slopes(path_slope))
 
     def _try(self, step: float) -> tuple[State, Instant]:
         """The state a step later."""
@@ -229,8 +231,10 @@ class Integration(Remembering):
         return found
 
     def _read(self, now: Instant) -> Instant:
-        """Note a state that the run goes on from; returns it as faults that strike leave it."""
-        if self._strike(now):
+        """Note a state that the run goes on from; returns it as events leave it."""
+        if self._strike(now) | self._turn_loads(now.time) or self._events.at(now.time):
+            self._energy.go_on_from(now.energies.work, self._now)
+            self._begin(now)
             after = self._measure(now.time, self._now)
             # What a fault lets go is lost; nothing moves while it strikes.
             lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
@@ -239,6 +243,14 @@ class Integration(Remembering):
         self._energy.keep()
         self.history.note(self._readings.read(now, self._now, self._strains))
         return now
+
+    def _turn_loads(self, time: float) -> bool:
+        """Turn the loads round if it is time (s); returns whether it was."""
+        due = self._turn <= time + AT_ONCE
+        if due:
+            self._turn = math.inf
+            self._model.turn_loads()
+        return due
 
     def _strike(self, now: Instant) -> bool:
         """Strike all faults that are due; returns whether there was one."""

@@ -9,19 +9,23 @@ from ringsim.frame.net import passing_strings
 from ringsim.frame.state import State
 from ringsim.stepping.instant import Energies
 from ringsim.stepping.losses import Passing, lost_between
+from ringsim.stepping.memory import Remembering
 
 
-class EnergyMeter:
+class EnergyMeter(Remembering):
     """Measures the energies of a model.
 
     What friction, dampers and stops take is ``lost_between``; of ropes and winches see
     ``work_between``.
     """
 
+    changing = ("_done",)
+
     def __init__(self, model: FrameModel) -> None:
         self._model, self._damped = model, bool(model.mesh.tau.any())
         self._kept: tuple[Passing, ChainState | None] | None = None
         self._last: tuple[Passing, ChainState | None] | None = None
+        self._done = 0.0
 
     def read(self, time: float, state: State, strains: Strains) -> Energies:
         """Energies of a state at a time (s) with its strains and, if there are cables, its chain.
@@ -67,7 +71,11 @@ class EnergyMeter:
             if chain is not None and state.chain is not None:
                 driven, rubbed = work_between(chain, state.chain)
                 lost += rubbed
-        return Energies(kinetic, elastic, model.work(state), lost, driven)
+        return Energies(kinetic, elastic, self._done + model.work(state), lost, driven)
+
+    def go_on_from(self, work: float, state: State) -> None:
+        """Let other forces act from this state on, up to which loads have done so much work, J."""
+        self._done = work - self._model.work(state)
 
     def keep(self) -> None:
         """Count from the last reading on."""

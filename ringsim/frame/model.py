@@ -133,8 +133,13 @@ class FrameModel:
         self._begun = self.start.place.points.copy()
         self._fronts = Fronts.empty(mesh)
 
+    def turn_loads(self) -> None:
+        """Let the forces of ``Loads`` act the other way round."""
+        self.loads *= -1.0
+        self._loaded[2][...] *= -1.0
+
     def work(self, state: State) -> float:
-        """Of loads and gravity since the start, J."""
+        """Of loads and gravity since the start, as they act now, J."""
         at, start, forces = self._loaded
         done = float(np.vdot(forces, state.pose.place[at] - start))
         if self._held.weighs:

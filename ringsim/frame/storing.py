@@ -76,6 +76,7 @@ class Storing(Integration):
         memory = super().memory() | {
             "state": now.memory(),
             "latches": self._latches.memory(),
+            "energy": self._energy.memory(),
             "reaction": getattr(model, "reaction", None),
             "stuck": [opening for *_, opening in model.laws.stuck],
         }
@@ -92,6 +93,7 @@ class Storing(Integration):
         self._now = self._model.start.copy()
         self._now.recall(memory["state"])
         self._latches.recall(memory["latches"])
+        self._energy.recall(memory["energy"])
         if memory["reaction"] is not None:
             self._model.reaction = memory["reaction"]
 
@@ -106,14 +108,18 @@ class Storing(Integration):
         self._strike_again(start, gone)
         if model.cables is not None:
             state.chain = self._chain_of(start, gone)
+        self._turn_loads(start.time)
+        before = self._control.now.energies
+        if changed:
+            self._energy.go_on_from(before.work, state)
         now = self._told(start.time, state)
         if not changed:
             self._energy.keep()
             return
-        # What a change takes away is lost, as what a fault lets go: nothing moves meanwhile.
-        before, after = self._control.now.energies, now.energies
-        lost = before.kinetic + before.elastic - before.work
-        lost -= after.kinetic + after.elastic - after.work
+        # What a change takes away is lost, as what a fault lets go: nothing moves meanwhile, so
+        # that other loads do no work.
+        after = now.energies
+        lost = before.kinetic + before.elastic - after.kinetic - after.elastic
         energies = after._replace(lost=before.lost + lost, driven=before.driven)
         self.history.forget_last()
         self._control.begin_anew(self._read(replace(now, energies=energies)), lost)

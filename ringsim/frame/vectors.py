@@ -8,9 +8,11 @@ from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numba import config, njit
+from numba.core.errors import NumbaError
 
-from ringsim.compile_cache import packs
+from ringsim.compile_cache import alone, packs, tell_damage
 from ringsim.layout.pose import Array
+from ringsim.refusal import InputError
 
 Vector: TypeAlias = tuple[float, float, float]
 Matrix: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
@@ -27,7 +29,26 @@ def compiled(function: _Function) -> _Function:
     Sums keep their order: with sums in any order, code that a process has compiled and code that it
     has loaded need not round alike, and samples would depend on who ran them.
     """
-    return cast(_Function, njit(cache=True, error_model="numpy")(function))
+    return cast(_Function, _mending(njit(cache=True, error_model="numpy")(function)))
+
+
+def _mending(made: Any) -> Any:
+    """A compiled function that throws away what it cannot read of its stored code, and goes on."""
+    compiling = made.compile
+
+    def compile_or_mend(signature: Any) -> Any:
+        try:
+            return compiling(signature)
+        except (NumbaError, InputError):
+            raise  # of the function itself
+        except Exception:  # a damaged file raises nearly anything when it is unpickled
+            with alone():
+                tell_damage(made.stats.cache_path)
+                made._cache.flush()
+                return compiling(signature)
+
+    made.compile = compile_or_mend
+    return made
 
 
 def packed(function: _Function) -> _Function:
@@ -37,7 +58,7 @@ def packed(function: _Function) -> _Function:
     fronts alone, whose solutions tests compare with numpy's and, bit by bit, with those without it.
     What is compiled elsewhere in the process does not see it.
     """
-    made: Any = njit(cache=True, error_model="numpy")(function)
+    made = _mending(njit(cache=True, error_model="numpy")(function))
     compiling = made.compile
 
     def compile_packed(signature: Any) -> Any:

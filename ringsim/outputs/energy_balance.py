@@ -3,6 +3,7 @@
 import numpy as np
 
 from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+from ringsim.stepping.instant import exchanged
 
 
 class EnergyBalance(Output):
@@ -25,14 +26,15 @@ class EnergyBalance(Output):
     )  # fmt: skip
 
     def read(self, now: Reading) -> Array:
-        """In the order of the variables, J, shape (4,)."""
-        return np.array(now.energies[:4])
+        """In the order of the variables, and what winches have put in, J, shape (5,)."""
+        return np.array(now.energies)
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Each interpolated by itself: the losses may be unknown (NaN) where the others are not."""
-        kinetic, elastic, work, lost = series.values.T
+        kinetic, elastic, work, lost, wound = series.values.T
         # What a fault takes at the start is not in the first energies any more.
         balance = kinetic - kinetic[0] + elastic - elastic[0] + lost - lost[0] - work
-        exchanged = max(np.abs(work).max(), np.ptp(kinetic), np.ptp(elastic), 1e-300)
+        scale = max(exchanged(np.array([kinetic, elastic, work - wound, wound]).T), 1e-300)
         names = [variable.name for variable in self.variables]
-        return dict(zip(names, [*series.on_grid(), np.abs(balance).max() / exchanged], strict=True))
+        shown = [*series.on_grid()[:4], np.abs(balance).max() / scale]
+        return dict(zip(names, shown, strict=True))

@@ -41,9 +41,13 @@ COORDINATES = {
     "section": Variable("section", ("section",), "1", "section number, from 1", "i4"),
     "time": Variable("time", ("time",), "s", "time since the start of the run"),
     "span": Variable("span", ("span",), "1", "span of a cable, counted from its winch", "i4"),
+    "pulley": Variable(
+        "pulley", ("pulley",), "1", "pulley of a cable, at the end of the span of its number",
+        "i4",
+    ),
     "winch": Variable("winch", ("winch",), "1", "winch: 1 where a path begins, 2 at its end", "i4"),
     "axis": Variable("axis", ("axis",), "1", "axis of space; z points upwards", "str"),
-}
+}  # fmt: skip
 """Dimensions of the variables; an output may declare more."""
 
 SPAN_NAME = Variable("span_name", ("plane", "span"), "1", "ends of the span", "str")
@@ -149,6 +153,7 @@ def axes(scene: Scene) -> dict[str, NDArray[Any]]:
         "section": np.arange(1, scene.structure.sections + 1),
         "time": output_times(scene),
         "span": np.arange(1, scene.spans + 1),
+        "pulley": np.arange(1, scene.spans),
         "winch": np.arange(1, most + 1),
         "axis": np.array(["x", "y", "z"]),
     }

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ringsim.cable.records import Winch
 from ringsim.cable.winding.motor import MotorWinding
 from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+from ringsim.parts.faults.family import AT_ONCE
 
 
 class Motors(Output):
@@ -57,21 +58,22 @@ class Motors(Output):
         times, winches = series.times, len(run.coordinates["winch"])
         found = np.full((4, len(times), len(run.locks), winches), np.nan)
         torque, shaft, power, energy = found
-        turned = np.zeros_like(torque)
         # A run that went on may have had another motor before, or none: each for its own steps.
         for steps, (plane, end), winch, motor in _motors(run):
             tension, speed, wound = series.values[:, plane, end].T
-            on = np.array([winch.turns(time) for time in times[steps]], dtype=bool)
+            on = np.array([winch.turns(time + AT_ONCE) for time in times[steps]], dtype=bool)
             if winch.after_lock == "stop":
                 on &= times[steps] <= np.nan_to_num(held[plane].max(), nan=math.inf)
+            given = motor.torque(tension, speed)
             found[:, :, plane, end] = np.nan_to_num(found[:, :, plane, end])
             place, before = (steps, plane, end), np.maximum(steps - 1, 0)
-            torque[place] = np.where(on, motor.torque(tension[steps], speed[steps]), 0.0)
+            torque[place] = np.where(on, given[steps], 0.0)
             shaft[place] = speed[steps] / motor.travel
-            turned[place] = (wound[steps] - wound[before]) / motor.travel
+            # Also of a step at whose end the winch is switched off: its drum turned until then.
+            turned = (wound[steps] - wound[before]) / motor.travel
+            energy[place] = 0.5 * (given[steps] + given[before]) * turned
         power[:] = torque * shaft
-        energy[:] = 0.0 * torque
-        energy[1:] += np.cumsum(0.5 * (torque[1:] + torque[:-1]) * turned[1:], axis=0)
+        energy[:] = np.cumsum(energy, axis=0)
         values: Values = {
             variable.name: Series(series.times, own, series.grid).on_grid()
             for variable, own in zip(self.variables[:4], found, strict=True)

@@ -54,7 +54,8 @@ class Recorder(Remembering):
         self._lost += energies.lost
         self._driven += energies.driven
         work = energies.work + self._driven
-        now = replace(now, energies=energies._replace(work=work, lost=self._lost, driven=0.0))
+        told = Energies(energies.kinetic, energies.elastic, work, self._lost, self._driven)
+        now = replace(now, energies=told)
         for output, readings in self._readings.items():
             readings.append(output.read(now))
 

@@ -16,7 +16,7 @@ from ringsim.stepping.memory import Memory, pack, unpack
 from ringsim.stepping.run_control import RunControl
 from ringsim.variables import Status
 
-FORMAT = 3
+FORMAT = 4
 """Of what is stored; a state of another format is refused."""
 
 

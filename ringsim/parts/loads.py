@@ -1,7 +1,7 @@
 """Prescribed forces."""
 
 from ringsim.parts.persection import PerSection
-from ringsim.units import Model, Newton
+from ringsim.units import Model, Newton, Second
 
 
 class Loads(Model):
@@ -15,3 +15,6 @@ class Loads(Model):
 
     force: PerSection[Newton]
     """Force on the V-joints of a section, up on the upper and down on the lower one."""
+    reversal_time: Second | None = None
+    """From this time on all forces act the other way round, as where a ring is folded and then
+    deployed in one run, which no stop that it reaches before ends.  Left out, they never do."""

@@ -14,8 +14,10 @@ from ringsim.plots.asynchrony import asynchrony
 from ringsim.plots.cables import cables
 from ringsim.plots.drive import drive
 from ringsim.plots.energy import energy
+from ringsim.plots.nodal_forces import nodal_forces
 from ringsim.plots.opening_angles import opening_angles
 from ringsim.plots.planar_truss import strain_over_length, tension_over_length
+from ringsim.plots.pulleys import pulleys
 from ringsim.plots.ring import ring
 from ringsim.plots.rod_stress import rod_stress
 from ringsim.plots.section_map import section_map
@@ -37,7 +39,9 @@ PICTURES = (
     _Picture("section_map", section_map, ("opening_angle", "asynchrony"), ring_only=True),
     _Picture("rod_stress", rod_stress, ("rod_stress",), ring_only=True),
     _Picture("ring", ring, ("opening_angle",), ring_only=True),
-    _Picture("cables", cables, ("cable_tension",), ring_only=True),
+    _Picture("cables", cables, ("cable_tension", "rope_strain"), ring_only=True),
+    _Picture("pulleys", pulleys, ("pulley_ratio", "opening_angle"), ring_only=True),
+    _Picture("nodal_forces", nodal_forces, ("cable_tension", "opening_angle"), ring_only=True),
     _Picture("tension", tension_over_length, ("cable_tension", "cable_length")),
     _Picture("bending_strain", strain_over_length, ("bending_strain", "cable_length")),
     _Picture("drive", drive, ("drive_margin", "opening_angle")),

@@ -137,6 +137,22 @@ def section_colours(sections: int) -> Colormap:
     return ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0.0, 0.88, sections)))
 
 
+def some_sections(sections: int, most: int) -> list[int]:
+    """Numbers from 0 of a few sections, the first and the last among them.
+
+    >>> some_sections(18, 4)
+    [0, 6, 11, 17]
+    """
+    return [int(k) for k in np.unique(np.linspace(0, sections - 1, most).round())]
+
+
+def name_sections(figure: Figure, axes: Axes, sections: int) -> None:
+    """Below the figure a legend of axes that have a named line for each section; six at most."""
+    named = axes.get_legend_handles_labels()[0]
+    lines = [named[section] for section in some_sections(sections, 6)]
+    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))
+
+
 def time_axes(
     dataset: xr.Dataset, recorded: xr.DataArray, *panels: Axes, named: bool = True
 ) -> None:
@@ -181,6 +197,29 @@ def span_sizes(axes: Axes, sizes: np.ndarray) -> None:
     axes.set_yscale("log", nonpositive="clip")
     axes.set_ylim(10.0 ** np.floor(np.log10(lowest)), 4.0 * largest)
     plain_numbers(axes.yaxis)
+
+
+def signed_sizes(axes: Axes, sizes: np.ndarray) -> None:
+    """Value axis of both signs; logarithmic on either side where most would be a flat line.
+
+    ``sizes`` is what was drawn, of any shape, NaN where nothing was recorded; see ``span_sizes``.
+    """
+    known = np.abs(sizes[np.isfinite(sizes) & (sizes != 0.0)])
+    largest = float(known.max(initial=0.0)) or 1.0
+    least, most = np.nanmin(sizes, initial=0.0), np.nanmax(sizes, initial=0.0)
+    room = 0.05 * largest
+    if not known.size or np.median(known) > _FLAT * largest:
+        axes.set_ylim(least - room, most + room)
+        return
+    linear = 10.0 ** math.floor(math.log10(max(float(np.quantile(known, 0.02)), 1e-4 * largest)))
+    axes.set_yscale("symlog", linthresh=linear, linscale=0.3)
+    axes.set_ylim(2.0 * min(least, -0.5 * linear), 2.0 * max(most, 0.5 * linear))
+    plain_numbers(axes.yaxis)
+    if least < 0.0 < most:  # labels beside zero would lie on that of zero
+        beside = 1.01 * linear
+        axes.yaxis.set_major_formatter(
+            FuncFormatter(lambda value, _: "" if 0.0 < abs(value) < beside else f"{value:g}")
+        )
 
 
 def plain_numbers(axis: Axis) -> None:

@@ -11,6 +11,7 @@ from ringsim.analysis.campaign_notes import budget_lines, override_lines, peak_l
 from ringsim.analysis.campaign_samples import campaign_file, endings, scalars
 from ringsim.analysis.design import placement
 from ringsim.analysis.influence_text import influence_tables
+from ringsim.analysis.losses import losses
 from ringsim.analysis.quantities import good
 from ringsim.analysis.sensitivity_text import sensitivity_tables
 from ringsim.analysis.stopping import stopping_lines
@@ -62,7 +63,8 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     )  # fmt: skip
     shell.filters["sentence"] = _sentence
     placed = placement(campaign)
-    stopping = stopping_lines(campaign, placed)
+    lost = losses(campaign)
+    stopping = [line + lost.mark for line in stopping_lines(campaign, placed)]
     names = scalars(campaign)
     design = dict(wanted.get("design", {}))
     design.pop("samples", None)  # a call with --samples changes it
@@ -81,7 +83,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "brief": [slim(what_matters(analysis)), slim(what_separates(analysis))],
         "matters": [*influence_tables(analysis, names), *sensitivity_tables(analysis, names)],
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
-        "peaks": peak_lines(campaign), "stopping": stopping,
+        "peaks": peak_lines(campaign), "stopping": stopping, "lost": lost.note,
         "figures": figures, "player": shown, "failures": failures, "more": more,
         "worst": worst_tables(analysis, folder), "worst_note": NOTE,
         "players": {str(sample): k for sample, k in places.items()},

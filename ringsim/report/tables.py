@@ -19,6 +19,7 @@ from ringsim.analysis.campaign_samples import (
     scalars,
     values_of,
 )
+from ringsim.analysis.losses import losses, marked
 from ringsim.analysis.quantities import CHECKED
 from ringsim.refusal import show
 from ringsim.tables import Table, interval_text, number_text
@@ -63,7 +64,8 @@ def statistics(campaign: xr.Dataset, analysis: xr.Dataset) -> Table:
                 cells[-1] += f" ({interval_text(low, high, fine)})"
         for value in (least, most):
             first = samples[values == value][:1]
-            cells.append(number_text(value, fine) + "".join(f" ({sample})" for sample in first))
+            more = "".join(f" ({sample}{_error_bar(campaign, name, sample)})" for sample in first)
+            cells.append(number_text(value, fine) + more)
         used, lost, absent = (str(counts.sel(counted=c).item()) for c in _COUNTS)
         unit = str(says.get("units", "1"))
         cells.append(worst_of(analysis, name) if least < most else "-")
@@ -72,7 +74,17 @@ def statistics(campaign: xr.Dataset, analysis: xr.Dataset) -> Table:
     notes = (
         ["In brackets intervals of 95 %"] if any("(" in c for r in rows for c in r[2:-6]) else []
     )
-    return Table(("Number", "Unit", *moments.values(), *extremes), rows, notes)
+    if any("±" in c for r in rows for c in r[-6:-4]):
+        notes.append("± what the named sample states as its numerical error")
+    return marked(Table(("Number", "Unit", *moments.values(), *extremes), rows, notes), analysis)
+
+
+def _error_bar(campaign: xr.Dataset, name: str, sample: int) -> str:
+    """The numerical error that a sample states of an output; empty if it states none."""
+    if (bars := f"{name}_error") not in campaign:
+        return ""
+    own = float(campaign[bars].sel(sample=sample))
+    return f", ± {own:.2g}" if np.isfinite(own) else ""
 
 
 _COUNTS = ("used", "lost", "without_value")
@@ -130,7 +142,7 @@ def _short(value: Any) -> str:
 
 def truth(campaign: xr.Dataset) -> Rows:
     """What, samples, typical and largest size: errors of balance, error bars, second engines."""
-    rows = []
+    rows: Rows = []
     for name in NUMERICAL:
         if name in campaign:
             samples, values = values_of(campaign, name)
@@ -146,7 +158,8 @@ def truth(campaign: xr.Dataset) -> Rows:
                 rows += _row(campaign[name], words, samples, values, _rms)
             else:
                 rows += _row(campaign[other], words, samples, values, _rms)
-    return rows
+    mark = losses(campaign).mark
+    return [[f"{what}{mark}", *others] for what, *others in rows]
 
 
 def _rms(values: Any) -> float:
@@ -168,5 +181,9 @@ def _row(variable: xr.DataArray, words: str, samples: Any, values: Any, typical:
 def provenance(campaign: xr.Dataset) -> Iterator[tuple[str, str]]:
     """Who computed it, when, with what."""
     for name, value in campaign.attrs.items():
-        if name in _SHOWN or name.endswith("_version") or name in ("history", "git_commit"):
+        if (
+            name in _SHOWN
+            or name.endswith("_version")
+            or name in ("history", "git_commit", "sources")
+        ):
             yield name.replace("_", " "), str(value)

@@ -99,6 +99,9 @@ def add_inputs(file: Any, table: Table, *, compression: int) -> None:
     for column in table.columns:
         values, text = column.values, column.in_words
         kind: Any = str if text else {"b": "i1"}.get(values.dtype.kind, values.dtype)
+        if column.dim in file.dimensions and file.dimensions[column.dim].size != values.shape[1]:
+            # Of the pulleys of a result, there are as many as the cable with most of them has.
+            column = replace(column, dim=f"{column.dim}_of_one_winch")
         if column.dim and column.dim not in file.dimensions:
             file.createDimension(column.dim, values.shape[1])
         dims = ("sample", column.dim) if column.dim else ("sample",)
@@ -132,7 +135,7 @@ def _is_number(value: Any) -> bool:
 
 def _add_names(file: Any, column: Column, table: Table) -> str:
     """The coordinate with the names of a column's places; its own where columns differ in them."""
-    shared = len({each.places for each in table.columns if each.dim == column.dim}) == 1
+    shared = len({each.places for each in table.columns if each.dim == column.dim}) <= 1
     name = f"{column.dim}_name" if shared else f"{column.name}_{column.dim}_name"
     if name not in file.variables:
         file.createVariable(name, str, (column.dim,))[:] = np.array(column.places, dtype=object)

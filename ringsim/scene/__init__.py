@@ -1,6 +1,7 @@
 """The scene: everything that one simulation needs, strict in and exact out."""
 
 import copy
+import math
 import os
 from collections.abc import Iterator, Mapping
 from importlib import resources
@@ -134,6 +135,12 @@ class Scene(Model):
     def pulleys_of(self, cable: Cable) -> int:
         """Pulleys of one of the scene's cables: a second winch takes one more."""
         return len(self.path_of(cable)) - 2
+
+    @property
+    def loads_turn_at(self) -> float:
+        """Time at which the loads turn round, s; infinite if they do not."""
+        time = None if self.loads is None else self.loads.reversal_time
+        return math.inf if time is None else time
 
     @property
     def held(self) -> bool:

@@ -27,10 +27,15 @@ def go_on(control: RunControl, solver: Solver, memory: Memory, changed: bool, wh
             f"solver.end_time = {solver.end_time:g} s: must be after {control.now.time:g} s, the "
             f"time of {where}"
         )
+    if changed and control.fate is Fate.FOLDED:
+        control.unsettle()
     if control.settled:
+        folded = control.fate is Fate.FOLDED
+        words = "come to the stowed stop" if folded else "locked"
+        cure = "change the loads (--set), " if folded else ""
         raise InputError(
-            f"{where}: all V-joints had locked and settled: take an earlier state (--at), or raise "
-            "solver.settling_time"
+            f"{where}: all V-joints had {words} and settled: {cure}take an earlier state (--at), "
+            "or raise solver.settling_time"
         )
     if control.goes_on:
         return

@@ -1,16 +1,16 @@
 """Guards of a run: blow-up, energy growth and loss, joints that come apart.
 
 They compare the balance B = kinetic + elastic - both at the start + lost - work of loads and
-winches with the energy X exchanged so far, the largest of |work| and of the changes of kinetic and
-elastic energy.  Generalised-alpha takes energy out of what it does not resolve (B < 0) and puts in
-none, so that growth (B > 0) means more than loss.
+winches with the energy X exchanged so far (``ringsim.stepping.instant.exchanged``).
+Generalised-alpha takes energy out of what it does not resolve (B < 0) and puts in none, so that
+growth (B > 0) means more than loss.
 """
 
 import numpy as np
 
 from ringsim.parts.solver import Solver
 from ringsim.stepping.constant_steps import unresolved
-from ringsim.stepping.instant import Instant, Scales
+from ringsim.stepping.instant import Instant, Scales, exchanged
 from ringsim.stepping.memory import Remembering
 from ringsim.variables import Cause, Reason
 
@@ -30,14 +30,14 @@ _CURE = "reduce solver.step or solver.tolerance"
 class Guard(Remembering):
     """Watches one run from its first instant on."""
 
-    changing = ("_run", "_lost", "_driven", "_low", "_high", "_worst")
+    changing = ("_run", "_lost", "_driven", "_credit", "_low", "_high", "_worst")
 
     def __init__(self, solver: Solver, scales: Scales) -> None:
         self._tolerance, self._scales = solver.energy_tolerance, scales
         self._constant = solver.step_control == "constant"
         self._run: list[Instant] = []
-        self._lost = self._driven = 0.0
-        self._low = self._high = np.zeros(3)
+        self._lost = self._driven = self._credit = 0.0
+        self._low, self._high = np.full((2, 4), [[np.inf], [-np.inf]])
         self._worst = (0.0, 0.0)
 
     def judge(self, now: Instant) -> Reason:
@@ -52,12 +52,16 @@ class Guard(Remembering):
         work = found.work + self._driven
         stored = found.kinetic + found.elastic
         balance = stored - start.kinetic - start.elastic + self._lost - work
-        changes = [found.kinetic - start.kinetic, found.elastic - start.elastic, work]
-        self._low, self._high = np.fmin(self._low, changes), np.fmax(self._high, changes)
+        kinds = [found.kinetic, found.elastic, found.work, self._driven]
+        self._low, self._high = np.fmin(self._low, kinds), np.fmax(self._high, kinds)
         if abs(balance) > abs(self._worst[1]):
             self._worst = (time, balance)
 
-        available = max(abs(work), self._scales.energy) + start.kinetic + start.elastic
+        # Works by their ways up and down: what loads gave stays in the structure when they turn
+        # round, though their work passes zero later.
+        supplied = float(np.sum((self._high - self._low)[2:]))
+        available = start.kinetic + start.elastic + self._credit
+        available += max(supplied, self._scales.energy)
         if stored > BLOW_UP * available:
             return Reason(
                 Cause.BLOW_UP,
@@ -76,10 +80,13 @@ class Guard(Remembering):
         return self._unbalanced(time, balance, self._scales.energy, factor, words)
 
     def begin_anew(self, now: Instant, lost: float) -> None:
-        """Go on from how a change makes the present instant, which has taken so much energy, J."""
+        """Go on from how a change makes the present instant, which has taken so much energy, J;
+        what it has put in is negative.
+        """
         if len(self._run) > 1:
             self._run[-1] = now
         self._lost += lost
+        self._credit += max(-lost, 0.0)
 
     def verdict(self) -> Reason:
         """Why a run that ended by itself is not sound after all; empty if it is."""
@@ -93,12 +100,11 @@ class Guard(Remembering):
         self, time: float, balance: float, least: float, factor: float, bound: str
     ) -> Reason:
         """Why an imbalance B in J is too large; X counts as ``least`` (J) at least."""
-        work = max(self._high[2], -self._low[2])
-        exchanged = float(max(least, work, *(self._high - self._low)[:2]))
+        scale = max(least, exchanged(np.array([self._low, self._high])))
         # Not <=: an unknown balance (NaN) stops nothing.
-        if not abs(balance) > factor * self._tolerance * exchanged:
+        if not abs(balance) > factor * self._tolerance * scale:
             return Reason()
-        share, limit = 100.0 * abs(balance) / exchanged, 100.0 * self._tolerance
+        share, limit = 100.0 * abs(balance) / scale, 100.0 * self._tolerance
         return Reason(
             Cause.ENERGY_GREW if balance > 0.0 else Cause.ENERGY_LOST,
             f"time integration {'added' if balance > 0.0 else 'lost'} {abs(balance):.3g} J, "

@@ -23,6 +23,18 @@ class Energies(NamedTuple):
     driven: float = 0.0
 
 
+def exchanged(kinds: Array) -> float:
+    """Energy in J that a run has exchanged: the largest of the ranges of kinetic energy, of elastic
+    energy, and of works, those of loads and of winches added.
+
+    ``kinds`` has the shape (n, 4): these at n instants, or their lowest and highest values so far.
+    It never falls: unlike the present work it is not emptied where loads change their sign, or
+    where a winch takes what loads give.
+    """
+    kinetic, elastic, loads, winches = np.ptp(kinds, axis=0)
+    return float(max(kinetic, elastic, loads + winches))
+
+
 @dataclass(frozen=True)
 class Instant:
     """A state that a run has reached."""

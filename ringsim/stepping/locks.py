@@ -9,7 +9,7 @@ import numpy as np
 from ringsim.hermite import first_zero
 from ringsim.stepping.instant import Array, Instant
 from ringsim.stepping.memory import Remembering
-from ringsim.variables import PLANES
+from ringsim.variables import PLANES, Fate
 
 if TYPE_CHECKING:
     from ringsim.stepping.latches import Latches
@@ -47,10 +47,11 @@ class Locks(Remembering):
 
     ``deployed`` and ``stowed`` are whether each V-joint has reached 180 deg, and the stowed stop,
     shape (planes, sections), even if it has bounced since.  One that starts on the stowed stop has
-    to leave it before it can come back.
+    to leave it before it can come back.  ``reached`` is the stop that all have reached last: where
+    all come to one, none counts as having reached the other any more.
     """
 
-    changing = ("deployed", "stowed", "_away")
+    changing = ("deployed", "stowed", "reached", "_away")
 
     def __init__(
         self, angles: Array, stowed_angle: float | None, planes: Sequence[str] = PLANES,
@@ -66,12 +67,20 @@ class Locks(Remembering):
         self._stowed_angle = stowed_angle or 0.0
         self.deployed, self.stowed = np.zeros((2, *angles.shape), dtype=bool)
         self._away = angles > self._stowed_angle + _APART
+        self.reached = Fate.NONE
 
     def note(self, angles: Array) -> None:
         """Remember the joints that have reached a stop; opening angles in rad."""
         self.deployed |= angles >= math.pi
         self.stowed |= self._away & (angles <= self._stowed_angle)
-        self._away |= angles > self._stowed_angle + _NEAR
+        off = angles > self._stowed_angle + _NEAR
+        self._away |= off
+        if self.reached is Fate.FOLDED and off.all():
+            self.reached, self.stowed = Fate.NONE, np.zeros_like(self.stowed)
+        elif self.reached is not Fate.FOLDED and self.stowed.all():
+            self.reached, self.deployed = Fate.FOLDED, np.zeros_like(self.deployed)
+        elif self.reached is Fate.NONE and self.deployed.all():
+            self.reached = Fate.DEPLOYED
 
     def latch(self, before: Instant, now: Instant) -> None:
         """Let latches catch in a step."""

@@ -28,6 +28,9 @@ energy error; a quarter of it moves the asynchrony by 0.5 %."""
 _FIRST = 20.0
 """The first step is ``solver.step`` over this at most: generalised-alpha starts from rest without
 an acceleration, which delays the motion by a third of the first step."""
+_ANEW = 10.0
+"""The first step under other forces is so much shorter than one from rest: the integrator's
+accelerations are still those of the forces before, also where these moved it."""
 _APPROACH = 0.02
 """Largest first step over the time to the first stop, as it is chosen without knowing the motion: a
 winch may take a ring that is nearly open to its stops within it."""
@@ -62,12 +65,17 @@ class MotionSteps(Remembering):
         # Below ``_AT`` readings stay as far apart as at it: closer ones would see the rods vibrate.
         self._stride = max(1.0, math.sqrt(_AT / solver.tolerance))
         self._past: deque[tuple[float, float]] = deque()
-        self.step = min(solver.step / _FIRST, scales.first_step)
+        self.step = self._first = min(solver.step / _FIRST, scales.first_step)
 
     def recall(self, memory: Memory) -> None:
         """See ``Remembering``."""
         super().recall(memory)
         self.step = min(self.step, self._solver.step)
+
+    def begin_anew(self) -> None:
+        """Go on with other forces: nothing that is known tells how they move it."""
+        self._past.clear()
+        self.step = min(self.step, self._first / _ANEW)
 
     def advance(self, now: Instant, stops: StopContact) -> None:
         """Choose the step after an accepted one."""

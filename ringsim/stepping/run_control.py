@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from ringsim.parts.faults.family import AT_ONCE
 from ringsim.parts.limits import Limits
 from ringsim.parts.solver import NO_DEVIATIONS, Solver
 from ringsim.stepping.constant_steps import ConstantSteps
@@ -56,24 +57,25 @@ class RunControl(Remembering):
         *,
         limits: Limits = Limits(),  # noqa: B008  frozen
         follow_deviations: bool = False,
+        turn: float = math.inf,
     ) -> None:
         """Begin a run, which ends when the V-joints of ``locks`` have all reached the same stop and
         their latches have caught, or one is past it by more than ``limits``, or all are at rest,
         else at ``solver.end_time``; with ``follow_deviations`` steps resolve how the joints deviate
-        from their mean angle.
+        from their mean angle.  No stop that is reached before the time ``turn`` (s), at which loads
+        turn round, ends it.
         """
         self.now, self._solver, self._locks, self._limits = start, solver, locks, limits
         self._rest = Rest(start, solver.end_time, scales.energy)
         self._farthest = Overrun()
-        self._roped = scales.slack_tension is not None
+        self._scales, self._turn = scales, turn
         self._steps: MotionSteps | ConstantSteps = ConstantSteps(solver.step, locks is None)
         self._indicators: list[Indicator] = []
         self._deviations: DeviationSteps | None = None
         if solver.step_control == "motion":
             self._steps = MotionSteps(solver, scales)
             self._indicators.append(EnergyImbalance(solver, scales))
-            if scales.slack_tension is not None:
-                self._indicators.append(TensionBend(solver, scales.slack_tension))
+            self._take_tensions()
             if follow_deviations and solver.deviation_tolerance < NO_DEVIATIONS:
                 duration = scales.travel / scales.rate
                 self._deviations = DeviationSteps(solver.deviation_tolerance, duration)
@@ -98,6 +100,7 @@ class RunControl(Remembering):
         """See ``Remembering``; other settings may have given a control other parts."""
         super().recall(memory)
         self._settled_at += self._settling - memory["settling"]
+        self._turn = self._turn if self.now.time < self._turn - AT_ONCE else math.inf
         for kind, part in self._parts().items():
             if kind in memory["parts"]:
                 part.recall(memory["parts"][kind])
@@ -109,14 +112,24 @@ class RunControl(Remembering):
         """
         self.now = now
         self._guard.begin_anew(now, lost)
-        self._rest.begin(now)
-        if isinstance(self._steps, ConstantSteps):
-            self._steps.begin_anew()
+        self._set_out()
+
+    def unsettle(self) -> None:
+        """Let the stop that all V-joints have reached end the run no more: they may leave it."""
+        self._settled_at = math.inf
+        self._take_tensions()
+
+    def _set_out(self) -> None:
+        """Begin steps and the watch for rest as at the start: other forces act from now on."""
+        self._rest.begin(self.now)
+        self._steps.begin_anew()
 
     def next_step(self, next_event: float = math.inf) -> float:
         """The next step, s; it must not pass the time ``next_event`` (s), as of a fault."""
         self._steps.step = min([self._steps.step, *(one.limit for one in self._indicators)])
-        end = min(self._solver.end_time, next_event, self._settled_at)
+        end = min(self._solver.end_time, self._settled_at)
+        # What comes at once with the end is left to it: no step is as short as that.
+        end = next_event if next_event < end - AT_ONCE else end
         return self._steps.towards(end - self.now.time)
 
     def retry(self, shorter: float) -> float:
@@ -152,8 +165,7 @@ class RunControl(Remembering):
         if self.goes_on and self._locks is not None:
             self._locks.note(self.now.angles)
             self._locks.latch(before, found)
-            if math.isinf(self._settled_at):
-                self._note_lock(self._locks, before)
+            self._note_stop(self._locks, before)
             self._note_overrun(self._locks)
             self._note_strain(self._locks)
         if self.goes_on:
@@ -163,6 +175,9 @@ class RunControl(Remembering):
             locked = self._locks is not None and self._locks.deployed.any()
             if self._deviations is not None and not locked:
                 self._steps.step = min(self._steps.step, self._deviations.limit(self.now))
+            if self.now.time >= self._turn - AT_ONCE:
+                self._turn = math.inf
+                self._set_out()
         return self.goes_on
 
     def fail(self, cause: str) -> None:
@@ -202,6 +217,12 @@ class RunControl(Remembering):
         found = (one for one in (*parts, *self._indicators) if one is not None)
         return {type(one).__name__: one for one in found}
 
+    def _take_tensions(self) -> None:
+        """Let tensions choose steps, as from a start."""
+        if self._scales.slack_tension is not None and self._indicators:
+            bends = TensionBend(self._solver, self._scales.slack_tension)
+            self._indicators = [self._indicators[0], bends]
+
     def _leave_tensions(self) -> None:
         """After the last lock what tensions do is in no result but the series."""
         if math.isfinite(self._settled_at):
@@ -216,13 +237,22 @@ class RunControl(Remembering):
         if refused:
             self.diverge(refused)
 
-    def _note_lock(self, locks: Locks, before: Instant) -> None:
-        """Let the run settle once all V-joints have reached the same stop, and latches hold."""
-        if not (locks.deployed.all() or locks.stowed.all()) or locks.unlatched:
+    def _note_stop(self, locks: Locks, before: Instant) -> None:
+        """Let the run settle once all V-joints have reached the same stop, and latches hold; go on
+        once they have left the stowed one.
+        """
+        fate = Fate.NONE if locks.unlatched else locks.reached
+        if fate is self.fate:
             return
-        self.fate = Fate.DEPLOYED if locks.deployed.all() else Fate.FOLDED
-        where = "180 deg" if locks.deployed.all() else "the stowed stop"
+        self.fate = fate
+        if fate is Fate.NONE:
+            self.reason = Reason()
+            self.unsettle()
+            return
+        where = "180 deg" if fate is Fate.DEPLOYED else "the stowed stop"
         self.reason = Reason(text=f"all V-joints have reached {where}")
+        if math.isfinite(self._turn):
+            return
         # Settling counts from the last lock within this step: what happens after it must not
         # depend on where steps end.
         time = self.now.time
@@ -241,22 +271,24 @@ class RunControl(Remembering):
             self.goes_on = False
         elif time >= solver.end_time * (1.0 - _ROUND_OFF):
             if locks is None:
-                words = "the cable was wound" if self._roped else "the run lasted"
+                roped = self._scales.slack_tension is not None
+                words = "the cable was wound" if roped else "the run lasted"
                 self._end(Fate.FINISHED, f"{words} until {end}")
-            elif math.isinf(self._settled_at):
+            elif self.fate is Fate.NONE:
                 fate = Fate.NOT_LATCHED if locks.unlatched else Fate.CUT_OFF
                 self._end(fate, f"{end} was reached with {locks.missing()}")
             self.goes_on = False
         elif (
             locks is not None
             and math.isinf(self._settled_at)
+            and math.isinf(self._turn)
             and self._rest.reached(self.now, locks.ahead)
         ):
             fate = Fate.PARTLY_DEPLOYED if locks.deployed.any() else Fate.STALLED
-            self._end(
-                Fate.NOT_LATCHED if locks.unlatched else fate,
-                resting(locks.missing(), self._rest.window),
-            )
+            fate = Fate.NOT_LATCHED if locks.unlatched else fate
+            words = resting(locks.missing(), self._rest.window)
+            # Where all rest on a stop that they reached, as before loads that turned round in vain.
+            self._end(self.fate or fate, self.reason or words)
         elif self._count >= solver.step_limit:
             self._give_up(
                 Cause.STEP_LIMIT,

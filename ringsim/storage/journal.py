@@ -17,15 +17,16 @@ from numpy.typing import NDArray
 from ringsim.files import sync, writing
 from ringsim.refusal import InputError
 from ringsim.storage.locks import GO_ON
-from ringsim.storage.netcdf import NOT_RUN
+from ringsim.storage.netcdf import DESIGN, NOT_RUN
 from ringsim.storage.result import Result
 from ringsim.storage.verified import RECORD, Verified, forget, recall, remember
+from ringsim.tables import counted
 from ringsim.variables import Fate, Status
 
 FOLDER = "journals"
 _log = logging.getLogger(__name__)
 _FRAME = struct.Struct("<8sIQ16s")
-_MAGIC = b"ringsim2"
+_MAGIC = b"ringsim3"
 _SYNC_SECONDS = 1.0
 """Records are forced to the disk when this much time has passed since the last time: for samples
 longer than that each is, for shorter ones it would cost more than the run."""
@@ -39,19 +40,18 @@ class Journal:
     """An append-only file with one writer.
 
     A record is complete or, if the writer was killed within it, recognised as torn and ignored.
-    Its checksum is right for this campaign only.  ``writer`` names the share and the rank.
+    ``writer`` names the share and the rank.
     """
 
-    def __init__(self, folder: Path, campaign: str, writer: str) -> None:
+    def __init__(self, folder: Path, writer: str) -> None:
         # No two processes share a journal, even where the file system has no locks.
         self.path = folder / FOLDER / f"{writer}-{secrets.token_hex(4)}.journal"
-        self._campaign = campaign
         self._descriptor, self._size, self._synced = -1, 0, -_SYNC_SECONDS
 
     def append(self, result: Result) -> None:
         """Add a result; InputError if the disk is full, and the records before remain whole."""
         header, body = result.header(), result.body
-        check = _checksum(header, body, self._campaign)
+        check = _checksum(header, body)
         frame = _FRAME.pack(_MAGIC, len(header), len(body), check)
         record = memoryview(frame + header + body)
         with writing(self.path, GO_ON):
@@ -83,18 +83,16 @@ class Journal:
         self._synced = time.monotonic()
 
 
-def read_journal(
-    path: Path, campaign: str, place: int = 0
-) -> Iterator[tuple[int, int, Result | None]]:
+def read_journal(path: Path, place: int = 0) -> Iterator[tuple[int, int, Result | None]]:
     """The records of a journal in their order from a place on, each with its place and its end.
 
-    None stands for bytes between two records that are no record of this campaign.  What a writer
+    None stands for bytes between two records that are no record.  What a writer
     left unfinished at the end is left out: the file may still be growing.
     """
     with path.open("rb") as file:
         size = os.fstat(file.fileno()).st_size
         while place < size:
-            if (result := _read_record(file, place, campaign)) is not None:
+            if (result := _read_record(file, place)) is not None:
                 yield place, file.tell(), result
                 place = file.tell()
                 continue
@@ -105,7 +103,7 @@ def read_journal(
             place += 1 + gap
 
 
-def _read_record(file: BinaryIO, place: int, campaign: str) -> Result | None:
+def _read_record(file: BinaryIO, place: int) -> Result | None:
     """The record that begins at a place of a journal; None if there is no whole one."""
     file.seek(place)
     frame = file.read(_FRAME.size)
@@ -116,20 +114,19 @@ def _read_record(file: BinaryIO, place: int, campaign: str) -> Result | None:
     if magic != _MAGIC or file.tell() + header_size + body_size > os.fstat(file.fileno()).st_size:
         return None
     header, body = file.read(header_size), file.read(body_size)
-    if _checksum(header, body, campaign) != expected:
+    if _checksum(header, body) != expected:
         return None
     return Result.from_header(header, body)
 
 
-def _checksum(header: bytes, body: bytes, campaign: str) -> bytes:
-    return hashlib.blake2b(header + body, digest_size=16, key=campaign.encode()).digest()
+def _checksum(header: bytes, body: bytes) -> bytes:
+    return hashlib.blake2b(header + body, digest_size=16).digest()
 
 
 @dataclass(frozen=True)
 class Survey:
     """What a folder holds of every sample."""
 
-    campaign: str
     journals: list[Path]
     status: NDArray[np.int8]
     """Status of each sample, NOT_RUN where there is no result."""
@@ -161,7 +158,7 @@ class Survey:
         for number in np.unique(owner[owner >= 0]):
             with self.journals[number].open("rb") as file:
                 for place in np.sort(self.place[samples][owner == number]):
-                    if (result := _read_record(file, int(place), self.campaign)) is None:
+                    if (result := _read_record(file, int(place))) is None:
                         forget(self.journals[number].parents[1])
                         raise DamagedError(
                             f"{self.journals[number]} has been damaged meanwhile: give the same "
@@ -170,18 +167,21 @@ class Survey:
                     yield result
 
 
-def survey(folder: Path, campaign: str, samples: int, *, checks: bool = False) -> Survey:
+def survey(folder: Path, run_with: Sequence[str], *, checks: bool = False) -> Survey:
     """Look through the journals of a campaign's folder, for samples or for their ``checks``.
+
+    ``run_with`` tells for each sample what its records must say that it was run with; InputError
+    if one says something else, as those of another campaign do.
 
     Of several results of one sample, one that went well counts before one that failed, whatever
     the clocks said; otherwise the later one does.  A warning in the log tells of records that are
-    damaged, or of another ``campaign``.  What was verified once is remembered in the folder.
+    damaged.  What was verified once is remembered in the folder.
     """
     journals = sorted((folder / FOLDER).glob("*.journal"))
-    before = recall(folder, campaign)
-    known = {path.name: _verified(path, campaign, before.get(path.name)) for path in journals}
+    before = recall(folder)
+    known = {path.name: _verified(path, before.get(path.name)) for path in journals}
     if any(known[name] is not before.get(name) for name in known):
-        remember(folder, campaign, known)
+        remember(folder, known)
     for name, found in known.items():
         if found.damaged:
             told = "%s is damaged: %d of its records cannot be used, their samples run again"
@@ -189,9 +189,18 @@ def survey(folder: Path, campaign: str, samples: int, *, checks: bool = False) -
     records = np.concatenate([np.empty(0, RECORD), *(each.records for each in known.values())])
     counts = np.array([len(each.records) for each in known.values()], dtype=np.int64)
     owner = np.repeat(np.arange(len(known)), counts)
+    samples, expected = len(run_with), np.array(run_with, dtype=RECORD["run_with"])
     number = ~records["sample"] if checks else records["sample"]  # see result.check_of
     inside = (number >= 0) & (number < samples)
     records, owner, number = records[inside], owner[inside], number[inside]
+    if len(strange := np.flatnonzero(records["run_with"] != expected[number])):
+        first = strange[np.argmin(number[strange])]
+        raise InputError(
+            f"{journals[owner[first]]}: its record of sample {number[first]} was run with other "
+            f"inputs than {DESIGN} of this folder gives, or with another scene or build "
+            f"({counted(len(strange), 'record')} of other runs here): take that file out of the "
+            f"folder, or bring back the {DESIGN} that it was run with"
+        )
     # No clock is 1e12 s (30,000 years) wrong.
     weight = records["finished"] + 1e12 * (records["status"] < Status.SOLVER_FAILED)
     order = np.lexsort((-np.arange(len(records)), weight, number))
@@ -204,7 +213,7 @@ def survey(folder: Path, campaign: str, samples: int, *, checks: bool = False) -
         return found
 
     return Survey(
-        campaign, journals,
+        journals,
         status=of_each(records["status"][best], NOT_RUN),
         fate=of_each(records["fate"][best], Fate.NONE),
         seconds=of_each(records["seconds"][best], np.nan),
@@ -214,7 +223,7 @@ def survey(folder: Path, campaign: str, samples: int, *, checks: bool = False) -
     )  # fmt: skip
 
 
-def _verified(path: Path, campaign: str, before: Verified | None) -> Verified:
+def _verified(path: Path, before: Verified | None) -> Verified:
     """The records of a journal: those that were verified before, and what has come since."""
     now, old = path.stat(), before or Verified()
     if (now.st_size, now.st_mtime_ns) == (old.size, old.changed):
@@ -222,12 +231,13 @@ def _verified(path: Path, campaign: str, before: Verified | None) -> Verified:
     if now.st_size <= old.size:  # it has not grown: somebody else wrote to it
         old = Verified()
     end, damaged, new = old.end, old.damaged, []
-    for place, after, result in read_journal(path, campaign, old.end):
+    for place, after, result in read_journal(path, old.end):
         end = after
         if result is None:
             damaged += 1
         else:
             codes = result.sample, result.status, result.fate
-            new.append((place, *codes, result.seconds, result.finished, result.form))
+            words = result.form, result.run_with
+            new.append((place, *codes, result.seconds, result.finished, *words))
     records = np.concatenate([old.records, np.array(new, dtype=RECORD)])
     return Verified(records, now.st_size, now.st_mtime_ns, end, damaged)

@@ -1,9 +1,7 @@
 """How variables lie in netCDF files, and where these come from; ``design.nc``."""
 
 import math
-import os
 import platform
-import subprocess
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -15,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from ringsim import build
 from ringsim.files import whole
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
@@ -25,7 +24,7 @@ from ringsim.units import Model
 from ringsim.variables import Fidelity, Variable, flags_of
 
 DESIGN = "design.nc"
-_PACKAGES = ("ringsim", "exudyn", "numba", "numpy", "scipy", "netCDF4", "mpi4py")
+_PACKAGES = ("exudyn", "numba", "numpy", "scipy", "netCDF4", "mpi4py")
 
 NOT_RUN = -1
 """Value of ``status`` for samples that have not been run, and of codes that are missing."""
@@ -162,6 +161,7 @@ def read_design(folder: Path) -> tuple[Table, dict[str, Any]]:
 
 def provenance(*, name: str, title: str, action: str, model: Fidelity) -> dict[str, Any]:
     """Attributes after ACDD: by whom, when, where and with what a campaign's file was made."""
+    versions = {f"{package}_version": version(package) for package in _PACKAGES}
     now = datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
     software = f"ringsim {version('ringsim')}"
     return {
@@ -173,21 +173,5 @@ def provenance(*, name: str, title: str, action: str, model: Fidelity) -> dict[s
         "source": f"{software}: {model.model}", "fidelity": model.word,
         "creator_name": "ringsim", "creator_type": "institution", "creator_software": software,
         "python_version": platform.python_version(), "platform": platform.platform(),
-        "host": platform.node(), "git_commit": _git_commit(),
-    } | {f"{package}_version": version(package) for package in _PACKAGES}  # fmt: skip
-
-
-def _git_commit() -> str:
-    """Commit of the source tree that runs, with "+changes" if files differ; or "unknown"."""
-    tree = Path(__file__).resolve().parents[2]
-    if not (tree / ".git").exists():
-        return "unknown"
-    # Without tags, so that it is the commit itself.
-    describe = ["describe", "--always", "--abbrev=40", "--dirty=+changes", "--exclude=*"]
-    try:
-        return subprocess.run(
-            ["git", "-C", os.fspath(tree), *describe],
-            capture_output=True, text=True, timeout=10, check=True,
-        ).stdout.strip()  # fmt: skip
-    except (OSError, subprocess.SubprocessError):
-        return "unknown"
+        "host": platform.node(), **build.provenance(), **versions,
+    }  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.outputs import COORDINATES, VARIABLES
-from ringsim.variables import Cause, Fate, Status
+from ringsim.variables import Cause, Code, Fate, Status
 
 MISSING_COUNT = -1
 """Stands for a missing whole number."""
@@ -47,7 +47,9 @@ class Result:
     overrides: dict[str, Any] = field(default_factory=dict)
     """Settings by scene path that it was run with instead of the campaign's."""
     fate: Fate = Fate.NONE
-    """The variable ``outcome``, which is told while a campaign runs; NONE of older versions."""
+    """The variable ``outcome``, which is told while a campaign runs; NONE where nobody knows."""
+    run_with: str = ""
+    """Digest of what it was run with: build, scene, solver, and the sample's own inputs."""
 
     def header(self) -> bytes:
         """Everything but the body."""
@@ -66,14 +68,8 @@ class Result:
     def from_header(cls, header: bytes, body: bytes) -> "Result":
         """The result whose :meth:`header` is given."""
         table = json.loads(header)
-        # Older versions had a status 1, cut off by the end time, and causes that are outcomes now.
-        status, cause = table["status"], table.get("cause", 0)
-        known = cause in [each.value for each in Cause]
-        codes = {
-            "status": Status.OK if status == 1 else Status(status),
-            "cause": Cause(cause) if known else Cause.NONE,
-            "fate": Fate(table.get("fate", Fate.NONE)),
-        }
+        kinds: dict[str, type[Code]] = {"status": Status, "cause": Cause, "fate": Fate}
+        codes = {name: kind(table[name]) for name, kind in kinds.items()}
         return cls(**table | codes, body=body)
 
     def arrays(self) -> dict[str, NDArray[Any]]:

@@ -18,7 +18,7 @@ NAME = "journals-verified.npz"
 RECORD = np.dtype(
     [
         ("place", "i8"), ("sample", "i8"), ("status", "i1"), ("fate", "i1"), ("seconds", "f8"),
-        ("finished", "f8"), ("form", "U16"),
+        ("finished", "f8"), ("form", "U16"), ("run_with", "U16"),
     ]
 )  # fmt: skip
 """What is remembered of a whole record; its form is one of ``ringsim.storage.result.pack``."""
@@ -37,12 +37,12 @@ class Verified:
     """Gaps between records that are no records."""
 
 
-def recall(folder: Path, campaign: str) -> dict[str, Verified]:
-    """What was verified in a campaign's folder, by name of journal; nothing of another campaign."""
+def recall(folder: Path) -> dict[str, Verified]:
+    """What was verified in a campaign's folder, by name of journal."""
     # Lost or damaged it costs the time to read the journals, so that no fault of it counts.
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError, BadZipFile):
         with (folder / NAME).open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-            if str(file["campaign"]) != campaign or file["records"].dtype != RECORD:
+            if file["records"].dtype != RECORD:
                 return {}
             names, numbers = file["names"].tolist(), file["numbers"]
             parts = np.split(file["records"], np.cumsum(numbers[:, 4])[:-1])
@@ -51,7 +51,7 @@ def recall(folder: Path, campaign: str) -> dict[str, Verified]:
     return {}
 
 
-def remember(folder: Path, campaign: str, found: dict[str, Verified]) -> None:
+def remember(folder: Path, found: dict[str, Verified]) -> None:
     """Write it; never fail because of it, since folders may be read-only."""
     numbers = [(v.size, v.changed, v.end, v.damaged, len(v.records)) for v in found.values()]
     records = np.concatenate([np.empty(0, RECORD), *(v.records for v in found.values())])
@@ -60,7 +60,7 @@ def remember(folder: Path, campaign: str, found: dict[str, Verified]) -> None:
         whole(folder / NAME, lasting=False) as draft,
         draft.open("wb") as file,
     ):
-        np.savez(file, campaign=campaign, names=list(found), numbers=numbers, records=records)
+        np.savez(file, names=list(found), numbers=numbers, records=records)
 
 
 def forget(folder: Path) -> None:

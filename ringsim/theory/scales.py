@@ -21,11 +21,15 @@ def scales_of(scene: Scene, layout: Layout, ideal: OneCoordinate, ropes: Array |
     """
     structure = scene.structure
     angles, rates = layout.opening_angles()
-    travel, per_angle = math.pi - float(angles.mean()), float(rates.mean())
+    per_angle = float(rates.mean())
     start = structure.coordinate
     folding = ideal.motion(start).inertia
     acceleration = per_angle * (ideal.work_rate(start) / folding)
     inertia = folding / per_angle**2
+    travel = math.pi - float(angles.mean())
+    if acceleration < 0.0 and scene.cables is None:  # it folds, which may be a far longer way
+        stowed = 0.0 if scene.stop is None else math.radians(scene.stop.stowed_angle)
+        travel = max(float(angles.mean()) - stowed, travel)
     # The mean rate if the first acceleration lasted, at least that of the longest run.
     rate = max(math.sqrt(0.5 * abs(acceleration) * travel), travel / scene.solver.end_time)
     # Springs of its own set the scale: a thousandth of their force times a rod does not matter.

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import xarray as xr
+from made_campaign import made_campaign
 
-from ringsim.analysis.campaign_notes import latch_lines
+from ringsim.analysis.campaign_notes import latch_lines, peak_lines
 from ringsim.variables import Fate
 
 
@@ -22,3 +24,21 @@ def test_deployed_samples_whose_latches_have_not_caught_are_named() -> None:
 def test_those_that_are_told_as_they_are_need_no_note() -> None:
     assert latch_lines(campaign([Fate.DEPLOYED, Fate.NOT_LATCHED], [6, 4])) == []
     assert latch_lines(campaign([Fate.DEPLOYED], [0]).drop_vars("latched_joints")) == []
+
+
+def test_the_numerical_error_of_a_sample_that_is_named_stands_beside_its_value() -> None:
+    """Its own where it states one, else the largest of the others, else how to get one."""
+    made, name = made_campaign(5), "peak_tension_error"
+    where = {"time": [5.0] * 5, "plane": ["upper"] * 5, "span": [1] * 5}
+    made = made.assign({f"peak_tension_{k}": ("sample", v) for k, v in where.items()})
+
+    def told(bars: list[float]) -> list[str]:
+        lines = peak_lines(made.assign({name: ("sample", bars)}))
+        return [line for line in lines if "tension in sample" in line]
+
+    (line,) = told([0.1, np.nan, 0.3, np.nan, 0.25])
+    assert "in sample 4: 24" in line
+    assert line.endswith("; numerical error at most 0.25 N")
+    (line,) = told([0.1, np.nan, 0.3, np.nan, np.nan])
+    assert line.endswith("not stated, at most 0.3 N in the 2 samples that state theirs")
+    assert sum("error_bars_every" in line for line in peak_lines(made)) == 1

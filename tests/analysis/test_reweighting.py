@@ -9,12 +9,13 @@ import pytest
 from click.testing import CliRunner
 from scipy.stats import norm, truncnorm
 
-from made import UNIT, drawn_campaign, points
+from made import UNIT, campaign, drawn_campaign, points
 from ringsim.analysis import binomial, weighted
+from ringsim.analysis.capped import Cap, Pair
 from ringsim.analysis.reweighting import parse_reweighted, read_distributions, weights_of
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
-from ringsim.analysis.verdicts import Verdict
+from ringsim.analysis.verdicts import Verdict, verdict_of
 from ringsim.cli.analyse import command
 from ringsim.refusal import InputError
 from ringsim.sampling.designs.morris import Morris
@@ -69,12 +70,92 @@ def test_verdicts_are_those_of_the_other_distribution():
     assert "as drawn " not in "\n".join(told(analyse(made, wanted)))
 
 
-def test_equal_weights_have_the_bounds_of_plain_samples():
-    own, weights = np.arange(100) < 80, np.full(100, 0.3)
+STANDARD = read_distributions({"x": {"kind": "normal", "mean": 0.0, "standard_deviation": 1.0}})[
+    "x"
+]
+
+
+def shifted(mean):
+    """A standard normal input, reweighted to another mean."""
+    return {"x": Pair(STANDARD, STANDARD.model_copy(update={"mean": mean}), 1)}
+
+
+@pytest.mark.parametrize(
+    ("shift", "samples", "true", "required", "met", "not_met"),
+    [
+        # Violations where hardly a sample is: nothing can be shown.
+        (0.6, 300, 0.98, 0.985, (0.0, 0.0), (0.0, 0.1)),
+        (0.6, 300, 0.98, 0.975, (0.0, 0.1), (0.0, 0.1)),
+        (1.5, 300, 0.98, 0.985, (0.0, 0.0), (0.0, 0.1)),
+        (3.0, 50, 0.5, 0.6, (0.0, 0.0), (0.0, 0.1)),
+        # Enough samples, and a margin.
+        (0.6, 2000, 0.999, 0.98, (0.9, 1.0), (0.0, 0.0)),
+        (0.6, 2000, 0.9, 0.95, (0.0, 0.0), (0.9, 1.0)),
+        (0.6, 300, 0.9999, 0.95, (0.9, 1.0), (0.0, 0.0)),
+    ],
+)
+def test_verdicts_of_campaigns_with_unbounded_weights_err_on_the_safe_side(
+    shift, samples, true, required, met, not_met
+):
+    """Kish's count of all weights said "met" in 34 of 100 campaigns of the first case."""
+    cap, limit, campaigns = Cap(shifted(shift), samples, 0.1), shift + norm.ppf(true), 400
+    rng, counts, held = np.random.default_rng(0), np.zeros(2), np.zeros(2)
+    for _ in range(campaigns):
+        x = rng.standard_normal(samples)
+        ends = cap.bounds(x > limit, np.exp(shift * x - shift**2 / 2), None)
+        held += ends[0] <= 1 - true, 1 - true <= ends[1]
+        verdict = verdict_of(1 - ends[1], 1 - ends[0], required)
+        counts += verdict == Verdict.MET, verdict == Verdict.NOT_MET
+    assert (held >= 0.9 * campaigns).all()
+    for (least, most), share in zip((met, not_met), counts / campaigns, strict=True):
+        assert least <= share <= most, counts
+
+
+def test_a_verdict_of_few_samples_is_not_yet_shown_and_what_they_decide_is_marked():
+    """Campaigns whose lower bound lay above the truth while Kish's count was taken."""
+    law = {"kind": "normal", "mean": 0.0, "standard_deviation": 1.0}
+    limit = {"max": 0.6 + norm.ppf(0.98), "probability": 0.985, "confidence": 0.9}
+    for seed in range(8):
+        x = np.random.default_rng(seed).standard_normal(300)
+        made = campaign(x)
+        made["x"] = "sample", x, {"role": "input", "path": "x", "distribution": json.dumps(law)}
+        found = analyse(made, {"asynchrony_max": limit}, {"x": law | {"mean": 0.6}})
+        assert found.reweighted_verdict.item() == Verdict.NOT_YET_SHOWN
+        low, high = found.reweighted_bounds.values[0]
+        assert low < 0.98 < high
+        assert np.isnan(found.asynchrony_max_reweighted_interval.values[3]).all()
+        assert (found.reweighted_share_interval.sel(bound="lower") < 0.98).all()
+        assert (found.reweighted_share_interval.sel(bound="upper") > 0.98).all()
+        text = [line.split() for line in told(found)]
+        marked = [line for line in text if "(few)" in line[:-1]]
+        assert ["quantile", "95"] in [line[3:5] for line in marked]
+        assert ["deployed", "(few)"] in [line[:2] for line in marked]
+        assert ["mean"] not in [line[2:3] for line in marked]
+        assert [line for line in text if line[0:1] == ["(few):"]]
+
+
+def test_bounds_with_equal_weights_are_hardly_wider_than_those_of_plain_samples():
+    alike, own = shifted(0.0), np.arange(100) < 5
     for confidence in (0.5, 0.9, 0.999):
-        expected = binomial.share_bounds(80, 100, confidence)
-        found = weighted.share_bounds(own, weights, None, confidence)
-        assert found == pytest.approx(expected, abs=0.005)
+        low, high = Cap(alike, 100, 1 - confidence).bounds(own, np.ones(100), None)
+        exact = binomial.share_bounds(5, 100, confidence)
+        assert low <= exact[0] <= exact[1] <= high
+        assert high - low < 1.6 * (exact[1] - exact[0]) + 0.05
+    none = Cap(alike, 100, 0.1).bounds(own & False, np.ones(100), None)
+    assert none == (0.0, pytest.approx(1 - 0.1 ** (1 / 100), abs=1e-3))
+
+
+def test_draws_tell_what_lies_beyond_the_cap():
+    """Of weights exp(m x - m^2 / 2) in closed form: those above W are beyond ln(W) / m + m / 2."""
+    for mean in (0.6, 1.2):
+        cap = Cap(shifted(mean), 300, 0.1)
+        place = np.log(cap.weight) / mean + mean / 2
+        exact = norm.sf(place - mean) - cap.weight * norm.sf(place)
+        assert exact <= cap.beyond <= 1.2 * exact + 5e-4
+    old = read_distributions({"word": {"kind": "discrete", "values": ["a", "b"]}})["word"]
+    new = old.model_copy(update={"probabilities": (0.9, 0.1)})
+    two = Cap({"word": Pair(old, new, 2)}, 300, 0.1)
+    assert two.weight == pytest.approx(1.8**2)  # both places "a"
 
 
 def test_an_input_that_is_not_reweighted_keeps_its_distribution():
@@ -146,14 +227,14 @@ def test_words_and_lists_of_places_have_weights():
         word,
         {"role": "input", "path": "word", "distribution": json.dumps(old)},
     )
-    weights = weights_of(made, read_distributions({"word": old | {"probabilities": [0.9, 0.1]}}))
-    np.testing.assert_allclose(weights, np.where(word == "a", 1.0, 1 / 9))
+    weights, _ = weights_of(made, read_distributions({"word": old | {"probabilities": [0.9, 0.1]}}))
+    np.testing.assert_allclose(weights, np.where(word == "a", 1.8, 0.2))
     friction = np.random.default_rng(2).random((300, 2))
     says = {"role": "input", "path": "friction", "distribution": UNIT}
     made["friction"] = ("sample", "pulley"), friction, says
-    weights = weights_of(made, read_distributions({"friction": NARROW}))
-    product = TRUE.pdf(friction).prod(axis=1)
-    np.testing.assert_allclose(weights, product / product.max())
+    weights, pairs = weights_of(made, read_distributions({"friction": NARROW}))
+    np.testing.assert_allclose(weights, TRUE.pdf(friction).prod(axis=1))
+    assert pairs["friction"].places == 2
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from made import campaign, points, response
+from ringsim.analysis.binomial import samples_needed, share_bounds
 from ringsim.analysis.requirements import to_json
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
@@ -73,25 +74,32 @@ def test_too_many_violations_are_not_met():
     assert "not met" in text_of(found)
 
 
-def test_lost_samples_count_neither_way_and_the_worst_case_is_told():
+def test_lost_samples_count_as_the_worst_for_either_verdict():
     status = np.where(np.arange(240) < 10, Status.TIMEOUT, Status.OK)
     values = np.where(status == Status.OK, 9.0, np.nan)
     found = analyse(campaign(values, status=status, outcome=np.where(status, 0, 1)), MOST_TEN)
-    assert verdict(found) == Verdict.MET
-    assert verdict(found, which="verdict_worst_case") == Verdict.NOT_MET
+    assert verdict(found) == Verdict.NOT_YET_SHOWN
+    assert verdict(found, which="verdict_of_used") == Verdict.MET
+    low, high = found.probability_lower.item(), found.probability_upper.item()
+    assert (low, high) == pytest.approx((share_bounds(230, 240, 0.9)[0], 1.0))
     assert (found.samples_used.item(), found.samples_lost.item()) == (230, 10)
     assert found.asynchrony_max_samples.values.tolist() == [230, 10, 0, 0]
     assert found.outcome_samples.sel(kind="lost: timeout").item() == 10
     assert found.outcome_of.sel(kind="lost: timeout").item() == 240
-    assert found.outcome_share.sel(kind="deployed").item() == 1.0
+    assert found.outcome_share.sel(kind="deployed").item() == pytest.approx(230 / 240)
+    assert found.outcome_lost.sel(kind="deployed").item() == 10
+    # More violations than a hundredth, were all lost ones sound: not met all the same.
+    many = analyse(campaign(values + 2 * (np.arange(240) > 200), status=status), MOST_TEN)
+    assert verdict(many) == Verdict.NOT_MET
+    assert many.probability_upper.item() == pytest.approx(share_bounds(201, 240, 0.9)[1])
 
 
 def test_further_samples_would_show_only_what_lost_ones_leave_open():
     status = np.where(np.arange(100) < 10, Status.TIMEOUT, Status.OK)
     made = campaign(np.full(100, 9.0), status=status, outcome=np.where(status, 0, 1))
     assert (
-        "asynchrony_max: 140 further samples without a violation would show it, if 10 lost samples "
-        "would not have violated it"
+        f"asynchrony_max: {samples_needed(10, 0.99, 0.9) - 100} further samples without a "
+        "violation would show it, with 10 lost samples as violations"
     ) in text_of(analyse(made, MOST_TEN))
     status[:] = Status.TIMEOUT
     found = analyse(made.assign(status=("sample", status)), MOST_TEN)
@@ -136,7 +144,7 @@ def test_samples_that_have_not_run_are_neither_used_nor_lost():
     found = analyse(campaign(np.full(40, 1.0), status=status), MOST_TEN)
     assert found.asynchrony_max_samples.values.tolist() == [30, 0, 0, 10]
     assert found.samples_used.item() == 30
-    assert verdict(found, which="verdict_worst_case") == Verdict.NOT_YET_SHOWN
+    assert verdict(found) == Verdict.NOT_YET_SHOWN
 
 
 def test_requirements_of_the_file_are_judged_and_outcomes_are():

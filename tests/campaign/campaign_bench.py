@@ -177,9 +177,9 @@ def journals(bench):
 def lose(bench, samples):
     """Take the results of some samples out of the journals, and the merged file away."""
     folder = open_folder(bench.folder / "out")
-    paths, new = journals(bench), Journal(folder.path, folder.attributes["identity"], "all-rank0")
+    paths, new = journals(bench), Journal(folder.path, "all-rank0")
     for path in paths:
-        for *_, result in read_journal(path, folder.attributes["identity"]):
+        for *_, result in read_journal(path):
             if result.sample not in samples:
                 new.append(result)
         path.unlink()
@@ -190,7 +190,7 @@ def lose(bench, samples):
 def records(folder, writer="*"):
     """Records in the journals of running writers; looking at them costs nothing."""
     paths = (folder / "journals").glob(f"{writer}.journal")
-    return sum(path.read_bytes().count(b"ringsim2") for path in paths)
+    return sum(path.read_bytes().count(b"ringsim3") for path in paths)
 
 
 def ranks_of(bench, number):

@@ -9,7 +9,6 @@ import pytest
 import xarray as xr
 
 from campaign_bench import Bench, comparable, journals, lose
-from ringsim.campaign.folder import open_folder
 from ringsim.campaign.specification import load_campaign
 from ringsim.refusal import InputError
 from ringsim.storage.journal import read_journal
@@ -43,9 +42,7 @@ def checked(finished, tmp_path):
 
 
 def stored(bench):
-    folder = open_folder(bench.folder / "out")
-    identity = folder.attributes["identity"]
-    return [each.sample for path in journals(bench) for *_, each in read_journal(path, identity)]
+    return [each.sample for path in journals(bench) for *_, each in read_journal(path)]
 
 
 def test_the_file_holds_the_answers_of_both_engines(checked):

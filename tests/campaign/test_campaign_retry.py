@@ -6,7 +6,6 @@ import pytest
 import xarray as xr
 
 from campaign_bench import comparable, journals, lose
-from ringsim.campaign.folder import open_folder
 from ringsim.storage.journal import read_journal
 from ringsim.variables import Status
 
@@ -21,9 +20,7 @@ def poisoned(bench, *words, code=0):
 
 
 def stored(bench):
-    folder = open_folder(bench.folder / "out")
-    identity = folder.attributes["identity"]
-    return [each for path in journals(bench) for *_, each in read_journal(path, identity)]
+    return [each for path in journals(bench) for *_, each in read_journal(path)]
 
 
 def test_failed_samples_run_again_with_other_settings(bench):

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 import platform
+import runpy
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from ringsim.compile_cache import VARIABLE, compile_once
+from ringsim.compile_cache import VARIABLE, choose_folder, compile_once
 
 CHOOSES = "from ringsim.compile_cache import choose_folder\nprint(choose_folder())"
 FRAMES_FIRST = "import os, ringsim.frame\nprint(os.environ['NUMBA_CACHE_DIR'])"
@@ -43,7 +45,7 @@ def started(code: str, folder: Path, **environment: str) -> subprocess.Popen[str
     kept = {name: value for name, value in (os.environ | mine).items() if value}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     return subprocess.Popen(
-        [sys.executable, "-c", code], cwd=folder, env=kept, text=True, **pipes
+        [sys.executable, "-P", "-c", code], cwd=folder, env=kept, text=True, **pipes
     )  # fmt: skip
 
 
@@ -82,11 +84,88 @@ def test_without_a_home_to_write_to_a_temporary_folder_is_told(tmp_path: Path) -
     out, errors = ended(started(CHOOSES, tmp_path, **places))
     assert Path(out).parent == tmp_path
     assert len(errors.strip().splitlines()) == 1
-    assert "cannot be written: compiled code goes to" in errors
+    assert "cannot be written: make room, or let it be written to, or set NUMBA_CACHE" in errors
+    assert f"compiled code goes to {out}" in errors
     # The next run finds what this one compiled, but not in a folder that others can write to.
     assert ended(started(CHOOSES, tmp_path, **places))[0] == out
     Path(out).chmod(0o777)
     assert ended(started(CHOOSES, tmp_path, **places))[0] != out
+
+
+def test_a_given_folder_that_cannot_be_written_is_told_once_for_all(tmp_path: Path) -> None:
+    """numba would leave it in silence, and every process might compile on its own."""
+    (tmp_path / "file").write_text("")
+    code = f"{CHOOSES}\nimport subprocess, sys\nsubprocess.run([sys.executable, '-c', {CHOOSES!r}])"
+    places = {VARIABLE: str(tmp_path / "file" / "mine"), "TMPDIR": str(tmp_path)}
+    out, errors = ended(started(code, tmp_path, **places))
+    assert len(set(out.splitlines())) == 1
+    assert len(errors.splitlines()) == 1
+    assert f"or set {VARIABLE} to a folder of your own" in errors
+
+
+@pytest.mark.parametrize("given", [True, False])
+@pytest.mark.parametrize("whose", ["another user's", "open to all", "open to the group"])
+def test_code_of_others_is_not_run(
+    whose: str, given: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("numba.config.CACHE_DIR", "")  # and back to what it was
+    monkeypatch.delenv(VARIABLE, raising=False)
+    folder = choose_folder()
+    assert folder.parent == tmp_path / "cache" / "ringsim"
+    if not given:
+        monkeypatch.delenv(VARIABLE)
+    if whose == "another user's":
+        monkeypatch.setattr("os.getuid", lambda: 1 + folder.stat().st_uid)
+    else:
+        folder.chmod(0o777 if whose == "open to all" else 0o770)
+    assert choose_folder().parent == tmp_path
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"{folder}: ")
+    assert "whose code would run" in line
+    cure = "chown" if whose == "another user's" else "chmod go-w"
+    assert cure in line
+
+
+TINY = """
+from ringsim.frame.vectors import compiled, packed
+
+@compiled
+def half(x):
+    return 0.5 * x
+
+@packed
+def more(x):
+    return half(x) + 1.0
+"""
+
+
+@pytest.mark.parametrize("damage", [b"", b"no pickle", b"\x80\x05"])
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+def test_damaged_code_is_compiled_anew(
+    kind: str, damage: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    """Files of two functions, one of which calls the other; after that they are whole again."""
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path / "cache"))
+    source = tmp_path / "tiny.py"
+    source.write_text(TINY)
+
+    def hits() -> list[int]:
+        tiny = runpy.run_path(str(source))
+        assert tiny["more"](3.0) == 2.5
+        found = [sum(tiny[name].stats.cache_hits.values()) for name in ("more", "half")]
+        return found
+
+    assert hits() == [0, 0]
+    assert hits()[0] == 1
+    for path in (tmp_path / "cache").rglob(f"*.{kind}"):
+        path.write_bytes(damage)
+    assert hits() == [0, 0]
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("compiled code is damaged: it is compiled anew")
+    assert hits()[0] == 1
 
 
 def test_of_two_processes_one_compiles_and_the_other_waits(tmp_path: Path) -> None:

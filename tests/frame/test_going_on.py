@@ -136,7 +136,8 @@ def test_what_a_motor_gave_before_a_change_stays(change: dict[str, float], tmp_p
     upper = {"plane": "upper", "winch": 1}
     for name in ("motor_torque", "motor_speed", "motor_energy"):
         old, new = (found[name].sel(upper).values for found in (before, run))
-        np.testing.assert_array_equal(new[:10], old[:10], err_msg=name)
+        # To 16 ms: the curve through the last step before the change knows the step behind it.
+        np.testing.assert_array_equal(new[:9], old[:9], err_msg=name)
     assert run["motor_torque"].sel(upper).values[5] > 0.0
     # Without losses of the gear it is what the rope takes: tension times rope wound.
     after = run.sel(plane="upper").isel(time=slice(11, None))

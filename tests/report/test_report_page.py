@@ -144,8 +144,10 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
     assert cells[at + 7 : at + 13] == ["20 (0)", "26 (6)", "6", "5", "2", "0"]
     # Shares of outcomes have intervals, those of the analysis.
     at = cells.index("deployed")
-    low, high = share_interval(4, 5)
-    assert cells[at + 1 : at + 4] == ["4 of 5", "0.8", f"{low:.4g} .. {high:.4g}"]
+    low, high = share_interval(4, 7)[0], share_interval(6, 7)[1]
+    assert cells[at + 1 : at + 4] == [
+        "4 of 7 (2 lost)", f"{4 / 7:.4g}", f"{low:.4g} .. {high:.4g}"
+    ]  # fmt: skip
     at = cells.index("outcome is deployed")
     assert cells[at + 6 : at + 9] == ["5", "1", "2"]
 
@@ -375,3 +377,9 @@ def test_numerical_truth_tells_error_bars_and_differences_of_engines() -> None:
     assert checked == ["N", "2", f"{np.sqrt(0.125):.2g} (rms)", "0.4 (sample 2)"]
     (energy,) = [row for what, row in rows.items() if "energy imbalance" in what]
     assert energy == ["1", "3", "2e-05 (median)", "3e-05 (sample 2)"]
+    # The extremes' samples are named with the error that they state themselves.
+    campaign["peak_tension_error"][2] = 0.25
+    table = tables.statistics(campaign, analyse(campaign))
+    (row,) = [row for row in table.rows if "tension" in row[0]]
+    assert [cell.partition("(")[2] for cell in row[-5:-3]] == ["0, ± 0.5)", "2, ± 0.25)"]
+    assert table.notes[-1].startswith("± what the named sample states")

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import netCDF4
+import numpy as np
 import pytest
 import xarray as xr
 from pydantic import TypeAdapter
 
+from ringsim.outputs.family import axes
 from ringsim.refusal import InputError
-from ringsim.sampling.columns import Table
+from ringsim.sampling.columns import Table, add_inputs
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import Scene, load_scene
-from ringsim.storage.netcdf import read_design, write_design
+from ringsim.storage.netcdf import add_coordinate, read_design, write_design
 
 
 def drawn(base: Scene, inputs: dict[str, object]) -> Table:
@@ -58,6 +61,23 @@ def test_names_of_pulleys_are_in_the_design(tmp_path) -> None:
             names = found[f"{column.name}_pulley_name"]
             assert names.values.tolist() == list(column.places)
         assert "pulley_name" not in found.variables
+
+
+def test_fewer_pulleys_than_results_have_lie_in_a_dimension_of_their_own(tmp_path) -> None:
+    law = {"kind": "uniform", "low": 2e-4, "high": 4e-4, "each_section": True}
+    base = load_scene("truss2").with_values({"cables.upper.end": "both"})
+    paths = [f"cables.{plane}.friction.coefficient" for plane in ("upper", "lower")]
+    table = drawn(base, dict.fromkeys(paths, law))
+    with netCDF4.Dataset(tmp_path / "inputs.nc", "w") as file:
+        add_coordinate(file, "sample", np.arange(8))
+        add_coordinate(file, "pulley", axes(base)["pulley"])
+        add_inputs(file, table, compression=0)
+    with xr.open_dataset(tmp_path / "inputs.nc") as found:
+        assert found.sizes["pulley"] == 6
+        lower = found["cables_lower_friction_coefficient"]
+        assert lower.dims == ("sample", "pulley_of_one_winch")
+        assert lower["pulley_of_one_winch_name"].values.tolist() == list(table.columns[1].places)
+        assert found["cables_upper_friction_coefficient"].shape == (8, 6)
 
 
 def test_a_pulley_by_name_and_by_number_is_drawn_once() -> None:

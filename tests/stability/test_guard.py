@@ -101,6 +101,42 @@ def test_energy_of_the_start_is_available() -> None:
     assert watching.verdict() == ""
 
 
+def changed(credit: float) -> Watching:
+    """One that saw 5 J put into a ring, and then a change whose other loads say -5 J: it credited
+    what they differ by.
+    """
+    watching = guard()
+    assert watching.judge(1.0, after(5.0, 0.0)) == ""
+    now = Instant(1.0, *np.zeros((2, 2, 3)), Energies(5.0, 0.0, 5.0 - credit, 0.0))
+    watching.begin_anew(now, -credit)
+    return watching
+
+
+def test_what_a_change_credited_is_available_where_the_work_passes_zero() -> None:
+    watching = changed(10.0)
+    assert watching.judge(2.0, Energies(10.0, 0.0, 0.0, 0.0)) == ""
+    assert watching.judge(3.0, Energies(15.0, 0.0, 5.0, 0.0)) == ""
+    assert watching.verdict() == ""
+
+
+def test_a_blow_up_is_caught_behind_a_change_all_the_same() -> None:
+    """10 J of credit, and works that went up by 5 J."""
+    for factor, cause in ((0.9, "energy grew"), (1.1, "blow-up")):
+        stored = factor * BLOW_UP * 15.0
+        assert word_of(changed(10.0).judge(2.0, Energies(stored, 0.0, 0.0, 0.0)).cause) == cause
+
+
+def test_the_scale_of_energy_is_not_emptied_by_a_change_of_sign() -> None:
+    """Where a winch takes what loads give, and where loads take back what they gave."""
+    braked, turned = guard(), guard()
+    error = 0.9 * GAIN * TOLERANCE * 10.0
+    assert braked.judge(1.0, Energies(error, 0.0, 5.0, 0.0, -5.0)) == ""
+    assert turned.judge(1.0, after(5.0, 0.0)) == ""
+    assert turned.judge(2.0, Energies(0.5 * error, 0.0, 0.0, 0.0)) == ""
+    for one in (braked, turned):
+        assert word_of(one.judge(3.0, Energies(2.0 * error, 0.0, 0.0, 0.0)).cause) == "energy grew"
+
+
 def test_a_gap_of_a_joint_stops_the_run() -> None:
     assert guard().judge(1.0, after(1.0, 0.0), 0.99 * GAP * BAR) == ""
     reason = guard().judge(1.0, after(1.0, 0.0), 1.01 * GAP * BAR)

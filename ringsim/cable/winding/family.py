@@ -31,6 +31,10 @@ class Winding(Model):
         """
         raise NotImplementedError
 
+    def breaks(self) -> tuple[float, ...]:
+        """Times at which the law is not smooth, s: steps end there."""
+        return ()
+
     def available_tension(self, *, at_speed: bool = False) -> float:
         """Tension against which the winch still winds, N, at its commanded speed or however slowly;
         infinite if it is any.

@@ -31,6 +31,10 @@ class RampWinding(PrescribedWinding):
         """The speed after the ramp, in m/s."""
         return abs(self.speed)
 
+    def breaks(self) -> tuple[float, ...]:
+        """The end of the ramp, s."""
+        return (self.duration,)
+
     def wound(self, time: float) -> float:
         """Rope taken up, in metre."""
         phase = min(max(time / self.duration, 0.0), 1.0)

@@ -57,6 +57,10 @@ class TableWinding(PrescribedWinding):
         elapsed = np.cumsum(step[order])
         return float(speed[order[np.searchsorted(elapsed, 0.5 * elapsed[-1])]])
 
+    def breaks(self) -> tuple[float, ...]:
+        """The times of the table, s."""
+        return self.times
+
     def rests_from(self) -> float:
         """The last time of the table, s."""
         return self.times[-1]

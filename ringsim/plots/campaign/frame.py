@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ringsim.analysis.blocks import population_of
 from ringsim.analysis.courses import QUANTILES
+from ringsim.analysis.losses import losses
 from ringsim.plots import style
 
 LOOKS = {
@@ -31,9 +32,12 @@ FAILED = tuple((style.INK, marker) for marker in "x+1234")
 def head(figure: Figure, campaign: xr.Dataset, subject: str, caption: str) -> None:
     """Subject and campaign above the sheet, the number of samples and their fate below it."""
     inches = figure.get_size_inches()[0]
+    if (lost := losses(campaign)).note:
+        subject += lost.mark
+        caption += f"\n{lost.mark.strip()} {lost.note[0].upper()}{lost.note[1:]}."
+    words = "\n".join(textwrap.fill(each, int(12.0 * inches)) for each in caption.split("\n"))
     name = str(campaign.attrs.get("title", "")).strip()
     style.title(figure, textwrap.fill(f"{subject}: {name}".rstrip(": "), int(10.3 * inches)))
-    words = textwrap.fill(caption, int(12.0 * inches))
     if figure.legends:  # what stands outside of the axes twice would stand on one another
         (legend,) = figure.legends
         legend.set_title(words)
