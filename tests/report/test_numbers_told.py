@@ -181,13 +181,16 @@ def outcomes(file: File, rows: list[dict[str, str]]) -> None:
     wanted = {FATES[int(c)] for c in file.values["outcome"][file.ok]}
     wanted |= {f"lost: {LOSSES[int(c)]}" for c in file.values["status"][file.lost]}
     assert {row["outcome"] for row in rows} == wanted
-    run = np.flatnonzero(file.ok | file.lost)
+    of = file.ok | file.lost
+    run, total, gone = np.flatnonzero(of), int(of.sum()), int(file.lost.sum())
     for row in rows:
-        own, of = file.group(row["outcome"])
-        count, total = int(own.sum()), int(of.sum())
-        assert row["samples"] == f"{count} of {total}"
+        own, _ = file.group(row["outcome"])
+        # What lost ones would have done nobody knows: none of them may be of the kind, or all.
+        count, more = int(own.sum()), 0 if row["outcome"].startswith("lost") else gone
+        assert row["samples"] == f"{count} of {total}" + f" ({more} lost)" * bool(more)
         agrees(row["share"], count / total)
-        interval_agrees(row["95 % interval"], share_interval(count, total))
+        ends = share_interval(count, total)[0], share_interval(count + more, total)[1]
+        interval_agrees(row["95 % interval"], ends)
         for part in (25, 50, 75):
             first = run[: round(part / 100 * len(run))]
             agrees(row[f"first {part}%"], own[first].sum() / of[first].sum())
@@ -207,18 +210,21 @@ def verdicts(file: File, rows: list[dict[str, str]], lines: list[str]) -> None:
         def word(ends: tuple[float, float], share: float = share) -> str:
             return "met" if ends[0] >= share else "not met" if ends[1] < share else "not yet shown"
 
-        ends = bound(used - bad, used, level)
+        run, worse = used + lost, bad + lost  # lost ones violate it, or keep to it
+        ends = bound(run - worse, run, level)[0], bound(run - bad, run, level)[1]
         interval_agrees(row["one-sided bounds"], ends)
         assert row["verdict"] == word(ends)
         if lost:
-            assert row["if lost ones violate"] == word(bound(used - bad, used + lost, level))
-        needed = next(n for n in range(bad + 1, 10_000) if bound(n - bad, n, level)[0] >= share)
-        further = needed - used if row["verdict"] == "not yet shown" else 0
+            alone = word(bound(used - bad, used, level))
+            assert row["if lost ones were as the others"] == alone
+        many = range(worse + 1, 10_000)
+        needed = next(n for n in many if bound(n - worse, n, level)[0] >= share)
+        further = needed - run if row["verdict"] == "not yet shown" else 0
         assert row.get("further", "-") == (str(further) if further > 0 else "-")
         if further > 0:
             start = f"{name}: {further} further sample"
             assert any(each.startswith(start) for each in lines)
-            assert not lost or any(f"if {lost} lost sample" in each for each in lines)
+            assert not lost or any(f"with {lost} lost sample" in each for each in lines)
         if name == "outcome":
             continue
         absent = int((file.ok & np.isnan(file.values[name])).sum())
@@ -336,8 +342,8 @@ def worst_sample(
 
 def heads(file: File, text: str) -> str:
     words, count, of = re.fullmatch(r"(.*) \((\d+) of (\d+) samples?\)", text).groups()
-    own, among = file.group(words)
-    assert (int(count), int(of)) == (int(own.sum()), int(among.sum()))
+    own, _ = file.group(words)
+    assert (int(count), int(of)) == (int(own.sum()), int((file.ok | file.lost).sum()))
     return words
 
 
@@ -450,8 +456,11 @@ def statistics(file: File, rows: list[dict[str, str]]) -> None:
             else:
                 interval_agrees(interval.rstrip(")") or "-", ends)
         for word, end in (("Least (sample)", values.min()), ("Largest (sample)", values.max())):
-            number, sample = re.fullmatch(r"(\S+) \((\d+)\)", row[word]).groups()
+            number, sample, bar = re.fullmatch(r"(\S+) \((\d+)(?:, ± (\S+))?\)", row[word]).groups()
             agrees(number, end)
+            assert (bar is not None) == (name == "peak_tension")
+            if bar is not None:
+                agrees(bar, 0.01 * end, digits=2)
             assert file.values[name][int(sample)] == end
             assert file.ok[int(sample)]
         assert row["Worst sample"] == str(file.worst(name)[0])
