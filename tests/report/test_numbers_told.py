@@ -52,6 +52,7 @@ def made(kind: str) -> xr.Dataset:
     """Outputs of a few random inputs, one of which two paths share."""
     found, random = with_motors(made_campaign(COUNT, **KINDS[kind])), np.random.default_rng(11)
     cold, stiff, loose = random.random((3, COUNT))
+    gone = found["status"].to_numpy() > 0
     known, deployed = np.isfinite(found["asynchrony_max"]), np.isfinite(found["deployment_time"])
     for name, values in {
         "asynchrony_max": 1.0 + 3.0 * cold**2 + 0.4 * loose + 0.3 * random.random(COUNT),
@@ -59,7 +60,9 @@ def made(kind: str) -> xr.Dataset:
         "least_drive_margin": 0.6 - 0.9 * cold + 0.2 * random.normal(size=COUNT),
         "energy_error": 1e-5 * (1.0 + random.random(COUNT)),
     }.items():
-        found[name] = ("sample", np.where(known, values, np.nan), found[name].attrs)
+        # Lost runs have what was computed until then: it must not count.
+        values = np.where(gone, 1e3, np.where(known, values, np.nan))
+        found[name] = "sample", values, found[name].attrs
     times = np.where(deployed & known, 10.0 + 2.5 * stiff + 0.2 * random.random(COUNT), np.nan)
     found["deployment_time"] = "sample", times, found["deployment_time"].attrs
     found["peak_tension_error"] = 0.01 * found["peak_tension"]
