@@ -49,6 +49,8 @@ DEAR = 25.0
 REPRESENTED = ("forces-ring", "forces-arc", "cables-ring", "cables-arc", "cable-faults",
                "constant-steps", *loads.FAMILIES, *parts.FAMILIES)  # fmt: skip
 BASE = ("base_rotation", "base_force", "base_torque")
+ROUND_OFF = 1e-12
+"""Of them where nothing moves or pulls, as the turn of a fixed base, deg."""
 LEAST = {"asynchrony": 1e-6}
 """Difference that is round-off: at the start of a run deviations and their bars are."""
 ONE_ELEMENT = 10**6
@@ -111,7 +113,7 @@ def base_apart(scene: Scene, both: list[Outcome]) -> dict[str, tuple[float, floa
             one, two, *others = (outcome.values[name] for outcome in (*both, *coarse))
             value = float(np.nanmax(np.abs(one)))
             bars = sum(_farthest(x, y) for x, y in zip((one, two), others, strict=True))
-            if value > 0.0:
+            if value > ROUND_OFF:
                 found[name] = value, _farthest(one, two), bars
     return found
 
