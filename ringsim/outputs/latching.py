@@ -1,10 +1,11 @@
 """How fast V-joints met their latches, and which of these caught."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ringsim.outputs.family import Output, Run, Series, Values, Variable
 from ringsim.stepping.latches import history
-from ringsim.variables import PLANES
 
 
 class Latching(Output):
@@ -41,14 +42,14 @@ class Latching(Output):
         }
 
 
-def missed(values: Values) -> str:
+def missed(values: Values, planes: Sequence[str]) -> str:
     """Which latches did not catch though their joints came to them, in words; empty if none."""
     if "latched" not in values:
         return ""
     open_ = np.argwhere(np.isfinite(values["lock_time"]) & (values["latched"] == 0)).tolist()
     if not open_:
         return ""
-    names = [f"{PLANES[plane]} {section + 1}" for plane, section in open_]
+    names = [f"{planes[plane]} {section + 1}" for plane, section in open_]
     more = f" and {len(names) - 6} more" if len(names) > 6 else ""
     count = f"{len(names)} of {values['latched'].size} latches did not catch"
     return f"; {count}: {', '.join(names[:6])}{more}"
