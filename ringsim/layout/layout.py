@@ -212,6 +212,12 @@ class Layout:
         found = np.array([[self._opening(one) for one in plane] for plane in self.openings])
         return found[..., 0], found[..., 1]
 
+    def opens_by_twice(self, coordinate: float) -> bool:
+        """Whether every opening angle is pi less twice the coordinate (rad), as in pantographs."""
+        angles, rates = self.opening_angles()
+        expected = np.pi - 2.0 * coordinate
+        return bool(np.allclose(angles, expected, atol=1e-6) and np.allclose(rates, -2.0))
+
     def _opening(self, opening: Opening) -> tuple[float, float]:
         if not isinstance(opening, JointOpening):
             pose = self.bodies[opening.body].pose

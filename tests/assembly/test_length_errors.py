@@ -313,8 +313,8 @@ def test_a_scene_without_errors_is_as_it_was() -> None:
     ("ring18", {"rods.length_error": {}, "rods.kind": "ancf"}, "rods.length_error needs rods.kind"),
     ("ring18", {"structure.angle_error": -20.0, "structure.opening_angle": 12.0}, "must leave"),
     ("ring18", {"structure.angle_error": 0.1, "rods.kind": "ancf"}, "angle_error needs rods.kind"),
-    ("planar-truss", {"rods.length_error": {}}, "rods.length_error needs structure.kind"),
-    ("planar-truss", {"record.shape": True}, "record.shape = true needs structure.kind"),
+    ("planar-truss", {"rods.length_error": {}}, '"planar-truss" has no such parts'),
+    ("planar-truss", {"record.shape": True}, 'structure.kind = "planar-truss" has no corners'),
 ])  # fmt: skip
 def test_bad_input_is_refused(scene: str, values: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
