@@ -63,8 +63,9 @@ class Placement:
             )
         if self.independent:
             return (
-                "intervals of 95 %: bootstrap (BCa) of means and standard deviations, order "
-                "statistics of quantiles, Clopper-Pearson of shares"
+                "intervals of 95 %: bootstrap (BCa) of means, bootstrap-t and Bonett's of standard "
+                "deviations (approximate where tails are long: 80 to 88 % of a lognormal whose "
+                "logarithm scatters by 1), order statistics of quantiles, Clopper-Pearson of shares"
             )
         of = "the samples A and B of its blocks alone stand for the population: " * (self.block > 1)
         if self.replicates > 1:

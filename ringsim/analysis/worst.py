@@ -4,13 +4,14 @@ goal, and of each way in which runs were lost.
 
 import shlex
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsim.analysis.intervals import Array
-from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
+from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities, ran
 from ringsim.analysis.requirements import OUTCOME, Requirement
 from ringsim.analysis.unusual import NOTE, unusual
 from ringsim.analysis.verdicts import require_values, violations
@@ -22,11 +23,10 @@ MOST = 3
 
 
 class _Failure(NamedTuple):
-    """Samples that failed in one way, and of how many."""
+    """Samples that failed in one way."""
 
     words: str
     own: Mask
-    of: Mask
     badness: Array
     """By which samples are ordered, the worst the largest; NaN comes last."""
     value: str
@@ -36,7 +36,7 @@ class _Failure(NamedTuple):
 def worst(campaign: xr.Dataset, requirements: Mapping[str, Requirement]) -> xr.Dataset:
     """The worst samples of each failure along ``worst``, the worst first; empty without failures.
 
-    ``worst_failure`` says what failed, with ``worst_failed`` samples of ``worst_of``; then
+    ``worst_failure`` says what failed, with ``worst_failed`` samples of ``worst_of`` that ran; then
     ``worst_sample``, ``worst_found`` (its value, or why it ended) and ``worst_inputs``, what is
     unusual in its inputs.  Violations are ordered by their distance from the bound, those without
     a value last; outcomes by the V-joints that locked, the fewest first; lost runs by how far they
@@ -50,21 +50,30 @@ def worst(campaign: xr.Dataset, requirements: Mapping[str, Requirement]) -> xr.D
         order = own[np.argsort(-each.badness[own], kind="stable")][:MOST]
         for place in order.tolist():
             told = _found(campaign, each.value, place)
-            rows.append((each.words, int(each.own.sum()), int(each.of.sum()), told))
+            rows.append((each.words, int(each.own.sum()), int(ran(campaign).sum()), told))
             chosen.append(place)
     if not rows:
         return xr.Dataset()
-    words, failed, of, found = zip(*rows, strict=True)
-    about = {
-        "failure": (np.array(words, dtype=object), "what failed"),
+    failures, failed, of, found = zip(*rows, strict=True)
+    about: dict[str, tuple[NDArray[Any], str]] = {
+        "failure": (np.array(failures, dtype=object), "what failed"),
         "failed": (np.array(failed), "samples that failed so"),
-        "of": (np.array(of), "samples of which these are"),
+        "of": (np.array(of), "samples that have run"),
         "sample": (campaign["sample"].to_numpy()[chosen], "one of the worst of them"),
         "found": (np.array(found, dtype=object), "its value, or why it ended"),
-        "inputs": (np.array(unusual(campaign, chosen), dtype=object), "what is unusual in its"
-                   " inputs"),
+        "inputs": (
+            np.array(unusual(campaign, chosen), dtype=object), "what is unusual in its inputs",
+        ),
     }  # fmt: skip
-    return xr.Dataset({f"worst_{n}": ("worst", v, {"long_name": w}) for n, (v, w) in about.items()})
+    return xr.Dataset(
+        {
+            f"worst_{name}": (
+                "worst", values,
+                {"long_name": words} | ({} if values.dtype.kind == "O" else {"units": "1"}),
+            )
+            for name, (values, words) in about.items()
+        }
+    )  # fmt: skip
 
 
 def _failures(
@@ -84,16 +93,16 @@ def _failures(
         words, own = f"violates {wanted.told(name)}", violations(campaign, name, wanted)
         if not np.isfinite(badness[own]).any():  # why they ended tells more
             badness, value = stuck, ""
-        found.append(_Failure(words, own, ok, badness, value))
+        found.append(_Failure(words, own, badness, value))
     fates = numbers(campaign, OUTCOME)
     for fate in Fate:
         if fate not in GOALS and fate != Fate.NONE:
             words = fate.word.replace("_", " ")
-            found.append(_Failure(words, ok & (fates == fate), ok, stuck, ""))
+            found.append(_Failure(words, ok & (fates == fate), stuck, ""))
     came = -numbers(campaign, "final_time")
     for code in Status:
         own = gone & (campaign["status"].to_numpy() == code)
-        found.append(_Failure(f"lost: {code.word.replace('_', ' ')}", own, ok | gone, came, ""))
+        found.append(_Failure(f"lost: {code.word.replace('_', ' ')}", own, came, ""))
     kept: dict[tuple[bytes, str], _Failure] = {}
     for each in (each for each in found if each.own.any()):
         key = each.own.tobytes(), each.value

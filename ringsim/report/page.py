@@ -95,7 +95,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
 
 
 def _sentence(line: str) -> str:
-    """A line of a terminal as a sentence: with a capital, but where a name begins it."""
-    first = line.split(maxsplit=1)[0].strip(":,") if line else ""
+    """A line of a terminal as a sentence: with a capital, unless a name begins it."""
+    first = line.split(maxsplit=1)[0] if line else ""
     named = not first.isalpha() or first != first.lower()
     return f"{line if named else line[0].upper() + line[1:]}."

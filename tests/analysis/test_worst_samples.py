@@ -69,7 +69,7 @@ def test_failures_of_the_same_samples_are_one() -> None:
     assert list(one.worst_failure.values) == ["violates outcome is deployed; stalled",
                                               "lost: diverged"]  # fmt: skip
     assert one.worst_failed.values.tolist() == [1, 1]
-    assert one.worst_of.values.tolist() == [7, 8]
+    assert one.worst_of.values.tolist() == [8, 8]
     assert not worst(made().isel(sample=[0, 1]), {})
     with pytest.raises(InputError, match="no such output"):
         worst(made(), read_requirements({"peak_tension": {"max": 1.0, **BOUND}}, "file"))
@@ -126,7 +126,7 @@ def test_analysis_and_accessor_tell_the_same_and_how_to_run_them() -> None:
     assert table["replay"][0] == "ringsim replay runs/made 7"
     lines = told(known, "here/my runs")
     at = lines.index(worst_lines(known, "here/my runs")[0])
-    assert lines[at] == "worst of: violates asynchrony_max <= 3 degree (5 of 7 samples)"
+    assert lines[at] == "worst of: violates asynchrony_max <= 3 degree (5 of 8 samples)"
     assert lines[at + 3] == "    ringsim replay 'here/my runs' 7"
     one.attrs["requirements"] = json.dumps({})
     assert len(made_campaign(3, kind="grid").assign_attrs(requirements="{}").ring.worst()) == 0

@@ -359,7 +359,7 @@ def test_the_page_has_all_that_the_analysis_tells_of_main_numbers() -> None:
     at = cells.index("peak_tension with rods.young_modulus", at)
     assert cells[at + 1] == "1"
     assert any(cell.startswith("stalled: ") for cell in cells)
-    assert "Stalled: the same samples as violates deployment_time" in text
+    assert "stalled: the same samples as violates deployment_time" in text
     assert cells[cells.index("dominates") + 1] == "asynchrony_max"
     at = cells.index("peak_tension", cells.index("dominates"))
     assert cells[at + 4] == "sampling (engines unknown)"
