@@ -174,7 +174,7 @@ def outputs_of(one: Outcome, finer: Outcome, truth: Outcome) -> dict[str, list[f
     found = {n: [values[n], errors[n], apart[n]] for n in apart if n != "asynchrony"}
     if "asynchrony" in apart:
         error = np.abs(one.values["asynchrony"] - truth.values["asynchrony"])
-        bars = bar("asynchrony", apart["asynchrony"], values["asynchrony"])
+        bars = bar("asynchrony", apart["asynchrony"])
         there = np.isfinite(error) & (apart["asynchrony"] > 0.0)
         worst = int(np.argmax(np.where(there, error / np.maximum(bars, 1e-300), 0.0)))
         series = (values["asynchrony"], error, apart["asynchrony"])
@@ -192,8 +192,8 @@ def columns(rows: list[dict[str, Any]], name: str) -> np.ndarray:
 
 def ratios(name: str, table: np.ndarray) -> np.ndarray:
     """Error over bar of an output."""
-    value, error, apart = table
-    return np.maximum(error, 1e-300) / np.maximum(bar(name, apart, value), 1e-300)
+    _, error, apart = table
+    return np.maximum(error, 1e-300) / np.maximum(bar(name, apart), 1e-300)
 
 
 def shares(ratio: np.ndarray) -> str:
@@ -235,22 +235,17 @@ def summarise(rows: list[dict[str, Any]]) -> None:
 
 
 def fit(rows: list[dict[str, Any]]) -> None:
-    """Print, for shares of the value, the least safety that covers enough errors, and the best of
-    all by how far bars exceed errors (log mean).
-    """
-    print("\n| output | safety | share of the value | covered | median | within 10 | log excess |")
-    print("|---|---|---|---|---|---|---|")
+    """Print the least factors that cover enough errors."""
+    print("\n| output | safety | covered | error over bar, median | within 10 |")
+    print("|---|---|---|---|---|")
     for name in rules():
         table = columns(rows, name)
         if table.size == 0:
             continue
-        value, error, apart = np.maximum(table, 1e-300)
-        for share in (0.0, *np.geomspace(1e-6, 1e-2, 13)):
-            needed = (error - share * value) / (OF_DIFFERENCE * apart)
-            safety = max(float(np.quantile(needed, COVERED, method="higher")), 0.0)
-            ratio = error / (safety * OF_DIFFERENCE * apart + share * value)
-            excess = float(np.mean(np.abs(np.log(ratio))))
-            print(f"| {name} | {safety:.2g} | {share:.1e} | {shares(ratio)} | {excess:.2f} |")
+        _, error, apart = np.maximum(table, 1e-300)
+        needed = error / (OF_DIFFERENCE * apart)
+        safety = float(np.quantile(needed, COVERED, method="higher"))
+        print(f"| {name} | {safety:.2g} | {shares(needed / safety)} |")
 
 
 def main() -> None:

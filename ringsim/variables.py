@@ -144,8 +144,6 @@ class ErrorBar:
     """What may be wrong, for the bar's ``long_name``."""
     safety: float
     """Bar over the error that the difference of the two runs shows."""
-    share: float = 0.0
-    """Share of the value that is uncertain where both runs agree by chance."""
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ class CableTension(Output):
         Variable(
             "peak_tension", (), "N",
             "largest tension of any span of any cable up to the deployment time",
-            error_bar=ErrorBar("largest tension", safety=1.2),
+            error_bar=ErrorBar("largest tension", safety=1.8),
             summary=("largest tension", "10.3f"), worse="larger", largest_of="cable_tension",
         ),
         *PEAK.variables,

@@ -60,10 +60,7 @@ def error_bars(run: Outcome, finer: Outcome) -> dict[str, Array]:
     """
     if run.status.failed or finer.status.failed or not _alike(run, finer):
         return {}
-    return {
-        f"{name}_error": bar(name, apart, largest(name, run.values[name]))
-        for name, apart in differences(run, finer).items()
-    }
+    return {f"{name}_error": bar(name, apart) for name, apart in differences(run, finer).items()}
 
 
 def rules() -> dict[str, ErrorBar]:
@@ -92,10 +89,9 @@ def largest(name: str, values: Array) -> Array:
     return np.asarray(np.fmax.accumulate(values) if over_time else np.fmax.reduce(values, None))
 
 
-def bar(name: str, apart: Array | float, value: Array | float) -> Array:
+def bar(name: str, apart: Array | float) -> Array:
     """Error bar of a result from the difference of two runs, in its unit."""
-    rule = rules()[name]
-    return np.asarray(rule.safety * OF_DIFFERENCE * apart + rule.share * value)
+    return np.asarray(rules()[name].safety * OF_DIFFERENCE * apart)
 
 
 def _alike(one: Outcome, other: Outcome) -> bool:
