@@ -17,7 +17,7 @@ import numpy as np
 from ringsim.cable import regularisation
 from ringsim.choice import kind_of
 from ringsim.compile_cache import compile_once
-from ringsim.outputs.error_bars import error_bars
+from ringsim.outputs.error_bars import with_bars
 from ringsim.outputs.family import holds
 from ringsim.outputs.stored import StoredState
 from ringsim.parts.solver import Solver
@@ -159,10 +159,10 @@ def _run(
     begin = (time.perf_counter(), time.process_time())
     scene = substituted(scene)
 
-    def start(solver: Solver) -> Outcome:
+    def start(variant: Scene) -> Outcome:
         """One start; times count from the first."""
         try:
-            outcome = solve(scene.model_copy(update={"solver": solver}), watch)
+            outcome = solve(variant, watch)
             outcome.values["wall_time"] = np.array(time.perf_counter() - begin[0])
             outcome.values["cpu_time"] = np.array(time.process_time() - begin[1])
             return outcome
@@ -173,8 +173,14 @@ def _run(
             cause = Cause.REFUSED if isinstance(error, InputError) else Cause.EXCEPTION
             return Outcome(Status.ERROR, f"{type(error).__name__}: {error}", cause=cause)
 
-    bars = partial(error_bars, elements=scene.rods.elements)
-    outcome = run_with_restarts(start, scene.solver, bars)
+    def so_solved(solver: Solver) -> Scene:
+        return scene.model_copy(update={"solver": solver})
+
+    outcome = run_with_restarts(
+        lambda solver: start(so_solved(solver)),
+        scene.solver,
+        lambda outcome, used: with_bars(outcome, so_solved(used), start),
+    )
     outcome.values["fidelity"] = np.array(int(fidelity))
     return _with_remark(with_margin(outcome, scene, before), scene)
 

@@ -143,13 +143,7 @@ class ErrorBar:
     words: str
     """What may be wrong, for the bar's ``long_name``."""
     safety: float
-    """Bar over the difference of the two runs."""
-    of_one_element: float = 0.0
-    """Share of the value that one element per rod half makes uncertain."""
-    between_readings: float = 0.0
-    """Share of the value over ``solver.tolerance`` that both runs may miss alike."""
-    judged_by: str = ""
-    """Variable whose largest difference counts; the variable itself if empty."""
+    """Bar over the error that the difference of the two runs shows."""
 
 
 @dataclass(frozen=True)
@@ -209,10 +203,3 @@ class Outcome:
     def fate(self) -> Fate:
         """What the antenna did."""
         return Fate(int(self.values.get("outcome", Fate.NONE)))
-
-    @property
-    def reached_goal(self) -> bool:
-        """Whether the run did what runs are made for; limits that were passed do not matter."""
-        deployed = np.isfinite(float(self.values.get("deployment_time", np.nan)))
-        deployed &= np.all(self.values.get("latched", 1))
-        return self.fate in GOALS or (self.fate == Fate.OVERLOADED and bool(deployed))

@@ -16,11 +16,12 @@ _SHUFFLES = 999
 def dependence(missing: Mask, columns: Array, block: NDArray[np.int64] | None = None) -> float:
     """Probability that samples which are missing at random would look as unlike the others.
 
-    NaN if none is missing.  Of every column, shape (samples, columns), the mean rank of the missing
-    samples is compared with that of all, and that of the distance from the middle, which sees
-    both ends; with ``block``, the block of each sample, also how many pairs of missing samples are
-    in one block, since samples of a block share most inputs: that sees interactions, too.
-    Bonferroni's correction joins them.  Source: Lehmann, Nonparametrics (1975), section 1.
+    NaN if none is missing, 1 if there is nothing to compare by.  Of every column, shape (samples,
+    columns), the mean rank of the missing samples is compared with that of all, and that of the
+    distance from the middle, which sees both ends; with ``block``, the block of each sample, also
+    how many pairs of missing samples are in one block, since samples of a block share most inputs:
+    that sees interactions, too.  Bonferroni's correction joins them.
+    Source: Lehmann, Nonparametrics (1975), section 1.
     """
     count, gone = len(missing), int(missing.sum())
     if gone in (0, count):
@@ -37,7 +38,7 @@ def dependence(missing: Mask, columns: Array, block: NDArray[np.int64] | None = 
         chances.append(2 * columns.shape[1] * float(2 * norm.sf(largest)))
     if block is not None:
         chances.append(_clustered(np.bincount(block[missing], minlength=block[-1] + 1), block))
-    return min(1.0, len(chances) * min(chances, default=1.0))
+    return min(1.0, len(chances) * min(chances)) if chances else 1.0
 
 
 def _clustered(found: NDArray[np.int64], block: NDArray[np.int64]) -> float:

@@ -23,11 +23,11 @@ class Asynchrony(Output):
         Variable(
             "asynchrony", ("time",), "degree",
             "largest difference of opening angles between V-joints",
-            error_bar=ErrorBar("asynchrony", safety=10.0, of_one_element=0.014),
+            error_bar=ErrorBar("asynchrony", safety=5.0),
         ),
         Variable(
             "asynchrony_max", (), "degree", "largest asynchrony up to the deployment time",
-            error_bar=ErrorBar("largest asynchrony", safety=2.0, of_one_element=0.014),
+            error_bar=ErrorBar("largest asynchrony", safety=1.8),
             summary=("largest asynchrony", "10.4f"), worse="larger", largest_of="asynchrony",
         ),
         Variable("asynchrony_max_time", (), "s", "time of the largest asynchrony"),

@@ -1,44 +1,66 @@
-"""Numerical error of a run, estimated from a second run with steps twice or half as long.
+"""Numerical error of a run, estimated from a second run with half the steps and twice the elements.
 
-The integrator is of second order: runs with steps twice as long are apart by (4 - 1) of the error,
-with steps half as long by (1 - 1/4) of it, so that this difference counts four times.  Each output
-states the factors of its bar (``ErrorBar``); docs/accuracy.md tells what they cover.
+Integrator and elements are of second order: such a run has a quarter of the error, so that the two
+are apart by three quarters of it (Richardson).  A finer run shows the error itself, a coarser one
+only how errors grow: it says little of a vibration that it does not resolve.  Each output states
+the factors of its bar (``ErrorBar``); docs/accuracy.md tells what they cover.
 """
+
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from ringsim.outputs.family import VARIABLES, Array, ErrorBar
-from ringsim.variables import Outcome
+from ringsim.scene import Scene
+from ringsim.variables import TIMINGS, Outcome
+
+OF_DIFFERENCE = 4.0 / 3.0
+"""Error over the difference of two runs, of which the second has a quarter of it."""
+_MOST_ELEMENTS = 64
+"""Upper bound of ``rods.elements``."""
 
 
-def error_bars(
-    run: Outcome, other: Outcome, elements: int, tolerance: float, scale: float = 1.0
-) -> dict[str, Array]:
-    """Error bars of the main results of a run.
+def with_bars(outcome: Outcome, scene: Scene, solve: Callable[[Scene], Outcome]) -> Outcome:
+    """The outcome of a scene, run with its own settings, with error bars, or why it has none."""
+    finer = solve(refined(scene))
+    # Times count from the beginning: those of the last run hold for both.
+    outcome.values.update({n: finer.values[n] for n in TIMINGS if n in finer.values})
+    if bars := error_bars(outcome, finer):
+        outcome.values.update(bars)
+        return outcome
+    ended = f"ended as {finer.status.word}" if finer.status.failed else "locked other V-joints"
+    why = f"no error bars, since the run with half the steps {ended}: {finer.reason}"
+    return replace(outcome, reason=f"{outcome.reason}; {why}")
+
+
+def refined(scene: Scene) -> Scene:
+    """A scene with half the steps, twice the elements and a quarter of Newton's tolerance."""
+    solver = scene.solver.scaled(0.5)
+    solver = solver.model_copy(update={"newton_tolerance": solver.newton_tolerance / 4.0})
+    elements = min(2 * scene.rods.elements, _MOST_ELEMENTS)
+    rods = scene.rods.model_copy(update={"elements": elements})
+    return scene.model_copy(update={"solver": solver, "rods": rods})
+
+
+def error_bars(run: Outcome, finer: Outcome) -> dict[str, Array]:
+    """Error bars of the main results of a run, whatever the antenna did in it.
 
     Parameters
     ----------
-    run, other
-        The run that counts, and the same scene with other steps.
-    elements, tolerance
-        Elements per rod half and ``solver.tolerance`` of the run that counts.
-    scale
-        Factor on the differences: 1 if the other run has longer steps, 4 for shorter ones.
+    run, finer
+        The run that counts, and that of the ``refined`` scene.
 
     Returns
     -------
     dict
         ``NAME_error`` in the unit of NAME, of a function of time alone at every output time;
-        empty if one of the runs did not reach its goal.
+        NaN where the result itself is.  Empty if one of the runs failed, or if other V-joints
+        locked in the other: then the steps decide what the antenna does, and no bar holds.
     """
-    if not (run.reached_goal and other.reached_goal):
+    if run.status.failed or finer.status.failed or not _alike(run, finer):
         return {}
-    return {
-        f"{name}_error": bar(
-            name, scale * apart, largest(name, run.values[name]), elements, tolerance
-        )
-        for name, apart in differences(run, other).items()
-    }
+    return {f"{name}_error": bar(name, apart) for name, apart in differences(run, finer).items()}
 
 
 def rules() -> dict[str, ErrorBar]:
@@ -53,10 +75,9 @@ def differences(one: Outcome, other: Outcome) -> dict[str, Array]:
     up to each output time, shape (time,).
     """
     apart: dict[str, Array] = {}
-    for name, rule in rules().items():
-        judged = rule.judged_by or name
-        if judged in one.values:
-            first, second = one.values[judged], other.values[judged]
+    for name in rules():
+        if name in one.values:
+            first, second = one.values[name], other.values[name]
             found = largest(name, np.abs(first - second))
             apart[name] = np.where(np.isfinite(first), found, np.nan) if found.ndim else found
     return apart
@@ -68,10 +89,12 @@ def largest(name: str, values: Array) -> Array:
     return np.asarray(np.fmax.accumulate(values) if over_time else np.fmax.reduce(values, None))
 
 
-def bar(
-    name: str, apart: Array | float, value: Array | float, elements: int, tolerance: float
-) -> Array:
+def bar(name: str, apart: Array | float) -> Array:
     """Error bar of a result from the difference of two runs, in its unit."""
-    rule = rules()[name]
-    share = rule.of_one_element / elements**2 + rule.between_readings * tolerance
-    return np.asarray(rule.safety * apart + share * value)
+    return np.asarray(rules()[name].safety * OF_DIFFERENCE * apart)
+
+
+def _alike(one: Outcome, other: Outcome) -> bool:
+    """Whether the same V-joints have locked in both runs."""
+    first, second = (np.isfinite(run.values.get("lock_time", 0.0)) for run in (one, other))
+    return bool(np.array_equal(first, second))

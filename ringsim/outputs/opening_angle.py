@@ -12,7 +12,7 @@ class OpeningAngle(Output):
     variables = (
         Variable(
             "opening_angle", ("plane", "section", "time"), "degree", "angle between the bar halves",
-            error_bar=ErrorBar("opening angles", safety=1.3),
+            error_bar=ErrorBar("opening angles", safety=1.7),
         ),
     )  # fmt: skip
 

@@ -23,7 +23,7 @@ class RodStress(Output):
         ),
         Variable(
             "peak_rod_stress", (), "Pa", "largest axial + bending stress of any rod",
-            error_bar=ErrorBar("largest stress", safety=1.1, of_one_element=0.03),
+            error_bar=ErrorBar("largest stress", safety=4.0),
             summary=("largest rod stress", "10.3e"), worse="larger", largest_of="rod_stress",
         ),
         *PEAK.variables,

@@ -1,4 +1,4 @@
-"""Runs that start anew with smaller steps, and the second run that error bars need."""
+"""Runs that start anew with smaller steps."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -7,16 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from ringsim.parts.solver import Solver
-from ringsim.stepping.instant import Array
-from ringsim.variables import COUNTS, TIMINGS, Cause, Outcome, Status
+from ringsim.variables import COUNTS, Cause, Outcome, Status
 
 Solve = Callable[[Solver], Outcome]
 """Runs a scene with these settings; it never raises."""
-ErrorBars = Callable[..., dict[str, Array]]
-"""As ``ringsim.outputs.error_bars.error_bars``."""
+WithBars = Callable[[Outcome, Solver], Outcome]
+"""Gives a run with these settings its error bars; see ``ringsim.outputs.error_bars``."""
 
 
-def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Outcome:
+def run_with_restarts(solve: Solve, solver: Solver, with_bars: WithBars) -> Outcome:
     """A run that starts anew with smaller steps while that may help, at most ``solver.restarts``
     times, and has error bars where ``solver.error_bars`` asks for them.
 
@@ -37,29 +36,13 @@ def run_with_restarts(solve: Solve, solver: Solver, error_bars: ErrorBars) -> Ou
         cause = first.cause if outcome.cause is Cause.STEP_LIMIT else outcome.cause
         reason = f"{outcome.reason} ({how}; start 1: {first.reason})"
         outcome = replace(outcome, reason=reason, cause=cause)
-    if solver.error_bars and outcome.reached_goal:
-        outcome = _with_bars(outcome, solve, used, error_bars)
+    if solver.error_bars and not outcome.status.failed:
+        outcome = with_bars(outcome, used)
     tolerance = used.tolerance if used.step_control == "motion" else np.nan
     values = {"restarts": restarts, "step_used": used.step, "tolerance_used": tolerance}
     values |= {f"total_{name}": totals[name] for name in COUNTS}
     outcome.values.update({name: np.array(value) for name, value in values.items()})
     return outcome
-
-
-def _with_bars(outcome: Outcome, solve: Solve, used: Solver, error_bars: ErrorBars) -> Outcome:
-    """The outcome of a run at these settings with its error bars, or why it has none."""
-    reasons = []
-    # See ``ringsim.outputs.error_bars`` for the factors of the differences.
-    for words, factor, scale in (("twice as long", 2.0, 1.0), ("half as long", 0.5, 4.0)):
-        found = solve(used.scaled(factor))
-        # Times count from the beginning: those of the last run hold for all.
-        outcome.values.update({n: found.values[n] for n in TIMINGS if n in found.values})
-        bars = error_bars(outcome, found, tolerance=used.tolerance, scale=scale)
-        if bars:
-            outcome.values.update(bars)
-            return outcome
-        reasons.append(f"with steps {words} it ended as {found.status.word}: {found.reason}")
-    return replace(outcome, reason=f"{outcome.reason}; no error bars, since {'; '.join(reasons)}")
 
 
 def _counts(outcome: Outcome) -> Counter[str]:

@@ -13,7 +13,7 @@ from ringsim.campaign.cases import run_cases
 from ringsim.campaign.specification import load_campaign
 from ringsim.dataset import to_dataset
 from ringsim.engine import integrate
-from ringsim.outputs.error_bars import error_bars, rules
+from ringsim.outputs.error_bars import error_bars, refined, rules
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
@@ -56,13 +56,13 @@ def outcome(error: float, status: Status = Status.OK) -> Outcome:
     return Outcome(status, "", {"time": TIMES}, values)
 
 
-def test_a_method_of_second_order_is_covered_three_times_and_more() -> None:
-    """Twice the steps, four times the error: the runs differ by three errors of the finer."""
+def test_a_method_of_second_order_is_covered_by_its_safety() -> None:
+    """Half the steps, a quarter of the error: the runs differ by three quarters of it."""
     error = 1e-4
-    found = error_bars(outcome(error), outcome(4.0 * error), elements=100, tolerance=0.0)
+    found = error_bars(outcome(error), outcome(error / 4.0))
     values = {"deployment_time": 3.0, "opening_angle": 150.0, "peak_tension": 10.0}
     for name, value in values.items():
-        expected = 3.0 * rules()[name].safety * error * value
+        expected = rules()[name].safety * error * value
         assert found[f"{name}_error"] == pytest.approx(expected, rel=0.01)
 
 
@@ -88,10 +88,10 @@ CALM, WILD = [1.0] * 40, [1.0, -1e9] * 20
     ("rates", "stops"), [(CALM, FREE), (WILD, FREE), (CALM, MEETING)], ids=["cap", "floor", "stop"]
 )
 @pytest.mark.parametrize("control", ["motion", "constant"])
-def test_the_second_run_doubles_every_step(rates, stops, control) -> None:
+def test_the_second_run_halves_every_step(rates, stops, control) -> None:
     solver = Solver(step=0.1, step_control=control, tolerance=1e-3)
-    one, two = (steps_of(s, rates, stops) for s in (solver, solver.scaled(2.0)))
-    np.testing.assert_allclose(two, 2.0 * np.array(one), rtol=1e-12)
+    one, two = (steps_of(s, rates, stops) for s in (solver, solver.scaled(0.5)))
+    np.testing.assert_allclose(two, 0.5 * np.array(one), rtol=1e-12)
 
 
 def test_a_second_run_stays_within_its_bounds() -> None:
@@ -100,20 +100,44 @@ def test_a_second_run_stays_within_its_bounds() -> None:
     assert Solver.model_validate(solver.model_dump()) == solver
 
 
-def test_few_elements_widen_what_they_bend() -> None:
-    same = outcome(0.0)
-    for elements in (1, 2):
-        found = error_bars(same, same, elements, tolerance=0.0)
-        share = rules()["asynchrony_max"].of_one_element / elements**2
-        assert found["asynchrony_max_error"] == pytest.approx(share * 5.0)
-        assert found["deployment_time_error"] == 0.0
+def test_the_second_run_is_finer_in_all_that_has_an_order() -> None:
+    scene = ring(**{"rods.elements": 3, "solver.step": 0.1})
+    finer = refined(scene)
+    assert finer.rods.elements == 6
+    assert finer.solver.step == scene.solver.step / 2.0
+    assert finer.solver.tolerance == scene.solver.tolerance / 4.0
+    assert finer.solver.newton_tolerance == scene.solver.newton_tolerance / 4.0
 
 
 @pytest.mark.parametrize("which", [0, 1])
 def test_no_bars_without_two_good_runs(which: int) -> None:
-    pair = [outcome(1e-4), outcome(4e-4)]
+    pair = [outcome(4e-4), outcome(1e-4)]
     pair[which] = outcome(1e-4, Status.DIVERGED)
-    assert error_bars(*pair, elements=1, tolerance=0.0) == {}
+    assert error_bars(*pair) == {}
+
+
+def half_open(error: float, locked: int = 1) -> Outcome:
+    """A run that ended with so many V-joints locked of two."""
+    found = outcome(error)
+    found.values["lock_time"][0, locked:] = np.nan
+    found.values["deployment_time"] = np.array(np.nan)
+    found.values["outcome"] = np.array(int(Fate.PARTLY_DEPLOYED))
+    return found
+
+
+def test_a_run_that_does_not_deploy_has_bars_of_all_that_it_tells() -> None:
+    error = 1e-4
+    found = error_bars(half_open(error), half_open(error / 4.0))
+    assert np.isnan(found["deployment_time_error"])
+    for name in ("opening_angle", "asynchrony_max", "peak_tension"):
+        value = {"opening_angle": 150.0, "asynchrony_max": 5.0, "peak_tension": 10.0}[name]
+        expected = rules()[name].safety * error * value
+        assert found[f"{name}_error"] == pytest.approx(expected, rel=0.01)
+
+
+def test_no_bars_where_the_steps_decide_what_locks() -> None:
+    assert error_bars(half_open(1e-4), outcome(2.5e-5)) == {}
+    assert error_bars(half_open(1e-4, 0), half_open(2.5e-5)) == {}
 
 
 def test_bars_change_nothing_else() -> None:
@@ -138,13 +162,13 @@ def test_bars_change_nothing_else() -> None:
 
 @pytest.fixture
 def attempts(monkeypatch):
-    """Have runs end as given, one after another; the settings that they were given are noted."""
+    """Have runs end as given, one after another; the scenes that they were given are noted."""
 
-    def prepare(*endings: Outcome) -> list[Solver]:
+    def prepare(*endings: Outcome) -> list[Scene]:
         left, seen = list(endings), []
 
         def attempt(scene: Scene, watch: object) -> Outcome:
-            seen.append(scene.solver)
+            seen.append(scene)
             return left.pop(0)
 
         monkeypatch.setattr(integrate, "solve", attempt)
@@ -153,37 +177,41 @@ def attempts(monkeypatch):
     return prepare
 
 
-def test_shorter_steps_give_the_bars_where_longer_ones_fail(attempts) -> None:
-    """Half the steps, a quarter of the error: the runs differ by three quarters of it."""
-    error, failed = 4e-4, Outcome(Status.DIVERGED, "lost")
-    seen = attempts(outcome(error), failed, outcome(0.25 * error))
+def test_the_second_run_gives_the_bars(attempts) -> None:
+    error = 4e-4
+    seen = attempts(outcome(error), outcome(0.25 * error))
     scene = ring(**{"solver.error_bars": True})
     found = run(scene)
-    assert seen[1] == scene.solver.scaled(2.0)
-    assert seen[2] == scene.solver.scaled(0.5)
-    of_steps = 3.0 * rules()["peak_tension"].safety * error * 10.0
-    between = rules()["peak_tension"].between_readings * scene.solver.tolerance
-    expected = of_steps + (rules()["peak_tension"].of_one_element + between) * 10.0
+    assert seen[1] == refined(seen[0])
+    expected = rules()["peak_tension"].safety * error * 10.0
     assert found.values["peak_tension_error"] == pytest.approx(expected, rel=0.01)
     assert "no error bars" not in found.reason
 
 
-def test_a_run_without_bars_says_why(attempts) -> None:
-    failed = Outcome(Status.DIVERGED, "the motion blew up")
-    attempts(outcome(1e-4), failed, failed)
+@pytest.mark.parametrize(
+    ("second", "says"),
+    [
+        (Outcome(Status.DIVERGED, "the motion blew up"), "ended as diverged: the motion blew up"),
+        (half_open(1e-4), "locked other V-joints"),
+    ],
+    ids=["failed", "other"],
+)
+def test_a_run_without_bars_says_why(attempts, second, says) -> None:
+    attempts(outcome(1e-4), second)
     found = run(ring(**{"solver.error_bars": True}))
     assert found.status is Status.OK
-    assert "no error bars, since with steps twice as long it ended as diverged" in found.reason
+    assert f"no error bars, since the run with half the steps {says}" in found.reason
     assert not any(name.endswith("_error") for name in found.values)
 
 
 def test_the_bar_of_the_asynchrony_is_that_of_all_that_came_before() -> None:
-    fine, coarse = outcome(0.0), outcome(0.0)
-    fine.values["asynchrony"] = np.where(TIMES <= 3.0, TIMES, np.nan)
-    coarse.values["asynchrony"] = fine.values["asynchrony"] + np.where(TIMES[10] == TIMES, 0.5, 0.1)
-    found = error_bars(fine, coarse, elements=10**6, tolerance=0.0)["asynchrony_error"]
-    np.testing.assert_allclose(found[:10], 0.1 * rules()["asynchrony"].safety, rtol=1e-9)
-    np.testing.assert_allclose(found[10:31], 0.5 * rules()["asynchrony"].safety, rtol=1e-9)
+    one, finer = outcome(0.0), outcome(0.0)
+    one.values["asynchrony"] = np.where(TIMES <= 3.0, TIMES, np.nan)
+    finer.values["asynchrony"] = one.values["asynchrony"] + np.where(TIMES[10] == TIMES, 0.5, 0.1)
+    found = error_bars(one, finer)["asynchrony_error"]
+    safety = 4.0 / 3.0 * rules()["asynchrony"].safety
+    np.testing.assert_allclose(found[:10], 0.1 * safety, rtol=1e-9)
+    np.testing.assert_allclose(found[10:31], 0.5 * safety, rtol=1e-9)
     assert np.isnan(found[31:]).all()
 
 

@@ -215,6 +215,7 @@ def test_the_gate_sees_an_interaction_by_its_blocks():
     assert dependence(lost, x[:, [0, 1, 3]], None) > 0.05
     assert dependence(lost, x[:, [0, 1, 3]], block) < 0.01
     assert np.isnan(dependence(np.zeros(10, dtype=bool), x[:10], block[:10]))
+    assert dependence(lost, np.empty((len(lost), 0))) == 1.0  # no input: nothing to go with
 
 
 def test_statistics_are_of_the_samples_that_stand_for_the_population():
