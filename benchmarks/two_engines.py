@@ -2,6 +2,7 @@
 
     python benchmarks/two_engines.py run --out FILE.json [--scenes 40 --first 0]
     python benchmarks/two_engines.py run --out FILE.json --scenes 20 --first 1000   (or 2000)
+    python benchmarks/two_engines.py run --out FILE.json --seeds 8 16 1014
     python benchmarks/two_engines.py table FILE.json
     python benchmarks/two_engines.py look SEED [--finer 16]
 
@@ -26,6 +27,7 @@ import argparse
 import json
 import time
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -127,8 +129,10 @@ def run(asked: argparse.Namespace) -> None:
     rows: list[dict[str, Any]] = []
     if asked.out.exists():
         rows = json.loads(asked.out.read_text())
-    known, seed = {row["seed"] for row in rows}, asked.first
-    while sum("exudyn" in row for row in rows) < asked.scenes:
+    known = {row["seed"] for row in rows}
+    for seed in asked.seeds or count(asked.first):
+        if sum("exudyn" in row for row in rows) >= asked.scenes:
+            break
         found = None if seed in known else scene_of(seed)
         if found is not None:
             name, scene = found
@@ -136,7 +140,6 @@ def run(asked: argparse.Namespace) -> None:
             rows.append(row)
             asked.out.write_text(json.dumps(rows, indent=1))
             print(name, row.get("left_out", row.get("cpu")), flush=True)
-        seed += 1
 
 
 def compare(scene: Scene) -> dict[str, Any]:
@@ -219,6 +222,7 @@ def main() -> None:
     runs.add_argument("--out", type=Path, required=True)
     runs.add_argument("--scenes", type=int, default=40)
     runs.add_argument("--first", type=int, default=0, help="seed of the first scene")
+    runs.add_argument("--seeds", type=int, nargs="+", help="these alone")
     runs.set_defaults(act=run)
     tables = verbs.add_parser("table")
     tables.add_argument("out", type=Path)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ringsim.layout.layout import Hung
+from ringsim.parts.boom.rigid import RigidBoom
 from ringsim.parts.persection import spread
 
 if TYPE_CHECKING:
@@ -27,10 +28,8 @@ def hang(draft: "Draft", gravity: np.ndarray, base: int | None) -> Hung | None:
         rod.mass + sum(mass for _, mass, _ in rod.masses) for rod in draft.rods
     )
     whole += 0.0 if net is None else net.point_mass
-    flexible = boom is not None and not any(
-        lump.group == "boom" for lump in draft.bodies[draft.corners[0][0].number].lumps
-    )
-    if flexible and not draft.scene.held:
+    # A rigid boom is a lump of the body at its top.
+    if boom is not None and not isinstance(boom, RigidBoom) and not draft.scene.held:
         whole += boom.mass
     held = draft.bodies[base] if base is not None and draft.scene.held else None
     if held is not None and base not in [body for body, _ in carried]:

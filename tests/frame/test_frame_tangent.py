@@ -58,7 +58,9 @@ def test_tangent_of_rings(values: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("base", ["free", "fixed"])
-@pytest.mark.parametrize("boom", [{}, FLEXIBLE], ids=["rigid", "flexible"])
+@pytest.mark.parametrize(
+    "boom", [{}, {"boom.joint": "prismatic"}, FLEXIBLE], ids=["rigid", "prismatic", "flexible"]
+)
 def test_tangent_of_booms(base: str, boom: dict[str, Any]) -> None:
     """How the sliding body's gap turns with the boom is left out: the gap's force, up to 1e-9 m of
     1e9 N/m here, over inertias and stiffnesses of 100 N m/rad and more;

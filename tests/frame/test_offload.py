@@ -47,8 +47,11 @@ def test_a_suspension_of_every_mass_point_is_flight() -> None:
 
 def test_lines_carry_the_whole_weight() -> None:
     """All of it on a free ring; on a held one all but the share of the base's corner."""
-    for planes, base in (("upper", "free"), ("both", "free"), ("both", "fixed")):
-        layout = layout_of(ground({"planes": planes}, boom__base=base))
+    for planes, base, kind in (
+        ("upper", "free", "rigid"), ("both", "free", "rigid"), ("both", "fixed", "rigid"),
+        ("both", "free", "flexible"),
+    ):  # fmt: skip
+        layout = layout_of(ground({"planes": planes}, boom={"kind": kind, "base": base}))
         assert layout.hung is not None
         whole = 9.81 * sum(layout.masses().values())
         own = 9.81 * layout.bodies[0].mass
