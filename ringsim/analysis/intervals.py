@@ -101,7 +101,9 @@ def _of_spread(values: Array) -> tuple[Array, Array]:
     middle = np.sort(scaled, axis=-1)[..., cut : count - cut].mean(axis=-1, keepdims=True)
     fourth = count * ((scaled - middle) ** 4).sum(axis=-1) / (count - 1) ** 2
     fewer = count / (count - normal)
-    half = normal * fewer * np.sqrt((fourth - (count - 3) / count) / (count - 1)) / 2
+    # Never negative but by round-off, of values that are alike but for that.
+    square = np.maximum(fourth - (count - 3) / count, 0.0) / (count - 1)
+    half = normal * fewer * np.sqrt(square) / 2
     ends = (
         np.minimum(-ranked[..., RESAMPLES - place] * error, np.log(fewer) / 2 - half),
         np.maximum(-ranked[..., place - 1] * error, np.log(fewer) / 2 + half),

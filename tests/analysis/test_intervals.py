@@ -72,6 +72,11 @@ def test_a_spread_that_resamples_do_not_tell_has_no_interval():
     one = np.zeros(100)
     one[0] = 1.0
     assert np.isnan(intervals.of_independent(one, intervals.spread)).all()
+    alike = np.full(20, 20 / 3) + 8.9e-16 * (np.arange(20) % 3 == 0)  # but for round-off
+    assert np.ptp(alike) > 0
+    low, high = intervals.of_independent(alike, intervals.spread)
+    assert not high > 1e-13  # or there is none
+    assert not low < 0.0
 
 
 def test_many_independent_samples_are_covered_by_the_normal_limit(truth):
