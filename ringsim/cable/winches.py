@@ -276,7 +276,12 @@ class Winches:
         return {"winches": rows, "begun": [self._start, self._held, self._slopes]}
 
     def go_on(
-        self, memory: dict[str, Any], before: Sequence[Cable], time: float, wound: Array, rate: Array
+        self,
+        memory: dict[str, Any],
+        before: Sequence[Cable],
+        time: float,
+        wound: Array,
+        rate: Array,
     ) -> None:
         """Go on at a time (s) from a memory of winches that were those of the cables ``before``.
 
