@@ -190,3 +190,16 @@ def test_the_rope_wound_is_of_second_order(line: Line, steps: Steps) -> None:
         assert run_frame(scene).status is Status.OK
         errors.append(abs(steps[-1][1] - line.wound(STOP - START)))
     assert math.log2(errors[0] / errors[1]) > 1.8
+
+
+def test_a_step_ends_where_the_last_joint_of_a_plane_locks(steps: Steps) -> None:
+    """And the winch stops there: by the ramp's law it has wound no more."""
+    values = {"structure.sections": 4, "structure.opening_angle": 150.0}
+    scene = load_scene("ring18-cable").with_values(values)
+    found = run_frame(scene)
+    times, wound, _ = np.array(steps).T
+    lock = float(found.values["lock_time"][0].max())
+    number = int(np.searchsorted(times, lock))
+    assert 0.0 <= times[number] - lock <= 0.045 * (times[number] - times[number - 1])
+    law = scene.cables.upper.winch.winding
+    assert wound[number:] == pytest.approx(law.wound(times[number]), abs=1e-12)
