@@ -30,7 +30,7 @@ from ringsim.scene.substituted import strained
 from ringsim.stepping.events import Events
 from ringsim.stepping.instant import Instant, Strained
 from ringsim.stepping.latches import Latches
-from ringsim.stepping.locks import Locks
+from ringsim.stepping.locks import locks_of
 from ringsim.stepping.run_control import RunControl
 from ringsim.theory.scales import scales_of
 from ringsim.variables import Cause, Outcome, Reason
@@ -79,10 +79,8 @@ class Integration:
             coordinates["station"] = self._bending.stations
         self._gaps = joint_groups(model)
         angles = self._openings.read(self._state)[0]
-        stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
         self._latches = Latches(scene)
-        locks = Locks(angles, stowed, scene.structure.planes, self._latches)
-        self._locks = locks if scene.structure.locks else None
+        self._locks = locks_of(scene, angles, self._latches)
         self._events, self._turn = Events(scene), scene.loads_turn_at
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None

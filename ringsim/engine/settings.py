@@ -10,7 +10,7 @@ from ringsim.engine.build import Built
 from ringsim.engine.newton import Newton
 from ringsim.engine.rod_dampers import STIFFENING
 from ringsim.scene import Scene
-from ringsim.theory.scales import residual_tolerance
+from ringsim.theory.scales import residual_tolerance, rope_reach
 
 
 def solver_settings(scene: Scene, tolerance: float) -> Any:
@@ -40,7 +40,8 @@ def newton_norm(built: Built) -> float:
     """Residual norm in N at which Newton stops; see ``residual_tolerance``."""
     scene, layout = built.model.scene, built.model.layout
     size = built.model.assembly.system.systemData.ODE2Size()
-    reached = 4.0 * float(np.finfo(float).eps) * math.sqrt(size)
+    rounded = 4.0 * float(np.finfo(float).eps)
+    reached = rounded * math.sqrt(size)
     if scene.rods.damping > 0.0:
         reached *= STIFFENING
-    return residual_tolerance(scene, layout, reached)
+    return max(residual_tolerance(scene, layout, reached), rounded * rope_reach(scene))

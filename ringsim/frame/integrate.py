@@ -23,7 +23,7 @@ from ringsim.stepping.events import Events
 from ringsim.stepping.extrapolation import extrapolated
 from ringsim.stepping.instant import Instant, Strained
 from ringsim.stepping.latches import Latches
-from ringsim.stepping.locks import Locks
+from ringsim.stepping.locks import locks_of
 from ringsim.stepping.memory import Remembering
 from ringsim.stepping.run_control import RunControl
 from ringsim.theory.scales import scales_of
@@ -72,11 +72,9 @@ class Integration(Remembering):
         self._turn = scene.loads_turn_at
         self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
         self._readings = Readings(model)
-        stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
         first = self._measure(0.0, self._now)
         self._latches = Latches(scene)
-        locks = Locks(first.angles, stowed, scene.structure.planes, self._latches)
-        self._locks = locks if scene.structure.locks else None
+        self._locks = locks_of(scene, first.angles, self._latches)
         self.history = Recorder(scene, self._readings.coordinates)
         ropes = None if model.cables is None else model.cables.ropes.content
         self._control = RunControl(

@@ -29,7 +29,7 @@ from ringsim.scene import Scene
 from ringsim.theory.assembled import assembled
 from ringsim.theory.first_reaction import first_acceleration
 from ringsim.theory.one_coordinate import OneCoordinate
-from ringsim.theory.scales import residual_tolerance
+from ringsim.theory.scales import residual_tolerance, rope_reach
 
 
 class FrameModel:
@@ -164,13 +164,14 @@ class FrameModel:
 
     def tolerance(self, step: float, strains: Strains) -> float:
         """Residual norm at which Newton stops in a step (s), N; not below what round-off leaves of
-        coordinates of order 1 m: of inertia, of the rods with their damping, of slides.
+        coordinates of order 1 m: of inertia, of the rods with their damping, of slides; of ropes.
         """
         inertia = self._heaviest * self.coefficients.acceleration_by_place(step)
         rods = self._stiffest * (1.0 + self._tau * strains.lead)
         slides = STIFFNESS * self._stiffest if self.slides else 0.0
         reached = 4.0 * sys.float_info.epsilon * (math.sqrt(self.size) * (inertia + rods) + slides)
-        return max(self._tolerance, reached)
+        ropes = rope_reach(self.scene, self.coefficients.rate_by_place(step))
+        return max(self._tolerance, reached, 4.0 * sys.float_info.epsilon * ropes)
 
     def residual(
         self, time: float, step: float, start: State, now: State, strains: Strains

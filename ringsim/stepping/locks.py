@@ -1,8 +1,8 @@
 """Which V-joints have reached their stops, when, and how steps should meet them."""
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,9 @@ _NEAR = 0.1
 _APART = 1e-3
 """A V-joint that starts closer to the stowed stop than this has not come to it, rad; the stop of
 ``ring18`` gives 4e-5 under its load."""
+
+_LATE = 0.04
+"""Share of a step by which a plane may have locked before its end, where winches act on that."""
 
 _NAMED = 6
 """V-joints that a sentence names at most."""
@@ -55,14 +58,15 @@ class Locks(Remembering):
 
     def __init__(
         self, angles: Array, stowed_angle: float | None, planes: Sequence[str] = PLANES,
-        latches: "Latches | None" = None,
+        latches: "Latches | None" = None, acted_on: Iterable[int] = (),
     ) -> None:  # fmt: skip
         """Begin with these opening angles (rad); the stowed stop's is None without stops.
 
         ``planes`` are the names by which sentences call the rows of the angles, ``latches`` what
-        shall hold the V-joints at 180 deg.
+        shall hold the V-joints at 180 deg; in the rows ``acted_on`` winches do something else once
+        all have locked.
         """
-        self._planes, self._latches = planes, latches
+        self._planes, self._latches, self._acted_on = planes, latches, tuple(acted_on)
         self.stops = stowed_angle is not None
         self._stowed_angle = stowed_angle or 0.0
         self.deployed, self.stowed = np.zeros((2, *angles.shape), dtype=bool)
@@ -86,6 +90,24 @@ class Locks(Remembering):
         """Let latches catch in a step."""
         if self._latches is not None:
             self._latches.note(before, now)
+
+    def shorter(self, before: Instant, found: Instant, least: float) -> float | None:
+        """A smaller step (s) in whose end the last V-joint of a plane locks, if a winch acts on
+        that and this step goes on for long behind it; else None.  None is below ``least`` (s).
+        """
+        step, ends = found.time - before.time, (before, found)
+        times, angles, rates = (
+            np.array([getattr(one, name) for one in ends]) for name in ("time", "angles", "rates")
+        )
+        wanted = []
+        for row in self._acted_on:
+            left = ~self.deployed[row]
+            if left.any() and (found.angles[row, left] >= math.pi).all():
+                locked = lock_times(times, angles[:, [row]], rates[:, [row]])[0, left]
+                wanted.append(float(np.fmax.reduce(locked)) - before.time)
+        # The first of two planes leaves its step to the other.
+        ending = max(min(wanted, default=step) * (1.0 + 0.5 * _LATE), least)
+        return ending if step - ending > 0.5 * _LATE * step else None
 
     @property
     def unlatched(self) -> bool:
@@ -143,6 +165,18 @@ class Locks(Remembering):
             rate_of_next=abs(float(rates.flat[first])),
             resting_rate=float(np.abs(rates[resting]).max()) if resting.any() else 0.0,
         )
+
+
+def locks_of(scene: Any, angles: Array, latches: "Latches") -> Locks | None:
+    """Those of a scene that begins with these opening angles (rad); None if none lock."""
+    structure, cables = scene.structure, () if scene.cables is None else scene.cables.present()
+    if not structure.locks:
+        return None
+    stowed = None if scene.stop is None else math.radians(scene.stop.stowed_angle)
+    acted_on = [
+        plane for plane, cable in cables if any(w.after_lock != "pull" for w in cable.winches)
+    ]
+    return Locks(angles, stowed, structure.planes, latches, acted_on)
 
 
 def lock_times(times: Array, angles: Array, rates: Array) -> Array:

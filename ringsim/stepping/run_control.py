@@ -17,7 +17,7 @@ from ringsim.stepping.instant import AS_DRAWN, Instant, Scales, Strained
 from ringsim.stepping.locks import Locks, Overrun, StopContact, lock_times
 from ringsim.stepping.memory import Memory, Remembering
 from ringsim.stepping.motion_steps import DeviationSteps, MotionSteps
-from ringsim.stepping.repeats import EnergyImbalance, Indicator, TensionBend
+from ringsim.stepping.repeats import SHORTEST, EnergyImbalance, Indicator, TensionBend
 from ringsim.stepping.rest import Rest, resting
 from ringsim.variables import Cause, Fate, Reason, Status
 
@@ -147,6 +147,8 @@ class RunControl(Remembering):
         To be asked once for each step that has converged.
         """
         wanted = [one.shorter(self.now, found) for one in self._indicators]
+        if self._locks is not None and isinstance(self._steps, MotionSteps):
+            wanted.append(self._locks.shorter(self.now, found, SHORTEST * self._solver.step))
         self._shorter = min((one for one in wanted if one is not None), default=None)
         if self._shorter is None and isinstance(self._steps, MotionSteps):
             step = found.time - self.now.time

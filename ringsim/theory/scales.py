@@ -69,6 +69,23 @@ def residual_tolerance(scene: Scene, layout: Layout, reached: float) -> float:
     return max(scene.solver.newton_tolerance * drive, reached * float(stiffest))
 
 
+def rope_reach(scene: Scene, rate_by_place: float = 0.0) -> float:
+    """Residual norm over the round-off of coordinates of order 1 m that ropes leave, N.
+
+    The strain S / M - 1 of a rope is rounded as S / M, about 1, and its tension pulls on both ends
+    of every span; damped ropes feel rates, rounded as much as their derivative after places (1/s).
+    """
+    if scene.cables is None:
+        return 0.0
+    pulls = [
+        cable.axial_stiffness
+        * (1.0 + cable.damping_time * rate_by_place)
+        * math.sqrt(2 * (scene.pulleys_of(cable) + 1))
+        for _, cable in scene.cables.present()
+    ]
+    return math.hypot(*pulls)
+
+
 def _swing_step(inertia: float, stiffness: float, steps: int) -> float:
     """Step in s that takes so many to the period 2 pi sqrt(I / k) of a swing (kg m^2, N m/rad).
 

@@ -114,6 +114,30 @@ def test_a_winch_with_feedback_keeps_its_hours_too():
         winches.advance(time, case.state(), np.zeros(1))
 
 
+def test_a_step_has_the_law_of_its_inside_up_to_its_very_end():
+    """Speeds jump where a step begins or ends, be that a rounding before or behind the switch."""
+    table = TableWinding(times=(0.0, 1.0, 3.0), lengths=(0.0, 0.1, 0.4))
+    for law, stop in ((ConstantWinding(speed=0.1), 5.0), (table, None)):
+        winch = Winch(winding=law, start_time=2.0, stop_time=stop)
+        case = still([[0, 0, 0], [1, 0, 0]], 0.0, initial_slack=0.5, winch=winch)
+        winches = Winches(case.chain.cables)
+
+        def speed(time, case=case, winches=winches):
+            return float(winches.at(time, case.ropes, None, None)[1][0, 0])
+
+        running = winch.at(5.0 - 1e-9)[1]
+        assert running > 0.09
+        for near in (-1e-15, 0.0, 1e-15):
+            for begin, end, first, last in [
+                (1.0, 2.0 + near, 0.0, 0.0),
+                (4.0, 5.0 + near, winch.at(4.0)[1], running),
+                (5.0 + near, 6.0, 0.0, 0.0),
+                (2.0 + near, 3.0, winch.at(2.0)[1], winch.at(3.0)[1]),
+            ]:
+                winches.advance(begin, case.state(), np.zeros(1))
+                assert [speed(begin), speed(end)] == pytest.approx([first, last], abs=1e-7)
+
+
 def test_slopes_of_ideal_paths_are_asked_for_where_a_winch_answers():
     steady = Winch(winding=ConstantWinding(speed=0.1))
     winches = Winches([Cable(winch=steady), Cable(winch=Winch(winding=STALL))])
