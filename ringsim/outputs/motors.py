@@ -2,23 +2,37 @@
 
 import math
 from collections.abc import Iterator
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.records import Winch
 from ringsim.cable.winding.motor import MotorWinding
-from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable, holds
+
+_CONSTANTS = ("torque_constant",)
 
 
 class Motors(Output):
     """Torque, speed, power and energy of every motor's shaft; NaN for winches without one.
+
+    Of motors with a ``torque_constant`` also current, electrical power and what of it is lost.
 
     A motor that is switched off, or whose winch stops when its plane has locked, gives nothing.
     """
 
     rank = 45
     needs = ("motors",)
+    electrical: ClassVar = tuple(
+        Variable(name, ("plane", "winch", "time"), units, words, needs=_CONSTANTS)
+        for name, units, words in (
+            ("motor_current", "A", "current of a motor"),
+            ("motor_electrical_power", "W", "electrical power that a motor takes"),
+            ("motor_loss", "W", "electrical power less that of the shaft"),
+            ("motor_electrical_energy", "J", "electrical energy that a motor took"),
+        )
+    )
     variables = (
         Variable("motor_torque", ("plane", "winch", "time"), "N m", "torque of a motor's shaft"),
         Variable("motor_speed", ("plane", "winch", "time"), "rad/s", "speed of a motor's shaft"),
@@ -37,6 +51,15 @@ class Motors(Output):
         Variable(
             "total_motor_energy", (), "J", "energy that the shafts of all motors gave by the end",
             summary=("energy of all motors", "10.3g"),
+        ),
+        *electrical,
+        Variable(
+            "peak_motor_current", (), "A", "largest current of any motor at any step",
+            needs=_CONSTANTS, summary=("largest motor current", "10.3g"),
+        ),
+        Variable(
+            "total_motor_electrical_energy", (), "J",
+            "electrical energy that all motors took by the end", needs=_CONSTANTS,
         ),
     )  # fmt: skip
 
@@ -57,7 +80,8 @@ class Motors(Output):
         times, winches = series.times, len(run.coordinates["winch"])
         found = np.full((4, len(times), len(run.locks), winches), np.nan)
         torque, shaft, power, energy = found
-        turned = np.zeros_like(torque)
+        current, supplied, turned = np.zeros((3, *torque.shape))
+        current[:] = supplied[:] = np.nan
         # A run that went on may have had another motor before, or none: each for its own steps.
         for steps, (plane, end), winch, motor in _motors(run):
             tension, speed, wound = series.values[:, plane, end].T
@@ -69,6 +93,10 @@ class Motors(Output):
             torque[place] = np.where(on, motor.torque(tension[steps], speed[steps]), 0.0)
             shaft[place] = speed[steps] / motor.travel
             turned[place] = (wound[steps] - wound[before]) / motor.travel
+            if motor.torque_constant is not None:
+                now = torque[place], shaft[place]
+                current[place] = np.where(on, motor.current(*now), 0.0)
+                supplied[place] = np.where(on, motor.electrical_power(*now), 0.0)
         power[:] = torque * shaft
         energy[:] = 0.0 * torque
         energy[1:] += np.cumsum(0.5 * (torque[1:] + torque[:-1]) * turned[1:], axis=0)
@@ -76,10 +104,32 @@ class Motors(Output):
             variable.name: Series(series.times, own, series.grid).on_grid()
             for variable, own in zip(self.variables[:4], found, strict=True)
         }
+        if "torque_constant" in holds(run.scene):
+            values |= _electrical(series, current, supplied, supplied - power, energy)
         values["peak_motor_torque"] = np.nanmax(torque)
         values["peak_motor_power"] = np.nanmax(power)
         values["total_motor_energy"] = np.nansum(energy[-1])
         return values
+
+
+def _electrical(series: Series, *found: Array) -> Values:
+    """Outputs of current, electrical power, loss and the shafts' energy, shape (times, planes,
+    winches).
+    """
+    current, supplied, loss, energy = found
+    lost = 0.0 * loss
+    # The shafts' energy follows what they turned; what is lost follows the time.
+    steps = np.diff(series.times)[:, None, None]
+    lost[1:] += np.cumsum(0.5 * (loss[1:] + loss[:-1]) * steps, axis=0)
+    courses = current, supplied, loss, energy + lost
+    values: Values = {
+        variable.name: Series(series.times, own, series.grid).on_grid()
+        for variable, own in zip(Motors.electrical, courses, strict=True)
+    }
+    return values | {
+        "peak_motor_current": np.nanmax(current),
+        "total_motor_electrical_energy": np.nansum(courses[-1][-1]),
+    }
 
 
 def _motors(
