@@ -32,20 +32,44 @@ def margin_lines(scene: Scene) -> Iterator[str]:
     first = next(iter(courses.values()))
     # At rest nothing is accelerated, and a net may be slack at every angle; springs may be gone.
     kinds = [k for k in first[0].resisting if any(now.resisting[k] for now in first)]
+    known_sources = dict.fromkeys(
+        k for now in first for k, force in now.driving.items() if force > 0.0
+    )
+    sources = list(known_sources) if len(known_sources) > 1 else []
     yield "Forces on the opening angle in N m, without factors; margins with those of the standard."
     rows = [
         [
             f"{math.degrees(now.angle):.1f}",
-            *(f"{force:.4g}" for force in (now.available, *(now.resisting[k] for k in kinds))),
+            *(
+                f"{force:.4g}"
+                for force in (
+                    now.available,
+                    *(now.driving.get(k, 0.0) for k in sources),
+                    *(now.resisting[k] for k in kinds),
+                )
+            ),
             *(_told(course[row].margin) for course in courses.values()),
         ]
         for row, now in enumerate(first)
     ]
-    yield from text_table(["angle (deg)", "drive", *kinds, *drives], rows)
+    of_it = [f"of it {source}" for source in sources]
+    yield from text_table(["angle (deg)", "drive", *of_it, *kinds, *drives], rows)
+    for name, drive in drives.items():
+        yield f"{name}: margin = {_formula(drive)}"
     yield from _exceptions(scene, next(iter(drives.values())))
     for name, drive in drives.items():
         yield f"{name}: {_verdict(drive.least())}"
         yield from (f"  {line}" for line in _by_plane(scene, drive.standard))
+
+
+def _formula(drive: DriveMargin) -> str:
+    """The standard's factors in words."""
+    standard = drive.standard
+    resisting = " + ".join(f"{factor:g} {kind}" for kind, factor in drive.factors.items())
+    springs = any(one in drive.factors for one in ("springs", "net", "lines"))
+    driving = f", springs times {standard.driving_spring:g}" if springs else ""
+    speed = f" + {standard.inertia:g} inertia" if standard.keep_speed else ""
+    return f"drive{driving} / ({standard.motorisation:g} x ({resisting}){speed}) - 1"
 
 
 def _exceptions(scene: Scene, drive: DriveMargin) -> Iterator[str]:

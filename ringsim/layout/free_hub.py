@@ -45,7 +45,8 @@ class FreeHub:
         """
         _, _, units, still = self._balance(corners)
         longer = np.sum(units * slopes, axis=1)
-        return NetForce(-float(still.elastic @ longer), float(np.sum(still.stored)))
+        # A difference, not a negative: a slack net pulls with 0, not -0.
+        return NetForce(0.0 - float(still.elastic @ longer), float(np.sum(still.stored)))
 
     def _balance(self, corners: Array) -> tuple[Array, Array, Array, Reaction]:
         """The hub, and the strings' lengths, directions and reaction at rest there."""

@@ -22,7 +22,7 @@ class DriveMargins(Output):
     variables = (
         Variable(
             "drive_available", ("time",), "N m",
-            "what winches that stall and loads drive without friction in the pulleys",
+            "what winches that stall, loads and springs drive without friction in the pulleys",
             until=LAST_LOCK,
         ),
         Variable(

@@ -109,7 +109,7 @@ def _declared(output: type[Output]) -> dict[str, Variable]:
 
     The bar of a function of time alone is one, too; any other is a number.
     """
-    found = {v.name: replace(v, needs=output.needs) for v in output.variables}
+    found = {v.name: replace(v, needs=(*output.needs, *v.needs)) for v in output.variables}
     for one in output.variables:
         if one.error_bar is not None:
             name, words = f"{one.name}_error", f"numerical error bar of the {one.error_bar.words}"
@@ -129,6 +129,8 @@ def in_all_planes(values: Array, planes: Sequence[str]) -> Array:
 
 def holds(scene: Scene) -> set[str]:
     """Everything that a variable may need and the scene has."""
+    windings = [winch.winding for cable in _cables(scene) for winch in cable.winches]
+    motors = [winding for winding in windings if isinstance(winding, MotorWinding)]
     held = {name: getattr(scene, name) is not None for name in type(scene).parts()}
     held |= {
         kind_of(scene.structure): True,
@@ -137,11 +139,8 @@ def holds(scene: Scene) -> set[str]:
         "accelerations": scene.record.accelerations,
         "error bars": scene.solver.error_bars,
         "gauge": bool(scene.structure.gauge),
-        "motors": any(
-            isinstance(winch.winding, MotorWinding)
-            for cable in _cables(scene)
-            for winch in cable.winches
-        ),
+        "motors": bool(motors),
+        "torque_constant": any(motor.torque_constant is not None for motor in motors),
         "reactions": scene.record.reactions,
         "shape": scene.record.shape,
         "prestress": bool(strained(scene)),

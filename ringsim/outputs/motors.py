@@ -2,24 +2,38 @@
 
 import math
 from collections.abc import Iterator
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.records import Winch
 from ringsim.cable.winding.motor import MotorWinding
-from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable, holds
 from ringsim.parts.faults.family import AT_ONCE
+
+_CONSTANTS = ("torque_constant",)
 
 
 class Motors(Output):
     """Torque, speed, power and energy of every motor's shaft; NaN for winches without one.
+
+    Of motors with a ``torque_constant`` also current, electrical power and what of it is lost.
 
     A motor that is switched off, or whose winch stops when its plane has locked, gives nothing.
     """
 
     rank = 45
     needs = ("motors",)
+    electrical: ClassVar = tuple(
+        Variable(name, ("plane", "winch", "time"), units, words, needs=_CONSTANTS)
+        for name, units, words in (
+            ("motor_current", "A", "current of a motor"),
+            ("motor_electrical_power", "W", "electrical power that a motor takes"),
+            ("motor_loss", "W", "electrical power less that of the shaft"),
+            ("motor_electrical_energy", "J", "electrical energy that a motor took"),
+        )
+    )
     variables = (
         Variable("motor_torque", ("plane", "winch", "time"), "N m", "torque of a motor's shaft"),
         Variable("motor_speed", ("plane", "winch", "time"), "rad/s", "speed of a motor's shaft"),
@@ -38,6 +52,15 @@ class Motors(Output):
         Variable(
             "total_motor_energy", (), "J", "energy that the shafts of all motors gave by the end",
             summary=("energy of all motors", "10.3g"), worse="larger",
+        ),
+        *electrical,
+        Variable(
+            "peak_motor_current", (), "A", "largest current of any motor at any step",
+            needs=_CONSTANTS, summary=("largest motor current", "10.3g"),
+        ),
+        Variable(
+            "total_motor_electrical_energy", (), "J",
+            "electrical energy that all motors took by the end", needs=_CONSTANTS,
         ),
     )  # fmt: skip
 
@@ -58,13 +81,14 @@ class Motors(Output):
         times, winches = series.times, len(run.coordinates["winch"])
         found = np.full((4, len(times), len(run.locks), winches), np.nan)
         torque, shaft, power, energy = found
+        current, supplied, lost = np.full((3, *torque.shape), np.nan)
         # A run that went on may have had another motor before, or none: each for its own steps.
         for steps, (plane, end), winch, motor in _motors(run):
             tension, speed, wound = series.values[:, plane, end].T
-            on = np.array([winch.turns(time + AT_ONCE) for time in times[steps]], dtype=bool)
+            runs = np.array([winch.turns(time + AT_ONCE) for time in times], dtype=bool)
             if winch.after_lock == "stop":
-                on &= times[steps] <= np.nan_to_num(held[plane].max(), nan=math.inf)
-            given = motor.torque(tension, speed)
+                runs &= times <= np.nan_to_num(held[plane].max(), nan=math.inf)
+            on, given = runs[steps], motor.torque(tension, speed)
             found[:, :, plane, end] = np.nan_to_num(found[:, :, plane, end])
             place, before = (steps, plane, end), np.maximum(steps - 1, 0)
             torque[place] = np.where(on, given[steps], 0.0)
@@ -72,16 +96,41 @@ class Motors(Output):
             # Also of a step at whose end the winch is switched off: its drum turned until then.
             turned = (wound[steps] - wound[before]) / motor.travel
             energy[place] = 0.5 * (given[steps] + given[before]) * turned
+            if motor.torque_constant is not None:
+                takes = motor.electrical_power(given, speed / motor.travel)
+                current[place] = np.where(
+                    on, motor.current(given, speed / motor.travel)[steps], 0.0
+                )
+                supplied[place] = np.where(on, takes[steps], 0.0)
+                loss = takes - given * speed / motor.travel
+                during = np.where(runs, 0.5, 0.0)[before] * (times[steps] - times[before])
+                lost[place] = during * (loss[steps] + loss[before])
         power[:] = torque * shaft
         energy[:] = np.cumsum(energy, axis=0)
         values: Values = {
             variable.name: Series(series.times, own, series.grid).on_grid()
             for variable, own in zip(self.variables[:4], found, strict=True)
         }
+        if "torque_constant" in holds(run.scene):
+            taken = energy + np.cumsum(lost, axis=0)
+            values |= _electrical(series, current, supplied, supplied - power, taken)
         values["peak_motor_torque"] = np.nanmax(torque)
         values["peak_motor_power"] = np.nanmax(power)
         values["total_motor_energy"] = np.nansum(energy[-1])
         return values
+
+
+def _electrical(series: Series, *courses: Array) -> Values:
+    """Outputs of current, electrical power, loss and energy taken, shape (times, planes, winches)."""
+    values: Values = {
+        variable.name: Series(series.times, own, series.grid).on_grid()
+        for variable, own in zip(Motors.electrical, courses, strict=True)
+    }
+    current, *_, taken = courses
+    return values | {
+        "peak_motor_current": np.nanmax(current),
+        "total_motor_electrical_energy": np.nansum(taken[-1]),
+    }
 
 
 def _motors(

@@ -96,9 +96,11 @@ class Drive:
                 rates.append(sum(own) / max(released, 1e-300))
         return min(rates, default=0.0)
 
-    def pulls(self, state: Condition, over: Sequence[Reeved], friction: float = 1.0) -> Array:
+    def pulls(
+        self, state: Condition, over: Sequence[Reeved], friction: float = 1.0, losses: float = 1.0
+    ) -> Array:
         """What each cable drives, N m, shape (cables,), with so many times the friction of the
-        pulleys; ``over`` is how they are ``reeved``.
+        pulleys and the losses of gears and drums; ``over`` is how they are ``reeved``.
         """
         if friction not in self._laws:  # the same few factors at every angle
             self._laws[friction] = [cable.friction.factored(friction) for cable in self.cables]
@@ -110,7 +112,7 @@ class Drive:
             for end, (winch, way) in enumerate(zip(cable.winches, _ways(cable), strict=True)):
                 if (reach := state.reach.get((number, end))) is None:
                     continue
-                pull = winch.winding.available_tension(at_speed=self._at_speed)
+                pull = winch.winding.available_tension(at_speed=self._at_speed, losses=losses)
                 shares = np.exp(np.append(0.0, np.cumsum(steps[::way])))[::way]
                 tensions = np.maximum(tensions, pull * shares * reach)
             found[number] = tensions @ reeved.shortening

@@ -2,7 +2,7 @@
 
 What drives is set against what resists at the same angle, and speed helps nowhere.  Pulley friction
 is no force beside the others but a share of the tension at every pulley, so a standard's factor
-multiplies its coefficient, and the tensions are solved again.
+multiplies its coefficient, and the tensions are solved again; and so are those that gears leave.
 """
 
 import math
@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ringsim.cable.winding.motor import MotorWinding
 from ringsim.choice import kind_of
 from ringsim.layout.pose import Array
 from ringsim.parts.margin.family import MarginStandard
@@ -23,6 +24,10 @@ from ringsim.theory.section_loads import SectionLoads
 
 MOST = 1e6
 """Margin told along a run where next to nothing resists: files hold no infinite numbers."""
+CABLES, LOADS = "cables", "loads"
+"""Names of what drives, beside springs."""
+GEARS = "gear and drum"
+"""Name of what is lost between a motor's shaft and its rope."""
 PULLEYS = "pulley friction"
 """Name of what is lost between the winches and the ring at the tension that they have."""
 
@@ -33,18 +38,23 @@ _APART = 1e-9
 
 
 class Margin(NamedTuple):
-    """At one opening angle (rad): what would drive without friction in the pulleys, and all that
-    resists, without a standard's factors, N m; the margin with them; all that resists with them,
-    ``required``, N m; what each cable drives without friction in the pulleys, and with the
-    standard's, N m, shape (2, cables).
+    """At one opening angle (rad): what would drive without friction in the pulleys, by its source,
+    and all that resists, by its kind, without a standard's factors, N m; the margin with them; all
+    that resists with them, ``required``, N m; what each cable drives without friction in the
+    pulleys, and with the standard's losses, N m, shape (2, cables).
     """
 
     angle: float
-    available: float
+    driving: dict[str, float]
     resisting: dict[str, float]
     margin: float
     required: float
     pulls: Array
+
+    @property
+    def available(self) -> float:
+        """Sum of all that drives, N m."""
+        return sum(self.driving.values())
 
 
 class DriveMargin:
@@ -72,6 +82,17 @@ class DriveMargin:
         self.start = math.pi - 2.0 * scene.structure.coordinate
         """Opening angle at which the scene begins, rad."""
 
+    @property
+    def factors(self) -> dict[str, float]:
+        """The standard's factor of every kind of resistance that motorisation multiplies."""
+        motors = any(
+            isinstance(winch.winding, MotorWinding) for winch in self.conditions.winches.values()
+        )
+        found = {PULLEYS: self.standard.friction} if self.conditions.winches else {}
+        found |= {GEARS: self.standard.friction} if motors else {}
+        known = (one for one in self._resistances if one.category != "inertia")
+        return found | {one.kind: self.standard.factor(one.category) for one in known}
+
     def at(self, angle: float, time: float = 0.0) -> Margin:
         """At an opening angle (rad), with what is whole and on at a time (s): at rest, or with
         ``keep_speed`` at the speed that the winches are commanded to.
@@ -79,22 +100,27 @@ class DriveMargin:
         standard, now = self.standard, self.mechanism.at(0.5 * (math.pi - angle))
         over, state = self._drive.reeved(now), self.conditions.at(time)
         opening = Opening(angle, self._drive.speed(over, state), 0.0, now, state.sprung)
-        ideal, usual, factored = (
-            self._drive.pulls(state, over, factor) for factor in (0.0, 1.0, standard.friction)
-        )
-        driving = float(self._loads.at(now).clip(min=0.0).sum())  # what resists is a resistance
-        drive, required = float(factored.sum()) + driving, 0.0
+        ideal, usual = (self._drive.pulls(state, over, factor) for factor in (0.0, 1.0))
+        factored = self._drive.pulls(state, over, standard.friction, losses=standard.friction)
+        loads = float(self._loads.at(now).clip(min=0.0).sum())  # what resists is a resistance
+        driving = {CABLES: float(ideal.sum()), LOADS: loads}
+        drive, required, accelerated = float(factored.sum()) + loads, 0.0, 0.0
         resisting = {PULLEYS: float((ideal - usual).sum())}
         for one in self._resistances:
-            resisting[one.kind] = force = one.force(opening)
-            if force >= 0.0:
-                required += standard.factor(one.category) * force
-            elif one.category == "spring":  # what else drives is not counted on
+            force, factor = one.force(opening), standard.factor(one.category)
+            if one.category == "spring" and force < 0.0:  # what else drives is not counted on
+                driving[one.kind] = -force
                 drive -= standard.driving_spring * force
-        required *= standard.motorisation
+                force = 0.0
+            resisting[one.kind] = force
+            if one.category == "inertia":
+                accelerated += factor * force
+            else:
+                required += factor * max(force, 0.0)
+        required = standard.motorisation * required + accelerated
         margin = _margin(drive, math.inf if state.stuck else required)
         pulls = np.stack([ideal, factored])
-        return Margin(angle, float(ideal.sum()) + driving, resisting, margin, required, pulls)
+        return Margin(angle, driving, resisting, margin, required, pulls)
 
     def course(self, count: int = 33) -> list[Margin]:
         """At so many angles from the start to 180 deg, and more where parts resist at the end."""

@@ -27,4 +27,4 @@ class IdealEdge:
         lengths = np.linalg.norm(arms, axis=1)
         longer = np.sum(arms * (moving[:, 1] - moving[:, 0]), axis=1) / lengths
         reaction = pull(lengths - self._natural, self._rates)
-        return NetForce(-float(reaction.elastic @ longer), float(np.sum(reaction.stored)))
+        return NetForce(0.0 - float(reaction.elastic @ longer), float(np.sum(reaction.stored)))

@@ -8,7 +8,7 @@ import math
 
 from ringsim.parts.margin.family import MarginStandard
 from ringsim.scene import Scene
-from ringsim.theory.drive_margin import DriveMargin, Margin
+from ringsim.theory.drive_margin import CABLES, DriveMargin, Margin
 
 
 class PlaneMargin(DriveMargin):
@@ -30,12 +30,13 @@ class PlaneMargin(DriveMargin):
     """Of both planes."""
 
     def at(self, angle: float, time: float = 0.0) -> Margin:
-        """See ``DriveMargin``; ``available`` is that of the plane."""
+        """See ``DriveMargin``; what drives is that of the plane."""
         whole = self.whole(angle, time)
         ideal, factored = whole.pulls[:, self._plane] - whole.pulls[:, 1 - self._plane]
-        available = 0.5 * (whole.available + float(ideal))
+        half = {source: 0.5 * force for source, force in whole.driving.items()}
+        half[CABLES] += 0.5 * float(ideal)
         held = self.conditions.at(time).stuck
         if held or whole.required == 0.0 or not math.isfinite(whole.margin):
-            return whole._replace(available=available)
+            return whole._replace(driving=half)
         margin = whole.margin + float(factored) / whole.required
-        return whole._replace(available=available, margin=margin)
+        return whole._replace(driving=half, margin=margin)

@@ -167,7 +167,7 @@ def test_a_rope_that_is_pulled_off_turns_an_open_gear_and_breaks_its_head_on_a_l
         ({"back_efficiency": 1.2}, "back_efficiency"),
         ({"derating": 0.0}, "derating"),
         ({"current_limit": 1.0}, "current_limit needs torque_constant"),
-        ({"torque_constant": 1.0}, "torque_constant needs current_limit"),
+        ({"no_load_current": 1.0}, "no_load_current needs torque_constant"),
         (
             {"current_limit": 1.0, "torque_constant": 1.0, "torque_limit": 1.0},
             "leave one of them out",

@@ -73,14 +73,15 @@ def test_the_margin_of_known_friction_is_that_of_virtual_work(standard: MarginSt
         assert now.available == pytest.approx(frictionless, rel=1e-6)
         assert now.resisting[PULLEYS] == pytest.approx(frictionless - usual, rel=1e-6)
         required = standard.motorisation * (standard.friction * friction + standard.spring * net)
-        drive = driven(scene, angle, 0.04 * standard.friction)
+        gear = 1.0 / (1.0 + standard.friction * (1.0 / 0.6 - 1.0))
+        drive = driven(scene, angle, 0.04 * standard.friction) * gear / 0.6
         assert now.margin == pytest.approx(drive / required - 1.0, rel=1e-6)
 
 
 def test_factors_are_those_of_the_clauses() -> None:
     """ECSS-E-ST-33-01C 4.7.5.3 and, second-hand, NASA-STD-5017B, as the project has noted them."""
     ecss, nasa = EcssMechanisms(), NasaMechanisms()
-    assert (ecss.motorisation, ecss.inertia, ecss.spring, ecss.friction) == (2.0, 1.1, 1.2, 3.0)
+    assert (ecss.motorisation, ecss.inertia, ecss.spring, ecss.friction) == (2.0, 1.25, 1.2, 3.0)
     assert ecss.driving_spring == 0.8
     assert (nasa.motorisation, nasa.inertia, nasa.spring, nasa.friction) == (1.0, 1.25, 1.5, 3.0)
 
@@ -179,3 +180,38 @@ def test_other_structures_have_no_margin() -> None:
         DriveMargin(scene, PLAIN)
     with pytest.raises(InputError, match=r"margin: structure.kind = .planar-truss. has"):
         scene.with_values({"margin": PLAIN.model_dump(), "cables.upper.winch.winding": MOTOR})
+
+
+@pytest.mark.parametrize(("standard", "factor"), [(EcssMechanisms(), 3.0), (PLAIN, 1.0)])
+def test_losses_of_gears_take_the_factor_of_friction(
+    standard: EcssMechanisms, factor: float
+) -> None:
+    """A gear of efficiency e takes T (1 / e - 1) of what comes in for T that goes out."""
+    margins = []
+    for efficiency in (1.0, 0.6):
+        winding = MOTOR | {"efficiency": efficiency}
+        scene = ring(
+            cables__upper__friction={"kind": "none"}, cables__lower__friction={"kind": "none"},
+            cables__upper__winch__winding=winding, cables__lower__winch__winding=winding,
+            joints__vjoint={"coulomb": 0.01},
+        )  # fmt: skip
+        margins.append(DriveMargin(scene, standard).at(1.5).margin)
+    left = 1.0 / (1.0 + factor * (1.0 / 0.6 - 1.0))
+    assert (margins[1] + 1.0) / (margins[0] + 1.0) == pytest.approx(left, rel=1e-12)
+
+
+def test_inertia_at_a_commanded_speed_is_no_part_of_what_motorisation_multiplies() -> None:
+    """ECSS-E-ST-33-01C: 2 (3 F_R) + 1.25 F_D."""
+    standard = EcssMechanisms(keep_speed=True)
+    winding = MOTOR | {"speed": 300.0}
+    scene = ring(
+        cables__upper__friction={"kind": "none"}, cables__lower__friction={"kind": "none"},
+        cables__upper__winch__winding=winding, cables__lower__winch__winding=winding,
+        joints__vjoint={"viscous": 1e-3},
+    )  # fmt: skip
+    drive = DriveMargin(scene, standard)
+    rows = [drive.at(angle) for angle in (1.2, 1.8, 2.4, 3.0)]
+    assert max(now.resisting["inertia"] for now in rows) > 0.0
+    for now in rows:
+        friction, inertia = now.resisting["joint friction"], now.resisting["inertia"]
+        assert now.required == pytest.approx(2.0 * 3.0 * friction + 1.25 * inertia, rel=1e-12)

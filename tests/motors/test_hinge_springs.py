@@ -71,7 +71,9 @@ def test_virtual_work() -> None:
         torque = 0.01 + 0.004 * 2.0 * phi
         assert OneCoordinate(scene).work_rate(phi) == pytest.approx(-6 * 2.0 * torque, rel=1e-12)
         now = DriveMargin(scene, EcssMechanisms()).at(math.pi - 2.0 * phi)
-        assert now.resisting["springs"] == pytest.approx(-6 * torque)
+        assert now.driving["springs"] == pytest.approx(6 * torque)
+        assert now.resisting["springs"] == 0.0
+        assert now.available == pytest.approx(6 * torque)
         assert now.margin == pytest.approx(0.8 * torque / (2.0 * 3.0 * 0.001) - 1.0, rel=1e-9)
 
 

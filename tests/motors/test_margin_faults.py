@@ -18,7 +18,7 @@ from ringsim.layout.layout import layout_of
 from ringsim.parts.faults.family import Fault
 from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
 from ringsim.scene import Scene
-from ringsim.theory.drive_margin import DriveMargin
+from ringsim.theory.drive_margin import CABLES, DriveMargin
 from ringsim.theory.plane_margin import PlaneMargin
 
 ECSS = EcssMechanisms()
@@ -83,11 +83,12 @@ def test_one_spring_out_takes_a_twelfth_of_them() -> None:
     for angle in map(float, ANGLES):
         now = DriveMargin(struck(fault), ECSS).at(angle)
         one = 0.01 + 0.004 * (math.pi - angle)
-        assert now.resisting["springs"] == pytest.approx(-11.0 * one, rel=1e-9)
+        assert now.driving["springs"] == pytest.approx(11.0 * one, rel=1e-9)
         sound = DriveMargin(sprung(), ECSS).at(angle)
         lost = 0.8 * one / (2.0 * 3.0 * 12 * 0.05)  # ECSS: driving springs 0.8, friction 3, twice
         assert sound.margin - now.margin == pytest.approx(lost, rel=1e-9)
-        assert now.available == sound.available
+        assert now.driving[CABLES] == sound.driving[CABLES]
+        assert sound.available - now.available == pytest.approx(one, rel=1e-9)
 
 
 def test_a_stuck_joint_holds_the_ring() -> None:
@@ -113,14 +114,14 @@ def test_behind_a_jammed_pulley_the_rope_is_slack(ends: str) -> None:
         assert spans[1, 5:].max() > 0.01
         pulled = spans[0].sum() + spans[1, : None if ends == "both" else 5].sum()
         found = DriveMargin(scene, PLAIN).at(angle)
-        assert found.available == pytest.approx(STALL * pulled, rel=1e-6)
+        assert found.driving[CABLES] == pytest.approx(STALL * pulled, rel=1e-6)
     cut = {"kind": "cut-cable", "cable": "lower", "span": 7, "time": 0.0}
     jam = {"kind": "jammed-pulley", "cable": "lower", "pulley": 5, "time": 0.0}
     spans = shortening(scene, 1.5)
     for faults, pulling in (([jam, cut], 5), ([cut, jam], 0)):
         found = DriveMargin(sprung(faults=faults, **plain), PLAIN).at(1.5)
         pulled = spans[0].sum() + spans[1, :pulling].sum()
-        assert found.available == pytest.approx(STALL * pulled, rel=1e-6)
+        assert found.driving[CABLES] == pytest.approx(STALL * pulled, rel=1e-6)
 
 
 def test_a_jam_beside_one_of_two_winches_leaves_each_its_friction() -> None:
@@ -137,7 +138,8 @@ def test_planes_have_what_is_left_of_their_cables() -> None:
     scene = struck(CUT)
     upper, lower = (PlaneMargin(scene, PLAIN, plane).at(1.5) for plane in (0, 1))
     springs = 12.0 * (0.01 + 0.004 * (math.pi - 1.5))
-    assert lower.available == pytest.approx(0.0, abs=1e-12)
+    assert lower.driving[CABLES] == pytest.approx(0.0, abs=1e-12)
+    assert lower.available == pytest.approx(0.5 * springs, rel=1e-9)
     assert lower.margin == pytest.approx(springs / (12 * 0.05) - 1.0, rel=1e-9)
     sound = DriveMargin(sprung(), PLAIN).at(1.5)
     assert upper.margin == pytest.approx(sound.margin, rel=1e-9)

@@ -35,9 +35,9 @@ class Winding(Model):
         """Times at which the law is not smooth, s: steps end there."""
         return ()
 
-    def available_tension(self, *, at_speed: bool = False) -> float:
+    def available_tension(self, *, at_speed: bool = False, losses: float = 1.0) -> float:
         """Tension against which the winch still winds, N, at its commanded speed or however slowly;
-        infinite if it is any.
+        infinite if it is any.  ``losses`` is how many times the losses of its gear count.
         """
         return math.inf
 

@@ -63,7 +63,10 @@ class MotorWinding(FeedbackWinding):
     current_limit: Ampere | None = None
     """The same as a current; needs ``torque_constant``."""
     torque_constant: TorqueConstant | None = None
-    """Torque of the shaft over current."""
+    """Torque of the shaft over current above that without a load; with it a run tells the motor's
+    current and electrical power."""
+    no_load_current: Ampere | None = None
+    """What the motor draws while it turns without a load; left out, none."""
     derating: Ratio = 1.0
     """Share of its torque that the motor has left when hot (or cold)."""
     gear_ratio: GearRatio = 1.0
@@ -80,11 +83,9 @@ class MotorWinding(FeedbackWinding):
 
     @model_validator(mode="after")
     def _usable(self) -> "MotorWinding":
-        if (self.current_limit is None) != (self.torque_constant is None):
-            given, missing = "current_limit", "torque_constant"
-            if self.current_limit is None:
-                given, missing = missing, given
-            raise ValueError(f"{given} needs {missing}: give both, or neither")
+        for given in ("current_limit", "no_load_current"):
+            if getattr(self, given) is not None and self.torque_constant is None:
+                raise ValueError(f"{given} needs torque_constant: give both, or neither")
         if self.current_limit is not None and self.torque_limit is not None:
             raise ValueError(
                 f"torque_limit = {self.torque_limit} N m and current_limit = {self.current_limit} "
@@ -104,6 +105,28 @@ class MotorWinding(FeedbackWinding):
         if self.current_limit is not None and self.torque_constant is not None:
             return self.current_limit * self.torque_constant
         return math.inf if self.torque_limit is None else self.torque_limit
+
+    @property
+    def resistance(self) -> float:
+        """Of the winding, ohm: the slope of the line is k_t^2 / R; NaN without torque_constant."""
+        constant = math.nan if self.torque_constant is None else self.torque_constant
+        return constant**2 * self.no_load_speed / self.stall_torque
+
+    def current(self, torque: Any, shaft: Any) -> Any:
+        """I = T / k_t + I_0 at a torque (N m) and a speed of the shaft (rad/s), A; the losses of a
+        motor that does not turn need no I_0.  NaN without torque_constant.
+        """
+        constant = math.nan if self.torque_constant is None else self.torque_constant
+        idle = (self.no_load_current or 0.0) * np.sign(shaft)
+        return np.asarray(torque) / (self.derating * constant) + idle
+
+    def electrical_power(self, torque: Any, shaft: Any) -> Any:
+        """U I with U = R I + k_t w at the motor's terminals, W: all of ``voltage`` on its line,
+        less where its drive holds a command or a limit.
+        """
+        current = self.current(torque, shaft)
+        back = 0.0 if self.torque_constant is None else self.torque_constant
+        return current * (self.resistance * current + back * np.asarray(shaft))
 
     @property
     def fastest(self) -> float:
@@ -161,13 +184,18 @@ class MotorWinding(FeedbackWinding):
         half = 0.5 * self.voltage * self.no_load_speed
         return self.travel * (half if self.speed is None else min(self.speed, half))
 
-    def available_tension(self, *, at_speed: bool = False) -> float:
-        """Tension at which it stalls, or that it winds at its commanded speed, in N."""
-        if not at_speed or self.speed is None:
-            return self.stall_tension
-        limited = self.limit * (1.0 - self.band * self.speed / (self.voltage * self.no_load_speed))
-        torque = min(self.available(self.speed), self.derating * limited)
-        return float(torque) * self.efficiency / self.travel
+    def available_tension(self, *, at_speed: bool = False, losses: float = 1.0) -> float:
+        """Tension at which it stalls, or that it winds at its commanded speed, in N.
+
+        Gear and drum take T (1 / e - 1) of what comes in for T that goes out; so many times that
+        are counted as ``losses``.
+        """
+        torque = self.available(0.0)
+        if at_speed and self.speed is not None:
+            share = self.speed / (self.voltage * self.no_load_speed)
+            limited = self.limit * (1.0 - self.band * share)
+            torque = min(self.available(self.speed), self.derating * limited)
+        return float(torque) / self.travel / (1.0 + losses * (1.0 / self.efficiency - 1.0))
 
     def commanded_speed(self) -> float:
         """The command, in m/s; 0 without one."""

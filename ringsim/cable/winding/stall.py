@@ -28,7 +28,7 @@ class StallWinding(FeedbackWinding):
         """The speed below the stall, in m/s."""
         return self.speed
 
-    def available_tension(self, *, at_speed: bool = False) -> float:
+    def available_tension(self, *, at_speed: bool = False, losses: float = 1.0) -> float:
         """The maximum tension, or that up to which the speed is kept, in N."""
         return self.max_tension * (1.0 - self.band * at_speed)
 

@@ -14,20 +14,24 @@ Category = Literal["inertia", "spring", "friction", "gravity", "load", "latch"]
 class MarginStandard(Model):
     """Factors by which a standard takes resistances as larger than computed.
 
-    With Q what the drive gives, R_k the resistances, f the factors:
+    With Q what the drive gives, R_k the resistances, I the inertia of parts that a commanded speed
+    accelerates, f the factors:
 
-        margin = Q / (motorisation * sum f_k R_k) - 1,   required: >= 0.
+        margin = Q / (motorisation * sum f_k R_k + f_I I) - 1,   required: >= 0.
 
-    Q is computed with the friction of the pulleys multiplied by ``friction``: what a pulley takes
-    is a share of the tension before it, so that losses multiply along the chain.
+    Q is computed with the friction of the pulleys, and what gears and drums lose, multiplied by
+    ``friction``: what they take is a share of the tension, so that losses multiply along the chain.
+    Springs that drive are part of Q, times ``driving_spring``.
     """
 
     inertia: Factor
-    """Of the moving parts, where they are accelerated."""
+    """Of the moving parts where ``keep_speed`` accelerates them; beside the sum that
+    ``motorisation`` multiplies."""
     spring: Factor
     """Elastic parts that resist: net, springs, cables of the antenna."""
     friction: Factor
-    """Dry and viscous friction in joints; the coefficients of the pulleys."""
+    """Dry and viscous friction in joints; the coefficients of the pulleys; losses of gears and
+    drums."""
     gravity: Factor
     """Weight that the drive lifts, on ground."""
     load: Factor
