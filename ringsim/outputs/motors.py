@@ -121,7 +121,7 @@ class Motors(Output):
 
 
 def _electrical(series: Series, *courses: Array) -> Values:
-    """Outputs of current, electrical power, loss and energy taken, shape (times, planes, winches)."""
+    """Outputs of current, power taken, loss and energy taken, shape (times, planes, winches)."""
     values: Values = {
         variable.name: Series(series.times, own, series.grid).on_grid()
         for variable, own in zip(Motors.electrical, courses, strict=True)
