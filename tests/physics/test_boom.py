@@ -90,7 +90,7 @@ def test_a_free_ring_keeps_its_momenta_at_zero(kind: str) -> None:
 
 
 def cable_arc(**values: Any) -> Scene:
-    """A free arc of three on cables, whose boom has 17 N to hold aside as it opens."""
+    """A free arc of three on cables of up to 17 N, whose end assemblies lean on the boom."""
     plain = {
         "structure.sections": 3, "structure.closed": False, "structure.opening_angle": 40.0,
         "net": "none", "joints.hinge": {"viscous": 0.001}, "record.reactions": True,
