@@ -13,7 +13,9 @@ coordinates, each with the error bars of its own two runs, and keeps what it fin
 comes.  Scenes on which exudyn takes more than ``DEAR`` are left out: that says nothing about
 agreement.  ``table`` compares all that has a bar: the difference over the sum of both bars, of
 series where it is largest.  Both engines have the same elements, so that the part of a bar that
-stands for one element a half says nothing about them; it is left out.
+stands for one element a half says nothing about them; it is left out.  How the base turns, and what
+it carries, have no bars: each engine runs such scenes once more with steps twice as long, and what
+that changes stands for one.
 ``look`` runs one scene again in both at a tolerance divided by so much, to see whose a difference
 is.
 """
@@ -46,6 +48,9 @@ DEAR = 25.0
 """Processor time of exudyn's run without bars, s."""
 REPRESENTED = ("forces-ring", "forces-arc", "cables-ring", "cables-arc", "cable-faults",
                "constant-steps", *loads.FAMILIES, *parts.FAMILIES)  # fmt: skip
+BASE = ("base_rotation", "base_force", "base_torque")
+ROUND_OFF = 1e-12
+"""Of them where nothing moves or pulls, as the turn of a fixed base, deg."""
 LEAST = {"asynchrony": 1e-6}
 """Difference that is round-off: at the start of a run deviations and their bars are."""
 ONE_ELEMENT = 10**6
@@ -97,6 +102,27 @@ def apart(one: Outcome, two: Outcome) -> dict[str, tuple[float, float, float]]:
     return found
 
 
+def base_apart(scene: Scene, both: list[Outcome]) -> dict[str, tuple[float, float, float]]:
+    """The same of the base, for all of its series that are long enough to be compared."""
+    double = scene.with_values({"solver.error_bars": False})
+    double = double.model_copy(update={"solver": double.solver.scaled(2.0)})
+    coarse = [engine(double) for engine in ENGINES.values()]
+    found = {}
+    for name in BASE:
+        if all(name in outcome.values for outcome in (*both, *coarse)):
+            one, two, *others = (outcome.values[name] for outcome in (*both, *coarse))
+            value = float(np.nanmax(np.abs(one)))
+            bars = sum(_farthest(x, y) for x, y in zip((one, two), others, strict=True))
+            if value > ROUND_OFF:
+                found[name] = value, _farthest(one, two), bars
+    return found
+
+
+def _farthest(one: Any, two: Any) -> float:
+    """Largest difference of two series as long as both run."""
+    return float(np.nanmax(np.abs(one - two)))
+
+
 def run(asked: argparse.Namespace) -> None:
     rows: list[dict[str, Any]] = []
     if asked.out.exists():
@@ -114,6 +140,8 @@ def run(asked: argparse.Namespace) -> None:
 
 
 def compare(scene: Scene) -> dict[str, Any]:
+    if scene.boom is not None or scene.structure.supported:
+        scene = scene.with_values({"record.reactions": True})
     begin = time.process_time()
     try:
         by_frames(scene.with_values({"solver.step_limit": 1}))
@@ -128,7 +156,8 @@ def compare(scene: Scene) -> dict[str, Any]:
     half = time.process_time()
     two = outcome_of("frames", scene)
     cpu = [half - begin, time.process_time() - half]
-    return {"exudyn": told(one), "frames": told(two), "cpu": cpu, "apart": apart(one, two)}
+    found = apart(one, two) | base_apart(scene, [one, two])
+    return {"exudyn": told(one), "frames": told(two), "cpu": cpu, "apart": found}
 
 
 def table(asked: argparse.Namespace) -> None:

@@ -6,11 +6,12 @@ from functools import cache
 from scipy.optimize import brentq
 
 from ringsim.cable.bracket.bar_half import BarHalfBracket
+from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.scene.substituted import substituted
 from ringsim.simulation import run_frame
-from ringsim.structures.pantograph_ring import LEAST_OPENING, PantographRing
+from ringsim.structures.pantograph_ring import LEAST_OPENING
 
 _WIDEST = 179.0
 """Opening angles that are tried, deg."""
@@ -31,10 +32,11 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         If no angle between 1 and 179 deg gives that time, or the frame engine cannot represent the
         scene.
     """
-    if not isinstance(scene.structure, PantographRing):
+    if "opening_angle" not in type(scene.structure).model_fields:
         raise InputError(
-            f"scene {scene.name} is no pantograph ring: only those have a stowed angle to determine"
+            f'structure.kind = "{kind_of(scene.structure)}" has no opening_angle to determine'
         )
+    opened: float = scene.structure.opening_angle  # type: ignore[attr-defined]
     if not (math.isfinite(time) and time > 0.0):
         raise InputError(f"a deployment time of {time:g} s must be finite and above 0 s")
     end = min(max(_PATIENCE * time, scene.solver.step), _LONGEST)
@@ -56,7 +58,7 @@ def opening_angle_for(scene: Scene, time: float) -> float:
         found = float(outcome.values["deployment_time"]) - time
         return found if math.isfinite(found) else math.inf
 
-    low = high = min(max(scene.structure.opening_angle, least), _WIDEST)
+    low = high = min(max(opened, least), _WIDEST)
     slow = fast = excess(low)
     while fast > 0.0:
         if high == _WIDEST:

@@ -29,7 +29,7 @@ from ringsim.stepping.restarts import run_with_restarts
 from ringsim.stored_state import require_fit
 from ringsim.theory.margin_along import with_margin
 from ringsim.threads import one_thread
-from ringsim.variables import GONE, PLANES, Cause, Fidelity, Outcome, Status
+from ringsim.variables import GONE, Cause, Fidelity, Outcome, Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -199,7 +199,7 @@ def _with_remark(outcome: Outcome, scene: Scene) -> Outcome:
         excess = regularisation.excess(slip, speed, pulleys, float(decay))
         if speed > 0.0 and excess > regularisation.TOLERATED:
             most = regularisation.slip_speed(speed, pulleys)
-            faded[f"cables.{PLANES[plane]}.slip_speed"] = slip, most, 100.0 * excess
+            faded[f"cables.{scene.structure.planes[plane]}.slip_speed"] = slip, most, 100.0 * excess
     if not faded:
         return outcome
     slips, bounds, excesses = zip(*faded.values(), strict=True)

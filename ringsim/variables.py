@@ -68,6 +68,7 @@ class Cause(Code):
     TIME_LIMIT = 15
     MEMORY = 16
     UNFIT = 17
+    STRAINED = 18
 
 
 class Fate(Code):

@@ -149,7 +149,7 @@ def read_evidence(path: Path | Traversable) -> Evidence:
 
 def evidence_for(scene: Scene) -> Evidence:
     """The evidence of the built-in scene with the same kind of structure and drive."""
-    if kind_of(scene.structure) == "planar-truss":
+    if scene.structure.gauge:
         name = "planar-truss"
     elif scene.cables is None:
         name = "ring18"

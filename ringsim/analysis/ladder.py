@@ -127,7 +127,7 @@ def ladder(scene: Scene, most: int = 4) -> list[Rung]:
         constant = {"solver.step_control": "constant", "solver.step": step}
         add("constant step", f"{step:g} s", step, constant | tight)
     meshes = [("elements", "", _scaled(scene, _OF_ELEMENTS))]
-    if kind_of(scene.structure) == "pantograph-ring" and scene.cables is None:
+    if scene.structure.locks and scene.cables is None:
         other = "ancf" if kind_of(scene.rods) != "ancf" else "geometrically-exact"
         rods = _scaled(scene, 1.0 / 4.0) | {"rods.kind": other}
         meshes.append(("formulation", f"{other}, ", rods))

@@ -5,14 +5,17 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 
-from ringsim.analysis.binomial import share_interval
+from ringsim.analysis.binomial import share_bounds, share_interval
 from ringsim.analysis.intervals import LEVEL, Array, student
 from ringsim.analysis.quantities import CHECKED, good, lost
 from ringsim.sampling.designs.subset_simulation import SubsetSimulation
 from ringsim.sampling.subset_levels import Repetition
 from ringsim.variables import Status
+
+DISAGREE = 0.01
+"""Probability below which replicates scatter by more than their chains explain."""
 
 
 def subset_simulation(campaign: xr.Dataset) -> SubsetSimulation | None:
@@ -45,7 +48,21 @@ def approach(campaign: xr.Dataset) -> list[tuple[Array, Array]]:
     return found
 
 
-def replicated_interval(each: Array, chains: Array) -> tuple[Array, float]:
+def agreement(each: Array, chains: Array) -> float:
+    """Probability that replicates scatter as much as these if their errors were those of their
+    chains; NaN of a single one, and if any did not come to the event.
+
+    Where the event has parts that only some replicates found, it is small: chains in one part tell
+    nothing of the others.  Variance of normal logarithms: chi-squared.
+    """
+    square = float(np.mean(chains**2))
+    if len(each) < 2 or not (each > 0.0).all() or not 0.0 < square < np.inf:
+        return np.nan
+    free = len(each) - 1
+    return float(chi2.sf(free * np.log(each).var(ddof=1) / square, free))
+
+
+def replicated_interval(each: Array, chains: Array, most: float = 1.0) -> tuple[Array, float]:
     """Interval of the probability that replicates ``each`` estimate, and the mean's coefficient of
     variation by their scatter (NaN for a single one); ``chains`` are their own coefficients.
 
@@ -53,11 +70,18 @@ def replicated_interval(each: Array, chains: Array) -> tuple[Array, float]:
     the probability by half its variance on average, since its mean is exact.  That variance is
     taken from the chains, which know it better than a few replicates do; the width comes from the
     replicates' scatter, but is not less than that from their chains: few may agree by chance.
+
+    Where they disagree beyond that, their logarithms are of different things.  Then the lower end
+    is what a mean of positive numbers that is exact on average exceeds that often (Markov), and the
+    upper end is ``most``, a bound from samples that no chain has led.
     """
     count, middle = len(each), float(each.mean())
     if not (each > 0.0).all():
         return np.full(2, np.nan), np.nan
     logs, square = np.log(each), float(np.mean(chains**2))
+    if agreement(each, chains) < DISAGREE:
+        variation = float(each.std(ddof=1) / middle / count**0.5)
+        return np.array([(1 - LEVEL) / 2 * middle, max(most, middle)]), variation
     variation, half = np.nan, float(norm.ppf(0.5 + LEVEL / 2)) * (square / count) ** 0.5
     if count > 1:
         variation = float(each.std(ddof=1) / middle / count**0.5)
@@ -75,7 +99,8 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
     found = design.levels(known)
     each = np.array([one.probability for one in found.repetitions])
     chains = np.array([one.variation for one in found.repetitions])
-    ends, variation = replicated_interval(each, chains)
+    unled = _unled(found.repetitions, design.target)
+    ends, variation = replicated_interval(each, chains, unled)
     units = campaign[design.of].attrs.get("units", "1")
     event = _event(design, design.target, units)
 
@@ -87,6 +112,18 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
             (), float(each.mean()), told(f"probability of {event}") | {"event": event},
         ),
         "tail_probability_interval": ("bound", ends, told("interval of 95 % of that probability")),
+        "tail_agreement": (
+            (), agreement(each, chains),
+            told("probability that replicates with the errors of their chains scatter as much"),
+        ),
+        "tail_unled": (
+            (), unled,
+            told("upper bound of 97.5 % of that probability by the first levels' samples alone"),
+        ),
+        "tail_unled_samples": (
+            (), sum(len(one.states[0]) for one in found.repetitions if one.states),
+            told("samples of the first levels"),
+        ),
         "tail_variation": ((), variation, told("coefficient of variation of that probability")),
         "tail_variation_of_chains": (
             (), float(np.sqrt(np.mean(chains**2) / len(each))),
@@ -106,6 +143,17 @@ def tail(campaign: xr.Dataset) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _unled(found: list[Repetition], response: float) -> float:
+    """Upper bound of the probability beyond a response from the independent samples of the first
+    levels, whatever chains have found; 1 before they have run.
+    """
+    first = [one.states[0] > response for one in found if one.states]
+    if not first:
+        return 1.0
+    inside = np.concatenate(first)
+    return share_bounds(int(inside.sum()), len(inside), 0.5 + LEVEL / 2)[1]
+
+
 def _event(design: SubsetSimulation, response: float, units: str) -> str:
     """That the output is beyond a response, in words."""
     unit = "" if units == "1" else f" {units}"
@@ -122,7 +170,10 @@ def _short(
     if not ends or any(np.isnan(one.probability) for one in found):
         return {}
     each, chains = np.array([one.beyond(min(ends)) for one in found]).T
-    ends_of_interval, _ = replicated_interval(each, chains)
+    unled = _unled(found, min(ends))
+    ends_of_interval, _ = replicated_interval(each, chains, unled)
+    if any(one.probability > 0.0 for one in found):  # by a way that the others did not find
+        ends_of_interval[1] = unled
     event = _event(design, min(ends), units)
     nearest = design.sign * float(np.max(known, where=np.isfinite(known), initial=-np.inf))
     return {
@@ -208,6 +259,26 @@ def short_of(found: xr.Dataset) -> list[str]:
     ]
 
 
+def unseen_lines(found: xr.Dataset) -> list[str]:
+    """What chains cannot tell of a rare event that all replicates came to, as sentences: whether
+    these disagree, and how probable parts of it may be that none has found.
+    """
+    chance, most = float(found["tail_agreement"]), float(found["tail_unled"])
+    samples, lines = int(found["tail_unled_samples"]), []
+    if chance < DISAGREE:
+        p = f"p = {chance:.2g}" if chance >= 1e-4 else "p < 0.0001"
+        lines.append(
+            f"replicates disagree by more than the errors of their chains ({p}): the event has "
+            "parts that only some of them found, so that the interval is as wide as their mean and "
+            f"the first {samples} samples allow; give more replicates, and more samples"
+        )
+    lines.append(
+        "parts of the event that no chain has found are in none of these numbers: the first "
+        f"{samples} samples, which no chain has led, put all of it below {most:.2g} (97.5 %)"
+    )
+    return lines
+
+
 def tail_lines(analysis: xr.Dataset) -> list[str]:
     """The same as sentences; none without it."""
     if "tail_probability" not in analysis:
@@ -224,8 +295,10 @@ def tail_lines(analysis: xr.Dataset) -> list[str]:
     by_chains = f"{float(one['tail_variation_of_chains']):.2g} from the correlation of chains"
     variation = f"{float(one['tail_variation']):.2g} from {count} replicates, " if count > 1 else ""
     lines = [
-        f"probability of {event}: {probability:.3g} (95 % {low:.2g} .. {high:.2g}), coefficient of "
-        f"variation {variation}{by_chains}; {one['tail_levels'].max()} levels at most, {runs}"
+        f"probability of {event}: {probability:.3g} (95 % {low:.2g} .. {high:.2g}, of the parts "
+        f"of it that chains found), coefficient of variation {variation}{by_chains}; "
+        f"{one['tail_levels'].max()} levels at most, {runs}",
+        *unseen_lines(analysis),
     ]
     if checked := int(one["tail_checked"]):
         confirmed = int(one["tail_confirmed"])

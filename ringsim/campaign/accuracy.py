@@ -21,7 +21,6 @@ from ringsim.analysis.ladder import (
     shortened,
 )  # fmt: skip
 from ringsim.campaign.cases import run_cases
-from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.simulation import why_not_frame
@@ -144,7 +143,7 @@ class _Study:
         """
         if rung.fidelity == FRAME:
             return f"{stage}-{FRAME}", True, FRAME
-        if kind_of(self.scene.structure) == "planar-truss":  # a strain for each of its elements
+        if self.scene.structure.gauge:  # a strain for each of its elements
             return f"{stage}-elements-{rung.values['rods.elements']}", False, rung.fidelity
         stressed = rung.values["rods.kind"] != "ancf"  # whose elements report no forces
         return stage if stressed else f"{stage}-unstressed", stressed, rung.fidelity
@@ -162,7 +161,7 @@ def _needed(file: Path) -> xr.Dataset:
 def _quadrature(scene: Scene) -> list[Truth]:
     """Deployment time of a ring that only position-dependent loads drive, without losses."""
     conservative = not scene.joints.present() and (scene.net is None or scene.net.lossless)
-    if kind_of(scene.structure) != "pantograph-ring" or not scene.structure.closed:
+    if not scene.structure.locks or not scene.structure.closed:
         return []  # the quadrature keeps an arc's end assemblies upright, but they swing
     if not conservative or scene.cables is not None or scene.faults:
         return []

@@ -140,9 +140,9 @@ def command(
 
         for picture in draw_run(dataset, target.parent, target.stem, formats or ("png",)):
             click.echo(f"wrote {picture}")
-        ring = kind_of(chosen.structure) == "pantograph-ring" and kind_of(chosen.rods) != "ancf"
+        drawn = chosen.structure.locks and kind_of(chosen.rods) != "ancf"
         # Not recorded for the figure: steps that resolve the rods' vibration are another run.
-        if ring and not chosen.record.stress:
+        if drawn and not chosen.record.stress:
             click.echo("stresses are drawn with --set record.stress=true")
     if animate:
         from ringsim.plots.animation import animate as write_animation

@@ -28,7 +28,7 @@ from ringsim.parts.faults.family import AT_ONCE
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
 from ringsim.stepping.events import Events
-from ringsim.stepping.instant import Instant
+from ringsim.stepping.instant import Instant, Strained
 from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.run_control import RunControl
@@ -97,6 +97,7 @@ class Integration:
             limits=scene.limits,
             follow_deviations=scene.record.stress,
             turn=scene.loads_turn_at,
+            strained=Strained(self._energy.strain_energy(), model.prestress),
         )
 
     def run(self) -> Recorder:
@@ -105,13 +106,15 @@ class Integration:
         solver.SetUserFunctionUpdateCurrentTime(system, self._update_time)
         system.SetPostStepUserFunction(self._after_step)
         model = self._built.model
-        assembly, newton = model.assembly, Newton(solver, model.layout)
+        assembly, newton, boom = model.assembly, Newton(solver, model.layout), self._built.boom
         predictor = Predictor(assembly, solver)
 
         def before_residual(system: Any, time: float, count: int, discontinuous: int) -> None:
             # The rods' dampers read the state that the step starts from, before it is moved.
             assembly.dampers.prepare(system, time, count, discontinuous)
             predictor.apply(time, count, discontinuous)
+            if boom is not None:
+                boom.settle()
             assembly.dry_joints.follow()
             newton.apply()
 

@@ -51,7 +51,7 @@ class EnergyMeter:
         Opening angles and their rates have the shape (planes, sections), rad and rad/s.
         """
         kinetic = sum(self._output(body, _KIND.KineticEnergy) for body in self._assembly.bodies)
-        elastic = sum(self._output(element, _KIND.PotentialEnergy) for element in self._elements)
+        elastic = self.strain_energy()
         forces, resisted = [np.zeros(0)], [np.zeros(0)]
         for connector in self._connectors:
             reaction, resisting = connector(state, angles, rates)
@@ -85,6 +85,10 @@ class EnergyMeter:
     def go_on_from(self, work: float, state: State) -> None:
         """Let other forces act from this state on, up to which loads have done so much work, J."""
         self._done = work - self._work(state)
+
+    def strain_energy(self) -> float:
+        """Of rods and boom at the current state, J."""
+        return sum(float(self._output(each, _KIND.PotentialEnergy)) for each in self._elements)
 
     def keep(self) -> None:
         """Count from the last reading on."""

@@ -42,13 +42,15 @@ class BuiltJoint(NamedTuple):
 
 class Multibody:
     """Bodies (each with its node), rods, joints and loads of a scene's layout at the start, in the
-    layout's order; ``loose`` are nodes of neither, by the names of ``ringsim.layout.points``,
-    ``forces`` those of the loads as they act now, N, shape (loads, 3).
+    layout's order; ``loose`` are nodes of neither, by the names of ``ringsim.layout.points``;
+    ``forces`` are those of the loads as they act now, N, shape (loads, 3); ``prestress`` is what
+    putting the bodies together has left in the rods, J.
     """
 
     def __init__(self, scene: Scene) -> None:
         drawn = layout_of(scene)
-        self.scene, self.layout = scene, assembled(drawn, scene.rods).layout
+        self.scene = scene
+        self.layout, self.prestress = assembled(drawn, scene.rods)
         self.formulation = formulation = FORMULATIONS[type(scene.rods)]
         self.assembly = assembly = Assembly()
         self.ideal = OneCoordinate(scene, drawn)

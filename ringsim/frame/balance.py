@@ -23,7 +23,8 @@ strings and its hub, bodies that hang on lines."""
 
 class Held(NamedTuple):
     """Where followed coordinates begin, shape (7,); bodies at the ends of strings, and on lines;
-    bodies with a boom and those that slide along it, with the stiffness that holds them (N/m);
+    bodies with a boom and those that slide along it, lengths (m) at which their turns are held (see
+    ``ringsim.frame.slide.aside``), and the stiffness of both (N/m);
     linear friction of the angles, N m s/rad; whether there is gravity, and it, m/s^2.
     """
 
@@ -32,6 +33,7 @@ class Held(NamedTuple):
     hung: Indices
     top: Indices
     low: Indices
+    reach: Array
     stiffness: float
     damping: Array
     weighs: bool
@@ -78,8 +80,8 @@ def balance(
     push_joints(joints, pose.angle, rates, mesh, g)
     for n in range(len(held.top)):
         top, low = held.top[n], held.low[n]
-        gaps, rows = aside(pose, top, low)
-        for k in range(2):
+        gaps, rows = aside(pose, top, low, held.reach[n])
+        for k in range(len(gaps)):
             force = held.stiffness * gaps[k]
             for i in range(6):
                 g[mesh.home[top] + i] += force * rows[k, i]
@@ -145,11 +147,13 @@ def add_slides(mesh: Mesh, held: Held, pose: Pose, fronts: Array) -> None:
     """
     for n in range(len(held.top)):
         top, low = mesh.frame_local[held.top[n]], mesh.frame_local[held.low[n]]
-        _, rows = aside(pose, held.top[n], held.low[n])
+        _, rows = aside(pose, held.top[n], held.low[n], held.reach[n])
         front = fronts[top[0]]
         for i in range(12):
             row = top[1] + i if i < 6 else low[1] + i - 6
             for j in range(12):
                 column = top[1] + j if j < 6 else low[1] + j - 6
                 shared = rows[0, i] * rows[0, j] + rows[1, i] * rows[1, j]
+                for k in range(2, len(rows)):
+                    shared += rows[k, i] * rows[k, j]
                 front[row, column] += held.stiffness * shared

@@ -21,7 +21,7 @@ from ringsim.parts.faults.stuck_vjoint import StuckVJoint
 from ringsim.scene import Scene
 from ringsim.stepping.events import Events
 from ringsim.stepping.extrapolation import extrapolated
-from ringsim.stepping.instant import Instant
+from ringsim.stepping.instant import Instant, Strained
 from ringsim.stepping.latches import Latches
 from ringsim.stepping.locks import Locks
 from ringsim.stepping.memory import Remembering
@@ -87,6 +87,7 @@ class Integration(Remembering):
             limits=scene.limits,
             follow_deviations=scene.record.stress,
             turn=scene.loads_turn_at,
+            strained=Strained(self._energy.strain_energy(model.start), model.prestress),
         )
 
     def run(self) -> Recorder:

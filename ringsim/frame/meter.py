@@ -77,6 +77,11 @@ class EnergyMeter(Remembering):
         """Let other forces act from this state on, up to which loads have done so much work, J."""
         self._done = work - self._model.work(state)
 
+    def strain_energy(self, state: State) -> float:
+        """Of rods and boom, and of what holds bodies on it, J."""
+        elements = 0.5 * float(np.sum(self._model.mesh.stiffness * state.strains**2))
+        return elements + sum(slide.stored(state.pose) for slide in self._model.slides)
+
     def keep(self) -> None:
         """Count from the last reading on."""
         self._kept = self._last

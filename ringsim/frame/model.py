@@ -41,6 +41,8 @@ class FrameModel:
         The structure with rigid rods, at the start.
     moving
         Its acceleration then.
+    prestress
+        What putting the structure together has left in its rods, J.
     with_hub, size
         Whether a net has a hub; number of unknowns: those of the mesh and the hub's three.
     reaction
@@ -51,7 +53,8 @@ class FrameModel:
         if not isinstance(scene.rods, GeometricallyExactRods):
             raise InputError(f"{NOT_HERE} rods.kind = {kind_of(scene.rods)!r}: {CURE}")
         drawn = layout_of(scene)
-        self.scene, self.layout = scene, assembled(drawn, scene.rods).layout
+        self.scene = scene
+        self.layout, self.prestress = assembled(drawn, scene.rods)
         self.ideal = OneCoordinate(scene, drawn)
         self.gravity = np.zeros(3) if self.layout.gravity is None else self.layout.gravity
         self.moving = first_acceleration(self.layout, self.ideal, scene.structure.coordinate)
@@ -75,7 +78,10 @@ class FrameModel:
         if scene.cables is not None:
             self.cables = FrameCables(scene.cables, skeleton, mesh, parts)
         self._stiffest = stiffest = float(mesh.stiffness[:, 0].max())
-        slides = [RigidSlide(mesh, *pair, STIFFNESS * stiffest) for pair in skeleton.slides]
+        slides = [
+            RigidSlide(mesh, top, low, STIFFNESS * stiffest, turns * scene.structure.reach)
+            for top, low, turns in skeleton.slides
+        ]
         self._beam_slides: list[Slide] = []
         if beam is not None:
             nodes = [(end.frame, end.axes) for end in skeleton.beam]
@@ -118,6 +124,7 @@ class FrameModel:
             hung=np.array(lines_on, dtype=np.int64),
             top=np.array([slide.top for slide in slides], dtype=np.int64),
             low=np.array([slide.low for slide in slides], dtype=np.int64),
+            reach=np.array([slide.reach for slide in slides]),
             stiffness=STIFFNESS * stiffest,
             damping=self.laws.damping,
             weighs=self.layout.gravity is not None,

@@ -5,6 +5,7 @@ rods cross or meet in a revolute, the first one's node is a frame and the second
 against it by an angle; where a rod hangs on a body, its end is turned against the body by one.
 """
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -63,7 +64,9 @@ class Skeleton:
         self.angles: list[Angle] = []
         self.angle_rates: list[float] = []
         self.fixed: list[int] = []
-        self.slides: list[tuple[int, int]] = []
+        self.slides: list[tuple[int, int, bool]] = []
+        """Bodies at the top of a boom and on it, and whether these cannot turn against each other.
+        """
         self.beam: list[End] = []
         self._ends: dict[tuple[int, int], End] = {}
         self.angle_of: dict[int, int] = {}
@@ -90,13 +93,13 @@ class Skeleton:
 
     def add_beam(self, beam: BoomBeam) -> list[Element]:
         """The elements of a flexible boom, from its clamped top down; ``beam`` are their nodes."""
-        boom, body = beam.record, self.layout.bodies[beam.top.body]
-        # x along the boom, downwards.
-        axes = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+        boom, pose = beam.record, self.layout.pose(beam.top)
+        # x along the boom, downwards, as the body at its top stands after assembly.
+        own = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+        axes = pose.axes @ own
         length = boom.length / boom.elements
-        self.beam = [End(beam.top.body, beam.top.arm, body.pose.axes.T @ axes, -1)]
-        place, rate = body.pose.at(beam.top.arm)
-        top = Pose(place, axes, rate, body.pose.turn)
+        self.beam = [End(beam.top.body, beam.top.arm, beam.top.axes @ own, -1)]
+        top = replace(pose, axes=axes)
         for k in range(1, boom.elements + 1):
             place, rate = top.at(np.array([k * length, 0.0, 0.0]))
             self._frame(Pose(place, axes, rate, top.turn))
@@ -105,7 +108,8 @@ class Skeleton:
         # Nothing twists a boom along which a body slides freely: any torsional stiffness will do.
         bending, across = young * second, 12.0 * young * second / length**2
         stiffness = np.array([young * area, across, across, bending, bending, bending]) / length
-        mass = inertia_of(boom.density, boom.tube, length)
+        # Its sections' inertia is the top's (ringsim.layout.base).
+        mass = boom.mass / boom.elements / 6.0 * np.array([2.0, 1.0])
         return [Element(*pair, length, stiffness, mass) for pair in pairwise(self.beam)]
 
     def _frame(self, pose: Pose) -> None:
@@ -125,10 +129,11 @@ class Skeleton:
         if joint.kind == "weld" and isinstance(joint.first, InSpace):
             assert isinstance(joint.second, OnBody)
             self.fixed.append(joint.second.body)
-        elif joint.kind == "sleeve":
+        elif joint.kind == "sleeve" or (joint.kind == "prismatic" and _along_z(joint.first)):
             assert isinstance(joint.first, OnBody)
             assert isinstance(joint.second, OnBody)
-            self.slides.append((joint.first.body, joint.second.body))
+            pair = joint.first.body, joint.second.body
+            self.slides.append((*pair, joint.kind == "prismatic"))
         elif joint.kind != "revolute":
             raise InputError(f"{NOT_HERE} {joint.kind} joints: {CURE}")
 
@@ -170,6 +175,13 @@ class Skeleton:
         self.angle_rates.append(rate)
         self.angle_of[joint] = len(self.angles) - 1
         return len(self.angles) - 1
+
+
+def _along_z(mount: Mount) -> bool:
+    """Whether a prismatic joint slides along the z axis of a body, through its origin."""
+    if not isinstance(mount, OnBody) or mount.arm.any():
+        return False
+    return bool(mount.axes[2, 0] == 1.0)
 
 
 def inertia_of(density: float, tube: Tube, length: float) -> Array:

@@ -16,7 +16,9 @@ STIFFNESS = 100.0
 
 
 class Gap(NamedTuple):
-    """Distances across the boom (n,), m, and derivatives after the unknowns of frames (n, 6 f)."""
+    """Distances across the boom, and turns against it times a length where these are held, (n,), m,
+    and derivatives after the unknowns of frames (n, 6 f).
+    """
 
     sizes: Array
     rows: Array
@@ -34,7 +36,7 @@ class Slide:
         raise NotImplementedError
 
     def size(self, pose: Pose) -> float:
-        """Distance from the line, m."""
+        """Of the gap, m."""
         return math.hypot(*self.at(pose).sizes.tolist())
 
     def stored(self, pose: Pose) -> float:
@@ -60,28 +62,43 @@ class Slide:
 
 
 @compiled
-def aside(pose: Pose, top: int, low: int) -> tuple[Array, Array]:
-    """Gaps along x and y of a body's axes, and how they change, shapes (2,) and (2, 12)."""
-    gaps, rows = np.empty(2), np.zeros((2, 12))
+def aside(pose: Pose, top: int, low: int, reach: float) -> tuple[Array, Array]:
+    """Gaps along x and y of a body's axes, and how they change, shapes (2,) and (2, 12).
+
+    If turns are held, those about its axes times ``reach`` (m) stand behind, (5,) and (5, 12): half
+    the axial vector of R_1^T R_2, a turn as long as it is small; ``reach`` is else 0.
+    """
+    size = 5 if reach > 0.0 else 2
+    gaps, rows = np.empty(size), np.zeros((size, 12))
     apart, axes = minus(vector(pose.place[low]), vector(pose.place[top])), pose.axes[top]
     for k in range(2):
         axis = vector(axes[:, k])
         gaps[k], turned = dot(axis, apart), cross(axis, apart)
         for i in range(3):
             rows[k, i], rows[k, 3 + i], rows[k, 6 + i] = -axis[i], turned[i], axis[i]
+    for k in range(size - 2):
+        first, second = (k + 1) % 3, (k + 2) % 3
+        sine = 0.0
+        for i in range(3):
+            sine += axes[i, second] * pose.axes[low, i, first]
+            sine -= axes[i, first] * pose.axes[low, i, second]
+            rows[2 + k, 3 + i], rows[2 + k, 9 + i] = -reach * axes[i, k], reach * axes[i, k]
+        gaps[2 + k] = 0.5 * reach * sine
     return gaps, rows
 
 
 class RigidSlide(Slide):
-    """Along the z axis of body ``top``."""
+    """Along the z axis of body ``top``; ``reach`` is 0 in a sleeve, and that of ``aside`` in a
+    prismatic joint.
+    """
 
-    def __init__(self, mesh: Mesh, top: int, low: int, stiffness: float) -> None:
+    def __init__(self, mesh: Mesh, top: int, low: int, stiffness: float, reach: float) -> None:
         super().__init__(mesh, low, stiffness)
-        self.top = top
+        self.top, self.reach = top, reach
 
     def at(self, pose: Pose) -> Gap:
         """See ``Slide``."""
-        return Gap(*aside(pose, self.top, self.low), (self.top, self.low))
+        return Gap(*aside(pose, self.top, self.low, self.reach), (self.top, self.low))
 
 
 class BeamSlide(Slide):

@@ -13,6 +13,9 @@ from ringsim.parts.boom.rigid import RigidBoom
 if TYPE_CHECKING:
     from ringsim.layout.draft import Draft
 
+_UPWARDS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+"""Axes with x along the boom."""
+
 
 def add_boom(draft: "Draft") -> BoomBeam | None:
     """A flexible boom; a rigid one becomes a lump of the body at its top."""
@@ -25,15 +28,20 @@ def add_boom(draft: "Draft") -> BoomBeam | None:
     if boom.base == "fixed":
         draft.joints.append(Joint("weld", "", 0, InSpace(body.pose.place, SPACE), top))
     across = 0.125 * boom.mass * (tube.outer_diameter**2 + tube.inner_diameter**2)
-    along = boom.mass * boom.length**2 / 3.0 + 0.5 * across
+    along = boom.mass * boom.length**2 / 3.0
     centre = np.array([0.0, 0.0, -0.5 * boom.length])
-    lump = Lump("boom", boom.mass, centre, np.diag([along, along, across]))
+    line = Lump("boom", boom.mass, centre, np.diag([along, along, 0.0]))
+    sections = across * np.diag([0.5, 0.5, 1.0])
     _add_spacecraft(draft, top.body)
     if not isinstance(boom, RigidBoom):
-        return BoomBeam(top, low, boom, lump)
-    body = draft.bodies[top.body]
-    draft.bodies[top.body] = replace(body, lumps=(*body.lumps, lump))
-    draft.joints.append(Joint("sleeve", "", 0, top, low))
+        # Elements are lines: what the tube's sections have of inertia turns with its top.
+        _add_lump(draft, top.body, Lump("boom", 0.0, np.zeros(3), sections))
+        return BoomBeam(top, low, boom, line)
+    _add_lump(draft, top.body, line._replace(inertia=line.inertia + sections))
+    # A sleeve slides along z, a prismatic joint along x.
+    axes = SPACE if boom.joint == "sleeve" else _UPWARDS
+    first, second = (end._replace(axes=axes) for end in (top, low))
+    draft.joints.append(Joint(boom.joint, "", 0, first, second))
     return None
 
 
@@ -48,6 +56,10 @@ def base_of(draft: "Draft") -> int | None:
 def _add_spacecraft(draft: "Draft", top: int) -> None:
     craft = draft.scene.spacecraft
     if craft is not None:
-        body = draft.bodies[top]
         lump = Lump(SPACECRAFT, craft.mass, np.array(craft.centre), craft.inertia_at_mount)
-        draft.bodies[top] = replace(body, lumps=(*body.lumps, lump))
+        _add_lump(draft, top, lump)
+
+
+def _add_lump(draft: "Draft", number: int, lump: Lump) -> None:
+    body = draft.bodies[number]
+    draft.bodies[number] = replace(body, lumps=(*body.lumps, lump))

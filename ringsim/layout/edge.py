@@ -21,7 +21,7 @@ def along_edges(draft: "Draft") -> EdgeNet | None:
     planes = {"upper": (0,), "lower": (1,), "both": (0, 1)}[law.planes]
     draft.require_corners("net", planes[-1] + 1)
     sections, count = draft.scene.structure.sections, len(draft.corners[0])
-    bodies = np.full((len(draft.corners), sections, 2), -1)
+    bodies = np.full((len(draft.scene.structure.planes), sections, 2), -1)
     for plane in planes:
         row = np.array([ref.number for ref in draft.corners[plane]])
         ahead = np.arange(1, sections + 1) % count

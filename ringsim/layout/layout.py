@@ -85,7 +85,8 @@ class Hung(NamedTuple):
 class BoomBeam(NamedTuple):
     """A flexible boom: clamped at ``top``, while ``low`` slides along it.
 
-    ``lump`` is what it would be as a rigid part of the body at its top.
+    ``lump`` is what it would be as a rigid part of the body at its top, but for the inertia of its
+    sections when they turn, which that body has.
     """
 
     top: OnBody
@@ -211,6 +212,12 @@ class Layout:
         found = np.array([[self._opening(one) for one in plane] for plane in self.openings])
         return found[..., 0], found[..., 1]
 
+    def opens_by_twice(self, coordinate: float) -> bool:
+        """Whether every opening angle is pi less twice the coordinate (rad), as in pantographs."""
+        angles, rates = self.opening_angles()
+        expected = np.pi - 2.0 * coordinate
+        return bool(np.allclose(angles, expected, atol=1e-6) and np.allclose(rates, -2.0))
+
     def _opening(self, opening: Opening) -> tuple[float, float]:
         if not isinstance(opening, JointOpening):
             pose = self.bodies[opening.body].pose
@@ -222,6 +229,13 @@ class Layout:
         folded = opening.sense * float(np.arctan2(cross(y, other) @ z, y @ other))
         folded += 2.0 * np.pi if folded < -0.5 * np.pi else 0.0
         return np.pi - folded, -opening.sense * float((second.turn - first.turn) @ z)
+
+    @property
+    def all_joints(self) -> tuple[Joint, ...]:
+        """Joints, with that of a body that slides along a flexible boom as along a rigid one."""
+        if self.boom is None:
+            return self.joints
+        return (*self.joints, Joint("sleeve", "", 0, self.boom.top, self.boom.low))
 
     @property
     def supports(self) -> tuple[Joint, ...]:

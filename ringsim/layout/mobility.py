@@ -2,8 +2,9 @@
 
 A section of a pantograph ring folds, and each of its four hinge assemblies tilts about the common
 axis of its two rods.  Where two sections meet, their normals differ: no tilt is left.  A closed
-ring has one freedom, an open arc five (four if a boom joins two end assemblies).  At 180 deg the
-bars lie straight, and each of the 2 N V-joints can start to move by itself.
+ring has one freedom, an open arc five (four if a boom joins two end assemblies, three if its joint
+is prismatic).  At 180 deg the bars lie straight, and each of the 2 N V-joints can start to move by
+itself.
 """
 
 from itertools import pairwise
@@ -33,9 +34,7 @@ def internal_mobility(layout: Layout) -> int:
     The motions of each section (of its joints) by itself are joined at the bodies that sections
     share.  A boom counts as rigid; supports do not count.
     """
-    joints = [joint for joint in layout.joints if not isinstance(joint.first, InSpace)]
-    if layout.boom is not None:
-        joints.append(Joint("sleeve", "", 0, layout.boom.top, layout.boom.low))
+    joints = [joint for joint in layout.all_joints if not isinstance(joint.first, InSpace)]
     size = max(rod.length for rod in layout.rods)
     motions: dict[tuple[bool, int], list[tuple[int, Array]]] = {}  # of a part: first column, twists
     columns = 0

@@ -154,7 +154,12 @@ def _lines(layout: Layout) -> Iterator[tuple[str, Where, Where]]:
             if isinstance(side, OnBody):
                 group = "hinge assemblies" if side.body in corners else _group(layout, side.body)
                 yield group, OnBody(side.body), side
-        if joint.kind == "prismatic" and isinstance(joint.first, OnBody):
+        # Along a boom there is a line already.
+        if (
+            joint.kind == "prismatic"
+            and isinstance(joint.first, OnBody)
+            and joint.first.body not in corners
+        ):
             yield _group(layout, joint.first.body), joint.first, joint.second
     for number, body in enumerate(layout.bodies):
         for lump in body.lumps:

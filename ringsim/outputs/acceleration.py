@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.family import (
+    Array,
+    Output,
+    Reading,
+    Run,
+    Series,
+    Values,
+    Variable,
+    in_all_planes,
+)
 
 
 class PeakAcceleration(Output):
@@ -33,4 +42,5 @@ class PeakAcceleration(Output):
     def reduce(self, run: Run, series: Series) -> Values:
         """Of all steps."""
         peaks = np.linalg.norm(series.values, axis=3).max(axis=0)
-        return {"peak_acceleration": peaks, "peak_acceleration_max": peaks.max()}
+        rows = in_all_planes(peaks, run.scene.structure.planes)
+        return {"peak_acceleration": rows, "peak_acceleration_max": peaks.max()}

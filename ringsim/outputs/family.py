@@ -1,5 +1,6 @@
 """The family of outputs, and what all of them together declare."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -116,6 +117,13 @@ def _declared(output: type[Output]) -> dict[str, Variable]:
             words += " at any time up to then" if dims else ""
             needs = ("error bars", *output.needs)
             found[name] = Variable(name, dims, one.units, words, needs=needs)
+    return found
+
+
+def in_all_planes(values: Array, planes: Sequence[str]) -> Array:
+    """Values by plane and corner with rows of NaN for planes that have no corners of their own."""
+    found = np.full((len(planes), *values.shape[1:]), np.nan)
+    found[: len(values)] = values
     return found
 
 

@@ -1,11 +1,12 @@
 """How fast V-joints met their latches, and which of these caught."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ringsim.outputs.family import Array, Output, Run, Series, Values, Variable
 from ringsim.outputs.peaks import Peak
 from ringsim.stepping.latches import history
-from ringsim.variables import PLANES
 
 _PLACE = ("plane", "section")
 LEAST = Peak("least_latch_rate", _PLACE, "the smallest latch rate", "opening_angle")
@@ -81,14 +82,14 @@ def _rates(run: Run) -> Array:
     return history(run.scene, run.angles.times, run.angles.values, run.rates.values).rates
 
 
-def missed(values: Values) -> str:
+def missed(values: Values, planes: Sequence[str]) -> str:
     """Which latches did not catch though their joints came to them, in words; empty if none."""
     if "latched" not in values:
         return ""
     open_ = np.argwhere(np.isfinite(values["lock_time"]) & (values["latched"] == 0)).tolist()
     if not open_:
         return ""
-    names = [f"{PLANES[plane]} {section + 1}" for plane, section in open_]
+    names = [f"{planes[plane]} {section + 1}" for plane, section in open_]
     more = f" and {len(names) - 6} more" if len(names) > 6 else ""
     count = f"{len(names)} of {values['latched'].size} latches did not catch"
     return f"; {count}: {', '.join(names[:6])}{more}"

@@ -178,7 +178,7 @@ def ended(
 ) -> Outcome:  # fmt: skip
     """The outcome of a run that ended so; ``passed`` are the limits that it went over."""
     fate = Fate.OVERLOADED if passed and not status.failed else fate
-    passed += missed(values)
+    passed += missed(values, coordinates.get("plane", np.array([])).tolist())
     values["outcome"] = np.array(int(fate))
     return Outcome(status, str(reason) + passed, coordinates, values, reason.cause)
 

@@ -5,7 +5,16 @@ import math
 import numpy as np
 
 from ringsim.layout.layout import layout_at_opening
-from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable
+from ringsim.outputs.family import (
+    Array,
+    Output,
+    Reading,
+    Run,
+    Series,
+    Values,
+    Variable,
+    in_all_planes,
+)
 
 
 class Shape(Output):
@@ -38,7 +47,8 @@ class Shape(Output):
         drawn = layout_at_opening(run.scene, math.pi)
         places = [[drawn.bodies[number].pose.place for number in p] for p in drawn.corners]
         found = deviations(series.values[-1], np.array(places))
-        return {"corner_deviation": found, "best_fit_rms": np.sqrt(np.mean(found**2))}
+        rows = in_all_planes(found, run.scene.structure.planes)
+        return {"corner_deviation": rows, "best_fit_rms": np.sqrt(np.mean(found**2))}
 
 
 def deviations(places: Array, drawn: Array) -> Array:

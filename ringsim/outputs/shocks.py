@@ -9,7 +9,6 @@ import numpy as np
 
 from ringsim.layout.layout import layout_of
 from ringsim.outputs.series import Run
-from ringsim.variables import PLANES
 
 _NAMED = 6
 """V-joints that a sentence names at most."""
@@ -59,7 +58,8 @@ def jerked(run: Run) -> str:
     late = np.argwhere(ahead.any(axis=(-2, -1)) & np.isfinite(locks)).tolist()
     if not late:
         return ""
-    names = ", ".join(f"{PLANES[plane]} {section + 1}" for plane, section in late[:_NAMED])
+    planes = run.scene.structure.planes
+    names = ", ".join(f"{planes[plane]} {section + 1}" for plane, section in late[:_NAMED])
     more = f" and {len(late) - _NAMED} more" if len(late) > _NAMED else ""
     return (
         f"; {names}{more}: another joint locked in the step that met the latch, whose rate is that "

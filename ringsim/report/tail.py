@@ -5,7 +5,7 @@ from typing import NamedTuple
 import xarray as xr
 
 from ringsim.analysis.binomial import share_interval
-from ringsim.analysis.tails import short_of, tail
+from ringsim.analysis.tails import short_of, tail, unseen_lines
 from ringsim.report.tables import Rows
 
 
@@ -36,7 +36,7 @@ def rare_event(campaign: xr.Dataset) -> RareEvent | None:
     else:
         rows += [
             ["probability", f"{float(found['tail_probability']):.3g}"],
-            ["95 % interval", f"{low:.2g} to {high:.2g}"],
+            ["95 % interval, of the parts that chains found", f"{low:.2g} to {high:.2g}"],
             ["coefficient of variation", f"{scatter if replicates > 1 else ''}{by_chains}"],
             ["by each replicate", each],
         ]
@@ -44,7 +44,7 @@ def rare_event(campaign: xr.Dataset) -> RareEvent | None:
         ["levels", f"{levels} at most, in {replicates} replicates"],
         ["runs", f"{runs}, {lost} lost and taken as no event"],
     ]
-    notes = [each[0].upper() + each[1:] for each in why[1:]]
+    notes = [each[0].upper() + each[1:] for each in why[1:] or unseen_lines(found)]
     if why:
         notes.append("Raise samples or most_levels, so that every replicate reaches the event")
     if checked := int(found["tail_checked"]):

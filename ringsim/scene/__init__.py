@@ -36,7 +36,7 @@ from ringsim.parts.stop.family import Stop
 from ringsim.parts.stop.spring_damper import SpringDamperStop
 from ringsim.parts.temperature import Temperature
 from ringsim.refusal import InputError, explain, known_or_nearest, models_in, show
-from ringsim.scene.checks import check_parts
+from ringsim.scene.checks import check_layout, check_parts
 from ringsim.structures.family import Structure
 from ringsim.structures.pantograph_ring import PantographRing
 from ringsim.units import ListIn, Model
@@ -102,6 +102,7 @@ class Scene(Model):
                 )
         check_parts(self)
         self.structure.check(self)
+        check_layout(self)
         for part in (self.spacecraft, self.offload, self.gravity, self.temperature):
             if part is not None:
                 part.check(self)

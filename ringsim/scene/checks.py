@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.limited import why_unlimited
 from ringsim.choice import kind_of
+from ringsim.layout.layout import Layout, layout_of
 from ringsim.parts.faults.failed_latch import FailedLatch
 from ringsim.parts.faults.failed_spring import FailedSpring
+from ringsim.parts.rods.length_error import LengthError
 from ringsim.scene.substituted import strained
 
 if TYPE_CHECKING:
@@ -16,7 +18,6 @@ if TYPE_CHECKING:
 def check_parts(scene: "Scene") -> None:
     """Refuse (ValueError) parts that lack what they need of each other."""
     _check_faults(scene)
-    _check_corners(scene)
     _check_rods(scene)
     _check_limits(scene)
     _check_latch(scene)
@@ -49,10 +50,6 @@ def _check_margin(scene: "Scene") -> None:
     """Refuse (ValueError) a margin of what has none."""
     if scene.margin is None:
         return
-    if (kind := kind_of(scene.structure)) != "pantograph-ring":
-        raise ValueError(
-            f'margin needs structure.kind = "pantograph-ring", not "{kind}" (leave it out)'
-        )
     if scene.cables is None and scene.loads is None and scene.hinge_spring is None:
         raise ValueError("margin: nothing drives the ring (add [cables.upper], or leave it out)")
     if scene.loads is not None and scene.loads.reversal_time is not None:
@@ -64,30 +61,41 @@ def _check_margin(scene: "Scene") -> None:
         raise ValueError(reason)
 
 
-def _check_corners(scene: "Scene") -> None:
-    """Refuse (ValueError) records of corners where there are none."""
-    for name in ("shape", "accelerations"):
-        if getattr(scene.record, name) and kind_of(scene.structure) != "pantograph-ring":
-            raise ValueError(
-                f'record.{name} = true needs structure.kind = "pantograph-ring", not '
-                f'"{kind_of(scene.structure)}", which has no corners: leave it out'
-            )
+def check_layout(scene: "Scene") -> None:
+    """Refuse (ValueError) what needs parts that the structure's layout does not have."""
+    record, young, what = scene.record, scene.rods.bar_young_modulus, strained(scene)
+    if not (record.shape or record.accelerations or young is not None or what or scene.margin):
+        return
+    layout, start = layout_of(scene), scene.structure.coordinate
+    with_corners, with_bars = bool(layout.corners), any(r.group == "bars" for r in layout.rods)
+    for asked, there, name, lacking in (
+        (record.shape, with_corners, "record.shape = true", "no corners"),
+        (record.accelerations, with_corners, "record.accelerations = true", "no corners"),
+        (young is not None, with_bars, "rods.bar_young_modulus", "no folding bars"),
+        (what, bool(what) and _shows(layout, what), what, "no such parts, or none that it shifts"),
+        (
+            scene.margin, scene.margin and layout.opens_by_twice(start), "margin",
+            "opening angles that are not all 180 deg less twice its coordinate",
+        ),
+    ):  # fmt: skip
+        if asked and not there:
+            kind = kind_of(scene.structure)
+            raise ValueError(f'{name}: structure.kind = "{kind}" has {lacking} (leave it out)')
+
+
+def _shows(layout: Layout, what: str) -> bool:
+    """Whether a layout has what a field of the scene strains."""
+    if what == "structure.hinge_error":
+        return any(joint.error is not None for joint in layout.joints)
+    if what == "structure.angle_error":
+        return layout.held is not None
+    return any(rod.name in LengthError.model_fields for rod in layout.rods)
 
 
 def _check_rods(scene: "Scene") -> None:
-    """Refuse (ValueError) rods of other lengths or moduli in structures that have no such rods."""
-    if scene.rods.bar_young_modulus is not None and kind_of(scene.structure) != "pantograph-ring":
-        raise ValueError(
-            "rods.bar_young_modulus: only the pantograph ring has folding bars (leave it out)"
-        )
+    """Refuse (ValueError) strained rods of a kind that cannot be."""
     what = strained(scene)
-    if not what:
-        return
-    if (kind := kind_of(scene.structure)) != "pantograph-ring":
-        raise ValueError(
-            f'{what} needs structure.kind = "pantograph-ring", not "{kind}" (leave it out)'
-        )
-    if kind_of(scene.rods) == "ancf":
+    if what and kind_of(scene.rods) == "ancf":
         raise ValueError(
             f'{what} needs rods.kind = "geometrically-exact", not "ancf": choose that, or leave '
             f"{what} out"
@@ -117,6 +125,10 @@ def _check_faults(scene: "Scene") -> None:
                 )
             pulleys = scene.pulleys_of(cables[min(fault.cable, len(cables)) - 1][1])
             places |= {"pulley": pulleys, "span": pulleys + 1}
+        planes = scene.structure.planes
+        if (plane := getattr(fault, "plane", planes[0])) not in planes:
+            known = " or ".join(f'"{each}"' for each in planes)
+            raise ValueError(f'faults[{number}].plane = "{plane}" must be {known}')
         for name, most in places.items():
             if getattr(fault, name, 0) > most:
                 raise ValueError(

@@ -11,7 +11,6 @@ import numpy as np
 from ringsim.parts.rods.length_error import LengthError
 from ringsim.parts.temperature import RodTemperature
 from ringsim.structures.hinge_error import HingeError
-from ringsim.structures.pantograph_ring import PantographRing
 
 if TYPE_CHECKING:
     from ringsim.scene import Scene
@@ -37,8 +36,9 @@ def substituted(scene: "Scene") -> "Scene":
     if heat.diagonal is not None and heat.diagonal.stiffness is not None:
         # The bars' modulus is that of the diagonals unless it stands there.
         values.setdefault("rods.bar_young_modulus", _plain(scene.rods.young_of("bar")))
-    ring = scene.structure
-    if heat.hinge is not None and heat.hinge.expansion != 0.0 and isinstance(ring, PantographRing):
+    ring: Any = scene.structure
+    pins = "hinge_error" in type(ring).model_fields
+    if pins and heat.hinge is not None and heat.hinge.expansion != 0.0:
         for name, error in ring.hinge_error or HingeError():
             grown = np.asarray(heat.hinge.value) - heat.reference
             more = (ring.hinge_offset + np.asarray(error)) * heat.hinge.expansion * grown

@@ -1,4 +1,4 @@
-"""Guards of a run: blow-up, energy growth and loss, joints that come apart.
+"""Guards of a run: false start, blow-up, energy growth and loss, joints that come apart.
 
 They compare the balance B = kinetic + elastic - both at the start + lost - work of loads and
 winches with the energy X exchanged so far (``ringsim.stepping.instant.exchanged``).
@@ -10,7 +10,7 @@ import numpy as np
 
 from ringsim.parts.solver import Solver
 from ringsim.stepping.constant_steps import unresolved
-from ringsim.stepping.instant import Instant, Scales, exchanged
+from ringsim.stepping.instant import AS_DRAWN, Instant, Scales, Strained, exchanged
 from ringsim.stepping.memory import Remembering
 from ringsim.variables import Cause, Reason
 
@@ -21,7 +21,8 @@ BLOW_UP = 10.0
 """Kinetic and elastic energy over what start, loads and winches could give: a state so far beyond
 any balance tells nothing of when the energy came, so that its cause has a name of its own."""
 SLIGHT = 1e-3
-"""Share of the reference energy below which a whole run has done nothing worth judging."""
+"""Share of the reference energy below which a whole run has done nothing worth judging; share of it
+and of the prestress by which a start may be strained otherwise than it was put together."""
 GAP = 1e-4
 """Largest gap of a joint over the length of a bar: joints that hold are closed to 1e-12 m."""
 _CURE = "reduce solver.step or solver.tolerance"
@@ -32,8 +33,8 @@ class Guard(Remembering):
 
     changing = ("_run", "_lost", "_driven", "_credit", "_low", "_high", "_worst")
 
-    def __init__(self, solver: Solver, scales: Scales) -> None:
-        self._tolerance, self._scales = solver.energy_tolerance, scales
+    def __init__(self, solver: Solver, scales: Scales, strained: Strained = AS_DRAWN) -> None:
+        self._tolerance, self._scales, self._strained = solver.energy_tolerance, scales, strained
         self._constant = solver.step_control == "constant"
         self._run: list[Instant] = []
         self._lost = self._driven = self._credit = 0.0
@@ -45,6 +46,14 @@ class Guard(Remembering):
         first = not self._run
         if self._constant or first:  # constant steps are judged by all of a run
             self._run.append(now)
+        stored, left = self._strained
+        if first and abs(stored - left) > SLIGHT * (self._scales.energy + left):
+            return Reason(
+                Cause.STRAINED,
+                f"rods and boom store {stored:.3g} J at the start, where putting them together has "
+                f"left {left:.3g} J: this model does not start where it was assembled, and what it "
+                "would tell is wrong (choose another fidelity, and report the scene)",
+            )
         time, found, start = now.time, now.energies, self._run[0].energies
         if not first:  # what a fault takes at the start is not in it any more
             self._lost += found.lost

@@ -35,6 +35,18 @@ def exchanged(kinds: Array) -> float:
     return float(max(kinetic, elastic, loads + winches))
 
 
+class Strained(NamedTuple):
+    """Elastic energy (J) of rods and boom before a run: as the engine finds it, and as putting the
+    structure together has left it.
+    """
+
+    found: float
+    left: float
+
+
+AS_DRAWN = Strained(0.0, 0.0)
+
+
 @dataclass(frozen=True)
 class Instant:
     """A state that a run has reached."""

@@ -68,6 +68,9 @@ def _counts(outcome: Outcome) -> Counter[str]:
 
 
 def _curable(outcome: Outcome, solver: Solver) -> bool:
-    """Whether smaller steps may help: not where there were too many of them already."""
+    """Whether smaller steps may help: not where there were too many of them already, or the first
+    one had begun from a wrong state.
+    """
     failed = outcome.status in (Status.SOLVER_FAILED, Status.DIVERGED)
+    failed &= outcome.cause is not Cause.STRAINED
     return failed and _counts(outcome)["steps"] < solver.step_limit

@@ -13,7 +13,7 @@ from ringsim.parts.limits import Limits
 from ringsim.parts.solver import NO_DEVIATIONS, Solver
 from ringsim.stepping.constant_steps import ConstantSteps
 from ringsim.stepping.guard import Guard
-from ringsim.stepping.instant import Instant, Scales
+from ringsim.stepping.instant import AS_DRAWN, Instant, Scales, Strained
 from ringsim.stepping.locks import Locks, Overrun, StopContact, lock_times
 from ringsim.stepping.memory import Memory, Remembering
 from ringsim.stepping.motion_steps import DeviationSteps, MotionSteps
@@ -58,12 +58,14 @@ class RunControl(Remembering):
         limits: Limits = Limits(),  # noqa: B008  frozen
         follow_deviations: bool = False,
         turn: float = math.inf,
+        strained: Strained = AS_DRAWN,
     ) -> None:
         """Begin a run, which ends when the V-joints of ``locks`` have all reached the same stop and
         their latches have caught, or one is past it by more than ``limits``, or all are at rest,
         else at ``solver.end_time``; with ``follow_deviations`` steps resolve how the joints deviate
         from their mean angle.  No stop that is reached before the time ``turn`` (s), at which loads
-        turn round, ends it.
+        turn round, ends it.  A structure that is not ``strained`` as it was put together does not
+        begin.
         """
         self.now, self._solver, self._locks, self._limits = start, solver, locks, limits
         self._rest = Rest(start, solver.end_time, scales.energy)
@@ -79,7 +81,7 @@ class RunControl(Remembering):
             if follow_deviations and solver.deviation_tolerance < NO_DEVIATIONS:
                 duration = scales.travel / scales.rate
                 self._deviations = DeviationSteps(solver.deviation_tolerance, duration)
-        self._guard = Guard(solver, scales)
+        self._guard = Guard(solver, scales, strained)
         self._shorter: float | None = None
         self._count, self.repeats, self._settled_at = 0, 0, math.inf
         self.status, self.fate, self.reason = Status.OK, Fate.NONE, Reason()

@@ -39,6 +39,7 @@ a ring of 18 is against becoming an oval."""
 _CLOSES: dict[str, tuple[screws.OfTwo, ...]] = {
     "revolute": (screws.apart, screws.tilted),
     "sleeve": (screws.aside,),
+    "prismatic": (screws.off_x, screws.tilted, screws.turned_aside),
     "weld": (screws.apart, screws.tilted, screws.turned_aside),
 }
 """What must vanish of each kind of joint."""
@@ -77,8 +78,8 @@ class Frames:
         self._strains = screws.strains(np.array(lengths))
         self._scale = float(self._stiffness[:, 0].max())
         self._joints = []
-        for kind in sorted({joint.kind for joint in layout.joints}):
-            own = [joint for joint in layout.joints if joint.kind == kind]
+        for kind in sorted({joint.kind for joint in layout.all_joints}):
+            own = [joint for joint in layout.all_joints if joint.kind == kind]
             sides = [[joint.first for joint in own], [joint.second for joint in own]]
             self._joints += [(function, self._sides(sides)) for function in _CLOSES[kind]]
         found = [(one.joint, one.sense) for plane in layout.openings for one in plane

@@ -53,14 +53,14 @@ class DriveMargin:
     Raises
     ------
     InputError
-        If the scene is no ring, or its drive has no limit.
+        If its structure has no basis, or its drive no limit.
     """
 
     def __init__(self, scene: Scene, standard: MarginStandard) -> None:
-        if (kind := kind_of(scene.structure)) != "pantograph-ring":
+        if not scene.structure.basis(scene.structure.coordinate).size:
             raise InputError(
-                f'structure.kind = "{kind}": only the pantograph ring has a margin of its drive '
-                "(leave margin out)"
+                f'margin: structure.kind = "{kind_of(scene.structure)}" has no basis(), the '
+                "functions in which its places are linear (give it one, or leave margin out)"
             )
         self.mechanism, self.standard = Mechanism(scene), standard
         self._drive = Drive(scene, self.mechanism, at_speed=standard.keep_speed)

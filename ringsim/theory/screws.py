@@ -67,6 +67,12 @@ def aside(x1: Of, r1: Of, x2: Of, r2: Of) -> Of:
     return np.asarray(np.einsum("nji,nj->ni", r1, x2 - x1)[:, :2])
 
 
+def off_x(x1: Of, r1: Of, x2: Of, r2: Of) -> Of:
+    """How far the second place is from the first frame's x axis, shape (n, 2), m."""
+    del r2
+    return np.asarray(np.einsum("nji,nj->ni", r1, x2 - x1)[:, 1:])
+
+
 def tilted(x1: Of, r1: Of, x2: Of, r2: Of) -> Of:
     """How far the second frame's x and y axes are from normal to the first one's z, (n, 2)."""
     del x1, x2

@@ -13,7 +13,11 @@ from ringsim.scene import Scene
 from ringsim.variables import Outcome
 
 Array = NDArray[np.float64]
-SERIES = ("opening_angle", "cable_tension", "wound_length", "rod_stress", "dissipation")
+SERIES = (
+    "opening_angle", "cable_tension", "wound_length", "rod_stress", "dissipation",
+    "base_rotation", "base_force", "base_torque",
+)  # fmt: skip
+"""What is compared wherever a scene has it."""
 
 
 class Apart(NamedTuple):
@@ -30,6 +34,8 @@ def apart(scene: Scene) -> dict[str, Apart]:
     The error of a run is a third of what it changes with steps twice as long: the integrator's
     order is two.
     """
+    if scene.boom is not None or scene.structure.supported:
+        scene = scene.with_values({"record.reactions": True})
     double = scene.with_values({"solver.step": 2.0 * scene.solver.step})
     one, two = by_exudyn(scene), by_frames(scene)
     coarse = by_exudyn(double), by_frames(double)

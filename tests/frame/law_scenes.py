@@ -85,6 +85,7 @@ FORCES: dict[str, Values] = {
     "ramps": STOPS | {"stop.latch": True, "latch": {"peak_torque": [0.05, 0.1, 0.08]}},
     "rigid-free": RIGID | {"boom.base": "free"},
     "rigid-fixed": RIGID | {"boom.base": "fixed"},
+    "prismatic": RIGID | ARC | {"boom.joint": "prismatic", "boom.base": "free"},
     "flexible-free": FLEXIBLE | {"boom.base": "free"},
     "flexible-fixed": FLEXIBLE | {"boom.base": "fixed"},
     "stuck": RIGID | {
@@ -157,5 +158,6 @@ CABLES: dict[str, Values] = {
     | {"structure.opening_angle": 160.0, "solver.step": 2e-3, "solver.end_time": 0.8,
        "stop.latch": False, "joints.vjoint.viscous": 0.1},
     "boom-and-net": RIGID | NET | {"boom.base": "free"},
+    "arc-3-free": ARC | FLEXIBLE | {"structure.opening_angle": 40.0, "boom.base": "free"},
     "arc-2-flexible": ARC | FLEXIBLE | {"structure.sections": 2, "boom.base": "fixed"},
 }  # fmt: skip

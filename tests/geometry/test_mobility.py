@@ -95,6 +95,12 @@ def test_a_boom_ties_two_ends_of_an_arc_together(boom: str) -> None:
     assert mobility(ring_of(4, closed=True).with_values({"boom": {"kind": boom}}), 0.6) == 1
 
 
+def test_a_prismatic_joint_on_a_boom_holds_both_of_its_ends() -> None:
+    boom = {"boom": {"kind": "rigid", "joint": "prismatic"}}
+    assert mobility(ring_of(2, closed=False).with_values(boom), 0.6) == 3
+    assert mobility(ring_of(4, closed=True).with_values(boom), 0.6) == 1
+
+
 def test_the_planar_truss_can_only_fold() -> None:
     assert mobility(load_scene("planar-truss"), 0.8) == 1
 

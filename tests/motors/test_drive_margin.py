@@ -177,5 +177,5 @@ def test_other_structures_have_no_margin() -> None:
     scene = load_scene("planar-truss")
     with pytest.raises(InputError, match=r"structure.kind = .planar-truss."):
         DriveMargin(scene, PLAIN)
-    with pytest.raises(InputError, match=r"margin needs structure.kind"):
-        scene.with_values({"margin": PLAIN.model_dump()})
+    with pytest.raises(InputError, match=r"margin: structure.kind = .planar-truss. has"):
+        scene.with_values({"margin": PLAIN.model_dump(), "cables.upper.winch.winding": MOTOR})

@@ -11,7 +11,8 @@ from ringsim.units import Pascal
 class FlexibleBoom(Boom):
     """A chain of ANCF cable elements (axial and bending stiffness, no torsion).
 
-    Torsion is not needed: the sliding joint transmits no torque.
+    Torsion is not needed: the lower hinge assembly slides in a sleeve, which transmits no torque.
+    Only a rigid boom can hold its rotations, too.
     """
 
     kind: Literal["flexible"] = "flexible"

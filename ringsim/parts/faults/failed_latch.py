@@ -11,7 +11,7 @@ class FailedLatch(Fault):
     """The latch of a V-joint does not catch from that time on; one that has caught holds on."""
 
     kind: Literal["failed-latch"] = "failed-latch"
-    plane: Literal["upper", "lower"] = "upper"
-    """Plane of the V-joint."""
+    plane: str = "upper"
+    """Plane of the V-joint, one of those of the structure."""
     section: Annotated[int, Field(ge=1)]
     """Counted from 1 at the boom."""

@@ -13,8 +13,8 @@ class StuckVJoint(Fault):
     """A stiff spring holds the joint at the angle that it has at that time."""
 
     kind: Literal["stuck-vjoint"] = "stuck-vjoint"
-    plane: Literal["upper", "lower"] = "upper"
-    """Plane of the V-joint."""
+    plane: str = "upper"
+    """Plane of the V-joint, one of those of the structure."""
     section: Annotated[int, Field(ge=1)]
     """Counted from 1 at the boom."""
     stiffness: TorsionRate = 1000.0
