@@ -9,6 +9,7 @@ from scipy.stats import norm
 
 from ringsim.analysis import ranks
 from ringsim.analysis.confounded import confounding_notes, partners
+from ringsim.analysis.influence_text import DIRECTED, directed
 from ringsim.analysis.intervals import Array
 from ringsim.analysis.losses import marked
 from ringsim.analysis.quantities import quantities
@@ -84,9 +85,10 @@ def what_matters(analysis: xr.Dataset) -> Table:
             quiet.append(output)
     notes = measure_notes(analysis)
     if rows and "input" in analysis.dims and "factor" not in analysis.dims:
+        count = analysis.sizes["input"]
+        largest = f"the largest of all {count} would reach" if count > 1 else "it would reach"
         notes.append(
-            "an input is told if by chance the largest of all "
-            f"{analysis.sizes['input']} would reach as much in fewer than one output of 20"
+            f"an input is told if by chance {largest} as much in fewer than one output of 20"
         )
         notes += confounding_notes(analysis, {row[1] for row in rows})
     if doubtful:
@@ -223,13 +225,12 @@ def what_separates(analysis: xr.Dataset) -> Table:
         rows += [
             (
                 f"{first} ({one['group_samples'].item()})" if n == 0 else "",
-                str(analysis["input"].values[k]), number_text(middle[k], 2),
-                _ends(ends[k]),
+                str(analysis["input"].values[k]), *directed(middle, ends, k),
             )
             for n, k in enumerate(chosen[:_MOST])
         ]  # fmt: skip
-    head = ("what separates", "input", "probability that it is larger", "95 % interval")
-    return marked(Table(head, rows, left=2), analysis, 1)
+    head = ("what separates", "input", *DIRECTED)
+    return marked(Table(head, rows, left=3), analysis, 1)
 
 
 def _beyond(values: Array, ends: Array, chance: Array | float) -> NDArray[np.bool_]:

@@ -79,11 +79,24 @@ def _separated(analysis: xr.Dataset) -> Table:
             notes.append(f"{first}: the same samples as {', '.join(others)}")
         middle, ends = one["separation"].values, one["separation_interval"].values
         rows += [
-            (f"{first}: {names[k]}", *_told(middle, ends, k), str(one["group_samples"].item()))
+            (f"{first}: {names[k]}", *directed(middle, ends, k), str(one["group_samples"].item()))
             for k in _largest(middle - 0.5, place)
         ]  # fmt: skip
-    head = ("what separates", "probability that it is larger", "95 % interval", "samples")
+    head = ("what separates", *DIRECTED, "samples")
     return marked(Table(head, rows, notes), analysis)
+
+
+DIRECTED = ("it is", "with probability", "95 % interval")
+"""Heads of ``directed``."""
+
+
+def directed(middle: Array, ends: Array, k: int) -> tuple[str, str, str]:
+    """Whether an input is larger or smaller in a group than in the rest, with which probability (of
+    a sample of each), and its interval.
+    """
+    if middle[k] >= 0.5:
+        return "larger", *_told(middle, ends, k)
+    return "smaller", *_told(1.0 - middle, 1.0 - ends[:, ::-1], k)
 
 
 def _largest(values: Array, place: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[int]:

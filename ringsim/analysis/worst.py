@@ -44,13 +44,15 @@ def worst(campaign: xr.Dataset, requirements: Mapping[str, Requirement]) -> xr.D
     """
     for name in requirements:
         require_values(campaign, name)
+    # What has not run yet is no sample of which others are told.
+    campaign = campaign.isel(sample=np.flatnonzero(ran(campaign)))
     rows, chosen = list[tuple[str, int, int, str]](), list[int]()
     for each in _failures(campaign, requirements):
         own = np.flatnonzero(each.own)
         order = own[np.argsort(-each.badness[own], kind="stable")][:MOST]
         for place in order.tolist():
             told = _found(campaign, each.value, place)
-            rows.append((each.words, int(each.own.sum()), int(ran(campaign).sum()), told))
+            rows.append((each.words, int(each.own.sum()), campaign.sizes["sample"], told))
             chosen.append(place)
     if not rows:
         return xr.Dataset()

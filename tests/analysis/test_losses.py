@@ -177,6 +177,8 @@ def test_every_row_of_a_report_that_lost_runs_bend_is_marked(bent):
     for name, body in re.findall(r'<table id="([\w-]+)">.*?<tbody>(.*?)</tbody>', text, re.DOTALL):
         if name in ("outcomes-table", "failures-table", "inputs-table", "model-table"):
             continue
+        if name.startswith("worst-table"):  # single samples are what they are
+            continue
         label = ""
         for row in re.findall(r"<tr>(.*?)</tr>", body, re.DOTALL):
             cells = re.findall(r"<td>(.*?)</td>", row)

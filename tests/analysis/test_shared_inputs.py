@@ -109,7 +109,7 @@ def test_inputs_that_nothing_tells_apart_have_both_names() -> None:
 def test_it_is_reweighted_as_a_whole() -> None:
     made = shared()
     new = {"kind": "uniform", "low": 0.5, "high": 1.0}
-    weights = weights_of(made, read_distributions({"cold": new}))
+    weights, _ = weights_of(made, read_distributions({"cold": new}))
     np.testing.assert_array_equal(weights > 0, made["temperature_joint_value"] >= 0.5)
     for path in PATHS:
         with pytest.raises(InputError, match=rf"{path}: is no drawn .*did you mean cold\?"):

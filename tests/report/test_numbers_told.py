@@ -300,8 +300,15 @@ def separates(file: File, rows: list[dict[str, str]]) -> None:
         group, count = re.fullmatch(r"(.*) \((\d+)\)", words).groups()
         area, inside, outside = file.area(group, row["input"])
         assert int(count) == inside
-        agrees(row["probability that it is larger"], area, digits=2)
-        interval_agrees(row["95 % interval"], area_interval(area, inside, outside), digits=2)
+        directed(area, inside, outside, row)
+
+
+def directed(area: float, inside: int, outside: int, row: dict[str, str]) -> None:
+    """Larger or smaller, with the probability of that."""
+    assert row["it is"] == ("larger" if area >= 0.5 else "smaller")
+    area = max(area, 1.0 - area)
+    agrees(row["with probability"], area, digits=2)
+    interval_agrees(row["95 % interval"], area_interval(area, inside, outside), digits=2)
 
 
 def errors(file: File, rows: list[dict[str, str]]) -> None:
@@ -488,9 +495,8 @@ def measures(file: File, rows: list[dict[str, str]]) -> None:
         else:
             words, name = first.rsplit(": ", 1)
             area, inside, outside = file.area(words, name)
-            agrees(cells[0], area, digits=2)
-            interval_agrees(cells[1], area_interval(area, inside, outside), digits=2)
-            assert cells[2] == str(inside)
+            directed(area, inside, outside, row)
+            assert row["samples"] == str(inside)
 
 
 def test_the_closing_lines_of_a_campaign_say_it(

@@ -381,5 +381,5 @@ def test_numerical_truth_tells_error_bars_and_differences_of_engines() -> None:
     campaign["peak_tension_error"][2] = 0.25
     table = tables.statistics(campaign, analyse(campaign))
     (row,) = [row for row in table.rows if "tension" in row[0]]
-    assert [cell.partition("(")[2] for cell in row[-5:-3]] == ["0, ± 0.5)", "2, ± 0.25)"]
+    assert [cell.partition("(")[2] for cell in row[-6:-4]] == ["0, ± 0.5)", "2, ± 0.25)"]
     assert table.notes[-1].startswith("± what the named sample states")
