@@ -61,18 +61,25 @@ def _check_margin(scene: "Scene") -> None:
         raise ValueError(reason)
 
 
+_NO_SUCH = "no such parts, or none that it shifts"
+
+
 def check_layout(scene: "Scene") -> None:
     """Refuse (ValueError) what needs parts that the structure's layout does not have."""
     record, young, what = scene.record, scene.rods.bar_young_modulus, strained(scene)
     if not (record.shape or record.accelerations or young is not None or what or scene.margin):
         return
     layout, start = layout_of(scene), scene.structure.coordinate
+    # Each by itself: one that a layout ignores is not made good by another.
+    fields = [f"structure.{name}" for name in ("hinge_error", "angle_error")
+              if getattr(scene.structure, name, None) is not None]  # fmt: skip
+    shifting = [*fields, *([what] if what and what not in fields else [])]
     with_corners, with_bars = bool(layout.corners), any(r.group == "bars" for r in layout.rods)
     for asked, there, name, lacking in (
         (record.shape, with_corners, "record.shape = true", "no corners"),
         (record.accelerations, with_corners, "record.accelerations = true", "no corners"),
         (young is not None, with_bars, "rods.bar_young_modulus", "no folding bars"),
-        (what, bool(what) and _shows(layout, what), what, "no such parts, or none that it shifts"),
+        *((each, _shows(layout, each), each, _NO_SUCH) for each in shifting),
         (
             scene.margin, scene.margin and layout.opens_by_twice(start), "margin",
             "opening angles that are not all 180 deg less twice its coordinate",

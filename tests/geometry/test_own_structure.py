@@ -170,3 +170,5 @@ def test_what_its_layout_does_not_show_is_refused(double: Scene) -> None:
     for field, value in (("hinge_error", {"upper_left": 1e-4}), ("angle_error", 0.1)):
         with pytest.raises(InputError, match=f'structure.{field}: structure.kind = "double-ring"'):
             double.with_values({f"structure.{field}": value})
+        with pytest.raises(InputError, match=f"structure.{field}"):
+            double.with_values({f"structure.{field}": value, "rods.length_error": {}})
