@@ -29,7 +29,7 @@ from ringsim.scene import Scene
 from ringsim.theory.assembled import assembled
 from ringsim.theory.first_reaction import first_acceleration
 from ringsim.theory.one_coordinate import OneCoordinate
-from ringsim.theory.scales import residual_tolerance
+from ringsim.theory.scales import coordinates, residual_tolerance
 
 
 class FrameModel:
@@ -84,6 +84,12 @@ class FrameModel:
             )
         self.slides: list[Slide] = [*slides, *self._beam_slides]
         self.size = mesh.unknowns + 3 * self.with_hub
+        # Forces and torques, ways and turns are compared by a length of the structure: sums of
+        # their squares as they are would depend on the unit of length.
+        self.lengths = np.full(self.size, scene.structure.reach)
+        self.lengths[mesh.home[:, None] + np.arange(3)] = 1.0
+        if self.with_hub:
+            self.lengths[-3:] = 1.0
         self.loads = np.zeros(self.size)
         at, forces = [], []
         for number, force in self.layout.forces:
@@ -97,6 +103,7 @@ class FrameModel:
         self._loaded = loaded, pose.place[loaded], np.array(forces).reshape(-1, 3)
         self._tau = float(mesh.tau.max())
         self._tolerance = residual_tolerance(scene, self.layout, 0.0)
+        self._coordinates = coordinates(scene)
         self._masses = mesh.point_mass.copy()
         np.add.at(self._masses, mesh.point, mesh.mass.sum(axis=1)[:, None])
         self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
@@ -151,13 +158,15 @@ class FrameModel:
         return max((slide.size(pose) for slide in self.slides), default=0.0)
 
     def tolerance(self, step: float, strains: Strains) -> float:
-        """Residual norm at which Newton stops in a step (s), N; not below what round-off leaves of
-        coordinates of order 1 m: of inertia, of the rods with their damping, of slides.
+        """Residual norm at which Newton stops in a step (s), N, of torques over ``lengths``; not
+        below what round-off leaves of coordinates: of inertia, of the rods with their damping, of
+        slides.
         """
         inertia = self._heaviest * self.coefficients.acceleration_by_place(step)
         rods = self._stiffest * (1.0 + self._tau * strains.lead)
         slides = STIFFNESS * self._stiffest if self.slides else 0.0
         reached = 4.0 * sys.float_info.epsilon * (math.sqrt(self.size) * (inertia + rods) + slides)
+        reached *= self._coordinates
         return max(self._tolerance, reached)
 
     def residual(
