@@ -158,14 +158,16 @@ class Integration(Remembering):
         turns round, the residual may grow for an iteration: what it finds there is what tells the
         way back (``ringsim.stepping.turning``), and shorter changes would only find it later.
         """
-        model, factored, last, secants = self._model, None, math.inf, Secants()
+        model, factored, last = self._model, None, math.inf
+        secants = Secants(model.lengths)
         tolerance = model.tolerance(step, self._strains)
         for taken in range(_MOST):
             try:
                 g = model.residual(time, step, self._now, after, self._strains)
             except ValueError as error:
                 raise NoBalanceError(str(error)) from error
-            norm = math.sqrt(g @ g)
+            forces = g / model.lengths
+            norm = math.sqrt(forces @ forces)
             if not math.isfinite(norm):
                 raise NoBalanceError("the state is not finite")
             if norm <= tolerance:

@@ -29,7 +29,7 @@ from ringsim.scene import Scene
 from ringsim.theory.assembled import assembled
 from ringsim.theory.first_reaction import first_acceleration
 from ringsim.theory.one_coordinate import OneCoordinate
-from ringsim.theory.scales import residual_tolerance, rope_reach
+from ringsim.theory.scales import coordinates, residual_tolerance, rope_reach
 
 
 class FrameModel:
@@ -90,6 +90,12 @@ class FrameModel:
             )
         self.slides: list[Slide] = [*slides, *self._beam_slides]
         self.size = mesh.unknowns + 3 * self.with_hub
+        # Forces and torques, ways and turns are compared by a length of the structure: sums of
+        # their squares as they are would depend on the unit of length.
+        self.lengths = np.full(self.size, scene.structure.reach)
+        self.lengths[mesh.home[:, None] + np.arange(3)] = 1.0
+        if self.with_hub:
+            self.lengths[-3:] = 1.0
         self.loads = np.zeros(self.size)
         at, forces = [], []
         for number, force in self.layout.forces:
@@ -103,6 +109,7 @@ class FrameModel:
         self._loaded = loaded, pose.place[loaded], np.array(forces).reshape(-1, 3)
         self._tau = float(mesh.tau.max())
         self._tolerance = residual_tolerance(scene, self.layout, 0.0)
+        self._coordinates = coordinates(scene)
         self._masses = mesh.point_mass.copy()
         np.add.at(self._masses, mesh.point, mesh.mass.sum(axis=1)[:, None])
         self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
@@ -163,13 +170,15 @@ class FrameModel:
         return max((slide.size(pose) for slide in self.slides), default=0.0)
 
     def tolerance(self, step: float, strains: Strains) -> float:
-        """Residual norm at which Newton stops in a step (s), N; not below what round-off leaves of
-        coordinates of order 1 m: of inertia, of the rods with their damping, of slides; of ropes.
+        """Residual norm at which Newton stops in a step (s), N, of torques over ``lengths``; not
+        below what round-off leaves of coordinates: of inertia, of the rods with their damping, of
+        slides; of ropes, whose strain it is that is rounded.
         """
         inertia = self._heaviest * self.coefficients.acceleration_by_place(step)
         rods = self._stiffest * (1.0 + self._tau * strains.lead)
         slides = STIFFNESS * self._stiffest if self.slides else 0.0
         reached = 4.0 * sys.float_info.epsilon * (math.sqrt(self.size) * (inertia + rods) + slides)
+        reached *= self._coordinates
         ropes = rope_reach(self.scene, self.coefficients.rate_by_place(step))
         return max(self._tolerance, reached, 4.0 * sys.float_info.epsilon * ropes)
 

@@ -6,7 +6,8 @@ With changes s_0 ... s_n since the tangent was factored, and z = -K^-1 g of the 
     s_(n+1) = z / (1 - (s_n . z) / (s_n . s_n))
 
 (the product form of the good Broyden update: Kelley, Iterative Methods for Linear and Nonlinear
-Equations, SIAM 1995, section 7.3).  It costs some dot products.
+Equations, SIAM 1995, section 7.3).  It costs some dot products, in which turns count by the way
+that they move a length: sums of metres and radians would depend on the unit of length.
 """
 
 from ringsim.layout.pose import Array
@@ -19,7 +20,9 @@ hardly differs from the last one says that the tangent is wrong there."""
 class Secants:
     """The changes since a tangent."""
 
-    def __init__(self) -> None:
+    def __init__(self, lengths: Array) -> None:
+        """``lengths``, shape (unknowns,): by which turns become ways (m); 1 for what is one."""
+        self._metric = lengths**2
         self._changes: list[Array] = []
         self._squares: list[float] = []
 
@@ -31,11 +34,11 @@ class Secants:
         """The change to make instead of the tangent's own, shape (unknowns,)."""
         last = len(self._changes) - 1
         for n, square in enumerate(self._squares):
-            share = float(self._changes[n] @ change) / square
+            share = float((self._metric * self._changes[n]) @ change) / square
             if n < last:
                 change = change + share * self._changes[n + 1]
             elif share < _ALIKE:
                 change = change / (1.0 - share)
         self._changes.append(change)
-        self._squares.append(float(change @ change))
+        self._squares.append(float((self._metric * change) @ change))
         return change

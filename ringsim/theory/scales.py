@@ -13,6 +13,9 @@ from ringsim.scene import Scene
 from ringsim.stepping.instant import Scales
 from ringsim.theory.one_coordinate import OneCoordinate
 
+_MEASURED = 0.2889
+"""Reach of ``ring18``, m."""
+
 
 def scales_of(scene: Scene, layout: Layout, ideal: OneCoordinate, ropes: Array | None) -> Scales:
     """What the ideal structure, as stowed, the stops and the cables say before a run.
@@ -52,12 +55,19 @@ def scales_of(scene: Scene, layout: Layout, ideal: OneCoordinate, ropes: Array |
     )
 
 
+def coordinates(scene: Scene) -> float:
+    """Size of coordinates, m, that round-off goes with: 1 m for a ring as ``ring18``, for which
+    what it leaves of residuals was measured, and else as its reach.
+    """
+    return scene.structure.reach / _MEASURED
+
+
 def residual_tolerance(scene: Scene, layout: Layout, reached: float) -> float:
     """Residual norm in N at which Newton stops: a share of the driving forces, but above what
     round-off lets it reach.
 
     ``reached`` is that norm over the rate EA / L (N/m) of the stiffest element, for coordinates of
-    order 1 m.
+    1 m.
     """
     drive = float(np.linalg.norm([force for _, force in layout.forces])) + scene.structure.push
     if layout.net is not None:
@@ -66,7 +76,9 @@ def residual_tolerance(scene: Scene, layout: Layout, reached: float) -> float:
     if drive == 0.0 and layout.gravity is not None:
         drive = sum(layout.masses().values()) * float(np.linalg.norm(layout.gravity))
     stiffest = max(rod.young_modulus * rod.tube.area / rod.lengths.min() for rod in layout.rods)
-    return max(scene.solver.newton_tolerance * drive, reached * float(stiffest))
+    return max(
+        scene.solver.newton_tolerance * drive, reached * float(stiffest) * coordinates(scene)
+    )
 
 
 def rope_reach(scene: Scene, rate_by_place: float = 0.0) -> float:

@@ -12,7 +12,7 @@ def test_one_unknown_is_the_secant_method() -> None:
     def g(x: float) -> float:
         return x * x - 2.0
 
-    secants, found = Secants(), [2.0]
+    secants, found = Secants(np.ones(1)), [2.0]
     for _ in range(6):
         change = secants.corrected(np.array([-g(found[-1]) / 4.0]))
         found.append(found[-1] + float(change[0]))
@@ -31,7 +31,7 @@ def test_a_linear_system_is_solved_though_its_matrix_is_wrong() -> None:
     """
     random = np.random.default_rng(2)
     matrix = np.eye(4) + 0.25 * random.normal(size=(4, 4))
-    wanted, secants = random.normal(size=4), Secants()
+    wanted, secants = random.normal(size=4), Secants(np.ones(4))
     x, plain = np.zeros(4), np.zeros(4)
     for _ in range(9):
         x = x + secants.corrected(matrix @ (wanted - x))
@@ -41,8 +41,19 @@ def test_a_linear_system_is_solved_though_its_matrix_is_wrong() -> None:
 
 
 def test_a_change_like_the_last_one_is_left_alone() -> None:
-    secants, change = Secants(), np.array([1.0, 2.0])
+    secants, change = Secants(np.ones(2)), np.array([1.0, 2.0])
     assert secants.corrected(change) is change
     assert np.array_equal(secants.corrected(0.9 * change), 0.9 * change)
     secants.forget()
     assert secants.corrected(change) is change
+
+
+def test_a_turn_counts_as_the_way_it_moves() -> None:
+    """In other units of length the same changes are corrected alike."""
+    random, found = np.random.default_rng(3), []
+    changes = random.normal(size=(3, 2)) * [1.0, 0.5]
+    for unit in (1.0, 64.0):
+        secants, ways = Secants(np.array([1.0, 0.3 * unit])), np.array([unit, 1.0])
+        found.append([secants.corrected(ways * change) / ways for change in changes])
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
+    assert not np.allclose(found[0][2], changes[2])

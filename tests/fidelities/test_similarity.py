@@ -1,0 +1,42 @@
+"""Results do not depend on units: lengths, times and masses times a number change nothing else.
+
+Forces, stiffnesses and speeds follow from the three, so that all numbers without a unit stay, and
+so do the results.  The slip speed of ropes is given, as its default has a bound of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from similar import Scale, scaled
+
+from ringsim.outputs import VARIABLES
+from ringsim.scene import Scene, load_scene
+from ringsim.simulation import run_frame
+
+SLIP = {f"cables.{plane}.slip_speed": 2e-4 for plane in ("upper", "lower")}
+COMPARED = ("deployment_time", "lock_time", "asynchrony_max", "peak_tension", "peak_rod_stress")
+
+
+def ring(name: str) -> Scene:
+    small = {"structure.sections": 4, "boom": "none", "record.stress": True}
+    scene = load_scene(name).with_values(small)
+    return scene if scene.cables is None else scene.with_values(SLIP)
+
+
+@pytest.mark.parametrize("name", ["ring18", "ring18-cable", "ring18-motor"])
+@pytest.mark.parametrize(
+    "scale", [Scale(length=4.0), Scale(length=2.0, time=4.0, mass=16.0)], ids=["longer", "all"]
+)
+def test_a_similar_ring_has_similar_results(name: str, scale: Scale) -> None:
+    """To what Newton leaves: a norm of newtons and newton metres moved the peaks by 1e-3 to 0.1."""
+    one, other = run_frame(ring(name)), run_frame(scaled(ring(name), scale))
+    assert one.reason == other.reason
+    for key in set(COMPARED) & set(one.values):
+        factor = scale.of(VARIABLES[key].units)
+        np.testing.assert_allclose(
+            other.values[key] / factor, one.values[key], rtol=2e-5, atol=1e-7, err_msg=key
+        )
+    # Nor is Newton asked for more in one unit than in another: steps and iterations are alike.
+    for key, rel in (("steps", 0.02), ("newton_iterations", 0.05)):
+        assert int(other.values[key]) == pytest.approx(int(one.values[key]), rel=rel), key
