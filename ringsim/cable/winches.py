@@ -16,8 +16,10 @@ the step before and r = h over its length,
 
 The median lets a drum that comes to a standstill wind nothing more: W has the sign of V.  Commands
 fall with the tension, W and y grow with V, so there is one solution for any EA and step.  A law
-that follows the structure takes the speed V* for its rate with which W(V*) is the path taken up so
-far in the step, S_0 - S: not the rate at its start.
+that follows the structure takes for its rate the same differences of the path P = S_0 - S that it
+has given free so far in the step, with g* its mean rate in the step before: the V* for which
+P = h ((1 + r) V* + r median(0, g*, 2 V*)) / (1 + 2 r).  With the drum's g in place of g* its gain
+would count by two thirds.
 
 A step has the winches that turn behind its begin; where prescribed speeds jump, its end has those
 before the jump.  So steps must end where a law begins, bends or ends (``Winch.breaks``).
@@ -52,6 +54,8 @@ class _Rope:
     """A rope that winches with feedback wind in this step, as it was at the beginning."""
 
     path: float
+    natural: float
+    """Path (m), and natural length outside of the drums (m)."""
     material: list[float]
     """EA (N), Kelvin-Voigt time (s) and width of the passage from slack to taut (N)."""
     members: dict[tuple[int, int], tuple[FeedbackWinding, WinchReading, float]]
@@ -59,38 +63,44 @@ class _Rope:
     far)."""
     total: float
     """Speed of all members at which they last balanced the rope, m/s."""
-    before: tuple[float, float] | None = None
-    """Time (s) and rope wound (m) of the same members in the step before; None behind a jump."""
+    before: tuple[float, float, float] | None = None
+    """Time (s), rope wound (m) and path given free (m) for the same members in the step before;
+    None behind a jump."""
     gain: float = 1.0
     """How fast their excess over the commands rose with it there."""
     known: tuple[tuple[float, ...], Array] | None = None
     """The last question and its answer: a tangent asks what its residual has asked."""
 
-    def weights(self, elapsed: float) -> tuple[float, float, float]:
-        """So long after the beginning of the step (s): times (s) for which the speed V and the mean
-        speed g of the step before count, and g (m/s).
+    def weights(self, elapsed: float) -> tuple[float, float, float, float]:
+        """So long after the beginning of the step (s): times (s) for which a speed and its mean in
+        the step before count, and these means of the rope wound and of the path given free (m/s).
         """
         if self.before is None or elapsed == 0.0:
-            return elapsed, 0.0, 0.0
-        last, wound = self.before
+            return elapsed, 0.0, 0.0, 0.0
+        last, wound, freed = self.before
         ratio = elapsed / last
         past = elapsed * ratio / (1.0 + 2.0 * ratio)
-        return elapsed - past, past, wound / last
+        return elapsed - past, past, wound / last, freed / last
 
     def wound(self, elapsed: float, total: float) -> float:
         """Rope that all members have wound since the beginning of the step, m."""
-        own, past, mean = self.weights(elapsed)
+        own, past, mean, _ = self.weights(elapsed)
         return own * total + past * _median(0.0, mean, 2.0 * total)
 
-    def takeup(self, elapsed: float, taken: float, rate: float) -> float:
-        """Speed (m/s) with which the members would have wound what the structure has given free
-        since the beginning of the step (m), or gives at this rate (m/s).
+    def freed(self, path: float, natural: float) -> float:
+        """Path (m) that the structure has given free for the members since the step began, but for
+        what other winches have wound; from the present path and natural length without them (m).
         """
-        own, past, mean = self.weights(elapsed)
+        return self.path - path - (self.natural - natural)
+
+    def takeup(self, elapsed: float, path: float, natural: float, rate: float) -> float:
+        """Rate of ``freed``, m/s; ``rate`` (m/s) if no time has passed."""
         if elapsed == 0.0:
             return rate
-        # W is the median of three rising lines, so that its inverse is the median of theirs.
-        return _median(taken / own, (taken - past * mean) / own, taken / (own + 2.0 * past))
+        own, past, _, mean = self.weights(elapsed)
+        freed = self.freed(path, natural)
+        # Where a structure stops, limited as ``wound`` is: both then follow it without a jerk.
+        return _median(freed / own, (freed - past * mean) / own, freed / (own + 2.0 * past))
 
     def speeds(
         self, elapsed: float, path: float, rate: float, natural: float, rest: float
@@ -110,8 +120,7 @@ class _Rope:
     ) -> Array:
         """The answer, by a search from the last one."""
         count, (stiffness, damping_time, width) = len(self.members), self.material
-        given = self.path - path - rest * elapsed
-        follow = -self.takeup(elapsed, given, -rate - rest)
+        follow = -self.takeup(elapsed, path, natural, -rate - rest)
         laws = [
             (
                 law,
@@ -334,19 +343,23 @@ class Winches:
         a jump: what turned before no longer counts.
         """
         last, moved, past = time - self._start, state.wound - self._held, self._turning
+        before, natural = self._ropes, state.ropes.content - state.ropes.per_rope(state.wound)
         bends = (slopes - self._slopes) / last if last > 0.0 else 0.0 * slopes
         self._start, self._held, self._slopes, self._ropes = time, state.wound, slopes, {}
         for place, winch in self._winches.items():
             if isinstance(winch.winding, FeedbackWinding) and winch.turns(time + AT_ONCE):
                 k = int(state.ropes.of_end[place])
-                begun = _Rope(float(state.paths[k]), state.material[:, k].tolist(), {}, 0.0)
+                begun = _Rope(
+                    float(state.paths[k]), float(natural[k]), state.material[:, k].tolist(), {}, 0.0
+                )
                 reading = state.reading(*place, float(slopes[place[0]]))
                 rope = self._ropes.setdefault(k, begun)
                 rope.members[place] = winch.winding, reading, float(bends[place[0]])
                 rope.total += float(state.wound_rate[place])
         self._turning = {}
-        for rope in self._ropes.values():
+        for k, rope in self._ropes.items():
             laws = {place: law for place, (law, *_) in rope.members.items()}
-            if last > 0.0 and all(past.get(place) is law for place, law in laws.items()):
-                rope.before = last, sum(float(moved[place]) for place in laws)
+            if last > 0.0 and k in before and all(past.get(p) is law for p, law in laws.items()):
+                wound = sum(float(moved[place]) for place in laws)
+                rope.before = last, wound, before[k].freed(rope.path, rope.natural + wound)
             self._turning |= laws

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 
 from cable_cases import LAWS, cable, random_case, still
 from ringsim.cable.records import Cable, Winch
@@ -169,11 +169,11 @@ def test_far_winch_needs_two_ends():
     assert len(cable().winches) == 1
 
 
-def wind(law, stiffness, step, steps, path_speed=lambda time: 0.0):
+def wind(law, stiffness, step, steps, path_speed=lambda time: 0.0, friction=LAWS["bearing"]):
     """Wind a rope over two pulleys whose far end moves: tensions, speeds, last span's strain."""
     start = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 1, 0]], dtype=float)
     case = still(
-        start, 0.0, axial_stiffness=stiffness, friction=LAWS["bearing"], initial_slack=0.005,
+        start, 0.0, axial_stiffness=stiffness, friction=friction, initial_slack=0.005,
         winch=Winch(winding=law),
     )  # fmt: skip
     winches, tensions, speeds = Winches(case.chain.cables), [], []
@@ -226,6 +226,34 @@ def test_feedback_keeps_the_tension_while_the_structure_moves(stiffness):
     assert tensions[50:] == pytest.approx(5.0, abs=0.005 + 0.09 * 5.0 / stiffness / 0.02)
     assert speeds.max() <= 0.3
     assert speeds.min() >= -0.3
+
+
+def test_feedback_wins_tension_by_its_own_gain_at_second_order():
+    """T' = EA dW/dt over the path but for strains, solved beside it; the structure gives rope free.
+
+    A drum whose own past speed stood for the structure's won tension with two thirds of the gain.
+    """
+    stiffness, freed, slack = 150.0, 0.05, 0.005
+
+    def tension(time, wound):
+        strain = (3.0 - freed * time) / (3.0 + slack - wound) - 1.0
+        width = Cable(winch=Winch(winding=FEEDBACK)).slack_width
+        return width * np.logaddexp(0.0, stiffness * strain / width)
+
+    def speed(time, wound):
+        return freed + FEEDBACK.gain * (FEEDBACK.target - tension(time, wound))
+
+    times = np.linspace(0.0, 2.0, 26)
+    exact = solve_ivp(speed, (0.0, 2.0), [0.0], t_eval=times, rtol=1e-11, atol=1e-13)
+    assert 0.5 < tension(1.0, exact.y[0, 13]) / FEEDBACK.target < 0.9  # far from both ends of it
+    errors = []
+    for step in (0.02, 0.01):
+        count = round(2.0 / step) + 1
+        found, *_ = wind(FEEDBACK, stiffness, step, count, lambda time: -freed, LAWS["none"])
+        apart = found[:: round(0.08 / step)] - tension(times, exact.y[0])
+        errors.append(np.abs(apart).max())
+    assert errors[0] < 3e-3 * FEEDBACK.target
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
 
 
 def test_feedback_with_an_opening_rate_starts_as_slowly_as_the_geometry():
