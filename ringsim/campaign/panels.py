@@ -28,8 +28,8 @@ _DEFAULTS = (
     (("cables.*.winch.winding.speed", "loads.force"),
      ("stop.stiffness", "structure.rest.stiffness")),
 )  # fmt: skip
-"""Panels where none are asked for: for each axis the first path at which the scene has a positive
-number.  A panel without one of its axes is left out."""
+"""Panels where none are asked for: for each axis the first path at which the scene has a number
+other than zero.  A panel without one of its axes is left out."""
 _FACTOR, _STEP_FACTOR = 10.0, 5.0
 """Ends of a default axis over the scene's own value, and below it; less for solver.step, because
 the cost of a run grows with 1 / step."""
@@ -160,7 +160,8 @@ def sweep_of(scene: Scene, text: str, points: int) -> Sweep:
 
 def _sweep(scene: Scene, path: str, low: float, high: float, points: int) -> Sweep:
     paths = _expanded(scene, path)
-    spaced = np.geomspace if low > 0.0 and high >= _DECADE * low else np.linspace
+    least, most = sorted((abs(low), abs(high)))
+    spaced = np.geomspace if low * high > 0.0 and most >= _DECADE * least else np.linspace
     values = spaced(low, high, points)
     values[1:-1] = [float(f"{value:.6g}") for value in values[1:-1]]
     if type(_own_value(scene, paths[0])) is int:
@@ -199,9 +200,9 @@ def _around(scene: Scene, alternatives: Sequence[str], points: int) -> Sweep | N
     for path, spread in itertools.product(alternatives, _SPREADS):
         try:
             own = _own_value(scene, _expanded(scene, path)[0])
-            if isinstance(own, float) and own > 0.0:
+            if isinstance(own, float) and own != 0.0:  # loads that fold are negative
                 factor = (_STEP_FACTOR if path == "solver.step" else _FACTOR) ** spread
-                low, high = (float(f"{end:.3g}") for end in (own / factor, own * factor))
+                low, high = sorted(float(f"{end:.3g}") for end in (own / factor, own * factor))
                 return _sweep(scene, path, low, high, points)
         except InputError:
             continue
