@@ -56,11 +56,12 @@ class Motors(Output):
         *electrical,
         Variable(
             "peak_motor_current", (), "A", "largest current of any motor at any step",
-            needs=_CONSTANTS, summary=("largest motor current", "10.3g"),
+            needs=_CONSTANTS, summary=("largest motor current", "10.3g"), worse="larger",
+            largest_of="motor_current",
         ),
         Variable(
             "total_motor_electrical_energy", (), "J",
-            "electrical energy that all motors took by the end", needs=_CONSTANTS,
+            "electrical energy that all motors took by the end", needs=_CONSTANTS, worse="larger",
         ),
     )  # fmt: skip
 
