@@ -36,6 +36,7 @@ def full_outcome(sections: int = 4) -> Outcome:
     random = np.random.default_rng(7)
     sizes = {"plane": 2, "section": sections, "time": len(TIMES), "rod": len(RODS), "span": 6}
     sizes |= {"station": 5, "point": 4, "axis": 3, "winch": 2, "resistance": 3, "corner": 4}
+    sizes |= {"pulley": 5}
     values = {}
     for name, variable in VARIABLES.items():
         shape = tuple(sizes[dim] for dim in variable.dims)
@@ -44,7 +45,7 @@ def full_outcome(sections: int = 4) -> Outcome:
         elif np.dtype(variable.dtype).kind == "i":
             values[name] = random.integers(0, 100, shape)  # codes have 8 bits
         else:
-            values[name] = random.normal(size=shape)
+            values[name] = random.normal(size=shape).astype(variable.dtype)
             if variable.dims:
                 values[name][..., -1] = np.nan
     del values["status"], values["cause"]
@@ -55,6 +56,7 @@ def full_outcome(sections: int = 4) -> Outcome:
         "time": TIMES,
         "rod": np.array(RODS),
         "span": np.arange(1, 7),
+        "pulley": np.arange(1, 6),
         "station": np.linspace(0.05, 0.6, 5),
         "winch": np.array([1, 2]),
         "resistance": np.array(["pulley friction", "joint friction", "net"]),

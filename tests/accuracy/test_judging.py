@@ -216,9 +216,9 @@ def test_every_rung_of_every_scene_is_a_scene(name: str) -> None:
     for rung in rungs:
         assert set(rung.values) == set(PATHS)
         scene.with_values(dict(rung.values))
-    # Nothing was measured with these two: they are judged by the ring on cables.
-    judged_by = name.replace("-ground", "-cable").replace("-motor", "-cable")
-    assert evidence_for(scene).scene == judged_by
+    # Nothing was measured with these three: they are judged by a ring that is driven alike.
+    of = {"ring18-ground": "ring18-cable", "ring18-motor": "ring18-cable", "ring18-stow": "ring18"}
+    assert evidence_for(scene).scene == of.get(name, name)
 
 
 @pytest.fixture(scope="module")

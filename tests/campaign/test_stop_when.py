@@ -140,7 +140,7 @@ def test_looks_are_whole_replicates():
         (('kind = "random"', 'kind = "sobol"'), "design.replicates = 8"),
         (('requirement = "dep', 'requirement = "de'), "not among the requirements"),
         ((", half_width = 0.6", ""), "needs half_width"),
-        (('{ of = "deployment_time"', '{ of = "opening_angle"'), "no output with an interval"),
+        (('{ of = "deployment_time"', '{ of = "opening_angle"'), "has a value for each plane"),
         (('{ of = "dep', '{ requirement = "x", of = "dep'), "either requirement"),
         (("stop_when = [", "set_aside = ["), "set_aside"),
         (('of = "deployment_time"', 'of = "peak_tension"'), "it has no cables"),

@@ -59,8 +59,9 @@ def test_motors_stall_where_they_meet_the_net(stalled: xr.Dataset) -> None:
     assert Fate(stalled.outcome.item()) is Fate.STALLED
     kept = stalled.dropna("time", subset=["opening_angle"]).isel(time=-1)
     np.testing.assert_allclose(kept.opening_angle, rest, atol=2e-3)
-    np.testing.assert_allclose(kept.motor_torque, 0.002, rtol=1e-5)
+    # Newton's tolerance lets the shafts creep: 0.05 rad/s are 8e-5 of the line from 600 rad/s on.
     np.testing.assert_allclose(kept.motor_speed, 0.0, atol=0.05)
+    np.testing.assert_allclose(kept.motor_torque, 0.002, rtol=0.05 / 600.0)
 
 
 def test_the_margin_vanishes_where_a_run_stalls_and_a_run_tells_it(stalled: xr.Dataset) -> None:

@@ -67,16 +67,17 @@ def test_reversed_forces_fold_it_to_the_stowed_stop(sections: int, start: float)
             "net.neutral_length": 0.7116 * sections / 18,
             "loads.force": -0.015,
             "stop.stowed_angle": STOWED,
+            "solver.tolerance": 3e-5,  # relative to the whole way to the stop; see below
         }
     )
     found = run(scene)
     assert found.history.status is Status.OK
     assert found.history.reason == "all V-joints have reached the stowed stop"
-    # Released near 180 deg the rods give more than when stowed: 2.3e-4 when this was written;
-    # 6e-5 from 150 deg on.
+    # At 140 deg, where six sections have hardly left 175 deg, steps are off by 1.3e-4 of the time
+    # and rods give 4e-5 of it (limit of smaller steps); less of both later on.
     for angle in (140.0, 90.0, 60.0, 47.6):
         expected = ideal_time(scene, angle)
-        assert found.reaches(angle) == pytest.approx(expected, rel=4e-4)
+        assert found.reaches(angle) == pytest.approx(expected, rel=2.5e-4)
     # It rests on its stop, within what the stop gives, and has not gone through it.
     end = np.degrees(found.angles[-1])
     assert np.all(np.abs(end - STOWED) < 1.5)

@@ -136,7 +136,7 @@ def test_an_event_that_never_happens_ends_too():
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ({"of": "opening_angle"}, "no output with one number"),
+        ({"of": "opening_angle"}, "opening_angle has a value for each plane and section and time"),
         ({"below": 1.0}, "either above or below"),
         ({"share": 0.3}, "one over a whole number"),
         ({"samples": 25}, "multiple of 1 / share = 10, for example 20"),
