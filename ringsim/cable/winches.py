@@ -216,6 +216,8 @@ class Winches:
         self._turning: dict[tuple[int, int], FeedbackWinding] = {}
         self._ahead: dict[tuple[int, int], float] = {}
         self._ropes: dict[int, _Rope] = {}
+        self._begun: dict[int, tuple[float, float]] = {}
+        """Path and natural length (m) of every rope that answers, where the step began."""
 
     def path_slopes(self, slope: Callable[[int], float]) -> Array:
         """Derivatives of the cables' ideal paths after the opening angle, m/rad, shape (cables,),
@@ -282,7 +284,8 @@ class Winches:
              place in self._turning]
             for place, winch in self._winches.items()
         ]  # fmt: skip
-        return {"winches": rows, "begun": [self._start, self._held, self._slopes]}
+        ropes = [[k, *lengths] for k, lengths in self._begun.items()]
+        return {"winches": rows, "begun": [self._start, self._held, self._slopes, ropes]}
 
     def go_on(
         self,
@@ -297,7 +300,8 @@ class Winches:
         Rope wound (m) and its rate (m/s) are of shape (cables, 2).  A winch that is another one now
         begins with the rope that is on its drum; its rate is entered.
         """
-        self._start, self._held, self._slopes = memory["begun"]
+        self._start, self._held, self._slopes, ropes = memory["begun"]
+        self._begun = {k: (path, natural) for k, path, natural in ropes}
         for number, end, table, ahead, turning in memory["winches"]:
             place = number, end
             if self._winches[place] == before[number].winches[end]:
@@ -343,23 +347,24 @@ class Winches:
         a jump: what turned before no longer counts.
         """
         last, moved, past = time - self._start, state.wound - self._held, self._turning
-        before, natural = self._ropes, state.ropes.content - state.ropes.per_rope(state.wound)
+        begun, natural = self._begun, state.ropes.content - state.ropes.per_rope(state.wound)
         bends = (slopes - self._slopes) / last if last > 0.0 else 0.0 * slopes
         self._start, self._held, self._slopes, self._ropes = time, state.wound, slopes, {}
         for place, winch in self._winches.items():
             if isinstance(winch.winding, FeedbackWinding) and winch.turns(time + AT_ONCE):
                 k = int(state.ropes.of_end[place])
-                begun = _Rope(
+                anew = _Rope(
                     float(state.paths[k]), float(natural[k]), state.material[:, k].tolist(), {}, 0.0
                 )
                 reading = state.reading(*place, float(slopes[place[0]]))
-                rope = self._ropes.setdefault(k, begun)
+                rope = self._ropes.setdefault(k, anew)
                 rope.members[place] = winch.winding, reading, float(bends[place[0]])
                 rope.total += float(state.wound_rate[place])
         self._turning = {}
         for k, rope in self._ropes.items():
             laws = {place: law for place, (law, *_) in rope.members.items()}
-            if last > 0.0 and k in before and all(past.get(p) is law for p, law in laws.items()):
-                wound = sum(float(moved[place]) for place in laws)
-                rope.before = last, wound, before[k].freed(rope.path, rope.natural + wound)
+            if last > 0.0 and k in begun and all(past.get(p) is law for p, law in laws.items()):
+                wound, (path, length) = sum(float(moved[p]) for p in laws), begun[k]
+                rope.before = last, wound, path - rope.path - (length - rope.natural - wound)
             self._turning |= laws
+        self._begun = {k: (rope.path, rope.natural) for k, rope in self._ropes.items()}
