@@ -10,6 +10,8 @@ from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, 
 from ringsim.outputs.peaks import Peak
 from ringsim.scene import Scene
 
+_DEEP = 1e9
+"""Below zero by so much (m) no slope is seen: at the instant before."""
 PEAK = Peak("longest_slack", ("plane", "span"), "the longest slack")
 
 
@@ -72,15 +74,14 @@ def longest_above(times: Array, values: Array, until: Array) -> tuple[Array, Arr
     """
     shape = values.shape[1:]
     longest, best = np.where(np.isnan(values[0]), np.nan, 0.0), np.full(shape, np.nan)
-    begun = np.full(shape, times[0])
+    begun, values = np.full(shape, times[0]), np.maximum(values, -_DEEP)
     for k in range(1, len(times)):
         before, now, step = values[k - 1], values[k], times[k] - times[k - 1]
         above, still = before > 0.0, now > 0.0
         if not (above | still).any():
             continue
         fall = np.where(above == still, 1.0, before - now)
-        share = np.where(np.isfinite(fall), before / fall, np.where(still, 1.0, 0.0))
-        passes = times[k - 1] + share * step
+        passes = times[k - 1] + before / fall * step
         begun = np.where(still & ~above, passes, begun)
         ends = np.minimum(np.where(still, times[k], passes), until)
         better = (above | still) & (ends - begun > longest)

@@ -88,7 +88,7 @@ def test_a_rope_that_parts_is_slack_no_longer() -> None:
     times = np.array([0.0, 1.0, 2.0, 2.0, 3.0])
     values = np.array([[1.0, 1.0, 1.0, -np.inf, -np.inf], [np.nan] * 5]).T
     longest, begun = longest_above(times, values, np.array(math.inf))
-    np.testing.assert_array_equal(longest, [2.0, math.nan])
+    np.testing.assert_allclose(longest, [2.0, math.nan], rtol=1e-8)
     np.testing.assert_array_equal(begun, [0.0, math.nan])
 
 
