@@ -88,7 +88,10 @@ def load_cases(runs: Path) -> Figure:
                 found = diagonals(run, section)
                 axes.plot(found.times, found.values / 1e3, color=own, linestyle=dashes,
                           linewidth=1.2, label=f"section {section}, {rods} rods")  # fmt: skip
-                words.append(f"section {section}: {found.before / 1e3:.0f} kPa to {BEFORE:.0f} deg")
+                words.append(
+                    f"section {section}: up to {found.before / 1e3:.0f} kPa,\n"
+                    f"   at the locks {found.all / 1e6:.1f} MPa"
+                )
                 print(
                     f"| {rods} | {force:.3f} N | {section} | {found.before / 1e3:.1f} kPa "
                     f"| {found.all / 1e6:.2f} MPa | {float(run['deployment_time']):.3f} s |"
@@ -100,12 +103,13 @@ def load_cases(runs: Path) -> Figure:
                           fontsize=9, bbox=style.PAPER)  # fmt: skip
     angles.axhline(180.0, color=style.GREY, linewidth=0.8, zorder=1.4)
     angles.set(xlim=(0.0, 18.5), ylim=(40.0, 184.0), xlabel="Time (s)",
-               ylabel="Angle between the bars of section 1 (degree)")  # fmt: skip
+               ylabel="Angle between the bars\nof section 1 (degree)")  # fmt: skip
     angles.set_yticks(range(60, 181, 30))
     angles.legend(loc="upper left")
+    angles.get_legend().legend_handles[-1].set_color(style.GREY)
     first.set_ylabel("Stress of the diagonals (kPa)")
-    figure.legend(*first.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    style.title(figure, "Load cases of paper 002: its figs 10 and 11 to 13; peaks at locks cut off")
+    figure.legend(*first.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    style.title(figure, "Load cases of paper 002, its figs 10 to 13")
     return figure
 
 

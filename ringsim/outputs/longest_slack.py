@@ -97,9 +97,9 @@ def slackened(scene: Scene, values: Values) -> str:
     told: dict[str, Any] = {dim: np.asarray(values[f"longest_slack_{dim}"]).item()
                             for dim in ("plane", "span", "time")}  # fmt: skip
     name = dict(scene.span_names)[told["plane"]][int(told["span"]) - 1]
-    beyond = f" by more than {limits.slack_length:g} m" if limits.slack_length else ""
     return (
-        f"; the {told['plane']} rope was slack{beyond} for {found:.4g} s from {told['time']:.6g} s "
-        f"on, most in span {told['span']} ({name}), longer than limits.slack_duration = "
-        f"{limits.slack_duration:g} s: it may have left its pulleys"
+        f"; the {told['plane']} rope was slack in span {told['span']} ({name}), by more than "
+        f"limits.slack_length = {limits.slack_length:g} m, for {found:.4g} s from "
+        f"{told['time']:.6g} s on, longer than limits.slack_duration = {limits.slack_duration:g} "
+        "s: it may have left its pulleys"
     )

@@ -28,9 +28,10 @@ class Limits(Model):
     slack_duration: SecondOrZero | None = None
     """Longest time for which any span may be slack without a break, before its plane has locked: a
     rope that is slack for longer may leave its pulleys, and the outcome is "slackened"."""
-    slack_length: MetreOrZero = 0.0
-    """Free rope in a span, beyond its length, from which on that counts; L metre of span sag by
-    sqrt(3 L s / 8) with s of free rope, 0.4 m by 12 mm with 1 mm."""
+    slack_length: MetreOrZero = 1e-4
+    """Free rope in a span, beyond its length, from which on that counts.  With s of it L metre of
+    span sag by sqrt(3 L s / 8), 0.4 m with 0.1 mm by 4 mm, about as deep as the groove of a small
+    pulley."""
 
     @property
     def farthest(self) -> float:

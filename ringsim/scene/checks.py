@@ -38,11 +38,6 @@ def _check_limits(scene: "Scene") -> None:
                 f"limits.{name} = {value:g} {unit} needs a cable: add [cables.upper], or leave the "
                 "limit out"
             )
-    if scene.limits.slack_length and scene.limits.slack_duration is None:
-        raise ValueError(
-            f"limits.slack_length = {scene.limits.slack_length:g} m needs limits.slack_duration, "
-            "how long a span may hold so much free rope: give both, or leave it out"
-        )
 
 
 def _check_latch(scene: "Scene") -> None:
