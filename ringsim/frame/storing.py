@@ -18,6 +18,7 @@ from ringsim.outputs.stored import States, StoredState, cleared, struck_by
 from ringsim.parts.faults.failed_spring import FailedSpring
 from ringsim.parts.faults.family import Fault
 from ringsim.parts.faults.stuck_vjoint import StuckVJoint
+from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.stepping.going_on import go_on
 from ringsim.stepping.instant import Instant
@@ -150,7 +151,10 @@ class Storing(Integration):
         ropes = Ropes(cables.ropes.points_per_cable, *memory["ropes"])
         for fault in gone:
             if isinstance(fault, CableFault):
-                ropes = fault.clear(ropes)
+                try:
+                    ropes = fault.clear(ropes)
+                except ValueError as error:
+                    raise InputError(str(error)) from error
         wound, rate = memory["wound"]
         before = [cable for _, cable in scene.cables.present()]
         cables.winches.go_on(memory["winches"], before, start.time, wound, rate)

@@ -6,7 +6,6 @@ from pydantic import Field
 
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.ropes import Array, Ropes
-from ringsim.refusal import InputError
 
 
 class CutCable(CableFault):
@@ -25,7 +24,7 @@ class CutCable(CableFault):
 
     def clear(self, ropes: Ropes) -> Ropes:
         """Never."""
-        raise InputError(
+        raise ValueError(
             f"faults: the rope of cable {self.cable} that parted at {self.time:g} s cannot be made "
             "whole: keep that fault, or take a state before it (--at)"
         )

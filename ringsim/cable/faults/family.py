@@ -30,5 +30,5 @@ class CableFault(Fault):
         raise NotImplementedError
 
     def clear(self, ropes: Ropes) -> Ropes:
-        """The ropes after the fault is cleared; InputError if it cannot be."""
+        """The ropes after the fault is cleared; ValueError if it cannot be."""
         raise NotImplementedError

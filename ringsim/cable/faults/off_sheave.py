@@ -6,7 +6,6 @@ from pydantic import Field
 
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.ropes import Array, Ropes
-from ringsim.refusal import InputError
 
 
 class OffSheave(CableFault):
@@ -35,7 +34,7 @@ class OffSheave(CableFault):
         """Let a wedged rope slip again; nobody puts a free one back."""
         if self.rope == "wedged":
             return ropes.unjam(self.cable - 1, self.pulley - 1)
-        raise InputError(
+        raise ValueError(
             f"faults: the rope of cable {self.cable} that left its pulley at {self.time:g} s "
             "cannot be put back: keep that fault, or take a state before it (--at)"
         )
