@@ -92,6 +92,8 @@ class Fate(Code):
     """A structure that does not lock, driven until ``solver.end_time``."""
     NOT_LATCHED = 8
     """Every V-joint has reached 180 deg, but latches did not catch up to the run's end."""
+    SLACKENED = 9
+    """A rope was slack for longer than the scene allows: it may have left its pulleys."""
 
 
 GOALS = (Fate.DEPLOYED, Fate.FOLDED, Fate.FINISHED)

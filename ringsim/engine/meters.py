@@ -1,18 +1,16 @@
 """What is read of every state of a run: energies and their balance, stress and bending strain."""
 
 import math
-from collections.abc import Sequence
-from typing import Any
 
 import exudyn as exu
 import numpy as np
 
 from ringsim.cable.state import ChainState, work_between
-from ringsim.engine.assembly import Assembly
 from ringsim.engine.build import Built
 from ringsim.engine.model import Multibody
 from ringsim.engine.readings import State
 from ringsim.engine.rotations import Array
+from ringsim.engine.section_forces import section_forces
 from ringsim.stepping.instant import Energies
 from ringsim.stepping.losses import Passing, lost_between
 
@@ -107,20 +105,20 @@ class EnergyMeter:
 class StressMeter:
     """Stress |N| / A + |M| r / I of every rod half: the larger of its two ends.
 
-    exudyn gives the elastic moment in the middle of an element, the rods' dampers add what damping
-    carries there; along it the moment follows the shear force, dM_z/dx = -Q_y and dM_y/dx = Q_z.
+    Elements have the elastic moment in their middle, the rods' dampers add what damping carries
+    there; along it the moment follows the shear force, dM_z/dx = -Q_y and dM_y/dx = Q_z.
     """
 
     def __init__(self, model: Multibody) -> None:
         self._assembly = model.assembly
         rows = [*model.layout.halves().values()]
         self._shape = len(rows), len(rows[0]), 2
-        self._elements, numbers = [], []
+        places, numbers = [], []
         for half in (half for row in rows for half in row):
-            part, elements = model.layout.rods[half.rod], model.rods[half.rod].elements
+            part = model.layout.rods[half.rod]
             per_moment = 0.5 * part.tube.outer_diameter / part.tube.second_moment
             for k, end in ((half.first, -0.5), (half.last - 1, 0.5)):
-                self._elements.append(elements[k])
+                places.append((half.rod, k))
                 numbers.append((end * part.lengths[k], part.tube.area, per_moment))
         # Places of the outer ends from the elements' middles (m); by what force is divided (m^2)
         # and moment multiplied (1/m^3) to give stress.
@@ -128,11 +126,13 @@ class StressMeter:
         # All elements have a damper each, in their order, or none has.
         dampers = {int(e): k for k, e in enumerate(e for rod in model.rods for e in rod.elements)}
         damped = model.scene.rods.damping > 0.0
-        self._damped = [dampers[int(e)] for e in self._elements] if damped else None
+        elements = [model.rods[rod].elements[k] for rod, k in places]
+        self._damped = [dampers[int(e)] for e in elements] if damped else None
+        self._carried = section_forces(model, places)
 
-    def read(self) -> Array:
+    def read(self, state: State) -> Array:
         """Stresses at the current state, shape (rod halves, sections), Pa."""
-        force, torque = _in_the_middle(self._assembly, self._elements)
+        force, torque = self._carried(state)
         if self._damped is not None:
             carried = self._assembly.dampers.latest.forces[self._damped].T
             force, torque = force + carried[:3], torque + carried[3:]
@@ -151,24 +151,18 @@ class BendingMeter:
 
     def __init__(self, model: Multibody, name: str) -> None:
         number = next(k for k, rod in enumerate(model.layout.rods) if rod.name == name)
-        rod, self._elements = model.layout.rods[number], model.rods[number].elements
+        rod = model.layout.rods[number]
         self._lengths = rod.lengths
         self.stations = np.array(rod.stations) * rod.length
-        self._assembly = model.assembly
+        self._carried = section_forces(model, [(number, k) for k in range(len(rod.lengths))])
         self._per_moment = (
             0.5 * rod.tube.outer_diameter / (rod.young_modulus * rod.tube.second_moment)
         )
 
-    def read(self) -> Array:
+    def read(self, state: State) -> Array:
         """Strains at the current state, shape (nodes,)."""
-        force, torque = _in_the_middle(self._assembly, self._elements)
+        force, torque = self._carried(state)
         change = 0.5 * force[1] * self._lengths
         first, last = torque[2] + change, torque[2] - change
         at_nodes = np.concatenate([first[:1], 0.5 * (first[1:] + last[:-1]), last[-1:]])
         return np.asarray(-self._per_moment * at_nodes)
-
-
-def _in_the_middle(assembly: Assembly, elements: Sequence[Any]) -> list[Array]:
-    """Force (N) and moment (N m) of elements in their axes, shape (3, elements) each."""
-    output, kinds = assembly.system.GetObjectOutputBody, (_KIND.ForceLocal, _KIND.TorqueLocal)
-    return [np.array([output(e, kind, [0.0] * 3) for e in elements]).T for kind in kinds]

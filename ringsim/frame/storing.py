@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ringsim.cable.faults.cut_cable import CutCable
-from ringsim.cable.faults.jammed_pulley import JammedPulley
+from ringsim.cable.faults.family import CableFault
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.state import ChainState
 from ringsim.frame.integrate import Integration
@@ -151,13 +150,11 @@ class Storing(Integration):
         assert scene.cables is not None
         ropes = Ropes(cables.ropes.points_per_cable, *memory["ropes"])
         for fault in gone:
-            if isinstance(fault, CutCable):
-                raise InputError(
-                    f"faults: the rope of cable {fault.cable} that parted at {fault.time:g} s "
-                    "cannot be made whole: keep that fault, or take a state before it (--at)"
-                )
-            if isinstance(fault, JammedPulley):
-                ropes = ropes.unjam(fault.cable - 1, fault.pulley - 1)
+            if isinstance(fault, CableFault):
+                try:
+                    ropes = fault.clear(ropes)
+                except ValueError as error:
+                    raise InputError(str(error)) from error
         wound, rate = memory["wound"]
         before = [cable for _, cable in scene.cables.present()]
         cables.winches.go_on(memory["winches"], before, start.time, wound, rate)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ringsim.outputs.family import COORDINATES, OUTPUTS, VARIABLES, Array, Output, axes, holds
 from ringsim.outputs.latching import missed
+from ringsim.outputs.longest_slack import slackened
 from ringsim.outputs.series import Reading, Run, Series, output_times
 from ringsim.outputs.shocks import jerked, unresolved
 from ringsim.refusal import InputError
@@ -142,7 +143,8 @@ class Recorder(Remembering):
         values = reduced(run, self._readings, series_of)
         coordinates = spanned(values, known)
         passed = overloads(self._scene, self._readings, series_of)
-        found = ended(self.status, self.fate, self.reason, passed, coordinates, values)
+        loose = slackened(self._scene, values)
+        found = ended(self.status, self.fate, self.reason, passed, loose, coordinates, values)
         told = "" if self.status.failed else unresolved(run) + jerked(run)
         return replace(found, reason=found.reason + told)
 
@@ -173,11 +175,15 @@ def overloads(
 
 
 def ended(
-    status: Status, fate: Fate, reason: Reason, passed: str,
+    status: Status, fate: Fate, reason: Reason, passed: str, loose: str,
     coordinates: dict[str, NDArray[Any]], values: dict[str, NDArray[Any]],
 ) -> Outcome:  # fmt: skip
-    """The outcome of a run that ended so; ``passed`` are the limits that it went over."""
-    fate = Fate.OVERLOADED if passed and not status.failed else fate
+    """The outcome of a run that ended so; ``passed`` are the limits of loads that it went over,
+    ``loose`` that of slack ropes.
+    """
+    if not status.failed and fate is not Fate.OVERLOADED:
+        fate = Fate.OVERLOADED if passed else Fate.SLACKENED if loose else fate
+    passed += loose
     passed += missed(values, coordinates.get("plane", np.array([])).tolist())
     values["outcome"] = np.array(int(fate))
     return Outcome(status, str(reason) + passed, coordinates, values, reason.cause)

@@ -5,14 +5,14 @@ from typing import Annotated
 
 from pydantic import Field
 
-from ringsim.units import Degree, Model, Stress, Tension
+from ringsim.units import Degree, MetreOrZero, Model, SecondOrZero, Stress, Tension
 
 
 class Limits(Model):
-    """Bounds past which a run has the outcome "overloaded".
+    """Bounds past which a run has the outcome "overloaded", or "slackened" by slack ropes.
 
     A V-joint past ``overrun`` or a rope past ``rope_strain`` ends the run: the model means nothing
-    beyond.  The other two are allowables: the run goes on and shows by how much they are passed.
+    beyond.  The others are allowables: the run goes on and shows by how much they are passed.
     """
 
     overrun: Annotated[Degree, Field(gt=0.0, le=90.0)] = 3.0
@@ -25,6 +25,13 @@ class Limits(Model):
     """Largest tension of any span of a cable, at any time of the run."""
     rod_stress: Stress | None = None
     """Largest axial + bending stress of any rod; needs ``record.stress = true``."""
+    slack_duration: SecondOrZero | None = None
+    """Longest time for which any span may be slack without a break, before its plane has locked: a
+    rope that is slack for longer may leave its pulleys, and the outcome is "slackened"."""
+    slack_length: MetreOrZero = 1e-4
+    """Free rope in a span, beyond its length, from which on that counts.  With s of it L metre of
+    span sag by sqrt(3 L s / 8), 0.4 m with 0.1 mm by 4 mm, about as deep as the groove of a small
+    pulley."""
 
     @property
     def farthest(self) -> float:

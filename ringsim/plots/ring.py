@@ -1,4 +1,4 @@
-"""The ring in space: stowed, half-way and deployed."""
+"""The ring in space: stowed, between and deployed."""
 
 import math
 from typing import Any
@@ -41,16 +41,17 @@ LOOKS: dict[str, dict[str, Any]] = {
 
 
 @style.styled
-def ring(dataset: xr.Dataset) -> Figure:
-    """Three instants of a run side by side, all to one scale, with a scale bar in metre.
+def ring(dataset: xr.Dataset, states: int = 3) -> Figure:
+    """Instants of a run side by side, all to one scale, with a scale bar in metre.
 
     Orthographic views in which nearer lines are darker.  ``dataset`` is a run with
     ``opening_angle`` (plane, section, time), its scene as TOML in the attribute ``scene``; where it
-    has ``position`` (point, axis, time) this is drawn.
+    has ``position`` (point, axis, time) this is drawn.  ``states`` is the number of instants, as
+    for :func:`instants`; four are those of paper 002, fig. 9.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
     azimuth = facing_azimuth(scene)
-    moments = instants(dataset)
+    moments = instants(dataset, states)
     shape = shape_of(dataset, scene)
     shots = [_shot(shape, angles, _locked(dataset, angles), azimuth) for _, angles in moments]
     low = np.array([lines.min(axis=(0, 1)) for _, lines, _ in shots])
@@ -109,23 +110,27 @@ def view(points: Array, azimuth: float, elevation: float) -> tuple[Array, Array]
     return points @ np.stack([right, up], axis=-1), points @ towards
 
 
-def instants(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
-    """Name and opening angles (plane, section) of the three recorded instants to draw.
+def instants(dataset: xr.Dataset, states: int = 3) -> list[tuple[str, xr.DataArray]]:
+    """Name and opening angles (plane, section) of the recorded instants to draw, at least two.
 
-    The first, the one whose mean opening angle is nearest to the middle between the ends, and the
-    deployment, or else the last.
+    The first, those whose mean opening angles are nearest to equal steps between the ends, and the
+    deployment, or else the last.  ValueError for fewer than two.
     """
+    if states < 2:
+        raise ValueError(f"states = {states} must be at least 2: the start and the end")
     angle = dataset["opening_angle"].dropna("time", how="any")
     mean = angle.mean(("plane", "section")).values
     deployed = style.deployment_time(dataset)
     done = math.isfinite(deployed)
     last = int(np.abs(angle["time"].values - deployed).argmin()) if done else len(mean) - 1
-    middle = int(np.abs(mean[: last + 1] - 0.5 * (mean[0] + mean[last])).argmin())
+    wanted = np.linspace(mean[0], mean[last], states)[1:-1]
+    between = [int(np.abs(mean[: last + 1] - each).argmin()) for each in wanted]
     opens = mean[last] >= mean[0]
-    names = ("stowed" if opens else "start", "half-way", "deployed" if done else "end of the run")
-    angles = [angle.isel(time=k) for k in (0, middle, last)]
+    names = ["half-way"] if states == 3 else [f"stage {k}" for k in range(1, states - 1)]
+    names = ["stowed" if opens else "start", *names, "deployed" if done else "end of the run"]
+    angles = [angle.isel(time=k) for k in (0, *between, last)]
     if done:
-        angles[2] = _at_deployment(dataset, angle, deployed)
+        angles[-1] = _at_deployment(dataset, angle, deployed)
     return list(zip(names, angles, strict=True))
 
 

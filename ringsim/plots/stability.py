@@ -23,6 +23,7 @@ _LOOKS: dict[str, tuple[str, str]] = {
     "energy grew": (style.VERMILLION, "G"),
     "blow-up": ("#7f0000", "B"),
     "overloaded": (style.PURPLE, "P"),
+    "slackened": ("#b8860b", "k"),
     "stalled": ("#bdbdbd", "s"),
     "partly deployed": ("#b3cde3", "p"),
     "not latched": ("#8c96c6", "l"),

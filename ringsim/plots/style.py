@@ -114,7 +114,8 @@ def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: flo
     fitting = (w for w in range(1, width) if len(textwrap.wrap(words, w)) <= lines)
     title(figure, textwrap.fill(words, next(fitting, width)))
     end = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
-    axes.set_title("\n".join(end), pad=pad)
+    # The second of two lines reaches to what stands above the axes at their right end.
+    axes.set_title("\n".join(end), pad=pad + 12.0 * (len(end) > 1))
     free_labels.settle(figure)
 
 

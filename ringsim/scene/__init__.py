@@ -106,10 +106,10 @@ class Scene(Model):
         for part in (self.spacecraft, self.offload, self.gravity, self.temperature):
             if part is not None:
                 part.check(self)
-        if self.record.stress and isinstance(self.rods, AncfRods):
+        if self.record.stress and isinstance(self.rods, AncfRods) and self.rods.damping > 0.0:
             raise ValueError(
-                'record.stress = true is not possible with rods.kind = "ancf", whose elements '
-                'report no forces: choose "geometrically-exact", or leave record.stress out'
+                f'record.stress = true with rods.kind = "ancf" needs rods.damping = 0, not '
+                f"{self.rods.damping:g} s: exudyn does not tell what damping carries in these rods"
             )
         if self.record.interval > self.solver.end_time:
             raise ValueError(

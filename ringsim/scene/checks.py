@@ -31,11 +31,13 @@ def _check_limits(scene: "Scene") -> None:
             f"limits.rod_stress = {scene.limits.rod_stress:g} Pa needs the stress of the rods: "
             "set record.stress = true, or leave the limit out"
         )
-    if scene.limits.tension is not None and scene.cables is None:
-        raise ValueError(
-            f"limits.tension = {scene.limits.tension:g} N needs a cable: add [cables.upper], or "
-            "leave the limit out"
-        )
+    for name, unit in (("tension", "N"), ("slack_duration", "s")):
+        value = getattr(scene.limits, name)
+        if value is not None and scene.cables is None:
+            raise ValueError(
+                f"limits.{name} = {value:g} {unit} needs a cable: add [cables.upper], or leave the "
+                "limit out"
+            )
 
 
 def _check_latch(scene: "Scene") -> None:

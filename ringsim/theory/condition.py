@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.cable.faults.cut_cable import CutCable
-from ringsim.cable.faults.jammed_pulley import JammedPulley
+from ringsim.cable.faults.family import CableFault
 from ringsim.cable.records import Winch
 from ringsim.cable.ropes import Ropes
 from ringsim.layout.pose import Array
@@ -83,11 +82,9 @@ class Conditions:
         for fault in faults:
             if isinstance(fault, FailedSpring):
                 sprung[self._structure.planes.index(fault.plane), fault.section - 1] = 0.0
-            elif isinstance(fault, CutCable):
-                ropes = ropes.cut(fault.cable - 1, fault.span - 1)
-            elif isinstance(fault, JammedPulley):
+            elif isinstance(fault, CableFault):
                 none = np.zeros(ropes.spans), np.zeros((len(self._points), 2))
-                ropes = ropes.jam(fault.cable - 1, fault.pulley - 1, *none)
+                ropes = fault.change(ropes, *none)
         reach = {}
         for number, end in on:
             rope = ropes.of_end[number, end]
@@ -103,7 +100,7 @@ def turns_ever(winch: Winch) -> bool:
 
 def changes_drive(fault: Fault) -> bool:
     """Whether a fault takes anything from the drive of a ring, as far as the margin knows."""
-    return isinstance(fault, (CutCable, JammedPulley, FailedSpring, StuckVJoint))
+    return isinstance(fault, (CableFault, FailedSpring, StuckVJoint))
 
 
 def is_unknown(fault: Fault) -> bool:

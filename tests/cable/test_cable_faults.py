@@ -12,6 +12,7 @@ from cable_cases import LAWS, random_case, still
 from ringsim.cable.faults.cut_cable import CutCable
 from ringsim.cable.faults.family import CableFault
 from ringsim.cable.faults.jammed_pulley import JammedPulley
+from ringsim.cable.faults.off_sheave import OffSheave
 from ringsim.choice import OneOf
 
 PATH = [[0, 0, 0], [1, 0, 0], [1.5, 0.6, 0], [2, 0, 0.4], [3, 0, 0], [3, 1, 0]]
@@ -111,6 +112,19 @@ def test_a_jam_in_a_cut_cable_brings_no_tension_back():
     ropes = CutCable(cable=2, span=1, time=0.0).strike(case.ropes, case.state())
     ropes = JammedPulley(cable=2, pulley=1, time=1.0).strike(ropes, case.state(ropes=ropes))
     assert np.all(case.state(ropes=ropes).tensions[6:] == 0.0)
+
+
+def test_a_rope_that_was_wedged_before_is_free_on_both_sides() -> None:
+    case = random_case(7, wound=0.01)
+    jammed = JammedPulley(cable=1, pulley=3, time=0.5).strike(case.ropes, case.state())
+    assert np.all(case.state(ropes=jammed).tensions[:4] > 0.0)
+    free = OffSheave(cable=1, pulley=3, time=1.0, rope="free")
+    after = free.strike(jammed, case.state(ropes=jammed))
+    assert np.all(case.state(ropes=after).tensions[:4] == 0.0)
+    with pytest.raises(ValueError, match="cannot be put back"):
+        free.clear(after)
+    wedged = OffSheave(cable=1, pulley=3, time=0.5)
+    assert wedged.clear(jammed).starts.tolist() == case.ropes.starts.tolist()
 
 
 @pytest.mark.parametrize(

@@ -181,3 +181,15 @@ def test_positions_are_drawn_where_they_were_computed():
         assert subject == ("Deployment as computed" if "position" in one else "Deployment")
     assert heights[1] == pytest.approx(heights[0], rel=1e-6)
     assert 1.02 * heights[0] < heights[2] <= 1.1 * heights[0]
+
+
+def test_more_states_are_equal_steps_of_the_mean_angle(deployed):
+    moments = instants(deployed, 4)
+    assert [name for name, _ in moments] == ["stowed", "stage 1", "stage 2", "deployed"]
+    means = [float(angles.mean()) for _, angles in moments]
+    course = deployed["opening_angle"].dropna("time", how="any").mean(("plane", "section"))
+    for k in (1, 2):
+        wanted = means[0] + k * (means[-1] - means[0]) / 3.0
+        assert abs(means[k] - wanted) <= 1.01 * float(abs(course.diff("time")).max())
+    with pytest.raises(ValueError, match="states = 1 must be at least 2"):
+        instants(deployed, 1)

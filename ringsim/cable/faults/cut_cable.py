@@ -5,8 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ringsim.cable.faults.family import CableFault
-from ringsim.cable.ropes import Ropes
-from ringsim.cable.state import ChainState
+from ringsim.cable.ropes import Array, Ropes
 
 
 class CutCable(CableFault):
@@ -19,6 +18,13 @@ class CutCable(CableFault):
     span: Annotated[int, Field(ge=1)]
     """Name, as "section 6 V to second hinge", or number, counted from 1 at the winch."""
 
-    def strike(self, ropes: Ropes, state: ChainState) -> Ropes:
+    def change(self, ropes: Ropes, stored: Array, wound: Array) -> Ropes:
         """Let go of the rope that holds the span."""
         return ropes.cut(self.cable - 1, self.span - 1)
+
+    def clear(self, ropes: Ropes) -> Ropes:
+        """Never."""
+        raise ValueError(
+            f"faults: the rope of cable {self.cable} that parted at {self.time:g} s cannot be made "
+            "whole: keep that fault, or take a state before it (--at)"
+        )

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from ringsim.cable.ropes import Ropes
+from ringsim.cable.ropes import Array, Ropes
 from ringsim.cable.state import ChainState
 from ringsim.parts.faults.family import Fault
 
@@ -16,8 +16,19 @@ class CableFault(Fault):
     """Which cable of the scene, "upper" or "lower", or its number from 1: the upper one first."""
 
     def strike(self, ropes: Ropes, state: ChainState) -> Ropes:
-        """The ropes after the fault, from those before it and the chain at that instant.
+        """The ropes after the fault, from those before it and the chain at that instant; ValueError
+        as of ``change``.
+        """
+        return self.change(ropes, state.stored, state.wound)
+
+    def change(self, ropes: Ropes, stored: Array, wound: Array) -> Ropes:
+        """The ropes after the fault, with the natural length in each span, m, shape (spans,), and
+        the rope wound at both ends of each cable, m, shape (cables, 2), at that instant.
 
         ValueError if the cable or the place on it does not exist.
         """
+        raise NotImplementedError
+
+    def clear(self, ropes: Ropes) -> Ropes:
+        """The ropes after the fault is cleared; ValueError if it cannot be."""
         raise NotImplementedError

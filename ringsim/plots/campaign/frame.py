@@ -23,6 +23,7 @@ LOOKS = {
     "partly deployed": (style.ORANGE, "D"),
     "stalled": (style.VERMILLION, "s"),
     "overloaded": (style.PURPLE, "^"),
+    "slackened": ("#b8860b", "<"),
     "cut off": (style.GREEN, "v"),
 }
 """Colour and marker of an ending; the marker tells what the colour may not."""
