@@ -21,7 +21,7 @@ from ringsim.plots.run import PICTURES, draw_run
 from ringsim.plots.section_map import section_map
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
-from ringsim.variables import Outcome, Status
+from ringsim.variables import Fate, Outcome, Status
 
 DRAWINGS = [opening_angles, asynchrony, rod_stress, energy, ring, section_map]
 CHARTS = [opening_angles, asynchrony, rod_stress, energy, section_map]
@@ -276,3 +276,19 @@ def test_importing_the_figures_changes_no_global_setting():
     )
     found = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True)
     assert found.returncode == 0, found.stderr
+
+
+def test_a_long_ending_stands_clear_of_what_is_above_the_axes(deployed):
+    """Words of the lock above the right end of the axes, and the second line of the ending."""
+    long = deployed.assign(outcome=int(Fate.OVERLOADED))
+    long.attrs = long.attrs | {"reason": "all V-joints have locked; a limit was passed " * 6}
+    figure = opening_angles(long)
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    (lock,) = [text for text in axes.texts if text.get_text().startswith("all locked")]
+    (title,) = [
+        text for text in axes.findobj(mpl.text.Text) if text.get_text().startswith("Overloaded")
+    ]
+    ending = title.get_window_extent()
+    assert ending.height > 1.5 * lock.get_window_extent().height  # two lines
+    assert not ending.overlaps(lock.get_window_extent())
