@@ -20,7 +20,7 @@ from ringsim.engine.build import build
 from ringsim.engine.integrate import Integration
 from ringsim.scene import Scene, load_scene
 from ringsim.stepping.locks import lock_times
-from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.theory.statics import OneCoordinate, opening_time
 
 
 @dataclass(frozen=True)

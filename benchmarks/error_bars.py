@@ -31,7 +31,7 @@ from typing import Any
 
 import numpy as np
 
-from ringsim.outputs.error_bars import OF_DIFFERENCE, bar, differences, largest, refined, rules
+from ringsim.outputs.balance import OF_DIFFERENCE, bar, differences, largest, refined, rules
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import FIDELITIES
 from ringsim.variables import Outcome, Status

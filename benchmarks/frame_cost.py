@@ -144,12 +144,12 @@ def growth(counts: list[int]) -> None:
 def profile(name: str) -> None:
     """Compiled kernels one by one, and the rest; counts and processor time."""
     import ringsim.frame.cables as cables
-    import ringsim.frame.factored as factored
+    import ringsim.frame.elimination as factored
     import ringsim.frame.integrate as integrate
     import ringsim.frame.laws as laws
-    import ringsim.frame.meter as meter
     import ringsim.frame.model as model
-    import ringsim.frame.net as net
+    import ringsim.frame.readings as meter
+    import ringsim.frame.springs as net
 
     scene = scene_of(name)
     integrate.solve(scene.with_values({"solver.end_time": 0.5, "record.interval": 0.1}))

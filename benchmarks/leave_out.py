@@ -19,7 +19,7 @@ import numpy as np
 
 from ringsim.choice import kind_of
 from ringsim.engine.build import build
-from ringsim.outputs.error_bars import differences, error_bars
+from ringsim.outputs.balance import differences, error_bars
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run

@@ -21,7 +21,7 @@ import numpy as np
 from exudyn.advancedUtilities import CreateSymbolicUserFunction
 from scipy.spatial.transform import Rotation
 
-from ringsim.structures.ring_geometry import RingGeometry
+from ringsim.structures.pantograph_ring import RingGeometry
 
 SECTIONS, HALF_BAR, HALF_DIAGONAL, OFFSET = 18, 0.2889, 0.4275, 0.006554
 OPENING, FORCE = math.radians(47.578), 0.015

@@ -14,7 +14,7 @@ import subprocess
 import sys
 
 from ringsim.scene import load_scene
-from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.theory.statics import OneCoordinate, opening_time
 
 OURS = """
 import ringsim, time

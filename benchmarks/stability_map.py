@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from ringsim.campaign.panels import Panel, Sweep, by_engines
-from ringsim.cli.stability import draw_map
+from ringsim.cli.studies import draw_map
 from ringsim.scene import load_scene
 
 

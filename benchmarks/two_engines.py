@@ -38,11 +38,11 @@ from random_scenes import random_scene
 
 from ringsim.engine.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
-from ringsim.outputs.error_bars import differences, error_bars, largest, rules
+from ringsim.outputs.balance import differences, error_bars, largest, rules
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
-from ringsim.stepping.restarts import run_with_restarts
+from ringsim.stepping.ending import run_with_restarts
 from ringsim.variables import Outcome
 
 ENGINES = {"exudyn": by_exudyn, "frames": by_frames}

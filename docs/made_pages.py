@@ -4,7 +4,6 @@ A page asks for it with a line such as ``<!-- made: keys scene -->``; nothing of
 """
 
 import ast
-import importlib
 import os
 import re
 from collections.abc import Callable, Iterable
@@ -13,14 +12,12 @@ from pathlib import Path
 import click
 
 import ringsim
-from ringsim.cable.places import path_of, points_of, spans_of
-from ringsim.cli import VERBS
+from ringsim.cable.records import path_of, points_of, spans_of
+from ringsim.cli import VERBS, command_of
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
-from ringsim.reference.docstrings import words_of
-from ringsim.reference.keys import Key, keys_of, kind_in
-from ringsim.reference.tree import places
-from ringsim.reference.words import common, facts
+from ringsim.reference.keys import Key, keys_of, kind_in, words_of
+from ringsim.reference.tree import common, facts, places
 from ringsim.units import Model
 from ringsim.variables import Variable
 
@@ -110,7 +107,7 @@ def commands() -> str:
     """The help of every verb."""
     parts = []
     for verb in VERBS:
-        command: click.Command = importlib.import_module(f"ringsim.cli.{verb}").command
+        command = command_of(verb)
         context = click.Context(command, info_name=f"ringsim {verb}", max_content_width=96)
         context.help_option_names = ["-h", "--help"]
         parts.append(f"## ringsim {verb}\n\n```text\n{command.get_help(context)}\n```")

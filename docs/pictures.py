@@ -15,7 +15,7 @@ import xarray as xr
 from PIL import Image
 
 import ringsim
-from ringsim.plots.campaign.fan import fan
+from ringsim.plots.campaign.courses import fan
 from ringsim.plots.ring import ring
 
 ROOT = Path(__file__).parents[1]

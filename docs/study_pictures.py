@@ -17,17 +17,16 @@ import xarray as xr
 from matplotlib.figure import Figure
 from pictures import save
 
-from ringsim.analysis.binomial import share_interval
-from ringsim.analysis.campaign_samples import endings
-from ringsim.analysis.quantities import good
+from ringsim.analysis.design import endings
+from ringsim.analysis.intervals import good, share_interval
 from ringsim.analysis.tails import replicated_interval, subset_simulation
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import LOOKS
 from ringsim.sampling.subset_levels import Repetition, levels
 from ringsim.scene import scene_from_toml
 from ringsim.theory.drive import Drive
-from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.theory.resistances.family import Opening, resistances
+from ringsim.theory.mechanism import Mechanism
+from ringsim.theory.resistances import Opening, resistances
 from ringsim.variables import PLANES
 
 NEVER = 66.0

@@ -12,10 +12,8 @@ import numpy as np
 import ringsim
 from ringsim.layout.bodies import Lump
 from ringsim.layout.draft import Draft
-from ringsim.layout.layout import Layout, layout_of
-from ringsim.layout.mobility import internal_mobility
-from ringsim.structures.pantograph_ring import PantographRing
-from ringsim.structures.pantograph_sections import add_sections
+from ringsim.layout.layout import Layout, internal_mobility, layout_of
+from ringsim.structures.pantograph_ring import PantographRing, add_sections
 from ringsim.units import Metre
 
 

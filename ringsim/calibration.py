@@ -5,7 +5,7 @@ from functools import cache
 
 from scipy.optimize import brentq
 
-from ringsim.cable.bracket.bar_half import BarHalfBracket
+from ringsim.cable.records import BarHalfBracket
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError
 from ringsim.scene import Scene

@@ -5,7 +5,7 @@ import re
 import tomllib
 from typing import Any
 
-from ringsim.cable.places import number_of, path_of
+from ringsim.cable.records import number_of, path_of
 from ringsim.choice import kinds_of
 from ringsim.refusal import InputError
 from ringsim.structures.family import Structure

@@ -8,12 +8,11 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from ringsim.layout.edge import natural_lengths
+from ringsim.layout.bodies import Array
+from ringsim.layout.draft import natural_lengths
 from ringsim.layout.layout import Layout, layout_at_opening, layout_of
 from ringsim.layout.points import Points, points_of
-from ringsim.layout.pose import Array
-from ringsim.parts.net.boundary import BoundaryNet
-from ringsim.parts.net.hub import SpringNet
+from ringsim.parts.net import BoundaryNet, SpringNet
 from ringsim.scene import Scene
 
 COMPUTED = "positions as computed"

@@ -14,20 +14,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ringsim.cable import regularisation
+from ringsim.cable import friction
 from ringsim.choice import kind_of
 from ringsim.compile_cache import compile_once
-from ringsim.outputs.error_bars import with_bars
+from ringsim.outputs.balance import with_bars
 from ringsim.outputs.family import holds
-from ringsim.outputs.stored import StoredState
+from ringsim.outputs.recorder import StoredState
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError, known_or_nearest, show
 from ringsim.scene import Scene, load_scene
 from ringsim.scene.substituted import substituted
+from ringsim.stepping.ending import run_with_restarts
 from ringsim.stepping.instant import Instant
-from ringsim.stepping.restarts import run_with_restarts
 from ringsim.stored_state import require_fit
-from ringsim.theory.margin_along import with_margin
+from ringsim.theory.margin import with_margin
 from ringsim.threads import one_thread
 from ringsim.variables import GONE, Cause, Fidelity, Outcome, Status
 
@@ -51,7 +51,7 @@ def run(
     """Build and integrate a scene; one that fails or diverges starts anew with smaller steps.
 
     The outcome has arrays on the scene's output grid, of the last start, and what
-    :func:`ringsim.stepping.restarts.run_with_restarts` adds on the starts; times are those of all
+    :func:`ringsim.stepping.ending.run_with_restarts` adds on the starts; times are those of all
     of them and of the second run for error bars.  A solve that fails or does not reach its goal
     has a status other than OK and the reason; it never raises.  ``watch`` is called with every
     accepted state.
@@ -89,7 +89,7 @@ def run_frame(
 
     if start is None and scene.record.state_interval is None:
         return _run(solve, Fidelity.FRAME, scene, watch, refusal=(InputError,))
-    from ringsim.frame.storing import solve as solve_storing
+    from ringsim.frame.integrate import solve_and_store as solve_storing
 
     storing = partial(solve_storing, start=start)
     before = [] if start is None else start.scenes
@@ -189,7 +189,7 @@ def _with_remark(outcome: Outcome, scene: Scene) -> Outcome:
     """The outcome; its reason ends with the cables whose pulley friction is reduced, if any.
 
     A law with feedback finds its speed in the run, and a scene may set the slip speed, so this is
-    judged afterwards, by the length wound until deployed; see ``ringsim.cable.regularisation``.
+    judged afterwards, by the length wound until deployed; see ``ringsim.cable.friction``.
     """
     values = outcome.values
     if scene.cables is None or outcome.status.failed or "wound_length" not in values:
@@ -199,12 +199,12 @@ def _with_remark(outcome: Outcome, scene: Scene) -> Outcome:
     for plane, cable in scene.cables.present():
         pulleys = scene.pulleys_of(cable)
         slip = cable.slip_speed_over(pulleys)
-        speed = regularisation.usual_winding(times[before], values["wound_length"][plane, before])
+        speed = friction.usual_winding(times[before], values["wound_length"][plane, before])
         right_angle = np.full(pulleys, 0.5 * np.pi)
         decay = -cable.friction.log_decay(right_angle, cable.pulley_radius).min(initial=0.0)
-        excess = regularisation.excess(slip, speed, pulleys, float(decay))
-        if speed > 0.0 and excess > regularisation.TOLERATED:
-            most = regularisation.slip_speed(speed, pulleys)
+        excess = friction.excess(slip, speed, pulleys, float(decay))
+        if speed > 0.0 and excess > friction.TOLERATED:
+            most = friction.slip_speed(speed, pulleys)
             faded[f"cables.{scene.structure.planes[plane]}.slip_speed"] = slip, most, 100.0 * excess
     if not faded:
         return outcome

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ringsim.layout.layout import layout_of
-from ringsim.outputs.stored import FORMAT, StoredState
+from ringsim.outputs.recorder import FORMAT, StoredState
 from ringsim.refusal import InputError, show
 from ringsim.scene import Scene, scene_from_toml
 

@@ -85,7 +85,7 @@ class Fate(Code):
     FOLDED = 4
     """Every V-joint has reached the stowed stop."""
     OVERLOADED = 5
-    """A limit of the scene was passed; see ``ringsim.parts.limits``."""
+    """A limit of the scene was passed; see ``ringsim.parts.solver``."""
     CUT_OFF = 6
     """Still moving or driven at ``solver.end_time``."""
     FINISHED = 7
@@ -140,7 +140,7 @@ GONE = {
 
 @dataclass(frozen=True)
 class ErrorBar:
-    """How a variable's error bar follows from a second run; see ``ringsim.outputs.error_bars``."""
+    """How a variable's error bar follows from a second run; see ``ringsim.outputs.balance``."""
 
     words: str
     """What may be wrong, for the bar's ``long_name``."""

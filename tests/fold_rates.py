@@ -4,8 +4,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from ringsim.layout.pose import STEP
-from ringsim.structures.ring_geometry import Fold, RingGeometry
+from ringsim.layout.bodies import STEP
+from ringsim.structures.pantograph_ring import Fold, RingGeometry
 
 
 def fold_rate(ring: RingGeometry, phi: float) -> Fold:

@@ -16,12 +16,11 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from ringsim.cable.chain import Chain
-from ringsim.cable.state import ChainState
+from ringsim.cable.chain import Chain, ChainState
 from ringsim.parts.persection import at_section
 from ringsim.scene import Scene
-from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.mechanism import Mechanism
+from ringsim.theory.statics import OneCoordinate
 
 TIGHT = 1e-8
 """Local error of a step over the rate; the rates of angles and ropes are of order 0.01 to 1."""

@@ -29,9 +29,9 @@ class Ring:
 
         InputError if opening angles are not there.
         """
-        from ringsim.analysis import leaders
+        from ringsim.analysis import influence
 
-        found = leaders.often if "sample" in self._dataset.dims else leaders.over_time
+        found = influence.often if "sample" in self._dataset.dims else influence.over_time
         return found(self._dataset).assign_attrs(self._losses())
 
     def outcomes(self) -> "pd.DataFrame":
@@ -73,9 +73,8 @@ class Ring:
         """
         import pandas as pd
 
-        from ringsim.analysis.blocks import population_of
-        from ringsim.analysis.campaign_samples import requirements_of
-        from ringsim.analysis.requirements import read_requirements
+        from ringsim.analysis.design import population_of, requirements_of
+        from ringsim.analysis.verdicts import read_requirements
         from ringsim.analysis.worst import COLUMNS, command, worst
 
         self._require_samples("worst samples")
@@ -111,7 +110,7 @@ class Ring:
 
     def _losses(self) -> dict[str, str]:
         """The attribute that marks what lost runs bend; none for a run, and where they do not."""
-        from ringsim.analysis.losses import NOTE, losses
+        from ringsim.analysis.worst import NOTE, losses
 
         dataset = self._dataset
         note = (

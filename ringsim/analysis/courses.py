@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.quantities import Mask, good
-from ringsim.analysis.reading import blocks
+from ringsim.analysis.design import blocks
+from ringsim.analysis.intervals import Mask, good
 from ringsim.outputs.family import Array
 
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)

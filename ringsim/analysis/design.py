@@ -1,19 +1,82 @@
-"""How the samples of a campaign were placed, as far as it decides which statistics they allow."""
+"""How the samples of a campaign were placed, and what was read of them."""
 
+import hashlib
 import json
+import tomllib
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.blocks import blocks_of
-from ringsim.analysis.intervals import Array, standard_error
+from ringsim.analysis.intervals import good, numbers, standard_error, used
 from ringsim.choice import kind_of, kinds_of
 from ringsim.files import parse_toml
+from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
+from ringsim.sampling.columns import BLOCK_ROW
+from ringsim.sampling.designs.blocks import Grouped, stretches
 from ringsim.sampling.designs.family import Design
-from ringsim.sampling.designs.grouped import Grouped
+from ringsim.stepping.instant import Array
+from ringsim.variables import Fate, Status
+
+# The blocks of runs that designs for Sobol' indices and for screening are made of.
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """What every sample is within its block."""
+
+    rows: NDArray[np.str_]
+    """Shape (blocks, size): "A", "AB: GROUP", "B"; of trajectories "start", "up: GROUP", ..."""
+
+    @property
+    def size(self) -> int:
+        """Samples of a block."""
+        return int(self.rows.shape[1])
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of the groups that move, in the order of the first block."""
+        names = (row.partition(": ")[2] for row in self.rows[0].tolist())
+        return tuple(dict.fromkeys(name for name in names if name))
+
+    @property
+    def of_indices(self) -> bool:
+        """Whether they are for Sobol' indices; else they are trajectories."""
+        return bool(self.rows[0, 0] == "A")
+
+
+def blocks_of(campaign: xr.Dataset) -> Blocks | None:
+    """The blocks of a whole campaign; None if it has none, or is a selection of its samples."""
+    if BLOCK_ROW not in campaign or not campaign.sizes["sample"]:
+        return None
+    rows = campaign[BLOCK_ROW].to_numpy().astype(str)
+    whole = np.array_equal(campaign["sample"].to_numpy(), np.arange(len(rows)))
+    starts = np.flatnonzero(rows == rows[0])
+    size = int(starts[1]) if len(starts) > 1 else len(rows)
+    if not whole or len(rows) % size or (starts != np.arange(0, len(rows), size)).any():
+        return None
+    return Blocks(rows.reshape(-1, size))
+
+
+def population_of(campaign: xr.Dataset) -> xr.Dataset:
+    """The samples that stand for the population: of blocks for Sobol' indices those of A and B.
+
+    The other runs of a block repeat most of their values; in statistics they would count as if they
+    were more antennas.
+    """
+    blocks = blocks_of(campaign)
+    if blocks is None or not blocks.of_indices:
+        return campaign
+    return campaign.isel(sample=np.flatnonzero(np.isin(blocks.rows.ravel(), ["A", "B"])))
+
+
+# How the samples of a campaign were placed, as far as it decides which statistics they allow.
 
 
 @dataclass(frozen=True)
@@ -106,3 +169,278 @@ def placement(campaign: xr.Dataset) -> Placement:
     if issubclass(kind, Grouped) and (blocks := blocks_of(campaign)) is not None:
         block = blocks.size
     return Placement(str(table["kind"]), kind.population, kind.independent, int(given), block)
+
+
+# What became of each, and which one stands for many.
+
+
+NUMERICAL = ("energy_error", "constraint_error")
+"""Main numbers that tell about the solution, not about the antenna."""
+_EFFORT = ("wall_time",)
+
+
+def endings(campaign: xr.Dataset) -> NDArray[np.str_]:
+    """What became of each sample in words: an outcome, or why its numbers do not hold; (sample,).
+
+    >>> codes = {"status": ("sample", [0, 0, 7, -1]), "outcome": ("sample", [1, 3, 0, -1])}
+    >>> endings(xr.Dataset(codes)).tolist()
+    ['deployed', 'stalled', 'failed: memory', 'not run']
+    """
+    status = campaign["status"].to_numpy()
+    fates = campaign["outcome"].to_numpy() if "outcome" in campaign else np.zeros_like(status)
+    known = {int(fate) for fate in Fate}
+    words = []
+    for code, fate in zip(status.tolist(), fates.tolist(), strict=True):
+        if code < 0:
+            words.append("not run")
+        elif Status(code).failed:
+            words.append(f"failed: {Status(code).word.replace('_', ' ')}")
+        else:
+            named = Fate(fate) if fate in known else Fate.NONE
+            words.append("ok" if named == Fate.NONE else named.word.replace("_", " "))
+    return np.array(words, dtype=str)
+
+
+def told(campaign: xr.Dataset, counted: int) -> str:
+    """How many samples a statement counts, and what became of those that it does not.
+
+    ``counted`` are samples that are ``used`` and have the value in question.
+    """
+    words = endings(campaign)
+    ok = good(campaign)
+    left = [f"{count} {word}" for word, count in Counter(words[~ok].tolist()).items()]
+    if without := int(ok.sum()) - counted:
+        left.append(f"{without} without a value")
+    lost = f"; left out: {', '.join(left)}" if left else "; none lost"
+    return f"{counted} of {len(words)} samples{lost}"
+
+
+def scalars(campaign: xr.Dataset) -> list[str]:
+    """Main numbers of the antenna that some sample has, in the order of summaries."""
+    sound = used(campaign)
+    return [
+        name
+        for name, variable in VARIABLES.items()
+        if variable.summary is not None
+        and variable.dtype == "f8"
+        and name not in (*NUMERICAL, *_EFFORT)
+        and name in sound
+        and bool(np.isfinite(sound[name]).any())
+    ]
+
+
+def values_of(campaign: xr.Dataset, name: str) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Samples that are used and have a finite value, and these values."""
+    values = numbers(campaign, name)
+    known = good(campaign) & np.isfinite(values)
+    return campaign["sample"].to_numpy()[known], values[known]
+
+
+def judged_by(campaign: xr.Dataset) -> str:
+    """The number by which samples are ordered: asynchrony, or the time if there is none; ""."""
+    names = scalars(campaign)
+    return next((n for n in ("asynchrony_max", "deployment_time") if n in names), "")
+
+
+def median_and_worst(campaign: xr.Dataset) -> tuple[int, int] | None:
+    """The samples in the middle and at the worst end of that order; None if no sample is used."""
+    if not (name := judged_by(campaign)):
+        samples = used(campaign)["sample"].to_numpy()
+        return (int(samples[0]), int(samples[0])) if len(samples) else None
+    samples, values = values_of(campaign, name)
+    order = np.argsort(VARIABLES[name].badness * values, kind="stable")
+    return int(samples[order[(len(order) - 1) // 2]]), int(samples[order[-1]])
+
+
+def inputs(campaign: xr.Dataset) -> list[str]:
+    """A variable for each drawn input: the first of those that share its values."""
+    found: dict[str, str] = {}
+    for name, variable in campaign.data_vars.items():
+        if variable.attrs.get("role") == "input":
+            # Files of older runs tell the paths that share values, and no name.
+            told = str(variable.attrs.get("input") or paths_of(variable))
+            found.setdefault(told, str(name))
+    return [*found.values()]
+
+
+def called(variable: xr.DataArray) -> str:
+    """The campaign file's own name of an input, which is its path where it has no other."""
+    says = variable.attrs
+    return str(says.get("input") or says.get("path") or variable.name)
+
+
+def paths_of(variable: xr.DataArray) -> list[str]:
+    """The scene's paths that take the values of an input: one, or all that share it."""
+    shared = distribution_of(variable).get("shared")
+    return shared or [str(variable.attrs.get("path") or variable.name)]
+
+
+def campaign_file(campaign: xr.Dataset) -> dict[str, Any]:
+    """The tables of the campaign's file, which the dataset keeps as text."""
+    return tomllib.loads(str(campaign.attrs.get("campaign", "")))
+
+
+def requirements_of(campaign: xr.Dataset) -> dict[str, dict[str, Any]]:
+    """What the campaign requires of its numbers: tables with min, max or is, by name."""
+    stored = campaign.attrs.get("requirements")
+    wanted = json.loads(stored) if stored else campaign_file(campaign).get("requirements", {})
+    return {name: each for name, each in wanted.items() if {"min", "max", "is"} & each.keys()}
+
+
+def distribution_of(variable: xr.DataArray) -> dict[str, Any]:
+    """A drawn input's distribution; {"text": ...} where it came out of a list."""
+    text = str(variable.attrs.get("distribution", ""))
+    try:
+        found = json.loads(text)
+    except ValueError:
+        found = None
+    return found if isinstance(found, dict) else {"text": text}
+
+
+# The drawn inputs of a campaign as columns of numbers: by mean, quarter, place, and by word.
+
+
+_MOST_WORDS = 12
+"""Different words of an input up to which each is a column of its own."""
+_LEAST_QUARTERED = 8
+"""Places of an input from which on each quarter of them has a mean of its own."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Columns of inputs, shape (samples, columns), those that are alike in all samples left out."""
+
+    names: tuple[str, ...]
+    values: Array
+    level: tuple[str, ...]
+    """Of each column: "input"; of one that has many places "mean", "quarter" and "place"."""
+    input: tuple[str, ...]
+    """Of each column the name of its input."""
+
+
+def drawn(campaign: xr.Dataset) -> Drawn:
+    """All drawn inputs by the names that the campaign's file gives them: one that several paths
+    share is one column; inputs of other names that are alike in all samples are one, too, which has
+    both names, since nothing tells them apart.
+    """
+    found: dict[str, tuple[Array, str, str]] = {}
+    for variable in (campaign[name] for name in inputs(campaign)):
+        if variable.attrs.get("path") == "solver.error_bars":
+            continue
+        own, values = called(variable), variable.to_numpy()
+        if values.dtype.kind in "OUS":
+            words = np.unique(values.astype(str))
+            if values.ndim == 1 and len(words) <= _MOST_WORDS:
+                for word in words[: 1 if len(words) == 2 else None]:
+                    is_so = (values.astype(str) == word).astype(float)
+                    found[f"{own} = {word}"] = is_so, "input", own
+        elif values.ndim == 1:
+            found[own] = values.astype(float), "input", own
+        else:
+            numbers = values.astype(float)
+            found[f"mean of {own}"] = numbers.mean(axis=1), "mean", own
+            if (count := numbers.shape[1]) >= _LEAST_QUARTERED:
+                for low, high in stretches(count, 4):
+                    mean = numbers[:, low:high].mean(axis=1)
+                    found[f"mean of {own}[{low + 1}..{high}]"] = mean, "quarter", own
+            for k, place in enumerate(place_names(campaign, variable)):
+                found[f"{own}[{place}]"] = numbers[:, k], "place", own
+    kept: dict[bytes, tuple[list[str], Array, str, list[str]]] = {}
+    for name, (column, level, own) in found.items():
+        if np.ptp(column) > 0:
+            key = hashlib.blake2b(column.tobytes()).digest()
+            names, _, _, owners = kept.setdefault(key, ([], column, level, []))
+            if own not in owners:  # the mean of one place is that place
+                names.append(name)
+                owners.append(own)
+    count = campaign.sizes["sample"]
+    values = np.array([column for _, column, _, _ in kept.values()]).reshape(-1, count).T
+    return Drawn(
+        tuple(" and ".join(names) for names, *_ in kept.values()), values,
+        tuple(level for _, _, level, _ in kept.values()),
+        tuple(owners[0] for *_, owners in kept.values()),
+    )  # fmt: skip
+
+
+def place_names(campaign: xr.Dataset, variable: xr.DataArray) -> list[str]:
+    """Names of the places of an input: those of its coordinate if it has one, else numbers."""
+    (dim,) = variable.dims[1:]
+    for name, coordinate in variable.coords.items():
+        if coordinate.dims == (dim,) and str(name).endswith("_name"):
+            return [f'"{each}"' for each in coordinate.values]
+    return [str(k + 1) for k in range(variable.sizes[dim])]
+
+
+# Reading the series of many samples block by block, so that memory does not grow with them.
+
+
+BLOCK_BYTES = 32 << 20
+"""Numbers of one variable that are read at once, about."""
+
+
+def blocks(campaign: xr.Dataset, names: Sequence[str]) -> Iterator[xr.Dataset]:
+    """Some variables over ``sample``, in memory, a block of successive samples at a time.
+
+    Slices of samples are what the file is compressed in; any other selection reads it many times.
+    """
+    count = campaign.sizes["sample"]
+    widest = max(campaign[name].nbytes for name in names) // max(count, 1)
+    size = max(1, BLOCK_BYTES // max(widest, 1))
+    for start in range(0, count, size):
+        yield campaign[list(names)].isel(sample=slice(start, start + size)).load()
+
+
+def any_finite(campaign: xr.Dataset, name: str) -> bool:
+    """Whether a variable has a number in a sample whose numbers hold."""
+    return any(
+        bool(np.isfinite(block[name].to_numpy()[good(block)]).any())
+        for block in blocks(campaign, [name, "status"])
+    )
+
+
+# Opening what ringsim has stored: campaigns and runs, by folder or by file.
+
+
+MERGED = "campaign.nc"
+
+
+def open_stored(path: Path) -> xr.Dataset:
+    """The dataset in a file, or of the campaign in a folder, loaded only as far as it is used.
+
+    What has one value a sample is in memory at once, for it is used again and again; series stay
+    in the file.
+    InputError if there is none, or it is not merged yet; close it, or use it in ``with``.
+    """
+    file = path
+    if path.is_dir():
+        file = path / MERGED
+        if not file.exists():
+            inside = (path / "design.nc").exists()
+            cure = "there is no campaign in it: give the folder that ringsim campaign named"
+            if inside and any(path.glob("journals/*")):
+                cure = f"its results are not merged yet: give ringsim merge {path} first"
+            elif inside:
+                cure = "no sample of it has run yet: give ringsim campaign the same file again"
+            raise InputError(f"{path}: this folder holds no {MERGED}: {cure}")
+    try:
+        found = xr.open_dataset(file, engine="netcdf4")
+        for variable in found.variables.values():
+            if len(variable.dims) < 2:
+                variable.load()
+        return found
+    except FileNotFoundError:
+        raise InputError(
+            f"{file}: there is no such file or folder: check its name, and the folder that you are "
+            "in"
+        ) from None
+    except (OSError, ValueError) as error:
+        if file.suffix == ".toml":
+            raise InputError(
+                f"{file}: this says what to run, and holds no results: give the folder that "
+                "ringsim campaign named, runs/NAME by default"
+            ) from None
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"{file}: cannot be read as a netCDF file: {reason}; give a file that ringsim has "
+            "written"
+        ) from None

@@ -1,27 +1,159 @@
-"""What matters: which inputs go with an output, and which separate failures from successes.
+"""What matters: which inputs go with an output, and which separate failures from successes."""
 
-The idea of ranking inputs by how they separate failures is that of NASA's Monte Carlo tool, NTRS
-20130001901.
-"""
-
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Collection, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.special import expit, logit
 
-from ringsim.analysis import ranks
-from ringsim.analysis.confounded import confounded
-from ringsim.analysis.design import Placement
-from ringsim.analysis.drawn import Drawn, drawn
-from ringsim.analysis.intervals import Array
-from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities
-from ringsim.analysis.requirements import OUTCOME, Requirement
+from ringsim.analysis import indices
+from ringsim.analysis.design import Drawn, Placement, drawn
+from ringsim.analysis.indices import centred_ranks, chance_of_each, largest_by_chance
+from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, used
 from ringsim.analysis.tails import subset_simulation
-from ringsim.analysis.verdicts import violations
+from ringsim.analysis.verdicts import OUTCOME, Requirement, violations
+from ringsim.refusal import InputError
+from ringsim.stepping.instant import Array
+from ringsim.tables import counted
 from ringsim.variables import GOALS, Fate
+
+# Pairs of inputs that go together, so that the effect of one may be told as the other's.
+
+
+_NAMED = 3
+"""Pairs that a note names at most."""
+
+
+class Pair(NamedTuple):
+    """Two columns of which one tells something about the other."""
+
+    first: int
+    second: int
+    correlation: float
+    """Their rank correlation."""
+    share: float
+    """Given-data index of the ranks of one by the other, the larger one; NaN of few samples."""
+
+    @property
+    def strength(self) -> float:
+        """Share of the variance of one that goes with the other, about."""
+        return float(np.fmax(self.correlation**2, self.share))
+
+
+def pairs(columns: Array, which: NDArray[np.bool_]) -> list[Pair]:
+    """Pairs of columns, shape (samples, columns), that go together more than the largest pair does
+    by chance in one case of 20, the strongest first: by rank correlation, or by given-data index,
+    since points of few samples in many dimensions may lie on lines that are not straight.
+
+    ``which``, shape (columns, columns), tells which pairs count.
+    """
+    samples, wide = columns.shape
+    which = np.triu(which | which.T, 1)
+    if samples < 3 or not which.any():
+        return []
+    # Three tests of each: the correlation, and the index in both directions.
+    among = 3 * int(which.sum())
+    ranks = centred_ranks(columns)
+    scale = np.sqrt((ranks**2).sum(axis=0))
+    ranks /= np.where(scale > 0, scale, 1.0)
+    matrix = ranks.T @ ranks
+    beyond = np.abs(matrix) > largest_by_chance(samples, np.zeros(()), among)
+    share = np.full((wide, wide), np.nan)
+    if samples >= indices.LEAST_SAMPLES:
+        chance = chance_of_each(among)
+        for k, column in enumerate(columns.T):
+            bins = indices.Bins(column)
+            share[k] = indices.given_data_indices(bins, ranks)
+            beyond[k] |= share[k] > indices.level_of_normal(bins, chance)
+        share = np.fmax(share, share.T)
+    first, second = np.nonzero(which & (beyond | beyond.T))
+    found = [
+        Pair(int(j), int(k), float(matrix[j, k]), float(share[j, k]))
+        for j, k in zip(first, second, strict=True)
+    ]
+    return sorted(found, key=lambda pair: -pair.strength)
+
+
+def _apart(inputs: Drawn) -> NDArray[np.bool_]:
+    """Which pairs of inputs nothing but the design makes correlate, shape (input, input): not a
+    mean with its own places, nor words of one input.
+    """
+    own, place = np.array(inputs.input), np.array(inputs.level) == "place"
+    return np.asarray((own[:, None] != own) | (place[:, None] & place))
+
+
+def confounded(inputs: Drawn, used: NDArray[np.bool_]) -> dict[str, Any]:
+    """Variables along ``pair``: the names of both inputs and their correlation; none without a
+    pair.  ``used``, shape (samples,), are the samples that count.
+    """
+    found = pairs(inputs.values[used], _apart(inputs))
+    if not found:
+        return {}
+    names = np.array(inputs.names, dtype=object)
+    about = {
+        "correlation": "rank correlation of the two inputs",
+        "share": "share of the variance of one of them, in ranks, that the other explains",
+    }
+    sides = {"first": "one input of the pair", "second": "the other input of the pair"}
+    told = {"units": "1"}
+    return {
+        f"pair_{name}": (
+            "pair",
+            names[[getattr(each, name) for each in found]],
+            {"long_name": word},
+        )
+        for name, word in sides.items()
+    } | {
+        f"pair_{name}": (
+            "pair",
+            [getattr(each, name) for each in found],
+            {"long_name": word} | told,
+        )
+        for name, word in about.items()
+    }
+
+
+def partners(analysis: xr.Dataset) -> dict[str, set[str]]:
+    """Of every input that goes with others in the samples, their names."""
+    found: dict[str, set[str]] = {}
+    for first, second, *_ in _pairs_in(analysis):
+        found.setdefault(first, set()).add(second)
+        found.setdefault(second, set()).add(first)
+    return found
+
+
+def confounding_notes(analysis: xr.Dataset, told: Collection[str]) -> list[str]:
+    """Which inputs among those that are told go with others, and what that means."""
+    found = [each for each in _pairs_in(analysis) if not {each[0], each[1]}.isdisjoint(told)]
+    if not found:
+        return []
+    named = ", ".join(
+        f"{first} with {second} ({share:.0%}, r = {correlation:+.2f})"
+        for first, second, correlation, share in found[:_NAMED]
+    )
+    more = f" and {counted(len(found) - _NAMED, 'other pair')}" * (len(found) > _NAMED)
+    return [
+        "inputs are not independent in these samples, which chance does not explain (share of the "
+        f"variance of one that the other explains, rank correlation): {named}{more}; the effect of "
+        "one may be told as the other's: draw more samples, or a design of kind random"
+    ]
+
+
+def _pairs_in(analysis: xr.Dataset) -> list[tuple[str, str, float, float]]:
+    if "pair" not in analysis.dims:
+        return []
+    names = ("pair_first", "pair_second", "pair_correlation", "pair_share")
+    columns = [analysis[name].values.tolist() for name in names]
+    return list(zip(*columns, strict=True))
+
+
+# What matters: which inputs go with an output, and which separate failures from successes.
+#
+# The idea of ranking inputs by how they separate failures is that of NASA's Monte Carlo tool, NTRS
+# 20130001901.
+
 
 LEAST = 8
 """Samples below which there is no correlation to speak of."""
@@ -50,7 +182,7 @@ def influence(
         return xr.Dataset()
     found: dict[str, Any] = {}
     index, ok = campaign["sample"].to_numpy(), good(campaign)
-    columns, last = ranks.Columns(inputs.values), np.ones(len(ok), dtype=bool)
+    columns, last = indices.Columns(inputs.values), np.ones(len(ok), dtype=bool)
     for name in quantities():
         if name not in campaign:
             continue
@@ -59,7 +191,7 @@ def influence(
         if known.sum() < LEAST or np.ptp(values[known]) == 0:
             continue
         if not np.array_equal(known, last):  # most outputs lack the same samples
-            columns, last = ranks.Columns(inputs.values[known]), known
+            columns, last = indices.Columns(inputs.values[known]), known
         replicate = placed.replicate_of(index[known])
         plain, partial = _correlated(columns, values[known], inputs, placed, replicate)
         for word, (middle, ends) in {"": plain, "partial_": partial}.items():
@@ -104,7 +236,7 @@ def _told(
 
 
 def _correlated(
-    columns: ranks.Columns, output: Array, inputs: Drawn, placed: Placement,
+    columns: indices.Columns, output: Array, inputs: Drawn, placed: Placement,
     replicate: NDArray[np.int64] | None,
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:  # fmt: skip
     """Plain and partial rank correlations, shape (input,), with intervals, shape (input, 2)."""
@@ -112,13 +244,13 @@ def _correlated(
     own = level == "input"
 
     def plain(rows: Any) -> Array:
-        return ranks.correlations(columns.ranks(rows), output[rows])
+        return indices.correlations(columns.ranks(rows), output[rows])
 
     def partial(rows: Any) -> Array:
         found, x = np.full(len(level), np.nan), columns.ranks(rows)
         for each in (each for each in _LEVELS if (level == each).any() or each == "mean"):
             held = own | (level == each)
-            found[held] = ranks.partial_correlations(x[:, held], output[rows])
+            found[held] = indices.partial_correlations(x[:, held], output[rows])
         return found
 
     every, held = np.ones(len(output), dtype=bool), _held(level)
@@ -128,10 +260,10 @@ def _correlated(
         if placed.has_intervals and replicate is None:
             for count in np.unique(others):
                 some = np.broadcast_to(others == count, level.shape)
-                both = ranks.correlation_interval(middle[some], len(output), int(count))
+                both = indices.correlation_interval(middle[some], len(output), int(count))
                 ends[some] = np.stack(both, axis=1)
         elif placed.has_intervals and replicate is not None:
-            both = ranks.replicate_interval(measure, replicate, ranks.to_normal, np.tanh)
+            both = indices.replicate_interval(measure, replicate, indices.to_normal, np.tanh)
             ends = np.stack(both, axis=1)
         results.append((middle, ends))
     return results[0], results[1]
@@ -171,18 +303,88 @@ def _separated(
 ) -> tuple[Array, Array]:
     """Areas of a group, shape (input,), and their intervals, shape (input, 2)."""
     columns, group = inputs.values[of], own[of]
-    middle, replicate = ranks.areas(columns, group), placed.replicate_of(index[of])
+    middle, replicate = indices.areas(columns, group), placed.replicate_of(index[of])
     if not placed.has_intervals:
         return middle, np.full((len(middle), 2), np.nan)
     if replicate is None:
         inside = int(group.sum())
-        return middle, np.stack(ranks.area_interval(middle, inside, len(group) - inside), axis=1)
+        return middle, np.stack(indices.area_interval(middle, inside, len(group) - inside), axis=1)
 
     def measure(rows: Mask) -> Array:
         some = group[rows]
         if some.all() or not some.any():
             return np.full(len(middle), np.nan)
-        found = ranks.areas(columns[rows], some)
+        found = indices.areas(columns[rows], some)
         return np.where((found > 0) & (found < 1), found, np.nan)
 
-    return middle, np.stack(ranks.replicate_interval(measure, replicate, logit, expit), axis=1)
+    return middle, np.stack(indices.replicate_interval(measure, replicate, logit, expit), axis=1)
+
+
+# Which V-joint is ahead of all others, and which is behind.
+
+
+_WHO = {"leader": "leads", "laggard": "lags"}
+
+
+def over_time(run: xr.Dataset) -> xr.Dataset:
+    """The most and the least open joint of a run over time, in words, and their distance.
+
+    Among joints that are equally open the first one stands; empty and NaN where nothing was
+    recorded.
+    """
+    if "opening_angle" not in run:
+        raise InputError("leader: needs opening_angle, which this dataset does not hold")
+    angles = run["opening_angle"].transpose("time", "plane", "section")
+    rows = angles.to_numpy().reshape(angles.sizes["time"], -1)
+    names = np.array(
+        [f"{p} {s}" for p in run["plane"].to_numpy() for s in run["section"].to_numpy()]
+    )
+    known = np.isfinite(rows).all(axis=1)
+    filled = np.where(known[:, None], rows, 0.0)
+    found = {
+        "leader": (filled.argmax(axis=1), "V-joint that is most open"),
+        "laggard": (filled.argmin(axis=1), "V-joint that is least open"),
+    }
+    apart = np.where(known, np.ptp(filled, axis=1), np.nan)
+    return xr.Dataset(
+        {
+            name: ("time", np.where(known, names[joint], ""), {"long_name": words})
+            for name, (joint, words) in found.items()
+        }
+        | {
+            "asynchrony": (
+                "time", apart,
+                {"long_name": "how far they are apart", "units": angles.attrs.get("units", "")},
+            )
+        },
+        coords={"time": run["time"]},
+    )  # fmt: skip
+
+
+def often(campaign: xr.Dataset) -> xr.Dataset:
+    """In how many samples each joint leads and lags at the largest asynchrony, (plane, section).
+
+    ``samples`` among the attributes are those that tell: their numbers hold, and their joints have
+    been apart.
+    """
+    needed = [f"asynchrony_{who}_{dim}" for who in _WHO for dim in ("plane", "section")]
+    if absent := [name for name in needed if name not in campaign]:
+        raise InputError(
+            f"leader: needs {absent[0]}, which this campaign has left out, or which its fidelity "
+            "does not tell"
+        )
+    good = used(campaign)
+    planes, sections = (campaign[dim].to_numpy().tolist() for dim in ("plane", "section"))
+    found = xr.Dataset(coords={"plane": campaign["plane"], "section": campaign["section"]})
+    told = np.asarray(good[needed[0]].to_numpy() != "", dtype=bool)
+    for who, word in _WHO.items():
+        counts = np.zeros((len(planes), len(sections)), dtype="i8")
+        rows = good[f"asynchrony_{who}_plane"].to_numpy()[told]
+        columns = good[f"asynchrony_{who}_section"].to_numpy()[told]
+        np.add.at(
+            counts, ([planes.index(p) for p in rows], [sections.index(int(s)) for s in columns]), 1
+        )
+        words = {"long_name": f"samples in which the V-joint {word} most", "units": "1"}
+        found[word] = (("plane", "section"), counts, words)
+    found.attrs = {"samples": int(told.sum()), "of": campaign.sizes["sample"]}
+    return found

@@ -1,17 +1,23 @@
-"""Intervals of means, spreads and quantiles of independent samples, and of replicates of designs.
-
-Points of one Sobol or Latin hypercube design depend on each other: what scatters independently is
-its replicates.  All functions take the samples along the last axis.
-"""
+"""Intervals of means, spreads, quantiles and shares."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import binom, bootstrap, norm, t
+from scipy.stats import binom, binomtest, bootstrap, norm, t
 
-Array = NDArray[np.float64]
+from ringsim.outputs import COORDINATES, OUTPUTS
+from ringsim.outputs.family import Array
+from ringsim.variables import GOALS, Status, Variable
+
+# Intervals of means, spreads and quantiles of independent samples, and of replicates of designs.
+#
+# Points of one Sobol or Latin hypercube design depend on each other: what scatters independently is
+# its replicates.  All functions take the samples along the last axis.
+
+
 Interval = tuple[float, float]
 """Lower and upper end; NaN where there is none."""
 LEVEL = 0.95
@@ -266,3 +272,169 @@ def of_difference(
     half = np.sqrt(both) * t.ppf(0.5 + LEVEL / 2, both**2 / np.where(each > 0, each, 1.0))
     half = np.where(each > 0, half, 0.0)  # no scatter at all leaves no doubt
     return apart - half, apart + half
+
+
+# Arithmetic of shares: intervals of one, exact, and of differences; samples that are needed.
+
+
+_MOST = 1 << 40
+
+
+def share_interval(count: int, samples: int, level: float = LEVEL) -> Interval:
+    """Two-sided exact interval of a share.  Source: Clopper and Pearson, Biometrika 26 (1934)."""
+    low, high = binomtest(count, samples).proportion_ci(level, method="exact")
+    return float(low), float(high)
+
+
+def share_bounds(count: int, samples: int, confidence: float) -> Interval:
+    """The lower and the upper one-sided bound of a share, each with the confidence by itself."""
+    low = binomtest(count, samples, alternative="greater").proportion_ci(confidence, "exact").low
+    high = binomtest(count, samples, alternative="less").proportion_ci(confidence, "exact").high
+    return float(low), float(high)
+
+
+def samples_needed(violations: int, probability: float, confidence: float) -> int:
+    """The least number of samples, so many of them violations, that shows a probability.
+
+    It is shown when fewer violations, or as many, would come with a probability of at most
+    1 - confidence if the antenna just missed it.
+
+    >>> samples_needed(0, 0.99, 0.9), samples_needed(0, 0.99865, 0.9)
+    (230, 1705)
+    """
+    low, high = violations, violations + 1
+    while not _shows(violations, high, probability, confidence) and high < _MOST:
+        low, high = high, 2 * high
+    while high - low > 1:
+        middle = (low + high) // 2
+        if _shows(violations, middle, probability, confidence):
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+def _shows(violations: int, samples: int, probability: float, confidence: float) -> bool:
+    return bool(binom.cdf(violations, samples, 1.0 - probability) <= 1.0 - confidence)
+
+
+def _score(count: int, samples: int) -> Interval:
+    """The two-sided score interval of a share.  Source: Wilson, J. Am. Stat. Ass. 22 (1927)."""
+    low, high = binomtest(count, samples).proportion_ci(LEVEL, method="wilson")
+    return float(low), float(high)
+
+
+def difference_of_shares(first: tuple[int, int], second: tuple[int, int]) -> Interval:
+    """Interval of 95 % of the second share minus the first, of independent samples; each is a count
+    and the samples it is of.
+
+    Source: Newcombe, Statistics in Medicine 17 (1998) 873, method 10.
+
+    >>> [round(end, 4) for end in difference_of_shares((48, 80), (56, 70))]
+    [0.0524, 0.3339]
+    """
+    return _apart(first[0] / first[1], second[0] / second[1], _score(*first), _score(*second), 0.0)
+
+
+def difference_of_pairs(both: int, first: int, second: int, neither: int) -> Interval:
+    """Interval of 95 % of the second share minus the first among pairs, by how many pairs are of
+    the kind in both, in the first alone, in the second alone and in neither.
+
+    Source: Newcombe, Statistics in Medicine 17 (1998) 2635, method 10.
+    """
+    count, product = both + first + second + neither, float(both * neither - first * second)
+    margins = (both + first) * (second + neither) * (both + second) * (first + neither)
+    if product > 0:  # corrected for continuity
+        product = max(product - count / 2, 0.0)
+    one, other = both + first, both + second
+    return _apart(
+        one / count, other / count, _score(one, count), _score(other, count),
+        product / margins**0.5 if margins else 0.0,
+    )  # fmt: skip
+
+
+def _apart(one: float, other: float, ends: Interval, others: Interval, together: float) -> Interval:
+    """The second minus the first from the interval of each and their correlation."""
+
+    def half(mine: float, its: float) -> float:
+        square = mine**2 - 2 * together * mine * its + its**2
+        return float(max(square, 0.0) ** 0.5)
+
+    middle = other - one
+    return (
+        middle - half(other - others[0], ends[1] - one),
+        middle + half(others[1] - other, one - ends[0]),
+    )
+
+
+# The numbers of a result that statistics are about, and the samples whose numbers hold.
+
+
+Mask = NDArray[np.bool_]
+"""One truth for each sample."""
+CHECKED = "_checked"
+"""How names of the full engine's answers end in the file of a campaign."""
+
+
+def quantities() -> dict[str, Variable]:
+    """All numbers without dimensions that tell of the antenna, and are no places."""
+    places = COORDINATES.keys() - {"time"}
+    return {
+        each.name: each
+        for output in OUTPUTS if output.of_antenna
+        for each in output.variables
+        if not each.dims and each.flags is None and each.dtype != "str"
+        and each.name.rpartition("_")[2] not in places
+    }  # fmt: skip
+
+
+def numbers(campaign: xr.Dataset, name: str) -> Array:
+    """A variable over samples as floats, NaN where it is missing, or the variable itself is."""
+    if name not in campaign:
+        return np.full(campaign.sizes["sample"], np.nan)
+    values = campaign[name].to_numpy().astype(float)
+    known = quantities().get(name.removesuffix(CHECKED))
+    # Missing counts are negative.
+    counts = known is not None and known.dtype.startswith("i")
+    return np.where(values < 0, np.nan, values) if counts else values
+
+
+def good(campaign: xr.Dataset) -> Mask:
+    """Which samples have numbers that hold."""
+    return np.asarray(campaign["status"].to_numpy() == Status.OK)
+
+
+def tells_of(campaign: xr.Dataset, name: str) -> Mask:
+    """Which samples tell of a variable: they have a value of it, or ended before what it is about
+    happened.  The others reached their goal with a model that does not compute it.
+    """
+    done = np.zeros(campaign.sizes["sample"], dtype=bool)
+    if "outcome" in campaign:
+        done = np.isin(campaign["outcome"].to_numpy(), GOALS)
+    return np.asarray(good(campaign) & ~(done & np.isnan(numbers(campaign, name))))
+
+
+def lost(campaign: xr.Dataset) -> Mask:
+    """Which samples have run and given no numbers that hold."""
+    return np.asarray(campaign["status"].to_numpy() >= Status.SOLVER_FAILED)
+
+
+def ran(campaign: xr.Dataset) -> Mask:
+    """Which samples have run; the others are neither lost nor without a value."""
+    return np.asarray(campaign["status"].to_numpy() >= Status.OK)
+
+
+def used(campaign: xr.Dataset) -> xr.Dataset:
+    """The samples whose numbers hold; the others are told, and never counted."""
+    return campaign.isel(sample=np.flatnonzero(good(campaign)))
+
+
+def worst_sample(campaign: xr.Dataset, variable: Variable) -> int:
+    """The sample whose numbers hold with the worst value; -1 without a value, or where neither end
+    is the worse one.  Of equal ones the first.
+    """
+    values = variable.badness * numbers(campaign, variable.name)
+    known = good(campaign) & np.isfinite(values)
+    if not variable.badness or not known.any():
+        return -1
+    return int(campaign["sample"].to_numpy()[np.argmax(np.where(known, values, -np.inf))])

@@ -11,15 +11,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis import effects, given_data, sobol_indices
-from ringsim.analysis.blocks import Blocks, blocks_of, population_of
-from ringsim.analysis.dependence import LEVEL, dependence
-from ringsim.analysis.design import Placement
-from ringsim.analysis.drawn import drawn
+from ringsim.analysis import indices
+from ringsim.analysis.design import Blocks, Placement, blocks_of, drawn, population_of
+from ringsim.analysis.indices import UNLIKELY, dependence
 from ringsim.analysis.influence import groups_of
-from ringsim.analysis.intervals import Array
-from ringsim.analysis.quantities import good, lost, numbers, quantities, ran
-from ringsim.analysis.requirements import Requirement
+from ringsim.analysis.intervals import good, lost, numbers, quantities, ran
+from ringsim.analysis.verdicts import Requirement
+from ringsim.stepping.instant import Array
 
 _LEAST_OF_A_KIND = 10
 """Samples that failed, and that did not, below which failure is no output to analyse."""
@@ -91,7 +89,7 @@ def sensitivity(
     here = (held[:, None] * size + np.arange(size)).ravel()
     index, columns = campaign["sample"].to_numpy()[here], inputs.values[here]
     count, block = len(here), None if blocks is None else np.repeat(np.arange(len(held)), size)
-    tested: dict[bytes, tuple[float, list[given_data.Bins]]] = {}
+    tested: dict[bytes, tuple[float, list[indices.Bins]]] = {}
     found: dict[str, Found] = {}
     counts, gone = np.zeros((len(outputs), 4), dtype=np.int64), lost(campaign)[here]
     chance = np.full(len(outputs), np.nan)
@@ -104,11 +102,11 @@ def sensitivity(
             tested[key] = dependence(missing, columns, block), []
         chance[k], bins = tested[key]
         counts[k] = whole.sum(), len(whole) - whole.sum(), missing.sum(), (missing & gone).sum()
-        if chance[k] < LEVEL:
+        if chance[k] < UNLIKELY:
             continue
         if blocks is None:
-            if whole.sum() >= given_data.LEAST:
-                bins += [given_data.Bins(c[whole]) for c in columns.T] if not bins else []
+            if whole.sum() >= indices.LEAST_SAMPLES:
+                bins += [indices.Bins(c[whole]) for c in columns.T] if not bins else []
                 found[name] = _given(bins, values[whole], index[whole], placed)
         elif whole.sum() >= _LEAST_BLOCKS:
             number = held[whole]
@@ -141,7 +139,7 @@ def _plain(placed: Placement) -> bool:
 def _sobol(values: Array, blocks: Blocks, replicate: NDArray[np.int64], *, binary: bool) -> Found:
     """Indices of the groups of blocks; ``binary`` outputs are 0 or 1."""
     groups = len(blocks.groups)
-    middle, ends = sobol_indices.indices_with_intervals(values, groups, replicate)
+    middle, ends = indices.indices_with_intervals(values, groups, replicate)
     told = np.column_stack([middle, ends])
     hits = values[:, [0, -1]]
     if binary and min((hits == 0).sum(), (hits == 1).sum()) < _LEAST_FOR_FIRST:
@@ -152,7 +150,7 @@ def _sobol(values: Array, blocks: Blocks, replicate: NDArray[np.int64], *, binar
     }
     if len(told) > 2 * groups:
         matrix = np.full((groups, groups, 3), np.nan)
-        for (j, k), each in zip(sobol_indices.pairs(groups), told[2 * groups :], strict=True):
+        for (j, k), each in zip(indices.pairs(groups), told[2 * groups :], strict=True):
             matrix[j, k] = matrix[k, j] = each
         found["second_order_index"] = (("factor", "other_factor"), matrix)
     return found
@@ -160,12 +158,12 @@ def _sobol(values: Array, blocks: Blocks, replicate: NDArray[np.int64], *, binar
 
 def _effects(values: Array, kept: Blocks, blocks: Blocks) -> Found:
     joint = np.array([f"moved: {group}" in blocks.rows[0] for group in blocks.groups])
-    told = effects.measured(effects.effects(values, kept, blocks.groups), joint)
-    return {name: (("factor",), each) for name, each in zip(effects.MEASURES, told, strict=True)}
+    told = indices.measured(indices.effects(values, kept, blocks.groups), joint)
+    return {name: (("factor",), each) for name, each in zip(indices.MEASURES, told, strict=True)}
 
 
 def _given(
-    bins: list[given_data.Bins], values: Array, index: NDArray[np.int64], placed: Placement
+    bins: list[indices.Bins], values: Array, index: NDArray[np.int64], placed: Placement
 ) -> Found:
     """Indices of all columns; intervals of designs whose parts are independent.
 
@@ -173,15 +171,15 @@ def _given(
     do not scatter as the correction for chance takes it.
     """
     replicate = placed.replicate_of(index)
-    part = index % given_data.PARTS if replicate is None else replicate
+    part = index % indices.PARTS if replicate is None else replicate
     part = np.unique(part, return_inverse=True)[1]
     certain = placed.has_intervals and placed.kind != "sobol" and part.max() > 0
     told, chance = np.full((len(bins), 3), np.nan), np.full((len(bins), 1), np.nan)
-    chance[:] = given_data.chance_level(bins, values)
+    chance[:] = indices.chance_level(bins, values)
     for k, each in enumerate(bins):
-        told[k, 0], left_out = given_data.index(each, values, part)
+        told[k, 0], left_out = indices.index(each, values, part)
         if certain:
-            told[k, 1:] = given_data.interval(told[k, 0], left_out)
+            told[k, 1:] = indices.interval(told[k, 0], left_out)
     return {"given_data_index": (("input",), told), "chance_level": (("input",), chance)}
 
 

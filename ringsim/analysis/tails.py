@@ -7,11 +7,18 @@ import numpy as np
 import xarray as xr
 from scipy.stats import chi2, norm
 
-from ringsim.analysis.binomial import share_bounds, share_interval
-from ringsim.analysis.intervals import LEVEL, Array, student
-from ringsim.analysis.quantities import CHECKED, good, lost
-from ringsim.sampling.designs.subset_simulation import SubsetSimulation
+from ringsim.analysis.intervals import (
+    CHECKED,
+    LEVEL,
+    good,
+    lost,
+    share_bounds,
+    share_interval,
+    student,
+)
+from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.sampling.subset_levels import Repetition
+from ringsim.stepping.instant import Array
 from ringsim.variables import Status
 
 DISAGREE = 0.01

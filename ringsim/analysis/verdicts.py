@@ -1,24 +1,294 @@
-"""Verdicts on requirements: met, not met, or not yet shown, with exact bounds.
+"""Requirements of a campaign and what its samples say of them, at one look or several."""
 
-They err on the safe side: nobody knows what lost runs would have done, so that they count as
-violating for "met", and as keeping to the requirement for "not met".
-"""
-
-from collections.abc import Mapping
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import takewhile
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
 from scipy.stats import t
 
-from ringsim.analysis.binomial import samples_needed, share_bounds
+from ringsim.analysis import intervals
 from ringsim.analysis.design import Placement
-from ringsim.analysis.intervals import Interval, standard_error
-from ringsim.analysis.looks import Levels, Rule, rule_of
-from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities, tells_of
-from ringsim.analysis.requirements import OUTCOME, Requirement
-from ringsim.refusal import InputError, known_or_nearest
+from ringsim.analysis.intervals import (
+    Interval,
+    Mask,
+    good,
+    lost,
+    numbers,
+    quantities,
+    samples_needed,
+    share_bounds,
+    standard_error,
+    tells_of,
+)
+from ringsim.outputs import VARIABLES
+from ringsim.outputs.balance import instead_of
+from ringsim.refusal import InputError, explain, known_or_nearest, show
+from ringsim.tables import counted, number_text
+from ringsim.units import Model
 from ringsim.variables import GOALS, Code, Fate, flags_of
+
+# Requirements of a campaign: which values an antenna must keep to, how probably, how surely.
+
+
+OUTCOME = "outcome"
+_WORDS = [fate.word for fate in Fate if fate != Fate.NONE]
+
+
+class Requirement(Model):
+    """What one output must be, with which probability, shown with which confidence."""
+
+    max: float | None = None
+    """Largest value allowed, in the output's unit."""
+    min: float | None = None
+    """Smallest value allowed, in the output's unit."""
+    is_: Annotated[str | None, Field(alias="is")] = None
+    """What the antenna must do; of the outcome alone."""
+    probability: Annotated[float, Field(gt=0.0, lt=1.0)]
+    """Share of all antennas, at least, that must keep to it."""
+    confidence: Annotated[float, Field(ge=0.5, lt=1.0)]
+    """Probability, at least, with which an antenna that does not keep to it is found out."""
+
+    def told(self, name: str) -> str:
+        """The requirement in words, with units."""
+        units = quantities()[name].units if name in quantities() else "1"
+        unit = "" if units == "1" else f" {units}"
+        bounds = {"<=": self.max, ">=": self.min, "is": self.is_}
+        given = [
+            f"{sign} {bound}" if isinstance(bound, str) else f"{sign} {bound:g}{unit}"
+            for sign, bound in bounds.items() if bound is not None
+        ]  # fmt: skip
+        return f"{name} {' and '.join(given)}"
+
+
+def _check(requirements: dict[str, Requirement]) -> dict[str, Requirement]:
+    """Refuse outputs that do not exist, and what their requirements cannot hold."""
+    known = [OUTCOME, *quantities()]
+    for name, each in requirements.items():
+        if name not in known:
+            why = f"is no output that can be required ({known_or_nearest(name, known)})"
+            if name in VARIABLES and VARIABLES[name].dims:
+                senses = {"largest": each.max, "least": each.min}
+                asked = [sense for sense, bound in senses.items() if bound is not None]
+                raise ValueError(instead_of(name, *asked))
+            raise ValueError(f"{name} {why}")
+        if name == OUTCOME:
+            if each.is_ not in _WORDS or each.max is not None or each.min is not None:
+                wrong = f"is = {show(each.is_)}" if each.is_ is not None else "is"
+                hint = known_or_nearest(str(each.is_), _WORDS)
+                raise ValueError(
+                    f'{name}.{wrong} must be a word for what the antenna does, as is = "deployed", '
+                    f"without max and min ({hint})"
+                )
+        elif each.is_ is not None:
+            raise ValueError(
+                f"{name}.is = {show(each.is_)}: only the outcome is a word: give max or min"
+            )
+        elif each.max is None and each.min is None:
+            unit = "" if (u := quantities()[name].units) == "1" else f", in {u}"
+            raise ValueError(f"{name} needs a bound: give max or min{unit}")
+        elif each.max is not None and each.min is not None and each.min >= each.max:
+            raise ValueError(f"{name}.min = {each.min:g} must be below max = {each.max:g}")
+    return requirements
+
+
+Requirements = Annotated[dict[str, Requirement], AfterValidator(_check)]
+"""Requirement by name of the output."""
+
+
+class _Holder(Model):
+    requirements: Requirements
+
+
+def to_json(requirements: dict[str, Requirement]) -> str:
+    """The text that files hold."""
+    adapter = TypeAdapter(dict[str, Requirement])
+    return adapter.dump_json(requirements, by_alias=True, exclude_none=True).decode()
+
+
+def read_requirements(table: Mapping[str, Any], source: str) -> dict[str, Requirement]:
+    """Requirements from a plain table; an InputError begins with ``source``."""
+    try:
+        return _Holder.model_validate({"requirements": dict(table)}).requirements
+    except ValidationError as error:
+        raise InputError(explain(error, _Holder, source)) from None
+
+
+def parse_requirements(texts: Iterable[str]) -> dict[str, Requirement]:
+    """Requirements from texts of the command line.
+
+    >>> parse_requirements(["asynchrony_max: max 10, probability 0.99, confidence 0.9"])
+    {'asynchrony_max': Requirement(max=10.0, min=None, is_=None, probability=0.99, confidence=0.9)}
+    """
+    table: dict[str, dict[str, Any]] = {}
+    for text in texts:
+        name, found, rest = re.match(r"\s*(\w*)\s*([:=]?)(.*)", text, re.DOTALL).groups()  # type: ignore[union-attr]
+        parts = [re.fullmatch(r"(\w+)[\s=]+(\S+)", part.strip()) for part in rest.split(",")]
+        if not name or not found or None in parts:
+            raise InputError(
+                f"--require {show(text)}: must read NAME: KEY VALUE, KEY VALUE, ..., for example "
+                '"asynchrony_max: max 10, probability 0.99, confidence 0.9" or "outcome: is '
+                'deployed, probability 0.99, confidence 0.9"'
+            )
+        if name in table:
+            raise InputError(f"--require {name} is given twice: leave out one of the two")
+        table[name] = {part[1]: _value(part[2]) for part in parts if part}
+    return read_requirements(table, "--require")
+
+
+def _value(word: str) -> Any:
+    try:
+        return float(word)
+    except ValueError:
+        return word.strip("\"'")
+
+
+# When a campaign may stop: the conditions, the looks at them, and how looks share an error.
+#
+# A bound that is computed again and again until it pleases holds less often than it says.  What a
+# requirement allows for error, one minus its confidence, is therefore shared by all looks at it:
+# the j-th gets its part 1 / (j (j + 1)), and all of them together no more than the whole.
+
+
+Levels = tuple[float, float]
+"""Confidence of the lower and of the upper bound of a probability."""
+
+
+class Condition(Model):
+    """A requirement on which the samples decide, or an output that is known precisely enough."""
+
+    requirement: str | None = None
+    """Name under [requirements]: holds once that is met, or not met."""
+    of: str | None = None
+    """Output whose mean, or ``quantile``, is to have an interval of 95 % of ``half_width``."""
+    quantile: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
+    """Probability below the quantile; the mean without it."""
+    half_width: Annotated[float, Field(gt=0.0)] | None = None
+    """Half the length of the interval, at most, in the output's unit."""
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> "Condition":
+        if (self.requirement is None) == (self.of is None):
+            raise ValueError(
+                "needs either requirement, as { requirement = NAME }, or of, as { of = NAME, "
+                "half_width = VALUE }"
+            )
+        if self.of is None and (self.quantile is not None or self.half_width is not None):
+            raise ValueError(
+                "quantile and half_width belong to of = NAME, and a requirement has its own "
+                "confidence: leave them out"
+            )
+        if self.of is not None and self.half_width is None:
+            raise ValueError(f"of = {self.of} needs half_width, in the unit of that output")
+        if self.of in VARIABLES and VARIABLES[self.of].dims:
+            raise ValueError(f"of = {instead_of(self.of)}")
+        if self.of is not None and self.of not in quantities():
+            hint = known_or_nearest(self.of, quantities())
+            raise ValueError(f"of = {self.of} is no output with an interval ({hint})")
+        return self
+
+    @property
+    def what(self) -> str:
+        """What is to be known precisely, in words."""
+        return f"mean of {self.of}" if self.quantile is None else f"{self.quantile} of {self.of}"
+
+
+class Looks(Model):
+    """After how many samples the conditions are judged: numbers that depend on nothing else."""
+
+    first: Annotated[int, Field(ge=8, le=10_000_000)] = 64
+    """Samples at the first look."""
+    growth: Annotated[float, Field(ge=1.1, le=10.0)] = 1.5
+    """Samples at a look over those at the one before."""
+
+    def numbers(self, replicates: int = 1) -> Iterator[int]:
+        """Samples at each look, without end; whole replicates of a design.
+
+        >>> numbers = Looks().numbers()
+        >>> [next(numbers) for _ in range(5)]
+        [64, 96, 144, 216, 324]
+        """
+        count = self.first
+        while True:
+            yield -(-count // replicates) * replicates
+            count = max(math.ceil(count * self.growth), count + replicates)
+
+
+def as_list(given: Any) -> Any:
+    """A list of what may be given alone."""
+    return [given] if isinstance(given, dict) else given
+
+
+class Rule(Model):
+    """All conditions, which must hold at the same look, and the looks."""
+
+    conditions: list[Condition]
+    looks: Looks = Looks()
+
+    def numbers(self, most: int, replicates: int = 1) -> list[int]:
+        """Samples at all looks before the last sample of ``most``."""
+        return list(takewhile(lambda count: count < most, self.looks.numbers(replicates)))
+
+    def judges(self, name: str) -> bool:
+        """Whether a requirement is among the conditions."""
+        return name in [each.requirement for each in self.conditions]
+
+    def levels(self, name: str, wanted: Requirement, samples: int, replicates: int = 1) -> Levels:
+        """Confidence of both bounds of a requirement after so many samples.
+
+        A part of the error goes to each look at which a verdict is possible: not to those with
+        fewer samples than "met" takes without a violation.  Those of one look without the rule.
+        """
+        if not self.judges(name):
+            return wanted.confidence, wanted.confidence
+        from ringsim.analysis.intervals import samples_needed  # scipy.stats takes half a second
+
+        needed = samples_needed(0, wanted.probability, wanted.confidence)
+        # A campaign that ends between two looks has the part of the one to come.
+        upper = [*self.numbers(samples, replicates), samples]
+        lower = [count for count in upper[:-1] if count >= needed] + [samples]
+        return _part(wanted.confidence, len(lower)), _part(wanted.confidence, len(upper))
+
+    def further_samples(
+        self, name: str, wanted: Requirement, samples: int, violations: int, replicates: int = 1
+    ) -> int:
+        """How many samples without a violation after so many would show it at a look."""
+        from ringsim.analysis.intervals import samples_needed
+
+        least = samples_needed(violations, wanted.probability, wanted.confidence)
+        for count in self.looks.numbers(replicates):
+            if count > samples and count >= least:
+                confidence = self.levels(name, wanted, count, replicates)[0]
+                if count >= samples_needed(violations, wanted.probability, confidence):
+                    return count - samples
+        raise AssertionError("looks have no end")
+
+
+def _part(confidence: float, number: int) -> float:
+    """The confidence left of one when the error of the looks' sum is that of another.
+
+    >>> _part(0.9, 1), round(_part(0.9, 2), 4)
+    (0.95, 0.9833)
+    """
+    return 1.0 - (1.0 - confidence) / (number * (number + 1))
+
+
+def rule_of(attributes: Mapping[Any, Any]) -> Rule | None:
+    """The rule that a design or a merged campaign keeps as ``stop_when``; None without one."""
+    stored = json.loads(str(attributes.get("stop_when", "null")))
+    return None if stored is None else Rule.model_validate(stored)
+
+
+# Verdicts on requirements: met, not met, or not yet shown, with exact bounds.
+#
+# They err on the safe side: nobody knows what lost runs would have done, so that they count as
+# violating for "met", and as keeping to the requirement for "not met".
 
 
 class Verdict(Code):
@@ -192,3 +462,76 @@ def verdict_of(low: float, high: float, probability: float) -> Verdict:
     if low >= probability:
         return Verdict.MET
     return Verdict.NOT_MET if high < probability else Verdict.NOT_YET_SHOWN
+
+
+# Whether the first samples of a campaign are enough, by its ``stop_when``.
+
+
+def holds(
+    rule: Rule, campaign: xr.Dataset, requirements: Mapping[str, Requirement], placed: Placement
+) -> str:
+    """What the samples of a look show, in words, if all conditions hold; else empty.
+
+    ``campaign`` has the samples of the look and no others, all of which have run, and its attribute
+    ``stop_when``.  InputError if a requirement cannot be judged by them.
+    """
+    told = []
+    for each in rule.conditions:
+        if each.requirement is not None:
+            wanted = {each.requirement: requirements[each.requirement]}
+            (code,) = judge(campaign, wanted, placed)["verdict"].to_numpy().tolist()
+            shown = code in (Verdict.MET, Verdict.NOT_MET)
+            word = Verdict(code).word.replace("_", " ")
+            told.append(f"{wanted[each.requirement].told(each.requirement)} is {word}")
+        else:
+            half, shown = _half_width(each, campaign, placed), False
+            units = quantities()[str(each.of)].units
+            unit = "" if units == "1" else f" {units}"
+            shown = half <= float(each.half_width or 0.0)
+            told.append(f"the {each.what} is known to {number_text(half, 3)}{unit}")
+        if not shown:
+            return ""
+    return ", ".join(told)
+
+
+def _half_width(condition: Condition, campaign: xr.Dataset, placed: Placement) -> float:
+    """Half the length of the interval of a mean or a quantile; NaN if there is none."""
+    values = numbers(campaign, str(condition.of))
+    known = good(campaign) & np.isfinite(values)
+    if known.sum() < 2 or not placed.has_intervals:
+        return float("nan")
+    used, replicate = values[known], placed.replicate_of(campaign["sample"].to_numpy()[known])
+    if condition.quantile is None:
+        low, high = (
+            intervals.of_independent(used, np.mean)
+            if replicate is None
+            else intervals.of_replicates(used, replicate, np.mean)
+        )
+    else:
+        low, high = (
+            intervals.quantile_of_independent(used, condition.quantile)
+            if replicate is None
+            else intervals.quantile_of_replicates(used, replicate, condition.quantile)
+        )
+    return float(high - low) / 2
+
+
+def stopping_lines(campaign: xr.Dataset, placed: Placement) -> list[str]:
+    """What became of the rule of a merged campaign, a line; none if it has none."""
+    says = campaign.attrs
+    if (rule := rule_of(says)) is None:
+        return []
+    count, most = campaign.sizes["sample"], int(says.get("planned_samples", 0))
+    if "stopped_after" in says:
+        taken = [*rule.numbers(count, placed.replicates), count]
+        first = f"stop_when ended the campaign after {count} of at most {most} samples, because "
+        first += str(says["stop_reason"])
+    else:
+        taken = rule.numbers(count, placed.replicates)
+        first = f"stop_when did not end the campaign of {count} samples"
+    looks = f"{counted(len(taken), 'look')}: {', '.join(map(str, taken))}" if taken else "no look"
+    kept = []
+    if any(each.requirement for each in rule.conditions):
+        kept.append("bounds of its requirements hold at all looks at once")
+    kept.append("other intervals are those of a number of samples fixed before")
+    return [f"{first} ({looks}); {', '.join(kept)}"]

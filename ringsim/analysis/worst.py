@@ -1,22 +1,126 @@
-"""The worst samples: of each requirement that is violated, of each outcome that falls short of the
-goal, and of each way in which runs were lost.
-"""
+"""The worst samples, what is unusual in them, and what lost runs leave open."""
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.intervals import Array
-from ringsim.analysis.quantities import Mask, good, lost, numbers, quantities, ran
-from ringsim.analysis.requirements import OUTCOME, Requirement
-from ringsim.analysis.unusual import NOTE, unusual
-from ringsim.analysis.verdicts import require_values, violations
+from ringsim.analysis.design import blocks_of, called, drawn, inputs, place_names
+from ringsim.analysis.indices import UNLIKELY, dependence
+from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, ran
+from ringsim.analysis.tails import subset_simulation
+from ringsim.analysis.verdicts import OUTCOME, Requirement, require_values, violations
+from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted
 from ringsim.variables import GOALS, Fate, Status
+
+# What is unusual in the inputs of a sample, in words.
+
+
+RARE = 0.2
+"""Share of the samples that are as far out, on the same side, up to which a value is unusual."""
+_MOST = 3
+"""Inputs that are told of a sample."""
+_ROUND_OFF = 1e-9
+"""Distance from the median, over the largest value, that is none."""
+_ZERO = 273.15
+"""0 C in K."""
+NOTE_ON_UNUSUAL = (
+    "unusual is an input that one sample in five, at most, has as far out on the same side; in "
+    "brackets the distance from the median of all samples, of temperatures the value in C"
+)
+
+
+class _Oddity(NamedTuple):
+    """An input of a sample, and the share of samples that have it as far out."""
+
+    share: float
+    words: str
+
+
+def unusual(campaign: xr.Dataset, places: list[int]) -> list[str]:
+    """For samples, by their places, the inputs that are farthest out among all samples, at most
+    three: "cold: temperature 235 K (-38 C, the lowest); pulleys 8.3e-4 m (+50 %)".
+
+    Of an input with m places the one that is farthest out among all values counts, with m times
+    the share: some place of every sample is far out by chance.  Its mean counts beside.
+    """
+    columns = [campaign[name] for name in inputs(campaign)]
+    columns = [each for each in columns if each.attrs.get("path") != "solver.error_bars"]
+    found = []
+    for place in places:
+        odd = [each for variable in columns for each in _odd(campaign, variable, place)]
+        chosen = sorted(odd, key=lambda each: each.share)[:_MOST]
+        found.append("; ".join(each.words for each in chosen) or "nothing unusual")
+    return found
+
+
+def _odd(campaign: xr.Dataset, variable: xr.DataArray, sample: int) -> Iterator[_Oddity]:
+    """The oddity of one input in a sample, by its place in the file; none if it is usual."""
+    values, name = variable.to_numpy(), called(variable)
+    if values.dtype.kind in "OUSb":
+        rows = values.reshape(len(values), -1).astype(str)
+        alike = int((rows == rows[sample]).all(axis=1).sum())
+        if alike <= RARE * len(rows):
+            word = ", ".join(dict.fromkeys(rows[sample].tolist()))
+            yield _Oddity(alike / len(rows), f"{name} = {word} (as in {alike} of {len(rows)})")
+        return
+    numbers, odd = values.astype(float), list[_Oddity]()
+    units = str(variable.attrs.get("units", "1"))
+    for each, of in (
+        [(numbers, [""])]
+        if numbers.ndim == 1
+        else [
+            (numbers, [_place(variable, p) for p in place_names(campaign, variable)]),
+            (numbers.mean(axis=1), ["mean of "]),
+        ]
+    ):
+        rows = each.reshape(len(each), -1)
+        apart = np.abs(rows[sample] - np.median(rows))
+        if apart.max() <= _ROUND_OFF * np.abs(rows).max():
+            continue
+        below = np.array([np.mean(rows < value) for value in rows[sample]])
+        above = np.array([np.mean(rows > value) for value in rows[sample]])
+        k = int(np.minimum(below, above).argmin())
+        # Of continuous values one of so many is the farthest, and has none beyond it.
+        share = rows.shape[1] * (min(below[k], above[k]) + 1.0 / rows.size)
+        if share <= RARE:
+            before, behind = (of[k], "") if of[k].endswith("of ") else ("", of[k])
+            told = _told(f"{before}{name}{behind}", rows, float(rows[sample, k]), units)
+            odd.append(_Oddity(share, told))
+    if odd:
+        yield min(odd)
+
+
+def _place(variable: xr.DataArray, name: str) -> str:
+    """As " of section 3"."""
+    dim = str(variable.dims[1]).replace("_", " ")
+    return f" of {name[1:-1]}" if name.startswith('"') else f" of {dim} {name}"
+
+
+def _told(name: str, rows: Array, value: float, units: str) -> str:
+    """A value among those of all samples."""
+    middle = float(np.median(rows))
+    end = {rows.min(): ", the lowest", rows.max(): ", the highest"}.get(value, "")
+    if units == "K":
+        word = "cold" if value < middle else "hot"
+        return f"{word}: {name} {value:.4g} K ({value - _ZERO:+.0f} C{end})"
+    unit = "" if units == "1" else f" {units}"
+    if rows.min() > 0.0 or rows.max() < 0.0:
+        ratio = value / middle
+        far = f"{100.0 * (ratio - 1.0):+.0f} %" if ratio < 3.0 else f"{ratio:.2g} times"
+    else:
+        far = f"{value - middle:+.2g}{unit}"
+    return f"{name} {value:.4g}{unit} ({far}{end})"
+
+
+# The worst samples: of each requirement that is violated, of each outcome that falls short of the
+# goal, and of each way in which runs were lost.
+
 
 MOST = 3
 """Samples that are told of each failure."""
@@ -156,4 +260,72 @@ def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:
         lines.append(f"worst of: {head}")
         for sample, value, odd, again in table.rows:
             lines += [f"  sample {sample}: {value}", f"    inputs: {odd}", f"    {again}"]
-    return [*lines, NOTE] if lines else []
+    return [*lines, NOTE_ON_UNUSUAL] if lines else []
+
+
+# Lost runs that bend what the others tell: which lines they bend, and the mark on these.
+#
+# Runs that are lost where inputs have certain values leave another population behind: its mean,
+# quantiles and shares are not those of the antenna, and their intervals tell nothing of that.
+
+
+MARK = " *"
+"""Stands behind what lost runs bend."""
+NOTE = "lost_runs"
+"""Attribute that says why, of an analysis and of each of its variables that is bent."""
+LOST = "lost"
+"""How names of groups and outcomes begin that are those of lost runs: all that ran tell them."""
+
+
+@dataclass(frozen=True)
+class Losses:
+    """The lost runs of a campaign, and whether they go with inputs."""
+
+    count: int
+    ran: int
+    chance: float
+    """Probability that runs lost at random go with inputs as much; NaN if none is lost."""
+
+    @property
+    def note(self) -> str:
+        """Why statistics are bent, in words; empty if they are not, as far as one can tell."""
+        if not self.chance < UNLIKELY:
+            return ""
+        p = f"p = {self.chance:.2g}" if round(self.chance, 4) else "p < 0.0001"
+        return (
+            f"{self.count} of {self.ran} runs are lost, and which ones goes with inputs ({p}): "
+            f"what is marked{MARK} tells of the other {self.ran - self.count} alone, another "
+            "population, and may be far off (run the lost ones again: ringsim campaign "
+            "--retry-failed, or narrow the inputs)"
+        )
+
+    @property
+    def mark(self) -> str:
+        """What stands behind a line that they bend; empty if they do not."""
+        return MARK if self.note else ""
+
+
+def losses(campaign: xr.Dataset) -> Losses:
+    """The lost runs of a merged campaign; subset simulation takes them as no event, and says so."""
+    run, gone = ran(campaign), lost(campaign)
+    count, chance = int(gone.sum()), np.nan
+    if count and subset_simulation(campaign) is None:
+        blocks, block = blocks_of(campaign), None
+        if blocks is not None:
+            block = np.unique(np.arange(len(run))[run] // blocks.size, return_inverse=True)[1]
+        chance = dependence(gone[run], drawn(campaign).values[run], block)
+    return Losses(count, int(run.sum()), chance)
+
+
+def marked(table: Table, analysis: xr.Dataset, column: int = 0) -> Table:
+    """A table with the mark in one column of each row, but of those about lost runs, if an analysis
+    says that its statistics are bent.
+    """
+    if not analysis.attrs.get(NOTE):
+        return table
+    rows, own = [], False
+    for row in table.rows:
+        own = row[0].startswith(LOST) if row[0] else own  # a blank repeats the one above
+        mark = "" if own else MARK
+        rows.append((*row[:column], f"{row[column]}{mark}", *row[column + 1 :]))
+    return table._replace(rows=rows)

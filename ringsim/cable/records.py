@@ -1,16 +1,19 @@
-"""Records of the cables of a scene and their winches."""
+"""Records of the cables of a scene: sheaves, places, brackets, winches."""
 
-from typing import Annotated, Literal, Self
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
 
+import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
-from ringsim.cable import regularisation
-from ringsim.cable.bracket.bisector import BisectorBracket
-from ringsim.cable.bracket.family import Bracket
-from ringsim.cable.friction.family import PulleyFriction
-from ringsim.cable.friction.frictionless import Frictionless
-from ringsim.cable.winding.family import FeedbackWinding, PrescribedWinding, Winding
-from ringsim.cable.winding.stall import StallWinding
+from ringsim.cable import friction as regularisation
+from ringsim.cable.friction import Frictionless, PulleyFriction
+from ringsim.cable.ropes import Array
+from ringsim.cable.winding import FeedbackWinding, PrescribedWinding, StallWinding, Winding
 from ringsim.choice import OneOf
 from ringsim.units import (
     AxialStiffness,
@@ -21,7 +24,72 @@ from ringsim.units import (
     SecondOrZero,
     SignedMetre,
     Tension,
+    Unit,
 )
+
+# The family of brackets: where the V pulley stands beside its V-joint.
+#
+# In the plane of an ideal section, with the bars at phi = (pi - delta) / 2 from the line of the
+# hinge pulleys, the joint stands l cos(phi) along that line from either of them and l sin(phi)
+# inwards. With the pulley a (along, to the second hinge pulley) and b (inwards) from the joint the
+# spans on either side of it have the lengths
+#
+#     L_1, L_2 = sqrt((l cos(phi) +- a)^2 + (l sin(phi) + b)^2).
+#
+# A kind gives a and b; b is the h of paper 000, eqs 20 and 21.
+
+
+_STEP = 1e-30
+"""rad; its square, which the complex step neglects, is nothing beside any angle."""
+
+
+class Bracket(Model):
+    """Any bracket; the pulley's distance from the V-joint's axis is the cable's block_offset."""
+
+    def refusal(self, opening_angle: float) -> str | None:
+        """Why it cannot open a ring that is stowed at this angle (deg), or None if it can."""
+        return None
+
+    def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
+        """Offsets a and b in m at bar angles (rad), of their shape.
+
+        Analytic in phi, which may be complex: ``path_slope`` differentiates it so.
+        """
+        raise NotImplementedError
+
+    def spans(self, half_bar: float, distance: float, opening: ArrayLike) -> tuple[Array, Array]:
+        """Lengths L_1 and L_2 at opening angles in rad, m."""
+        phi = 0.5 * (np.pi - np.asarray(opening))
+        aside, inward = self.place(phi, distance)
+        reach, drop = half_bar * np.cos(phi), half_bar * np.sin(phi) + inward
+        return np.sqrt((reach + aside) ** 2 + drop**2), np.sqrt((reach - aside) ** 2 + drop**2)
+
+    def path_slope(self, half_bar: float, distance: float, opening: ArrayLike) -> Array:
+        """Derivative of L_1 + L_2 after the opening angle, m/rad; a cable opens where negative."""
+        # Complex step: no difference of nearby lengths, hence exact to round-off.
+        lengths = self.spans(half_bar, distance, np.asarray(opening) + 1j * _STEP)
+        return np.asarray(sum(lengths).imag / _STEP)
+
+
+# A bracket that a gear keeps on the bisector of the bar halves.
+
+
+class BisectorBracket(Bracket):
+    """The pulley at a constant distance h from the joint, away from the bars on their bisector.
+
+    Both spans are alike at every angle.  Source: paper 000, eq. 20 and fig. 3 with constant h.
+    """
+
+    kind: Literal["bisector"] = "bisector"
+
+    def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
+        """Offsets a = 0, b = h."""
+        size = np.shape(phi)
+        return np.zeros(size), np.full(size, distance)
+
+
+# Records of the cables of a scene and their winches.
+
 
 AnyBracket = Annotated[Bracket, OneOf()]
 AnyFriction = Annotated[PulleyFriction, OneOf()]
@@ -32,7 +100,7 @@ LEAST_HELD = 1e-3
 RESTING = 1e-2
 """A motor that answers to the tension stands still below this share of its usual speed: it comes to
 rest exponentially, never quite, and a ring that just counts as resting takes up 0.7 % on
-``ring18-motor`` (``ringsim.stepping.rest``)."""
+``ring18-motor`` (``ringsim.stepping.ending``)."""
 
 
 class Winch(Model):
@@ -127,7 +195,7 @@ class Cable(Model):
     """Law by which tension falls over a pulley."""
     slip_speed: PositiveSpeed | None = None
     """Rope speed over a pulley at which 76 % of its friction acts; left out, it follows the winding
-    (``ringsim.cable.regularisation``)."""
+    (``ringsim.cable.friction``)."""
     slack_width: Annotated[Tension, Field(ge=1e-6)] = 0.05
     """Width of the transition from slack to taut; tension at the natural length is 0.69 of it."""
     initial_slack: SignedMetre = 0.0
@@ -188,3 +256,192 @@ class Cables(Model):
         """The cables that there are, with the number of their plane (0 upper, 1 lower)."""
         both = ((0, self.upper), (1, self.lower))
         return [(plane, cable) for plane, cable in both if cable is not None]
+
+
+# Names of the points of a cable's path and of its spans, in inputs, outputs and messages.
+
+
+CABLES = ("upper", "lower")
+OF_SECTION = ("first hinge", "V", "second hinge")
+"""Pulleys of a section; its first hinge assembly is the one next to the section before."""
+
+
+def points_of(sections: int) -> tuple[str, ...]:
+    """What a cable runs along, from section 1 on.
+
+    >>> points_of(1)
+    ('section 1 first hinge', 'section 1 V', 'section 1 second hinge')
+    """
+    return tuple(f"section {k} {place}" for k in range(1, sections + 1) for place in OF_SECTION)
+
+
+def path_of(points: Sequence[str], end: str) -> tuple[str, ...]:
+    """The path from the winch on: the winch, its pulleys, and the cable's end or other winch.
+
+    ``points`` are in the order of the sections, ``end`` is that of ``Cable``.
+
+    >>> path_of(points_of(1), "last")
+    ('winch', 'section 1 second hinge', 'section 1 V', 'section 1 first hinge')
+    """
+    path = points[::-1] if end == "last" else points
+    return ("winch", *path, *(("far winch",) if end == "both" else ()))
+
+
+def spans_of(path: Sequence[str]) -> tuple[str, ...]:
+    """Names of the spans by their ends; the section stands there once if both have the same.
+
+    >>> spans_of(path_of(points_of(1), "first"))[:2]
+    ('winch to section 1 first hinge', 'section 1 first hinge to V')
+    """
+    return tuple(f"{one} to {_short(one, other)}" for one, other in pairwise(path))
+
+
+def _short(before: str, name: str) -> str:
+    section = " ".join(name.split()[:2]) + " "
+    return name.removeprefix(section) if before.startswith(section) else name
+
+
+def number_of(name: str, names: Sequence[str], where: str, end: str = "") -> int:
+    """Number, from 1, of a named pulley or span; ValueError with the nearest name if unknown, or if
+    it is that of the cable's ``end``.
+    """
+    if name in names:
+        return names.index(name) + 1
+    if name == end:
+        raise ValueError(
+            f'{where}: the cable is fixed there and has no pulley: the last is "{names[-1]}"'
+        )
+    begun = [each for each in names if each.startswith(f"{name} ")]  # a span by its pulley
+    near = begun or difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    hint = f'did you mean "{near[0]}"?' if near else f'the first is "{names[0]}"'
+    raise ValueError(f"{where}: there is no place of that name ({hint})")
+
+
+def numbered(table: dict[str, Any], points: Sequence[str]) -> dict[str, Any]:
+    """A scene's table with numbers and lists for the pulleys and spans that it names.
+
+    These are ``cable``, ``pulley`` and ``span`` of faults, and tables of coefficients: ``default``
+    and one value for each named pulley.  ValueError if a name is unknown, or there is no default.
+    """
+    cables, faults = table.get("cables"), table.get("faults")
+    known = cables if isinstance(cables, dict) else {}
+    paths, present, changed = [], [], dict(known)
+    for name in CABLES if points else ():
+        if not isinstance(cable := known.get(name), dict):
+            continue
+        present.append(name)
+        paths.append(path_of(points, cable.get("end", "first")))
+        law = cable.get("friction")
+        if isinstance(law, dict) and isinstance(law.get("coefficient"), dict):
+            listed = _listed(law["coefficient"], paths[-1], f"cables.{name}.friction.coefficient")
+            changed[name] = cable | {"friction": law | {"coefficient": listed}}
+    if changed != known:
+        table = table | {"cables": changed}
+    if points and isinstance(faults, (list, tuple)):
+        table = table | {
+            "faults": [_fault(fault, present, paths, k) for k, fault in enumerate(faults, 1)]
+        }
+    return table
+
+
+def _listed(given: dict[str, Any], path: Sequence[str], where: str) -> list[Any]:
+    if "default" not in given:
+        raise ValueError(f"{where}.default is missing: give it for all pulleys that have no own")
+    values = [given["default"]] * (len(path) - 2)
+    for name, value in given.items():
+        if name != "default":
+            values[number_of(name, path[1:-1], f'{where}."{name}"', path[-1]) - 1] = value
+    return values
+
+
+def _fault(fault: Any, present: Sequence[str], paths: Sequence[Sequence[str]], number: int) -> Any:
+    """A fault with numbers; on a cable that is not there any will do, since that is refused."""
+    if not isinstance(fault, dict):
+        return fault
+    made = dict(fault)
+    if fault.get("cable") in present:
+        made["cable"] = present.index(fault["cable"]) + 1
+    cable = made.get("cable", 1)
+    path = paths[cable - 1] if cable in range(1, len(paths) + 1) else ()
+    for key, names, end in (("pulley", path[1:-1], path[-1:]), ("span", spans_of(path), ())):
+        if isinstance(name := fault.get(key), str):
+            where = f'faults[{number}].{key} = "{name}"'
+            made[key] = number_of(name, names, where, *end) if path else 1
+    return made
+
+
+# A bracket that is a part of one bar half.
+
+
+class BarHalfBracket(Bracket):
+    r"""The pulley at the end of an element of length H that is fixed to one bar half.
+
+    From the bar to the element are theta + 90 deg, turned across the other half, so that with the
+    opening angle delta
+
+        b = H sin((2 theta - delta) / 2),   a = +-H cos((2 theta - delta) / 2)
+
+    (+ on the first half).  b is h of paper 000, eq. 21, which neglects a; see docs/cables.md.  The
+    span to that half's own hinge pulley keeps its length, and the other has
+
+        L^2 = l^2 + H^2 + 2 l H sin(theta - delta),
+
+    which falls from the stowed angle on all the way if 90 deg <= theta <= 90 deg + delta.
+    """
+
+    kind: Literal["bar-half"] = "bar-half"
+    angle: Annotated[float, Field(ge=90.0, le=270.0), Unit("deg")]
+    """Angle theta."""
+    half: Literal["first", "second"] = "first"
+    """The half towards the section's first or second corner, seen from the boom."""
+
+    def refusal(self, opening_angle: float) -> str | None:
+        """See ``Bracket``."""
+        most = 90.0 + opening_angle
+        if self.angle <= most:
+            return None
+        return (
+            f"bracket.angle = {self.angle} deg must be at most {most:g} deg, 90 deg above "
+            "structure.opening_angle: the cable would fold the bars at first "
+            "(lower it, or raise structure.opening_angle)"
+        )
+
+    def place(self, phi: ArrayLike, distance: float) -> tuple[Array, Array]:
+        """Offsets a and b with theta - delta / 2 = theta - 90 deg + phi."""
+        turn = np.radians(self.angle - 90.0) + np.asarray(phi)
+        sign = 1.0 if self.half == "first" else -1.0
+        return sign * distance * np.cos(turn), distance * np.sin(turn)
+
+
+# What a cable's path runs over; its winch and far end are points as well.
+#
+# A node names a moving frame where the path is used: a mount of a layout, or a node of an engine.
+
+
+@dataclass(frozen=True)
+class FixedSheave:
+    """A sheave, winch or end of a rope fixed on the body of a node."""
+
+    node: Any
+    arm: Array
+    """From the node to the point in the node's axes, m, shape (3,)."""
+
+    @property
+    def nodes(self) -> tuple[Any, ...]:
+        """All nodes that carry it."""
+        return (self.node,)
+
+
+@dataclass(frozen=True)
+class BlockSheave:
+    """A V pulley on a block that stays on the bisector of two bar halves."""
+
+    nodes: tuple[Any, ...]
+    """Nodes of the first and the second half at their V-joint."""
+    sense: float
+    """+1 in the upper plane, -1 in the lower: the block stands inside of the joint."""
+    offset: float
+    """Distance from the joint's axis, m."""
+
+
+Sheave = FixedSheave | BlockSheave

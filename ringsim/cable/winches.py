@@ -1,29 +1,4 @@
-"""The winches of all cables, turning within every Newton iteration.
-
-A prescribed law gives the length wound at any time.  A feedback law depends on the tension at the
-end of the step, which depends on the rope wound during the step and on where the structure gets
-to: with V the speed of all such winches of a rope, h the time into the step, S its path and M its
-natural length without V,
-
-    V = sum_i command_i(r_i(V) q(y)),   y = EA (S / (M - W(V)) - 1 + t_d de/dt),
-
-r_i(V) the ratio of the tension at a winch to the rope's mean tension, were the n winches of the
-rope to turn at V / n each while the structure moves as at the beginning of the step.  The rope that
-they wind in the step follows from backward differences of second order, with g the mean speed of
-the step before and r = h over its length,
-
-    W(V) = h ((1 + r) V + r median(0, g, 2 V)) / (1 + 2 r);   W(V) = h V behind a jump.
-
-The median lets a drum that comes to a standstill wind nothing more: W has the sign of V.  Commands
-fall with the tension, W and y grow with V, so there is one solution for any EA and step.  A law
-that follows the structure takes for its rate the same differences of the path P = S_0 - S that it
-has given free so far in the step, with g* its mean rate in the step before: the V* for which
-P = h ((1 + r) V* + r median(0, g*, 2 V*)) / (1 + 2 r).  With the drum's g in place of g* its gain
-would count by two thirds.
-
-A step has the winches that turn behind its begin; where prescribed speeds jump, its end has those
-before the jump.  So steps must end where a law begins, bends or ends (``Winch.breaks``).
-"""
+"""The winches of all cables, turning within every Newton iteration."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -32,11 +7,39 @@ from typing import Any
 
 import numpy as np
 
-from ringsim.cable.records import Cable, Winch
+from ringsim.cable.chain import ChainState
+from ringsim.cable.records import Cable, Cables, Winch
 from ringsim.cable.ropes import Array, Ropes
-from ringsim.cable.state import ChainState
-from ringsim.cable.winding.family import FeedbackWinding, WinchReading
-from ringsim.parts.faults.family import AT_ONCE
+from ringsim.cable.winding import FeedbackWinding, WinchReading
+from ringsim.choice import kind_of
+from ringsim.parts.faults import AT_ONCE
+
+# The winches of all cables, turning within every Newton iteration.
+#
+# A prescribed law gives the length wound at any time.  A feedback law depends on the tension at the
+# end of the step, which depends on the rope wound during the step and on where the structure gets
+# to: with V the speed of all such winches of a rope, h the time into the step, S its path and M its
+# natural length without V,
+#
+#     V = sum_i command_i(r_i(V) q(y)),   y = EA (S / (M - W(V)) - 1 + t_d de/dt),
+#
+# r_i(V) the ratio of the tension at a winch to the rope's mean tension, were the n winches of the
+# rope to turn at V / n each while the structure moves as at the beginning of the step.  The rope
+# that they wind in the step follows from backward differences of second order, with g the mean
+# speed of the step before and r = h over its length,
+#
+#     W(V) = h ((1 + r) V + r median(0, g, 2 V)) / (1 + 2 r);   W(V) = h V behind a jump.
+#
+# The median lets a drum that comes to a standstill wind nothing more: W has the sign of V.
+# Commands fall with the tension, W and y grow with V, so there is one solution for any EA and step.
+# A law that follows the structure takes for its rate the same differences of the path P = S_0 - S
+# that it has given free so far in the step, with g* its mean rate in the step before: the V* for
+# which P = h ((1 + r) V* + r median(0, g*, 2 V*)) / (1 + 2 r).  With the drum's g in place of g*
+# its gain would count by two thirds.
+#
+# A step has the winches that turn behind its begin; where prescribed speeds jump, its end has those
+# before the jump.  So steps must end where a law begins, bends or ends (``Winch.breaks``).
+
 
 _NUDGE = 1e-8
 """Change of path in m by which the answer of the winches to the structure is measured: a hundred
@@ -368,3 +371,19 @@ class Winches:
                 rope.before = last, wound, path - rope.path - (length - rope.natural - wound)
             self._turning |= laws
         self._begun = {k: (rope.path, rope.natural) for k, rope in self._ropes.items()}
+
+
+# Whether a drive has a limit, without which it has no margin.
+
+
+def why_unlimited(cables: Cables | None, planes: tuple[str, ...]) -> str:
+    """Which winch pulls with any force, and the cure; empty if none does."""
+    for plane, cable in [] if cables is None else cables.present():
+        for end, winch in zip(("winch", "far_winch"), cable.winches, strict=False):
+            if not math.isfinite(winch.winding.available_tension()):
+                return (
+                    f'cables.{planes[plane]}.{end}.winding.kind = "{kind_of(winch.winding)}": it '
+                    'pulls with any force, so that the drive has no margin (choose kind = "motor" '
+                    'or "stall", or leave margin out)'
+                )
+    return ""

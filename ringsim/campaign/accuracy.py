@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ringsim.analysis.accuracy import NEEDED, Truth, judge
-from ringsim.analysis.ladder import (
+from ringsim.analysis.ladder import (  # fmt: skip
     FRAME,
     PATHS,
     Rung,
@@ -19,12 +19,12 @@ from ringsim.analysis.ladder import (
     left_out,
     references,
     shortened,
-)  # fmt: skip
-from ringsim.campaign.cases import run_cases
+)
+from ringsim.campaign.run import run_cases
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.simulation import why_not_frame
-from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.theory.statics import OneCoordinate, opening_time
 from ringsim.variables import GOALS, Fate, Status
 
 _STEP_LIMIT = 1_000_000

@@ -5,6 +5,7 @@ import functools
 import hashlib
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -14,18 +15,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim import build
-from ringsim.analysis.requirements import to_json
+from ringsim.analysis.verdicts import to_json
 from ringsim.campaign.specification import SOLVERS, Campaign, flat
 from ringsim.files import DRAFT, writing
 from ringsim.refusal import InputError, show
 from ringsim.sampling.columns import Table
-from ringsim.sampling.values import plain
+from ringsim.sampling.distributions import plain
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.storage.journal import FOLDER, Survey, survey
-from ringsim.storage.locks import GO_ON, locked, tries
-from ringsim.storage.netcdf import DESIGN, provenance, read_design, write_design
+from ringsim.storage.netcdf import (
+    DESIGN,
+    GO_ON,
+    locked,
+    provenance,
+    read_design,
+    tries,
+    write_design,
+)
 from ringsim.units import LEFT_OUT
-from ringsim.variables import Fidelity
+from ringsim.variables import Fidelity, Status
+
+# A campaign's folder: its design, its identity, whether it may be gone on with; its merging.
 
 
 @dataclass(frozen=True)
@@ -265,3 +275,32 @@ def _changed_input(new: Table, old: Table) -> str:
             if change := _first_change(json.loads(mine.origin), json.loads(held.origin)):
                 return f"; inputs.{mine.path}{change}"
     return ""
+
+
+# Which settings may differ when failed samples of a campaign are run again.
+
+
+FAILED = frozenset(status for status in Status if status.failed)
+_TABLES = ("solver.", "record.")
+_SHAPING = ("solver.end_time", "record.interval")
+
+
+def check_settings(scene: Scene, settings: Mapping[str, Any]) -> None:
+    """Refuse (InputError) settings that would make samples of another antenna, or of another shape.
+
+    ``scene`` is the campaign's, ``settings`` are values by scene path.
+    """
+    for path, value in settings.items():
+        given = f"--set {path} = {show(value)}"
+        if not path.startswith(_TABLES):
+            raise InputError(
+                f"{given}: failed samples are run again with other solver.* or record.* settings "
+                "only: another antenna is another campaign, change its file and choose another "
+                "--out"
+            )
+        if path in (*_SHAPING, *scene.structure.shaping):
+            raise InputError(
+                f"{given}: it shapes the result, and the samples must fit into one file: change "
+                "the campaign file and choose another --out"
+            )
+    scene.with_values(dict(settings))

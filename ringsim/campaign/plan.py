@@ -5,20 +5,19 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.analysis.confounded import pairs
 from ringsim.analysis.design import placement_of
+from ringsim.analysis.influence import pairs
 from ringsim.campaign.folder import digests, opened_as
-from ringsim.campaign.growing import grown
-from ringsim.campaign.start import Order
+from ringsim.campaign.run import Order, grown
 from ringsim.campaign.status import in_words
 from ringsim.choice import kind_of
-from ringsim.execution.local import Local
+from ringsim.execution.slot import Local
 from ringsim.execution.work import Array, Work, relative_cost
 from ringsim.refusal import show
 from ringsim.sampling.columns import Column, Table
-from ringsim.sampling.designs.grouped import Grouped
-from ringsim.sampling.designs.subset_simulation import SubsetSimulation
-from ringsim.sampling.values import labels_of
+from ringsim.sampling.designs.blocks import Grouped
+from ringsim.sampling.designs.levels import SubsetSimulation
+from ringsim.sampling.distributions import labels_of
 from ringsim.storage.journal import Survey, survey
 from ringsim.storage.result import Result, check_of, sample_of
 from ringsim.tables import counted

@@ -8,14 +8,13 @@ import numpy as np
 import tomli_w
 import xarray as xr
 
+from ringsim.analysis.design import MERGED, open_stored
 from ringsim.analysis.engines import too_far
-from ringsim.analysis.stored import MERGED, open_stored
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.merging import is_behind, merge
 from ringsim.campaign.plan import plan
-from ringsim.campaign.run import Share
+from ringsim.campaign.run import Order, Share, require_no_launcher, start
 from ringsim.campaign.specification import campaign_of, load_campaign
-from ringsim.campaign.start import Order, require_no_launcher, start
+from ringsim.campaign.stopping import is_behind, merge
 from ringsim.execution.mpi import launched_size
 from ringsim.exit_codes import EXIT_FAILED, EXIT_INTERRUPTED
 from ringsim.refusal import InputError

@@ -1,30 +1,50 @@
-"""Running a campaign: run what is missing in its folder, merge, say how it ended."""
+"""Running a campaign: start it, run what is missing in its folder, merge, say how it ended."""
 
 import contextlib
+import csv
+import io
+import json
 import sys
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import tomli_w
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import budget_lines, notes
+from ringsim.analysis.brief import budget_lines, notes
 from ringsim.analysis.engines import check_lines, too_far
-from ringsim.campaign.folder import Folder, open_folder
-from ringsim.campaign.merging import merge
-from ringsim.campaign.specification import SOLVERS
-from ringsim.campaign.stopping import Watch, as_decided
+from ringsim.campaign.folder import (
+    FAILED,
+    Folder,
+    check_settings,
+    open_folder,
+    prepare_folder,
+    require_this_build,
+)
+from ringsim.campaign.specification import SOLVERS, Campaign, load_campaign
+from ringsim.campaign.stopping import Watch, as_decided, merge
 from ringsim.campaign.watch import Progress, StopRequest, stopping_on_signals
 from ringsim.compile_cache import choose_folder
+from ringsim.execution.mpi import Mpi, aborting, launched_size, mpi_world
+from ringsim.execution.slot import Local, Serial
 from ringsim.execution.work import Allowance, Scheduler, Work, longest_first, relative_cost
 from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED, EXIT_INTERRUPTED
+from ringsim.files import write_text, writing
 from ringsim.refusal import InputError
+from ringsim.sampling.designs.levels import SubsetSimulation
+from ringsim.sampling.distributions import Array
+from ringsim.scene import Scene
 from ringsim.storage.journal import Journal
-from ringsim.storage.locks import reserved
+from ringsim.storage.merge import NAME as MERGED
+from ringsim.storage.netcdf import DESIGN, reserved
 from ringsim.storage.result import Result, check_of, sample_of
-from ringsim.variables import Status
+from ringsim.variables import GOALS, Fate, Status
+
+# Running a campaign: run what is missing in its folder, merge, say how it ended.
 
 
 @dataclass(frozen=True)
@@ -242,3 +262,252 @@ def _conclude(campaign: Folder, choices: Choices, stop: StopRequest) -> int:
 
 def _tell(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
+
+
+# Designs that grow with their results: which samples come next, and how well they went.
+
+
+def grows(campaign: Campaign) -> bool:
+    """Whether the samples of a campaign depend on the results of others."""
+    return isinstance(campaign.specification.design, SubsetSimulation)
+
+
+def grown(campaign: Campaign, path: Path) -> Campaign:
+    """A campaign with the samples that follow from the results in its folder, if there is one.
+
+    InputError if the runs do not compute the output that is asked for.
+    """
+    design = campaign.specification.design
+    if not isinstance(design, SubsetSimulation) or not (path / DESIGN).exists():
+        return campaign
+    folder = open_folder(path)
+    known = _responses(folder, design)
+    design = design.knowing(known)
+    wanted = campaign.specification.model_copy(update={"design": design})
+    suspects = _suspects(folder, known, design) if design.check and design.ended else ()
+    return replace(campaign, specification=wanted, suspects=suspects)
+
+
+def _suspects(folder: Folder, known: Array, design: SubsetSimulation) -> tuple[int, ...]:
+    """Runs on which the probability depends most: the nearest ones outside the event, half of what
+    is wanted; of those in it, lost, or short of their goal the rest, evenly spread.
+    """
+    short = ~np.isin(folder.survey().fate, (*GOALS, Fate.NONE))
+    found = np.flatnonzero((known > design.target) | np.isneginf(known) | short)
+    outside = np.setdiff1d(np.arange(len(known)), found)
+    near = outside[np.argsort(-known[outside], kind="stable")][: design.check // 2]
+    count = min(design.check - len(near), len(found))
+    chosen = np.linspace(0, len(found) - 1, count).round().astype(int)
+    return tuple(np.union1d(found[chosen], near).tolist())
+
+
+def growth_told(folder: Folder) -> str:
+    """How many runs a campaign that grows has, in words; nothing of others."""
+    table = json.loads(folder.attributes.get("design", "{}"))
+    if table.get("kind") != "subset-simulation":
+        return ""
+    design = SubsetSimulation.model_validate(table)
+    if not len(folder.survey().missing):
+        design = design.knowing(_responses(folder, design))
+    return design.runs_told(folder.table.samples)
+
+
+def is_open(campaign: Campaign) -> bool:
+    """Whether more samples may follow from the results of those that it has."""
+    design = campaign.specification.design
+    return isinstance(design, SubsetSimulation) and not design.ended
+
+
+def _responses(folder: Folder, design: SubsetSimulation) -> Array:
+    """Responses of the first samples, all of which have run."""
+    found = folder.survey()
+    count = int(found.missing[0]) if len(found.missing) else folder.table.samples
+    values = np.full(count, np.nan)
+    for result in found.results(np.arange(count)):
+        arrays = result.arrays()
+        if design.of in arrays:
+            values[result.sample] = arrays[design.of]
+        elif result.status == Status.OK and result.fate in GOALS:
+            raise InputError(
+                f"design.of = {design.of}: sample {result.sample} reached its goal without a value "
+                "of it: its model does not compute it; choose another output, or another fidelity"
+            )
+    return design.responses(values, found.status[:count] != Status.OK)
+
+
+# Starting a campaign: here, in several processes, or on all ranks of an MPI world.
+
+
+class Order(NamedTuple):
+    """Which campaign to run where, and how this time."""
+
+    campaign: Campaign
+    folder: Path
+    share: Share = Share()
+    again: bool = False
+    """Whether failed samples run again, too."""
+    overrides: Mapping[str, Any] = {}
+    """Settings by scene path with which those run, and nothing else does."""
+    solver: str = ""
+    """What maps a scene to its outcome instead of the fidelity's."""
+    judge: str = SOLVERS["full"]
+
+    @property
+    def solving(self) -> str:
+        """What maps a scene to its outcome."""
+        return self.solver or SOLVERS[self.campaign.specification.fidelity]
+
+    def check(self) -> None:
+        """Refuse (InputError) overrides that would make samples of another antenna, and parts and
+        retries of a design whose samples follow from the results of others.
+        """
+        if grows(self.campaign) and self.share.count > 1:
+            raise InputError(
+                f"--part {self.share.number}/{self.share.count}: which samples a design of kind "
+                "subset-simulation has depends on the results of all others: leave it out, and "
+                "use --workers or MPI"
+            )
+        if grows(self.campaign) and self.again:
+            raise InputError(
+                "--retry-failed: later samples of a design of kind subset-simulation follow from "
+                "the results as they are: leave it out, or choose another folder with --out"
+            )
+        check_settings(self.campaign.scene, self.overrides)
+
+    def prepare(self) -> bool:
+        """Make the folder, or see that it is this campaign's; InputError if it is not.
+
+        Returns whether more samples will follow from the results of these.
+        """
+        self.check()
+        name = self.campaign.specification.name
+        if not (self.again and (self.folder / DESIGN).exists()):
+            campaign = grown(self.campaign, self.folder)
+            prepare_folder(campaign, self.folder, solver=self.solving, judge=self.judge)
+            open_folder(self.folder).survey()  # here, where a refusal reaches all ranks
+            return grows(campaign) and not self.again and is_open(campaign)
+        begun = open_folder(self.folder)
+        if (held := begun.attributes["campaign_name"]) != name:
+            raise InputError(
+                f"{self.folder}: this folder holds the campaign {held}, not {name}: choose its "
+                "folder with --out"
+            )
+        require_this_build(begun)
+        begun.survey()
+        return False
+
+    @property
+    def choices(self) -> tuple[Any, ...]:
+        """All ``Choices`` but the scheduler and whether more follow, in their order."""
+        wanted = self.campaign.specification
+        again = FAILED if self.again else frozenset[Status]()
+        return wanted.limits, wanted.max_failed, self.share, again, self.overrides
+
+
+class Ended(NamedTuple):
+    """How a campaign ended: its exit code, on all ranks, or why it was refused."""
+
+    code: int = 0
+    refused: InputError | None = None
+    first: bool = True
+    """Whether this is rank 0, who tells."""
+
+
+def require_no_launcher(workers: int | None) -> None:
+    """Refuse (InputError) a number of workers under an MPI launcher."""
+    if launched_size() > 1 and workers is not None:
+        raise InputError(
+            f"--workers {workers}: under an MPI launcher every rank drives one solver "
+            "process: leave out --workers"
+        )
+
+
+def start(workers: int | None, order: Callable[[], Order], then: Callable[[Path], None]) -> Ended:
+    """Place an order on rank 0, run it on all ranks, and go on on rank 0 with its folder.
+
+    ``workers`` solver processes, one if None, or this very process for 0; under an MPI launcher
+    one for each rank.
+    """
+    if launched_size() == 1:
+        return _start(Serial() if workers == 0 else Local(workers or 1), order, then)
+    world = mpi_world()
+    with aborting(world):
+        return _start(Mpi(world), order, then)
+
+
+def _start(scheduler: Scheduler, order: Callable[[], Order], then: Callable[[Path], None]) -> Ended:
+    first = scheduler.rank == 0
+    try:
+        while True:
+            placed: Any = None
+            if first:
+                try:
+                    made = order()
+                    placed = made.folder, (*made.choices, made.prepare())
+                except InputError as error:
+                    placed = error
+            if isinstance(placed := scheduler.from_first(placed), InputError):
+                raise placed
+            folder, chosen = placed
+            how = Choices(scheduler, *chosen)
+            code = run_campaign(folder, how)
+            if not how.more or scheduler.from_first(code) != EXIT_DONE:
+                break
+        if first:
+            then(folder)
+        return Ended(code, first=first)
+    except InputError as error:
+        return Ended(refused=error, first=first)
+    finally:
+        scheduler.close()
+
+
+# Campaigns of listed cases, written and run by the program itself.
+
+
+def run_cases(
+    folder: Path, name: str, scene: Scene, cases: Sequence[Mapping[str, Any]], *, workers: int,
+    title: str = "", timeout: float = 3600.0, fidelity: str = "full",
+    again: frozenset[Status] = frozenset(),
+) -> Path:  # fmt: skip
+    """Run the cases of a scene that are still missing; returns the merged file: sample k is case k.
+
+    An ordinary campaign called ``name`` goes into ``folder``, which is created, file and all.
+    ``cases`` are values by scene path, the same paths in each, one value (no lists) to a path;
+    ``timeout`` is the longest time of one run, s; ``fidelity`` is "full" or "frame".
+
+    Cases that ended with a status of ``again`` run again.
+
+    InputError if a case or the folder is refused, which changes no file; KeyboardInterrupt after a
+    signal: call again.
+    """
+    paths, listed = list(cases[0]), io.StringIO()
+    writer = csv.DictWriter(listed, paths, lineterminator="\n")
+    writer.writeheader()
+    for number, case in enumerate(cases):
+        if case.keys() != cases[0].keys():
+            raise InputError(
+                f"case {number} has values for {', '.join(case)}, and must have them for "
+                f"{', '.join(paths)}"
+            )
+        writer.writerow({k: str(v).lower() if isinstance(v, bool) else v for k, v in case.items()})
+    base, rows, file = (f"{name}{end}" for end in ("-scene.toml", ".csv", ".toml"))
+    table = {
+        "name": name, "title": title, "scene": base, "fidelity": fidelity,
+        "design": {"kind": "list", "file": rows}, "limits": {"timeout": timeout},
+    }  # fmt: skip
+    texts = {base: scene.to_toml(), rows: listed.getvalue(), file: tomli_w.dumps(table)}
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    # Judged elsewhere, so that what is refused does not replace the files of what was run.
+    with tempfile.TemporaryDirectory(prefix="ringsim-cases-") as drafts:
+        for each, text in texts.items():
+            write_text(Path(drafts) / each, text)
+        campaign = load_campaign(Path(drafts) / file)
+        prepare_folder(campaign, folder / name, solver=SOLVERS[fidelity])
+    for each, text in texts.items():
+        write_text(folder / each, text)
+    choices = Choices(Local(workers), campaign.specification.limits, again=again)
+    if run_campaign(folder / name, choices) == EXIT_INTERRUPTED:
+        raise KeyboardInterrupt
+    return folder / name / MERGED

@@ -8,18 +8,16 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from ringsim.analysis.looks import Condition, Looks, Rule, as_list
-from ringsim.analysis.quantities import quantities
-from ringsim.analysis.requirements import Requirements
+from ringsim.analysis.intervals import quantities
+from ringsim.analysis.verdicts import Condition, Looks, Requirements, Rule, as_list
 from ringsim.choice import kind_of, kinds_of
 from ringsim.execution.work import Allowance
 from ringsim.files import parse_toml, read_text
-from ringsim.outputs.extremes import instead_of
+from ringsim.outputs.balance import instead_of
 from ringsim.outputs.family import VARIABLES, holds
 from ringsim.overrides import place_of
 from ringsim.refusal import InputError, explain, known_or_nearest, show
-from ringsim.sampling.columns import Table
-from ringsim.sampling.correlation import Correlation
+from ringsim.sampling.columns import Correlation, Table
 from ringsim.sampling.designs.family import Design
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw, first_inside
 from ringsim.scene import Scene, load_scene

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import xarray as xr
 
-from ringsim.analysis.stability import cells_of, checked, chosen_for_check, joined
-from ringsim.analysis.stability_engines import compared
-from ringsim.campaign.cases import run_cases
+from ringsim.analysis.stability import cells_of, checked, chosen_for_check, compared, joined
 from ringsim.campaign.panels import Panel
+from ringsim.campaign.run import run_cases
 from ringsim.parts.solver import MOST_STEPS
 from ringsim.scene import Scene
 
@@ -35,7 +34,7 @@ def run_map(folder: Path, panels: Sequence[Panel], workers: int) -> xr.Dataset:
     """Run all cells that are still missing, each panel in a folder of its own.
 
     Returns the judged map (``ringsim.analysis.stability.joined``), in which panels of both engines
-    are compared (``ringsim.analysis.stability_engines``).  InputError if a scene refuses a
+    are compared (``ringsim.analysis.stability``).  InputError if a scene refuses a
     value, KeyboardInterrupt if a signal stopped it: the same call goes on.
     """
     found = []

@@ -5,12 +5,11 @@ import json
 import time
 from collections import Counter
 
-from ringsim.analysis.campaign_notes import ending_lines
+from ringsim.analysis.brief import ending_lines
 from ringsim.campaign.folder import Folder
-from ringsim.campaign.growing import growth_told
+from ringsim.campaign.run import growth_told
 from ringsim.campaign.stopping import End, decided, looks_of
-from ringsim.storage.locks import in_use
-from ringsim.storage.netcdf import NOT_RUN
+from ringsim.storage.netcdf import NOT_RUN, in_use
 from ringsim.storage.result import sample_of
 from ringsim.tables import counted
 from ringsim.variables import Status

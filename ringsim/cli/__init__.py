@@ -29,7 +29,23 @@ VERBS = {
     "stability": "Map where the solver is sound, and how runs end where it is not.",
     "accuracy": "Compare numerical settings of a scene: error against run time.",
 }
-"""Verb and its line of help; the command ``VERB`` lives in ringsim.cli.VERB as ``command``."""
+"""Verb and its line of help; its command is ``VERB_command`` in the file of ``_FILES``."""
+_FILES = {
+    "scene": ("scenes", "check", "explain"),
+    "run": ("run", "replay"),
+    "studies": ("accuracy", "stability"),
+    "campaign": ("campaign", "status"),
+    "results": ("merge", "analyse", "report", "plot", "compare", "export"),
+}
+"""Files of ``ringsim.cli`` and their verbs: only that of the verb which is called is imported."""
+
+
+def command_of(verb: str) -> click.Command:
+    """The command of a verb, whose file is imported by this."""
+    file = next(file for file, verbs in _FILES.items() if verb in verbs)
+    found = getattr(importlib.import_module(f"ringsim.cli.{file}"), f"{verb}_command")
+    assert isinstance(found, click.Command)
+    return found
 
 
 class _Verbs(click.Group):
@@ -44,8 +60,7 @@ class _Verbs(click.Group):
                 return None
             hint = known_or_nearest(cmd_name, VERBS)
             raise InputError(f"ringsim {cmd_name}: there is no such verb ({hint})")
-        command: click.Command = importlib.import_module(f"ringsim.cli.{cmd_name}").command
-        return command
+        return command_of(cmd_name)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Verbs, without importing any of them."""

@@ -1,4 +1,4 @@
-"""``ringsim campaign``: run a campaign, or finish an interrupted one."""
+"""``ringsim campaign`` and ``status``."""
 
 from pathlib import Path
 from typing import Any
@@ -7,14 +7,16 @@ import click
 
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.plan import plan
-from ringsim.campaign.run import Share
+from ringsim.campaign.run import Order, Share, require_no_launcher, start
 from ringsim.campaign.specification import SOLVERS, load_campaign
-from ringsim.campaign.start import Order, require_no_launcher, start
+from ringsim.campaign.status import status_lines
 from ringsim.campaign.stopping import as_decided
-from ringsim.cli.options import PATH, PLOT_FORMAT, SETTINGS, require_plot
+from ringsim.cli.options import FOLDER, PATH, PLOT_FORMAT, SETTINGS, require_plot
 from ringsim.execution.mpi import launched_size
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.storage.merge import NAME as MERGED
+
+# ``ringsim campaign``: run a campaign, or finish an interrupted one.
 
 
 @click.command()
@@ -41,7 +43,7 @@ from ringsim.storage.merge import NAME as MERGED
 @PLOT_FORMAT
 @click.option("--solver", default="", hidden=True)
 @click.option("--judge", default=SOLVERS["full"], hidden=True)
-def command(
+def campaign_command(
     file: Path, workers: int | None, settings: dict[str, Any], samples: int | None,
     out: Path | None, part: str, *, retry_failed: bool, dry_run: bool, plot: bool,
     formats: tuple[str, ...] | None, solver: str, judge: str,
@@ -85,3 +87,18 @@ def command(
     if ended.first:
         click.echo(str(ended.refused), err=True)
     return EXIT_BAD_INPUT
+
+
+# ``ringsim status``: how far a campaign is.
+
+
+@click.command()
+@FOLDER
+def status_command(folder: Path) -> None:
+    """Tell how many samples of the campaign in FOLDER are done, failed, running and left, and what
+    the antenna did.
+
+    It only reads, and may be called while the campaign runs.
+    """
+    for line in status_lines(open_folder(folder)):
+        click.echo(line)

@@ -1,21 +1,197 @@
-"""From a scene to a model that is ready to be integrated."""
+"""From a scene to a model that is ready to be integrated: boom, connectors, cables, faults."""
 
-from typing import NamedTuple
+import math
+from typing import Any, NamedTuple
 
+import exudyn.itemInterface as item
 import numpy as np
 
-from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
-from ringsim.engine.boom import Boom
+from ringsim.cable.chain import ChainState
+from ringsim.cable.faults import CableFault
+from ringsim.cable.records import BlockSheave, FixedSheave, Sheave
+from ringsim.choice import kind_of
+from ringsim.engine.assembly import Array
 from ringsim.engine.cable_path import CablePath
 from ringsim.engine.cables import CableDrive
-from ringsim.engine.connectors import Reacting, Springs, Stops, connect
-from ringsim.engine.edge import EdgeCables
-from ringsim.engine.faults import Faults
-from ringsim.engine.model import Multibody
+from ringsim.engine.laws import (
+    EdgeCables,
+    Reacting,
+    Springs,
+    Stops,
+    Weight,
+    connect,
+    opening_joints,
+    torsion,
+)
+from ringsim.engine.model import Multibody, State
 from ringsim.engine.rods import Ancf
-from ringsim.engine.weight import Weight
 from ringsim.layout.bodies import OnBody
+from ringsim.layout.layout import BoomBeam
+from ringsim.layout.points import BOOM_TIP
+from ringsim.parts.boom import FlexibleBoom
+from ringsim.parts.faults import AT_ONCE, FailedSpring, StuckVJoint
+from ringsim.parts.joints import Reaction
 from ringsim.scene import Scene
+
+# A flexible boom: a chain of elements, clamped at its top, with a body that slides along it.
+#
+# A rigid one is part of its hinge assembly.
+
+
+_DOWN = np.array([0.0, 0.0, -1.0])
+"""Along the boom, in the axes of the body at its top."""
+
+
+class Boom:
+    """The elements of a boom in a model before it is assembled, with the joint that slides on them.
+
+    One unknown of exudyn's sliding joint is how far the body slides in a step, d, and the equation
+    that finds it is t . f = 0 (slope of the boom, force of the joint).  exudyn takes each unknown
+    times the gradient of its equation for a force: that is d f S'(s) on the boom, S its shape
+    functions, besides the joint's own f S(s).  It has no resultant but a moment d t x f that
+    nothing answers, of the first order in the step, which turned free structures.  It vanishes with
+    d, which exudyn adds to the place on the boom that the joint remembers after a step only;
+    ``settle`` does so before every residual, so that Newton's method ends where d = 0.
+    """
+
+    def __init__(self, model: Multibody, beam: BoomBeam, weight: Weight | None) -> None:
+        assembly, boom = model.assembly, beam.record
+        if not isinstance(boom, FlexibleBoom):
+            raise TypeError(f"no builder for a boom of kind {kind_of(boom)}")
+        self._data, self._unknown = assembly.system.systemData, -1
+        top, pose = model.bodies[beam.top.body][0], model.layout.pose(beam.top)
+        down, spin = pose.axes @ _DOWN, model.moving.turning(pose.turn)
+        nodes = []
+        for drop in np.linspace(0.0, boom.length, boom.elements + 1):
+            place, rate = pose.at(drop * _DOWN)
+            point = item.NodePointSlope1(referenceCoordinates=[*place, *down])
+            start = [model.moving.at(place, rate), np.cross(spin, down)]
+            nodes.append(assembly.add_node(point, np.concatenate(start)))
+        model.loose[BOOM_TIP] = nodes[-1]
+        length = boom.length / boom.elements
+        cables = [
+            assembly.system.AddObject(
+                item.ObjectANCFCable(
+                    nodeNumbers=nodes[k : k + 2],
+                    length=length,
+                    massPerLength=boom.density * boom.tube.area,
+                    bendingStiffness=boom.young_modulus * boom.tube.second_moment,
+                    axialStiffness=boom.young_modulus * boom.tube.area,
+                )
+            )
+            for k in range(boom.elements)
+        ]
+        assembly.bodies += cables
+        assembly.beams += cables
+        if weight is not None:
+            weight.add_beam(cables, nodes, boom.mass / boom.elements, length)
+        # The elements' nodes have a slope but no orientation: a second spherical joint holds the
+        # direction, and the boom is inextensible between the two.
+        for drop in (0.0, 0.001 * length):
+            place = item.MarkerBodyPosition(bodyNumber=cables[0], localPosition=[drop, 0.0, 0.0])
+            clamp = [assembly.body_marker(top, drop * _DOWN), assembly.system.AddMarker(place)]
+            assembly.system.AddObject(item.ObjectJointSpherical(markerNumbers=clamp))
+        low = model.layout.pose(beam.low).place
+        self._slide(model, beam.low.body, cables, length, float((low - pose.place) @ down))
+
+    def settle(self) -> None:
+        """Due before every residual."""
+        if self._unknown < 0:
+            self._unknown = self._data.GetObjectLTGAE(self._joint)[0]
+            self._place = self._data.GetNodeLTGData(self._node)[1]
+        now = self._data.GetSystemStateDict(reference=True)
+        now["dataCoords"][self._place] += now["AECoords"][self._unknown]
+        now["AECoords"][self._unknown] = 0.0
+
+    def _slide(
+        self, model: Multibody, body: int, cables: list[Any], length: float, place: float
+    ) -> None:
+        """Let a body slide along elements of a length, from a place (m) on them."""
+        system = model.assembly.system
+        markers = [system.AddMarker(item.MarkerBodyBeamShape(bodyNumber=c)) for c in cables]
+        element = min(int(place / length), len(cables) - 1)
+        self._node = system.AddNode(
+            item.NodeGenericData(initialCoordinates=[element, place], numberOfDataCoordinates=2)
+        )
+        sliding = model.assembly.body_marker(model.bodies[body][0], np.zeros(3))
+        self._joint = system.AddObject(
+            item.ObjectJointSliding(
+                markerNumbers=[sliding, markers[element]],
+                slidingMarkerNumbers=markers,
+                slidingMarkerOffsets=[k * length for k in range(len(cables))],
+                nodeNumber=self._node,
+                constrainRotations=[0, 0, 0],
+                constrainTranslations=[1, 1, 1],
+            )
+        )
+
+
+# The faults that strike a multibody model between two steps.
+
+
+class StuckJoint:
+    """A V-joint that a fault will hold: a torsion spring that lies inactive until then."""
+
+    def __init__(self, model: Multibody, fault: StuckVJoint) -> None:
+        self._law, self._system = fault, model.assembly.system
+        self._place = model.scene.structure.planes.index(fault.plane), fault.section - 1
+        planes = opening_joints(model, 'faults of kind "stuck-vjoint"', "faults")
+        joint, self._sense = planes[self._place[0]][self._place[1]]
+        linear = {"stiffness": fault.stiffness, "damping": fault.damping, "activeConnector": False}
+        self._object, self._angle = torsion(model, joint.markers, **linear), math.nan
+
+    def strike(self, angles: Array) -> None:
+        """Hold the joint at the opening angle that it has now."""
+        self._angle = float(angles[self._place])
+        offset = self._sense * (math.pi - self._angle)
+        self._system.SetObjectParameter(self._object, "offset", offset)
+        self._system.SetObjectParameter(self._object, "activeConnector", True)
+
+    def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
+        """See ``Reacting``."""
+        rate = rates[self._place]
+        if math.isnan(self._angle):  # the fault has not struck
+            return Reaction(0.0, 0.0, 0.0), rate
+        return self._law.torque(float(angles[self._place]) - self._angle, rate), rate
+
+
+class Faults:
+    """The faults of a scene, in the order of their times, each struck between two steps.
+
+    ``joints`` are the V-joints that will stick.
+    """
+
+    def __init__(self, model: Multibody, drive: CableDrive | None, springs: Springs | None) -> None:
+        self._drive, self._springs = drive, springs
+        self._planes = model.scene.structure.planes
+        self._waiting = [
+            (fault, StuckJoint(model, fault) if isinstance(fault, StuckVJoint) else None)
+            for fault in sorted(model.scene.faults, key=lambda fault: fault.time)
+        ]
+        self.joints = [joint for _, joint in self._waiting if joint is not None]
+
+    @property
+    def next_time(self) -> float:
+        """Time of the next fault, s; infinite if there is none left."""
+        return self._waiting[0][0].time if self._waiting else math.inf
+
+    def strike(self, time: float, angles: Array, state: ChainState | None) -> bool:
+        """Strike all faults that are due, at opening angles (rad) of shape (planes, sections) and
+        a state of the cables; returns whether there was one.
+        """
+        due = [one for one in self._waiting if one[0].time <= time + AT_ONCE]
+        del self._waiting[: len(due)]
+        for fault, joint in due:
+            if joint is not None:
+                joint.strike(angles)
+            elif isinstance(fault, FailedSpring) and self._springs is not None:
+                self._springs.fail((self._planes.index(fault.plane), fault.section - 1))
+            elif isinstance(fault, CableFault) and self._drive is not None and state is not None:
+                self._drive.ropes = fault.strike(self._drive.ropes, state)
+        return bool(due)
+
+
+# From a scene to a model that is ready to be integrated.
 
 
 class Built(NamedTuple):

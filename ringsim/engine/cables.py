@@ -1,8 +1,4 @@
-"""Cables in the multibody model: their forces inside every Newton iteration.
-
-One exudyn object spans all nodes that the paths depend on.  Its force is the chain's, its
-Jacobian that of ringsim.engine.cable_jacobian.
-"""
+"""Cables in the multibody model: their forces and Jacobians inside every Newton iteration."""
 
 from typing import Any
 
@@ -10,15 +6,169 @@ import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
 
-from ringsim.cable.chain import Chain
+from ringsim.cable.chain import Chain, ChainState, RopeTangent, decay_tangent, rope_tangent
 from ringsim.cable.records import Cables
-from ringsim.cable.state import ChainState
+from ringsim.cable.ropes import Ropes
 from ringsim.cable.winches import Winches
-from ringsim.engine.assembly import Assembly
-from ringsim.engine.cable_jacobian import JacobianPattern
+from ringsim.engine.assembly import Array, Assembly, Indices
 from ringsim.engine.cable_path import CablePath, Placed
-from ringsim.engine.rotations import Array
-from ringsim.stepping.turning import Turning
+from ringsim.stepping.locks import Turning
+
+# The Jacobian of the cables' forces after the coordinates of the nodes that carry them.
+#
+# It is written with auxiliary unknowns that carry no mass and no force: for every span the change
+# of its difference vector (three) and of its tension (one), for every rope that of its mean
+# tension.  The coupling of all spans of a rope through its mean tension is then a few sparse rows
+# instead of a dense block over the whole ring; eliminating the unknowns gives P^T (dF/dx) P with
+# the material, decay and geometric parts of ringsim.cable.chain.  The decay part alone is dense
+# (spans by spans).  Its entries are written only where they matter to Newton's convergence: those
+# of friction that turns round within a step.  Velocities of the points are taken as fixed while
+# nodes turn at fixed rates; against the rest that is of the order of a node's turn within one step.
+
+
+class JacobianPattern:
+    """Rows and columns of the Jacobian, found once, and its values.
+
+    The object's equation is mass * acceleration - force = 0; what follows is its left-hand side.
+    ``most_ropes`` is the largest number of ropes that faults can make of the cables, and
+    ``unknowns`` the number of auxiliary ones.
+    """
+
+    steady = 0.9999
+    """Share of the full friction from which its changes with the rope's speed do not matter: the
+    decay of a rope above it over all its pulleys is left out."""
+    negligible = 0.02
+    """Decay entries are left out below this share of the largest geometric stiffness T / L.
+    Newton needs one iteration more at most (tests/cable_engine/test_newton.py)."""
+
+    def __init__(self, path: CablePath, ropes: Ropes, most_ropes: int) -> None:
+        self._path, spans = path, ropes.spans
+        self.unknowns = 4 * spans + most_ropes
+        every = np.arange(path.size, path.size + self.unknowns)
+        # The unknowns: differences of all spans, their tensions, and the ropes' mean tensions.
+        self._differences = every[: 3 * spans].reshape(-1, 3)
+        self._tensions, self._means = every[3 * spans : 4 * spans], every[4 * spans :]
+        # Every leg of the two points of every span; the far point adds to the difference.
+        ends = np.stack([ropes.near, ropes.near + 1], axis=1).ravel()
+        end, self._leg = np.nonzero(path.leg_point == ends[:, None])
+        self._span, self._sign = end // 2, 2.0 * (end % 2) - 1.0
+        nodes = path.leg_node[self._leg]
+        own, width = path.spots[nodes], path.width
+        differences, tension = self._differences[self._span], self._tensions[self._span]
+        first, second = path.turning_pairs
+        turn = path.spots[path.leg_node, 3:]
+        turned = np.ones((len(self._leg), width, 3), dtype=bool)
+        turned[:, :3] = path.leg_carries[self._leg, None, None] > 0.0
+        turned &= own[:, :, None] >= 0
+        shifted = turned.copy()
+        shifted[:, :3] &= np.eye(3, dtype=bool)
+        places = [
+            _pairs(differences, own),
+            _pairs(own, tension[:, None]),
+            _pairs(own, differences),
+            _pairs(turn[first], turn[second]),
+            _pairs(turn, turn),
+        ]
+        rows, columns = (np.concatenate([place[k] for place in places]) for k in (0, 1))
+        filled = [shifted.transpose(0, 2, 1), turned[:, :, :1], turned]
+        mask = np.concatenate([part.ravel() for part in filled])
+        # Explicit zeros would fill the factors of the system's matrix.
+        mask = np.concatenate([mask, (rows[len(mask) :] >= 0) & (columns[len(mask) :] >= 0)])
+        self._kept = np.flatnonzero(mask)
+        self._known = self.unknowns + len(self._kept)
+        self._entries = np.ones((self._known, 3))
+        self._entries[:, 0] = np.concatenate([every, rows[self._kept]])
+        self._entries[:, 1] = np.concatenate([every, columns[self._kept]])
+
+    def empty(self) -> Array:
+        """Entries of a cable that pulls nothing, shape (entries, 3)."""
+        return self._entries[: self.unknowns] * [1.0, 1.0, 0.0] + [0.0, 0.0, 1.0]
+
+    def triplets(
+        self,
+        state: ChainState,
+        placed: Placed,
+        by_q: float,
+        by_rate: float,
+        slopes: Array,
+        left: Array | float = 1.0,
+    ) -> Array:
+        """All entries as (row, column, value), shape (entries, 3), until the next call.
+
+        ``by_q`` and ``by_rate`` multiply the derivatives after coordinates and after rates;
+        ``slopes`` are those of the pulleys' friction (``ringsim.stepping.locks``), and ``left``
+        is the share of each rope's stiffness that its winches do not answer.
+        """
+        maps = self._path.leg_maps(placed)[self._leg] * self._sign[:, None, None]
+        turned = maps.transpose(0, 2, 1)
+        directions = np.empty((len(self._tensions), 3, 3))
+        shares = np.broadcast_to(left, len(state.natural))
+        parts: list[Array] = []
+        for rope in range(len(state.natural)):
+            tangent = rope_tangent(state, placed.velocities, rope)
+            directions[tangent.spans] = tangent.by_direction
+            parts += self._rope(state, tangent, rope, by_q, by_rate, slopes, float(shares[rope]))
+        blocks = [
+            -maps,
+            turned @ state.directions[self._span, :, None],
+            turned @ directions[self._span],
+            *(-block for block in self._path.turning(placed, state.point_forces)),
+        ]
+        values = np.concatenate([block.ravel() for block in blocks])
+        count = self._known + sum(len(part) for part in parts)
+        if len(self._entries) < count:  # a buffer that is kept: its first places stay the same
+            room = np.empty((count // 4, 3))
+            self._entries = np.concatenate([self._entries[: self._known], *parts, room])
+        entries = self._entries[:count]
+        entries[: self.unknowns, 2] = by_q
+        np.multiply(values[self._kept], by_q, out=entries[self.unknowns : self._known, 2])
+        np.concatenate(parts, out=entries[self._known :])
+        return entries
+
+    def _rope(
+        self,
+        state: ChainState,
+        tangent: RopeTangent,
+        rope: int,
+        by_q: float,
+        by_rate: float,
+        slopes: Array,
+        left: float,
+    ) -> list[Array]:
+        """How a rope's span tensions follow its mean tension and the differences of its points."""
+        spans, mean = tangent.spans, self._means[rope : rope + 1, None]
+        tension, difference = self._tensions[spans, None], self._differences[spans].reshape(1, -1)
+        mean_values = by_q * left * tangent.mean_by_place + by_rate * tangent.mean_by_velocity
+        entries = [
+            _entries(tension, mean, -by_q * state.shares[spans]),
+            _entries(mean, difference, -mean_values),
+        ]
+        if np.all((slopes * state.slip_speeds)[state.ropes.inner(rope)] < 1.0 - self.steady**2):
+            return entries
+        by_place, by_velocity = decay_tangent(state, tangent, rope, slopes)
+        flat = (by_q * by_place + by_rate * by_velocity).reshape(len(tension), -1)
+        stiffest = float(np.max(state.tensions[spans] / state.lengths[spans]))
+        row, column = np.nonzero(np.abs(flat) > by_q * self.negligible * max(stiffest, 1.0))
+        decay = [tension[row, 0], difference[0, column], -flat[row, column]]
+        return [*entries, np.stack(decay, axis=1)]
+
+
+def _entries(rows: Indices, columns: Indices, values: Array) -> Array:
+    """Entries of a block with (a, 1) rows and (1, b) columns, shape (a b, 3)."""
+    block = values.reshape(len(rows), columns.shape[1])
+    return np.stack(np.broadcast_arrays(rows, columns, block), axis=-1).reshape(-1, 3)
+
+
+def _pairs(rows: Indices, columns: Indices) -> tuple[Indices, Indices]:
+    """Row and column of every entry of blocks, (n, a) and (n, b) -> (n a b,) each."""
+    row, column = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
+    return row.ravel(), column.ravel()
+
+
+# Cables in the multibody model: their forces inside every Newton iteration.
+#
+# One exudyn object spans all nodes that the paths depend on.  Its force is the chain's, its
+# Jacobian that of ringsim.engine.cables.
 
 
 class CableDrive:

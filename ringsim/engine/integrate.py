@@ -1,5 +1,5 @@
 """Integrating a built model with exudyn's generalised-alpha; ``ringsim.stepping`` decides on the
-steps and on the end.
+steps.
 """
 
 import math
@@ -10,30 +10,140 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
+from ringsim.cable.chain import ChainState
 from ringsim.cable.ropes import Flags
-from ringsim.cable.state import ChainState
-from ringsim.engine.accelerations import AccelerationMeter
-from ringsim.engine.base import BaseMeter
+from ringsim.engine.assembly import STIFFENING, Predictor
 from ringsim.engine.build import Built, build
-from ringsim.engine.meters import BendingMeter, EnergyMeter, StressMeter
-from ringsim.engine.newton import Newton
-from ringsim.engine.positions import PositionMeter
-from ringsim.engine.predictor import Predictor
-from ringsim.engine.readings import Openings, State, joint_groups
-from ringsim.engine.settings import newton_norm, solver_settings
-from ringsim.engine.shape import ShapeMeter
+from ringsim.engine.meters import (
+    AccelerationMeter,
+    BaseMeter,
+    BendingMeter,
+    EnergyMeter,
+    PositionMeter,
+    ShapeMeter,
+    StressMeter,
+)
+from ringsim.engine.model import Openings, State, joint_groups
+from ringsim.layout.layout import Layout
+from ringsim.outputs.family import Reading
 from ringsim.outputs.recorder import Recorder
-from ringsim.outputs.series import Reading
-from ringsim.parts.faults.family import AT_ONCE
+from ringsim.parts.faults import AT_ONCE
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
+from ringsim.stepping.control import RunControl
 from ringsim.stepping.events import Events
 from ringsim.stepping.instant import Instant, Strained
-from ringsim.stepping.latches import Latches
-from ringsim.stepping.locks import locks_of
-from ringsim.stepping.run_control import RunControl
-from ringsim.theory.scales import scales_of
+from ringsim.stepping.locks import Latches, locks_of
+from ringsim.theory.statics import residual_tolerance, rope_reach, scales_of
 from ringsim.variables import Cause, Outcome, Reason
+
+# When exudyn's modified Newton renews its Jacobian within a step, and when it gives up.
+#
+# exudyn renews where the residual does not halve, but never before the third iteration; where the
+# residual doubles, or after eight iterations, it begins the step anew, without its extrapolated
+# start, and renews the Jacobian in every iteration from then on.  Stops, and dry friction that
+# turns round, let a residual grow by much more on the way to a solution.  So here
+#
+# - any iteration, the first ones included, renews the Jacobian where the residual falls too little,
+#   and each does from the ninth on;
+# - growth is no reason to begin anew, but for that of a run-away, by ``_RUNAWAY`` in an iteration:
+#   there the step is given up, and repeated with a shorter one;
+# - the second iteration has a Jacobian of its own where that of the start is worth nothing.  The
+#   extrapolated start strains the rods; one that carries a force F by mistake is as if it had a
+#   lateral stiffness F / L, which must not rule over its inertia m / h^2.
+#
+# exudyn offers no settings for this, but its solver's counters can be written before a residual.
+
+
+_EXEMPT = 2
+"""Iterations in which exudyn does not look at the residual's fall."""
+_RUNAWAY = 1e6
+_ROUGH = 30.0
+"""Start's residual over that at which mistaken forces and inertia are alike.  1 renews Jacobians
+for nothing (490 for 344 on ring18), 1e9 leaves them where a ring of 6 that stalls wants new ones.
+"""
+
+
+class Newton:
+    """Newton's iterations of the steps of one run."""
+
+    iterations = 25
+    """Most iterations of a step."""
+    fall = 0.6
+    """Share of the last residual above which the Jacobian is renewed."""
+    patience = 8
+    """Iterations after which it is renewed in any case."""
+
+    def __init__(self, solver: Any, layout: Layout) -> None:
+        self._solver, self._count = solver, 0
+        # The residual of a step's start is a norm over all rods, and so is this, kg m.
+        self._rough = _ROUGH * float(np.linalg.norm([rod.mass * rod.length for rod in layout.rods]))
+
+    @classmethod
+    def configure(cls, newton: Any) -> None:
+        """Settings of exudyn's that leave these decisions to an object of this class."""
+        newton.useModifiedNewton = True
+        newton.modifiedNewtonJacUpdatePerStep = True
+        newton.maxIterations = newton.maxModifiedNewtonIterations = cls.iterations + _EXEMPT
+        # exudyn's own limit for beginning anew is a growth by 2, of what stands in lastResidual.
+        newton.modifiedNewtonContractivity = cls.fall / _RUNAWAY
+
+    def apply(self) -> None:
+        """Due before every residual."""
+        now, found = self._solver.it, self._solver.conv
+        if now.newtonSteps == 1:
+            now.newtonSteps += _EXEMPT
+            if found.residual * now.currentStepSize**2 > self._rough:
+                found.jacobianUpdateRequested = True
+        elif 0 < now.newtonSteps == self._count:
+            found.stopNewton = True  # exudyn begins anew
+        if now.newtonSteps > self.patience + _EXEMPT:
+            found.jacobianUpdateRequested = True
+        if now.newtonSteps > 0:
+            found.lastResidual = found.lastResidual * _RUNAWAY
+        self._count = now.newtonSteps
+
+
+# Settings of exudyn's solver.
+
+
+def solver_settings(scene: Scene, tolerance: float) -> Any:
+    """Generalised-alpha with modified Newton, which stops at a residual norm ``tolerance`` (N); the
+    step is set by a user function.
+    """
+    settings = exu.SimulationSettings()
+    settings.solution.file.write = False
+    settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
+    time = settings.timeIntegration
+    time.verboseMode = 0
+    time.endTime = scene.solver.end_time
+    time.numberOfSteps = 1
+    time.adaptiveStep = True
+    time.adaptiveStepRecoverySteps = 10**6
+    time.minimumStepSize = 1e-9
+    time.generalizedAlpha.spectralRadius = scene.solver.spectral_radius
+    time.generalizedAlpha.computeInitialAccelerations = False
+    time.generalizedAlpha.resetAccelerations = False
+    Newton.configure(time.newton)
+    time.newton.relativeTolerance = 1e-14
+    time.newton.absoluteTolerance = tolerance
+    return settings
+
+
+def newton_norm(built: Built) -> float:
+    """Residual norm in N at which Newton stops; see ``residual_tolerance``."""
+    scene, layout = built.model.scene, built.model.layout
+    size = built.model.assembly.system.systemData.ODE2Size()
+    rounded = 4.0 * float(np.finfo(float).eps)
+    reached = rounded * math.sqrt(size)
+    if scene.rods.damping > 0.0:
+        reached *= STIFFENING
+    return max(residual_tolerance(scene, layout, reached), rounded * rope_reach(scene))
+
+
+# Integrating a built model with exudyn's generalised-alpha; ``ringsim.stepping`` decides on the
+# steps and on the end.
+
 
 _REFUSE = 10.0
 """Error that makes exudyn repeat a step; its tolerance is 1."""

@@ -1,20 +1,102 @@
-"""What is read of every state of a run: energies and their balance, stress and bending strain."""
+"""What is read of every state of a run: energies, stress, the base, corners."""
 
 import math
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import exudyn as exu
 import numpy as np
 
-from ringsim.cable.state import ChainState, work_between
+from ringsim.cable.chain import ChainState, work_between
+from ringsim.engine.assembly import Array, axes_of, cross, spin
 from ringsim.engine.build import Built
-from ringsim.engine.model import Multibody
-from ringsim.engine.readings import State
-from ringsim.engine.rotations import Array
-from ringsim.engine.section_forces import section_forces
-from ringsim.stepping.instant import Energies
-from ringsim.stepping.losses import Passing, lost_between
+from ringsim.engine.cable_path import Direction
+from ringsim.engine.model import Multibody, State
+from ringsim.engine.rods import Ancf, beam_section
+from ringsim.layout.bodies import InSpace, OnBody
+from ringsim.layout.points import points_of
+from ringsim.outputs.family import Carried, Put
+from ringsim.stepping.instant import Energies, Instant, Passing, lost_between
+from ringsim.theory.statics import body_reaction, first_reaction
+
+# Force and moment in the middle of beam elements, by their formulation.
+#
+# exudyn tells those of geometrically exact elements.  Of those with slope vectors it does not: they
+# are evaluated here from the nodes as its element does (Nachbagauer, Gruber and Gerstmayr,
+# Structural and continuum mechanics approaches for a 3D shear deformable ANCF beam finite element,
+# 2013).  With the means r', y and z of position's derivative and of the slopes in the middle, and
+# their derivatives along the element, y' and z',
+#
+#     e3 = z / \|z\|,   e1 = y x z / \|y x z\|,   e2 = e3 x e1,
+#     Gamma = (e1 . r' - 1, e2 . r', e3 . r'),   kappa = 1/2 sum e_k x e_k',
+#
+# in the axes e, and forces and moments are EA, kGA, kGA and GJ, EI, EI times these.
+
 
 _KIND = exu.OutputVariableType
+SectionForces = Callable[[State], tuple[Array, Array]]
+"""Force (N) and moment (N m) in the axes of elements at a state, shape (3, elements) each."""
+
+
+def section_forces(model: Multibody, places: Sequence[tuple[int, int]]) -> SectionForces:
+    """Elastic ones in the middle of elements, each told by its rod and its place in the rod."""
+    if isinstance(model.formulation, Ancf):
+        return SlopeForces(model, places)
+    output = model.assembly.system.GetObjectOutputBody
+    elements = [model.rods[rod].elements[k] for rod, k in places]
+
+    def read(state: State) -> tuple[Array, Array]:
+        force, moment = (
+            np.array([output(e, kind, [0.0] * 3) for e in elements]).T
+            for kind in (_KIND.ForceLocal, _KIND.TorqueLocal)
+        )
+        return force, moment
+
+    return read
+
+
+class SlopeForces:
+    """Those of elements with slope vectors."""
+
+    def __init__(self, model: Multibody, places: Sequence[tuple[int, int]]) -> None:
+        where = model.assembly.coordinates_of
+        self._where = np.array(
+            [[where(node) for node in model.rods[rod].nodes[k : k + 2]] for rod, k in places]
+        )
+        parts = [model.layout.rods[rod] for rod, _ in places]
+        self._lengths = np.array(
+            [part.natural_lengths[k] for part, (_, k) in zip(parts, places, strict=True)]
+        )[:, None]
+        rods = model.scene.rods
+        self._stiffness = np.array(
+            [np.diag(beam_section(rods, part, 0.0).stiffnessMatrix) for part in parts]
+        ).T
+
+    def __call__(self, state: State) -> tuple[Array, Array]:
+        """As for ``SectionForces``."""
+        first, last = state.position[self._where].swapaxes(0, 1)
+        middle, along = 0.5 * (first + last), (last - first) / self._lengths
+        y, z = middle[:, 3:6], middle[:, 6:]
+        normal = np.cross(y, z)
+        normal_along = np.cross(along[:, 3:6], z) + np.cross(y, along[:, 6:])
+        e1, e1_along = _unit(normal, normal_along)
+        e3, e3_along = _unit(z, along[:, 6:])
+        e2, e2_along = np.cross(e3, e1), np.cross(e3_along, e1) + np.cross(e3, e1_along)
+        axes = np.stack([e1, e2, e3], axis=1)
+        turned = np.stack([e1_along, e2_along, e3_along], axis=1)
+        strain = np.einsum("nij,nj->in", axes, along[:, :3])
+        strain[0] -= 1.0
+        bent = np.einsum("nij,nj->in", axes, 0.5 * np.cross(axes, turned).sum(axis=1))
+        return self._stiffness[:3] * strain, self._stiffness[3:] * bent
+
+
+def _unit(vectors: Array, along: Array) -> tuple[Array, Array]:
+    """Unit vectors and their derivatives, from vectors and theirs, shape (n, 3) each."""
+    direction = Direction(vectors)
+    return direction.unit, np.einsum("nij,nj->ni", direction.first(), along)
+
+
+# What is read of every state of a run: energies and their balance, stress and bending strain.
 
 
 class EnergyMeter:
@@ -166,3 +248,138 @@ class BendingMeter:
         first, last = torque[2] + change, torque[2] - change
         at_nodes = np.concatenate([first[:1], 0.5 * (first[1:] + last[:-1]), last[-1:]])
         return np.asarray(-self._per_moment * at_nodes)
+
+
+# What the base carries and how it turns.
+
+
+class BaseMeter:
+    """Reads the base of a model: what exudyn's clamp of the ground carries, and of a spacecraft
+    what accelerates it.
+    """
+
+    def __init__(self, built: Built) -> None:
+        model, layout = built.model, built.model.layout
+        self._system, self._layout, self._stops = model.assembly.system, layout, built.stops
+        self._first = first_reaction(layout, model.moving)
+        self._node = None if layout.base is None else model.bodies[layout.base][1]
+        clamps = [j.holder for j in model.joints if isinstance(j.part.first, InSpace)]
+        self._clamp = clamps[0] if clamps else None
+
+    def read(self, now: Instant) -> Carried:
+        """At the current state."""
+        stops = self._stops
+        torques = None if stops is None else stops.reaction(None, now.angles, now.rates)[0].total
+        return Carried(self._reaction(), self._turn(), torques)
+
+    def _reaction(self) -> Array | None:
+        """Shape (2, 3), N and N m; None of a base that floats alone."""
+        first, self._first = self._first, None
+        if first is not None:  # the clamp has not been solved for yet
+            return first
+        if self._clamp is not None:
+            found = [self._system.GetObjectOutput(self._clamp, kind) for kind in _CLAMP]
+            return np.asarray(_SENSES * found)
+        craft = self._layout.spacecraft
+        if craft is None or self._layout.base is None:
+            return None
+        kinds = _KIND.Acceleration, _KIND.AngularAcceleration, _KIND.AngularVelocity
+        moving, *turning = map(self._output, kinds)
+        gravity = np.zeros(3) if self._layout.gravity is None else self._layout.gravity
+        return body_reaction(craft, self._axes(), moving - gravity, *turning)
+
+    def _turn(self) -> Array | None:
+        """Rotation matrix since the start; None without a base."""
+        if self._layout.base is None:
+            return None
+        return np.asarray(self._axes() @ self._layout.bodies[self._layout.base].pose.axes.T)
+
+    def _axes(self) -> Array:
+        return self._output(_KIND.RotationMatrix).reshape(3, 3)
+
+    def _output(self, kind: Any) -> Array:
+        return np.asarray(self._system.GetNodeOutput(self._node, kind))
+
+
+_CLAMP = _KIND.ForceLocal, _KIND.TorqueLocal
+"""Along the axes of the ground's marker, which are those of space."""
+_SENSES = np.array([[-1.0, -1.0, -1.0], [-1.0, 1.0, 1.0]])
+"""exudyn tells multipliers: those of displacements, and of z_0 . y_1, z_0 . x_1 and x_0 . y_1, the
+rates of which are w_x, -w_y and -w_z of the body."""
+
+
+# Places and velocities of a structure's points in exudyn.
+
+
+class PositionMeter:
+    """Reads points on nodes, and those beside the nodes of bodies."""
+
+    def __init__(self, model: Multibody) -> None:
+        points = points_of(model.layout, model.scene.structure.planes)
+        self.coordinates = points.coordinates
+        nodes, arms = [], []
+        for where in points.mounts:
+            node, arm = (
+                (model.loose[where], np.zeros(3)) if isinstance(where, str)
+                else model.side_of(where)
+            )  # fmt: skip
+            nodes.append(model.assembly.coordinates_of(node))
+            arms.append(arm)
+        assert all(len(nodes[k]) == 7 for k, arm in enumerate(arms) if arm.any())
+        self._where = np.array([own[:3] for own in nodes])
+        self._aside = [k for k, arm in enumerate(arms) if arm.any()]
+        self._arms = np.array([arms[k] for k in self._aside]).reshape(-1, 3)
+        turns = [nodes[k][3:7] for k in self._aside]
+        self._turns = np.array(turns, dtype=np.int64).reshape(-1, 4)
+        assert all(isinstance(points.mounts[k], OnBody) for k in self._aside)
+
+    def read(self, state: State) -> Array:
+        """Places (m) and velocities (m/s), shape (points, 2, 3)."""
+        found = np.stack([state.position[self._where], state.velocity[self._where]], axis=1)
+        if self._aside:
+            turns = state.position[self._turns]
+            arms = np.einsum("nij,nj->ni", axes_of(turns), self._arms)
+            spins = spin(turns, state.velocity[self._turns])
+            found[self._aside] += np.stack([arms, cross(spins, arms)], axis=1)
+        return found
+
+
+# Where corners are and what the rods store, in exudyn.
+
+
+class ShapeMeter:
+    """Reads corners and the elastic energy of the rods."""
+
+    def __init__(self, model: Multibody) -> None:
+        corners, size = model.layout.corners, model.assembly.coordinates_of
+        self._where = np.array([[size(model.bodies[k][1])[:3] for k in plane] for plane in corners])
+        self.coordinates = {"corner": np.arange(1, self._where.shape[1] + 1)}
+        self._elements = [element for rod in model.rods for element in rod.elements]
+        self._output = model.assembly.system.GetObjectOutputBody
+
+    def read(self, state: State) -> Put:
+        """At the current state."""
+        kind = exu.OutputVariableType.PotentialEnergy
+        energy = sum(float(self._output(element, kind)) for element in self._elements)
+        return Put(state.position[self._where], energy)
+
+
+# Accelerations of corners in exudyn.
+
+
+class AccelerationMeter:
+    """Reads the nodes of corners."""
+
+    def __init__(self, model: Multibody) -> None:
+        corners, size = model.layout.corners, model.assembly.coordinates_of
+        self.coordinates = {"corner": np.arange(1, len(corners[0]) + 1)}
+        self._where = np.array([[size(model.bodies[k][1])[:3] for k in plane] for plane in corners])
+        self._data = model.assembly.system.systemData
+        # exudyn's solver takes the initial ones over in its first step.
+        self._next = exu.ConfigurationType.Initial
+
+    def read(self) -> Array:
+        """Shape (planes, corners, 3), m/s^2, at the current state."""
+        found = self._data.GetODE2Coordinates_tt(self._next)
+        self._next = exu.ConfigurationType.Current
+        return np.asarray(np.asarray(found, dtype=float)[self._where])

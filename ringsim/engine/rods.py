@@ -8,13 +8,10 @@ import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
 
-from ringsim.engine.assembly import Assembly
-from ringsim.engine.rotations import Array, axes_of, spin
+from ringsim.engine.assembly import Array, Assembly, axes_of, spin
 from ringsim.layout import bodies as parts
-from ringsim.layout.pose import Pose
-from ringsim.parts.rods.ancf import AncfRods
-from ringsim.parts.rods.family import Rods
-from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
+from ringsim.layout.bodies import Pose
+from ringsim.parts.rods import AncfRods, GeometricallyExactRods, Rods
 
 
 class BuiltRod(NamedTuple):
@@ -48,7 +45,7 @@ class GeometricallyExact:
 
         exudyn's element takes no damping and says nothing of it.  Its strains are constant, so
         damping C eps_dot is a damper C / L between its ends' frames moved to its middle, where
-        they coincide (``ringsim.engine.rod_dampers``).
+        they coincide (``ringsim.engine.assembly``).
         """
         damping = np.array(section.dampingMatrix) / length
         if damping.any():

@@ -1,4 +1,4 @@
-"""A worker slot: samples one after the other in a supervised solver process."""
+"""Worker slots: samples one after the other in supervised solver processes, on this machine."""
 
 import contextlib
 import os
@@ -11,18 +11,23 @@ import sys
 import tempfile
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
-from ringsim.execution.scratch import scratch_folder
-from ringsim.execution.solve import LOG_CHARACTERS
-from ringsim.execution.work import Allowance, Work
+from ringsim.execution.child import scratch_folder
+from ringsim.execution.work import LOG_CHARACTERS, Allowance, Scheduler, Work, load_solver, solve
 from ringsim.refusal import InputError
+from ringsim.scene import Scene
 from ringsim.storage.result import Result, plain
+from ringsim.tables import counted
 from ringsim.threads import ENVIRONMENT
 from ringsim.variables import Cause, Status
+
+# A worker slot: samples one after the other in a supervised solver process.
+
 
 TICK = 0.2
 """Seconds between two looks at a process that says nothing."""
@@ -257,3 +262,64 @@ class Slot:
 def _require_started(process: SolverProcess) -> None:
     if not process.ready:
         raise InputError(f"the solver process does not start: {process.printed()}")
+
+
+# Running samples on this machine: in several solver processes at a time, or in this very one.
+
+
+class Local(Scheduler):
+    """A number of solver processes, supervised by one event loop."""
+
+    def __init__(self, workers: int) -> None:
+        self.workers, self.description = workers, counted(workers, "local worker")
+        self._slots: list[Slot] = []
+
+    def run(self, samples: Sequence[int], work: Work) -> str:
+        """See :meth:`Scheduler.run`."""
+        queue, stands = deque(samples), False
+        try:
+            slots = self._ready(min(self.workers, len(queue)), work)
+            while not work.stop():
+                for slot in slots:
+                    slot.serve(queue, work)
+                busy = [slot.pipe for slot in slots if slot.busy]
+                if not busy:
+                    stands = work.more
+                    break
+                wait(busy, timeout=TICK)
+            return work.stop()
+        finally:
+            if not stands:
+                self.close()
+
+    def close(self) -> None:
+        """See :meth:`Scheduler.close`."""
+        while self._slots:
+            self._slots.pop().close()
+
+    def _ready(self, count: int, work: Work) -> list[Slot]:
+        """Slots that stand since the last run, if they were set up for such work, and new ones."""
+        if any(not slot.suits(work) for slot in self._slots):
+            self.close()
+        while len(self._slots) < count:
+            self._slots.append(Slot(work.solver, work.scene, work.allowance, work.judge))
+        return self._slots[:count]
+
+
+class Serial(Scheduler):
+    """One sample after the other in this process, without limits: a crash ends everything."""
+
+    description = "in one process"
+
+    def run(self, samples: Sequence[int], work: Work) -> str:
+        """See :meth:`Scheduler.run`."""
+        solver, base = load_solver(work.solver), Scene.model_validate(work.scene)
+        for sample in samples:
+            if work.stop():
+                break
+            work.started(sample)
+            chosen = solver if sample >= 0 else load_solver(work.judge)
+            result = solve(chosen, base, sample, work.values_of(sample))
+            work.keep(result)
+            work.finished(result)
+        return work.stop()

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsim.files import whole
-from ringsim.layout.pose import Array
+from ringsim.layout.bodies import Array
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
 from ringsim.shapes import ByLine, Shape, shape_of

@@ -1,36 +1,99 @@
-"""Solving for all unknowns: fronts, one for each part and each block of bodies.
-
-A front is a small dense matrix.  Its first ``gone`` unknowns occur in no other front that is left,
-so they are eliminated there; what that leaves of the others (the Schur complement) is added to the
-parent front (the multifrontal method: Duff and Reid, ACM Transactions on Mathematical Software 9,
-1983).  Parts come first, then the blocks in their order; a closed ring's fronts carry the last
-block along.  The work grows linearly with the sections.
-
-A front's unknowns go in panels of 16 at most.  With a panel first, [A B; C D] becomes
-[. B; C A^-1 .] and an inverse A^-1 of its own: what is left of triangular factors would be too
-small for whole registers.
-"""
+"""The tangent of all unknowns, eliminated section by section, with the border of the ropes."""
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from scipy.linalg.lapack import dgetrf, dgetrs
 
-from ringsim.frame.eights import (
-    EIGHT,
-    NONE,
-    less,
-    product,
-    put_eight,
-    row_dot,
-    size_of,
-    take_eight,
-    total,
-)
-from ringsim.frame.mesh import Mesh
-from ringsim.frame.parts import Indices
+from ringsim.frame.mesh import Indices, Mesh
 from ringsim.frame.vectors import packed, unsigned
-from ringsim.layout.pose import Array
+from ringsim.layout.bodies import Array
+
+# Eight numbers of a row at a time, as tuples: one register of a modern processor, or two.
+#
+# numba turns tuples into separate numbers, and the SLP pass of the compiler (``packed``) packs
+# them. Loops over rows of a dozen numbers would be too short for its loop pass: most of their time
+# goes to what is left beside whole registers.
+
+
+EIGHT = 8
+Eight: TypeAlias = tuple[float, float, float, float, float, float, float, float]
+NONE: Eight = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@packed
+def take_eight(row: Array, first: int) -> Eight:
+    """Eight numbers of a row."""
+    k = unsigned(first)
+    return (
+        row[k], row[k + unsigned(1)], row[k + unsigned(2)], row[k + unsigned(3)],
+        row[k + unsigned(4)], row[k + unsigned(5)], row[k + unsigned(6)], row[k + unsigned(7)],
+    )  # fmt: skip
+
+
+@packed
+def put_eight(row: Array, first: int, x: Eight) -> None:
+    """Put eight numbers into a row."""
+    k = unsigned(first)
+    row[k], row[k + unsigned(1)], row[k + unsigned(2)] = x[0], x[1], x[2]
+    row[k + unsigned(3)], row[k + unsigned(4)], row[k + unsigned(5)] = x[3], x[4], x[5]
+    row[k + unsigned(6)], row[k + unsigned(7)] = x[6], x[7]
+
+
+@packed
+def less(x: Eight, share: float, y: Eight) -> Eight:
+    """X - share y."""
+    return (
+        x[0] - share * y[0], x[1] - share * y[1], x[2] - share * y[2], x[3] - share * y[3],
+        x[4] - share * y[4], x[5] - share * y[5], x[6] - share * y[6], x[7] - share * y[7],
+    )  # fmt: skip
+
+
+@packed
+def product(x: Eight, y: Eight) -> Eight:
+    """Of each two numbers."""
+    return (
+        x[0] * y[0], x[1] * y[1], x[2] * y[2], x[3] * y[3],
+        x[4] * y[4], x[5] * y[5], x[6] * y[6], x[7] * y[7],
+    )  # fmt: skip
+
+
+@packed
+def size_of(x: Eight) -> Eight:
+    """Of each number."""
+    return (
+        abs(x[0]), abs(x[1]), abs(x[2]), abs(x[3]), abs(x[4]), abs(x[5]), abs(x[6]), abs(x[7])
+    )  # fmt: skip
+
+
+@packed
+def total(x: Eight) -> float:
+    """Of all eight."""
+    return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]))
+
+
+@packed
+def row_dot(row: Array, first: int, y: Array, n: int) -> float:
+    """Of n numbers of a row with those of y, which has zeros behind them up to whole eights."""
+    found = NONE
+    for k in range(unsigned(0), unsigned(n), unsigned(EIGHT)):
+        found = less(found, -1.0, product(take_eight(row, unsigned(first) + k), take_eight(y, k)))
+    return total(found)
+
+
+# Solving for all unknowns: fronts, one for each part and each block of bodies.
+#
+# A front is a small dense matrix.  Its first ``gone`` unknowns occur in no other front that is
+# left, so they are eliminated there; what that leaves of the others (the Schur complement) is added
+# to the parent front (the multifrontal method: Duff and Reid, ACM Transactions on Mathematical
+# Software 9, 1983).  Parts come first, then the blocks in their order; a closed ring's fronts carry
+# the last block along.  The work grows linearly with the sections.
+#
+# A front's unknowns go in panels of 16 at most.  With a panel first, [A B; C D] becomes
+# [. B; C A^-1 .] and an inverse A^-1 of its own: what is left of triangular factors would be too
+# small for whole registers.
+
 
 LEAST_PIVOT = 1e-9
 """Pivot over the sum of its row's entries in the front.  Elimination without exchange loses as many
@@ -249,3 +312,70 @@ def solve_one(mesh: Mesh, fronts: Fronts, x: Array) -> None:
             known[i] = x[spots[first + i]] - row_dot(a[first + i], end, b, kept)
         for i in range(count):
             x[spots[first + i]] = row_dot(inverse[i], 0, known, count)
+
+
+# The tangent of all unknowns, factored, with its border.
+#
+#     K x + C z = r,   R^T x + D z = r_z:
+#
+# K is in the fronts; z are the changes of tension in all ropes and, where a net's strings pull, the
+# places of its hub.
+
+
+class Border(NamedTuple):
+    """C and R, shape (unknowns, k) each, and D, (k, k); the hub has the first three if ``strung``.
+
+    k is a whole number of eights: columns of zeros, whose z is zero, fill the last.
+    ``hub_inertia``, N/m, is that of a hub that no string pulls: it moves by this alone.  Else nan.
+    """
+
+    columns: Array
+    rows: Array
+    corner: Array
+    strung: bool
+    hub_inertia: float
+
+    @property
+    def first(self) -> int:
+        """First column of the ropes."""
+        return 3 if self.strung else 0
+
+    @classmethod
+    def empty(cls, unknowns: int, factors: int, strung: bool, hub_inertia: float) -> "Border":
+        """With room for the hub and so many factors of the ropes."""
+        k = EIGHT * math.ceil((factors + 3 * strung) / EIGHT)
+        columns, rows = np.zeros((2, unknowns, k))
+        return cls(columns, rows, -np.eye(k), strung, hub_inertia)
+
+
+class Factored:
+    """Solves with the tangent; ``sound`` unless a pivot is too small."""
+
+    def __init__(self, mesh: Mesh, fronts: Fronts, border: Border) -> None:
+        self._mesh, self._fronts, self._border = mesh, fronts, border
+        self.sound = bool(factor(mesh, fronts))
+        if self.sound and len(border.corner):
+            solve(mesh, fronts, border.columns)
+            corner = border.corner - border.rows.T @ border.columns
+            # LAPACK itself: around it numpy and scipy spend more than these few dozen rows take.
+            # Transposed, so that rows are its columns.
+            *self._corner, wrong = dgetrf(corner.T, overwrite_a=True)
+            self.sound &= wrong == 0
+
+    def solve(self, g: Array) -> Array:
+        """The change of all unknowns, the hub's last, that takes a residual to zero."""
+        unknowns, border = self._mesh.unknowns, self._border
+        found = -g
+        x, hub = found[:unknowns], found[unknowns:]
+        solve_one(self._mesh, self._fronts, x)
+        if len(border.corner):
+            right = -(x @ border.rows)
+            if border.strung:
+                right[:3] += hub
+            z, _ = dgetrs(*self._corner, right, trans=1)
+            x -= border.columns @ z
+            if border.strung:
+                hub[:] = z[:3]
+        if not math.isnan(border.hub_inertia):
+            hub /= border.hub_inertia
+        return np.asarray(found)

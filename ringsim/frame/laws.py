@@ -1,25 +1,243 @@
-"""Torques on joint angles: friction, stops and joints that stick, by the laws of ringsim.parts."""
+"""Laws of parts and cables as lists of operations, which compiled code plays back."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
-from ringsim.frame.mesh import Mesh
-from ringsim.frame.parts import Indices
-from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
-from ringsim.frame.tape import Law, Tape, play, taped
+from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh, Skeleton
 from ringsim.frame.vectors import compiled
-from ringsim.layout.joints import JointOpening
-from ringsim.layout.pose import Array
-from ringsim.parts.faults.stuck_vjoint import StuckVJoint
-from ringsim.parts.joint_friction.family import JointFriction
+from ringsim.layout.bodies import Array, JointOpening
+from ringsim.parts.faults import StuckVJoint
+from ringsim.parts.joints import JointFriction, Reaction
 from ringsim.parts.persection import at_section
-from ringsim.parts.springs import Reaction
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.stepping.turning import Turning
+from ringsim.stepping.locks import Turning
+
+# Laws of ringsim.parts and ringsim.cable as lists of operations, which compiled code plays back.
+#
+# A law is Python that numpy, exudyn's expressions and this module can follow: called once on rows
+# that note what is done with them, it leaves a tape.  So one file serves all engines, and Newton's
+# iterations do without the microsecond that numpy takes to begin each operation.
+#
+# A law that is to be taped works on each number by itself, by arithmetic and the functions of
+# ``_KNOWN``, and does not branch on numbers: ``numpy.where`` does that.
+
+
+_KNOWN = (
+    np.add, np.subtract, np.multiply, np.divide, np.maximum, np.minimum, np.negative, np.absolute,
+    np.sign, np.sqrt, np.square, np.power, np.exp, np.log, np.sin, np.cos, np.tanh, np.arctanh,
+    np.greater, np.less, np.greater_equal, np.less_equal, np.arctan, np.expm1, np.log1p,
+    np.positive, np.where,
+)  # fmt: skip
+(
+    _ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _MAXIMUM, _MINIMUM, _NEGATIVE, _ABSOLUTE,
+    _SIGN, _SQRT, _SQUARE, _POWER, _EXP, _LOG, _SIN, _COS, _TANH, _ARCTANH,
+    _GREATER, _LESS, _GREATER_EQUAL, _LESS_EQUAL, _ARCTAN, _EXPM1, _LOG1P,
+    _POSITIVE, _WHERE,
+) = range(len(_KNOWN))  # fmt: skip
+
+Law = Callable[..., Any]
+
+
+class Tape(NamedTuple):
+    """What laws do, one behind the other, each on columns of its own.
+
+    Operations, shape (m, 5): kind, rows of the result and of three operands; of every law the first
+    operation, the last one and columns, (laws, 4); rows of numbers, (rows, columns): the inputs
+    first, the results behind them, then constants and what comes in between.
+    """
+
+    code: Indices
+    laws: Indices
+    rows: Array
+
+
+class Row(NDArrayOperatorsMixin):
+    """A row that notes what is done with it; ``shape`` is that of what it stands for."""
+
+    def __init__(self, notes: "_Notes", place: int) -> None:
+        self._notes, self.place, self.shape = notes, place, notes.shape
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *given: Any, **options: Any) -> Any:
+        """What numpy calls for its element-wise functions."""
+        if method != "__call__" or options:
+            raise TypeError(f"it calls numpy.{ufunc.__name__} otherwise than on numbers alone")
+        return self._notes.do(ufunc, given)
+
+    def __array_function__(self, function: Any, _: Any, given: Any, options: Any) -> Any:
+        """What numpy calls for its other functions."""
+        if function is np.zeros_like:
+            return 0.0
+        if function is np.clip and not options:
+            return np.minimum(np.maximum(given[0], given[1]), given[2])
+        return self._notes.do(function, given)
+
+    def __bool__(self) -> bool:
+        """Refused: a tape has one way through a law."""
+        raise TypeError("it branches on a number, instead of numpy.where")
+
+
+class _Notes:
+    """Operations of one law on values of a shape."""
+
+    def __init__(self, shape: tuple[int, ...], inputs: int, results: int) -> None:
+        self.shape = shape
+        self.code: list[tuple[int, ...]] = []
+        self.rows = [np.zeros(shape) for _ in range(inputs + results)]
+        self.given = [Row(self, place) for place in range(inputs)]
+
+    def do(self, function: Any, given: Sequence[Any]) -> Any:
+        if function not in _KNOWN:
+            raise TypeError(f"it calls numpy.{function.__name__}")
+        operands = [self._place(each) for each in given]
+        self.rows.append(np.zeros(self.shape))
+        self._note(_KNOWN.index(function), len(self.rows) - 1, operands)
+        return Row(self, len(self.rows) - 1)
+
+    def end(self, found: Any, place: int) -> None:
+        """Put a result into its row."""
+        self._note(_POSITIVE, place, [self._place(found)])
+
+    def _note(self, kind: int, to: int, operands: list[int]) -> None:
+        self.code.append((kind, to, *operands, *[0] * (3 - len(operands))))
+
+    def _place(self, value: Any) -> int:
+        if isinstance(value, np.ndarray) and value.dtype == object:
+            value = value.item()  # numpy.asarray of a row
+        if isinstance(value, Row):
+            return value.place
+        self.rows.append(np.broadcast_to(np.asarray(value, dtype=float), self.shape))
+        return len(self.rows) - 1
+
+
+def taped(laws: Sequence[tuple[Law, tuple[int, ...], object]], inputs: int, results: int) -> Tape:
+    """A tape of laws, each with the shape of its coordinates and the record that it belongs to.
+
+    A law takes so many ``inputs`` and returns so many ``results``.  InputError if it does what
+    tapes do not know.
+    """
+    code: list[tuple[int, ...]] = []
+    table: list[tuple[int, ...]] = []
+    blocks: list[Array] = []
+    for law, shape, record in laws:
+        notes = _Notes(shape, inputs, results)
+        try:
+            found = law(*notes.given)
+            told = found if isinstance(found, tuple) else (found,)
+            if len(told) != results:
+                raise TypeError(f"it tells {len(told)} things, not {results}")
+            for place, each in enumerate(told, inputs):
+                notes.end(each, place)
+        except (TypeError, AttributeError, ValueError) as error:
+            known = ", ".join(each.__name__ for each in _KNOWN)
+            raise InputError(
+                f"{NOT_HERE} the law of {type(record).__name__}: {error} (write it with arithmetic "
+                f"and numpy's {known} on each number, or {CURE})"
+            ) from error
+        left = sum(block.shape[1] for block in blocks)
+        blocks.append(np.array([row.ravel() for row in notes.rows]))
+        table.append((len(code), len(code) + len(notes.code), left, left + blocks[-1].shape[1]))
+        code += notes.code
+    rows = np.zeros(
+        (max((len(block) for block in blocks), default=inputs + results),
+         sum(block.shape[1] for block in blocks))
+    )  # fmt: skip
+    for block, (*_, left, right) in zip(blocks, table, strict=True):
+        rows[: len(block), left:right] = block
+    operations = np.array(code, dtype=np.int64).reshape(-1, 5)
+    return Tape(operations, np.array(table, dtype=np.int64).reshape(-1, 4), rows)
+
+
+@compiled
+def play(tape: Tape) -> None:
+    """Compute the results from the inputs."""
+    for law in range(len(tape.laws)):
+        first, last, left, right = tape.laws[law]
+        for n in range(first, last):
+            kind, to, first_row, second_row, third_row = tape.code[n]
+            out = tape.rows[to, left:right]
+            x, y = tape.rows[first_row, left:right], tape.rows[second_row, left:right]
+            if kind == _ADD:
+                for k in range(len(out)):
+                    out[k] = x[k] + y[k]
+            elif kind == _SUBTRACT:
+                for k in range(len(out)):
+                    out[k] = x[k] - y[k]
+            elif kind == _MULTIPLY:
+                for k in range(len(out)):
+                    out[k] = x[k] * y[k]
+            elif kind == _DIVIDE:
+                for k in range(len(out)):
+                    out[k] = x[k] / y[k]
+            elif kind == _MAXIMUM:
+                for k in range(len(out)):
+                    out[k] = x[k] if x[k] >= y[k] or x[k] != x[k] else y[k]
+            elif kind == _MINIMUM:
+                for k in range(len(out)):
+                    out[k] = x[k] if x[k] <= y[k] or x[k] != x[k] else y[k]
+            elif kind == _NEGATIVE:
+                for k in range(len(out)):
+                    out[k] = -x[k]
+            elif kind == _POSITIVE:
+                for k in range(len(out)):
+                    out[k] = x[k]
+            elif kind == _WHERE:
+                z = tape.rows[third_row, left:right]
+                for k in range(len(out)):
+                    out[k] = y[k] if x[k] != 0.0 else z[k]
+            else:
+                _play_function(kind, x, y, out)
+
+
+@compiled
+def _play_function(kind: int, x: Array, y: Array, out: Array) -> None:
+    """Functions of one number, and rarer ones of two."""
+    for k in range(len(out)):
+        a = x[k]
+        if kind == _ABSOLUTE:
+            out[k] = abs(a)
+        elif kind == _SIGN:
+            out[k] = np.sign(a)
+        elif kind == _SQRT:
+            out[k] = np.sqrt(a)
+        elif kind == _SQUARE:
+            out[k] = a * a
+        elif kind == _POWER:
+            out[k] = a * a if y[k] == 2.0 else a ** y[k]
+        elif kind == _EXP:
+            out[k] = np.exp(a)
+        elif kind == _LOG:
+            out[k] = np.log(a)
+        elif kind == _SIN:
+            out[k] = np.sin(a)
+        elif kind == _COS:
+            out[k] = np.cos(a)
+        elif kind == _TANH:
+            out[k] = np.tanh(a)
+        elif kind == _ARCTANH:
+            out[k] = np.arctanh(a)
+        elif kind == _ARCTAN:
+            out[k] = np.arctan(a)
+        elif kind == _EXPM1:
+            out[k] = np.expm1(a)
+        elif kind == _LOG1P:
+            out[k] = np.log1p(a)
+        elif kind == _GREATER:
+            out[k] = 1.0 if a > y[k] else 0.0
+        elif kind == _GREATER_EQUAL:
+            out[k] = 1.0 if a >= y[k] else 0.0
+        elif kind == _LESS:
+            out[k] = 1.0 if a < y[k] else 0.0
+        else:
+            out[k] = 1.0 if a <= y[k] else 0.0
+
+
+# Torques on joint angles: friction, stops and joints that stick, by the laws of ringsim.parts.
+
 
 _NUDGE = 1e-7
 """Change of angle (rad) and rate (rad/s) by which the slopes of laws are measured."""

@@ -6,30 +6,35 @@ import sys
 import numpy as np
 
 from ringsim.choice import kind_of
-from ringsim.frame.balance import Held, balance, differentiate, put_in_place
-from ringsim.frame.cables import FrameCables
-from ringsim.frame.edge import EdgeCables
-from ringsim.frame.elimination import Fronts
-from ringsim.frame.factored import Border, Factored
-from ringsim.frame.following import Coefficients, Followed
-from ringsim.frame.hanging import Hanging
+from ringsim.frame.cables import Arms, FrameCables, no_lines
+from ringsim.frame.elimination import Border, Factored, Fronts
 from ringsim.frame.kernels import Pose, Strains, add_forces, move
 from ringsim.frame.laws import JointLaws, Openings
-from ringsim.frame.lines import Arms, no_lines
-from ringsim.frame.mesh import mesh_of
-from ringsim.frame.net import Web
-from ringsim.frame.skeleton import CURE, NOT_HERE, Skeleton
-from ringsim.frame.slide import STIFFNESS, BeamSlide, RigidSlide, Slide
-from ringsim.frame.state import State
+from ringsim.frame.mesh import CURE, NOT_HERE, Skeleton, mesh_of
+from ringsim.frame.springs import STIFFNESS, BeamSlide, EdgeCables, RigidSlide, Slide, Web
+from ringsim.frame.state import (
+    Coefficients,
+    Followed,
+    Hanging,
+    Held,
+    State,
+    balance,
+    differentiate,
+    put_in_place,
+)
+from ringsim.layout.bodies import Array
 from ringsim.layout.layout import layout_of
-from ringsim.layout.pose import Array
-from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
+from ringsim.parts.rods import GeometricallyExactRods
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.theory.assembled import assembled
-from ringsim.theory.first_reaction import first_acceleration
-from ringsim.theory.one_coordinate import OneCoordinate
-from ringsim.theory.scales import coordinates, residual_tolerance, rope_reach
+from ringsim.theory.assembling import assembled
+from ringsim.theory.statics import (
+    OneCoordinate,
+    coordinates,
+    first_acceleration,
+    residual_tolerance,
+    rope_reach,
+)
 
 
 class FrameModel:

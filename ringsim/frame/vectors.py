@@ -11,7 +11,7 @@ from numba import config, njit
 from numba.core.errors import NumbaError
 
 from ringsim.compile_cache import alone, packs, tell_damage
-from ringsim.layout.pose import Array
+from ringsim.layout.bodies import Array
 from ringsim.refusal import InputError
 
 Vector: TypeAlias = tuple[float, float, float]

@@ -1,8 +1,6 @@
-"""A layout under construction: what a structure calls to say what it consists of.
+"""A layout under construction: what a structure calls to say what it consists of."""
 
-Places and axes are given at q + i STEP (ringsim.layout.pose): no structure differentiates anything.
-"""
-
+import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -10,20 +8,238 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ringsim.cable.bracket.bar_half import BarHalfBracket
-from ringsim.cable.records import Cable
-from ringsim.cable.sheaves import BlockSheave, FixedSheave, Sheave
-from ringsim.layout.base import add_boom, base_of
-from ringsim.layout.bodies import SPACE, Body, InSpace, Lump, Mount, OnBody, OnRod, Rod, pose_of
-from ringsim.layout.edge import along_edges
-from ringsim.layout.free_hub import FreeHub
-from ringsim.layout.hung import hang
-from ringsim.layout.joints import ChordOpening, Joint, JointOpening, Opening
-from ringsim.layout.layout import Contact, HubNet, Layout, Spring
-from ringsim.layout.pose import Array, Pose, axes_along, rate_of, real_of
-from ringsim.parts.net.hub import SpringNet
-from ringsim.parts.persection import spread
-from ringsim.parts.tube import Tube
+from ringsim.cable.records import BarHalfBracket, BlockSheave, Cable, FixedSheave, Sheave
+from ringsim.layout.bodies import (
+    SPACE,
+    Array,
+    Body,
+    ChordOpening,
+    InSpace,
+    Joint,
+    JointOpening,
+    Lump,
+    Mount,
+    OnBody,
+    OnRod,
+    Opening,
+    Pose,
+    Rod,
+    axes_along,
+    pose_of,
+    rate_of,
+    real_of,
+)
+from ringsim.layout.layout import (
+    SPACECRAFT,
+    BoomBeam,
+    Contact,
+    EdgeNet,
+    HubNet,
+    Hung,
+    Layout,
+    Spring,
+    layout_at_opening,
+)
+from ringsim.parts.boom import RigidBoom
+from ringsim.parts.joints import Reaction
+from ringsim.parts.net import BoundaryNet, SpringNet
+from ringsim.parts.persection import at_section, spread
+from ringsim.parts.rods import Tube
+
+# What holds a structure: its boom and, at the boom's upper end, the ground or a spacecraft.
+
+
+_UPWARDS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+"""Axes with x along the boom."""
+
+
+def add_boom(draft: "Draft") -> BoomBeam | None:
+    """A flexible boom; a rigid one becomes a lump of the body at its top."""
+    boom = draft.scene.boom
+    if boom is None:
+        return None
+    draft.require_corners("boom", 2)
+    top, low = (OnBody(plane[0].number) for plane in draft.corners[:2])
+    body, tube = draft.bodies[top.body], boom.tube
+    if boom.base == "fixed":
+        draft.joints.append(Joint("weld", "", 0, InSpace(body.pose.place, SPACE), top))
+    across = 0.125 * boom.mass * (tube.outer_diameter**2 + tube.inner_diameter**2)
+    along = boom.mass * boom.length**2 / 3.0
+    centre = np.array([0.0, 0.0, -0.5 * boom.length])
+    line = Lump("boom", boom.mass, centre, np.diag([along, along, 0.0]))
+    sections = across * np.diag([0.5, 0.5, 1.0])
+    _add_spacecraft(draft, top.body)
+    if not isinstance(boom, RigidBoom):
+        # Elements are lines: what the tube's sections have of inertia turns with its top.
+        _add_lump(draft, top.body, Lump("boom", 0.0, np.zeros(3), sections))
+        return BoomBeam(top, low, boom, line)
+    _add_lump(draft, top.body, line._replace(inertia=line.inertia + sections))
+    # A sleeve slides along z, a prismatic joint along x.
+    axes = SPACE if boom.joint == "sleeve" else _UPWARDS
+    first, second = (end._replace(axes=axes) for end in (top, low))
+    draft.joints.append(Joint(boom.joint, "", 0, first, second))
+    return None
+
+
+def base_of(draft: "Draft") -> int | None:
+    """Number of the body that is held, or that a boom's upper end is fixed to; None without."""
+    for joint in draft.joints:
+        if isinstance(joint.first, InSpace) and isinstance(joint.second, OnBody):
+            return joint.second.body
+    return None if draft.scene.boom is None else draft.corners[0][0].number
+
+
+def _add_spacecraft(draft: "Draft", top: int) -> None:
+    craft = draft.scene.spacecraft
+    if craft is not None:
+        lump = Lump(SPACECRAFT, craft.mass, np.array(craft.centre), craft.inertia_at_mount)
+        _add_lump(draft, top, lump)
+
+
+def _add_lump(draft: "Draft", number: int, lump: Lump) -> None:
+    body = draft.bodies[number]
+    draft.bodies[number] = replace(body, lumps=(*body.lumps, lump))
+
+
+# Cables along the edge of a net: which corners they join, and how long they are.
+
+
+def along_edges(draft: "Draft") -> EdgeNet | None:
+    """The cables of a scene's net, if it has such."""
+    law = draft.scene.net
+    if not isinstance(law, BoundaryNet):
+        return None
+    planes = {"upper": (0,), "lower": (1,), "both": (0, 1)}[law.planes]
+    draft.require_corners("net", planes[-1] + 1)
+    sections, count = draft.scene.structure.sections, len(draft.corners[0])
+    bodies = np.full((len(draft.scene.structure.planes), sections, 2), -1)
+    for plane in planes:
+        row = np.array([ref.number for ref in draft.corners[plane]])
+        ahead = np.arange(1, sections + 1) % count
+        bodies[plane] = np.stack([row[:sections], row[ahead]], axis=-1)
+    return EdgeNet(law, bodies)
+
+
+def natural_lengths(scene: Any, edge: EdgeNet) -> Array:
+    """Of the cables, from the layout with all V-joints at 180 deg, m, shape (planes, sections);
+    NaN in planes without.
+    """
+    plain = scene.model_copy(update={"net": None})
+    deployed = distances(layout_at_opening(plain, math.pi), edge)
+    return edge.law.natural(deployed)
+
+
+def distances(layout: Layout, edge: EdgeNet) -> Array:
+    """Of the corners that cables join, in a layout, m, shape (planes, sections)."""
+    places = np.array([body.pose.place for body in layout.bodies])
+    found = np.full(edge.present.shape, np.nan)
+    found[edge.present] = np.linalg.norm(np.diff(places[edge.pairs], axis=1)[:, 0], axis=1)
+    return found
+
+
+# The lines that carry a structure in a ground test, and what each carries.
+
+
+def hang(draft: "Draft", gravity: np.ndarray, base: int | None) -> Hung | None:
+    """The lines of a scene's offload; the base carries its own corner where it is held."""
+    law = draft.scene.offload
+    if law is None:
+        return None
+    planes = {"upper": (0,), "lower": (1,), "both": (0, 1)}[law.planes]
+    draft.require_corners("offload", planes[-1] + 1)
+    size, count = float(np.linalg.norm(gravity)), len(draft.corners[0])
+    chosen = [number - 1 for number in law.corners] or range(count)
+    carried = [(draft.corners[plane][k].number, k) for plane in planes for k in chosen]
+    own = np.array([draft.bodies[body].mass for body, _ in carried])
+    net, boom = draft.scene.net, draft.scene.boom
+    whole = sum(body.mass for body in draft.bodies) + sum(
+        rod.mass + sum(mass for _, mass, _ in rod.masses) for rod in draft.rods
+    )
+    whole += 0.0 if net is None else net.point_mass
+    # A rigid boom is a lump of the body at its top.
+    if boom is not None and not isinstance(boom, RigidBoom) and not draft.scene.held:
+        whole += boom.mass
+    held = draft.bodies[base] if base is not None and draft.scene.held else None
+    if held is not None and base not in [body for body, _ in carried]:
+        whole -= held.mass
+    residual = spread(law.residual, count)[[k for _, k in carried]]
+    lifts = (1.0 - residual) * size * (own + (whole - own.sum()) / len(carried))
+    keep = [n for n, (body, _) in enumerate(carried) if held is None or body != base]
+    return Hung(law, tuple(carried[n][0] for n in keep), lifts[keep], -gravity / size)
+
+
+# The net of an ideal ring: springs from the upper corners to a massless hub.
+#
+# The hub lies where the springs' pulls balance, sum k_i s_i u_i = 0 (s_i the stretch, u_i the
+# direction from the hub): the least of a convex energy while they only pull, found by Newton's
+# method with A_i = k_i (u_i u_i^T + (s_i / L_i) (1 - u_i u_i^T)), the pulls' derivatives after its
+# place.  The springs' work is then that of the corners alone.
+
+
+_MOST = 60
+"""Newton steps to the hub, each a tenth of the net's size long at most."""
+_BALANCED = 1e-14
+"""Pull on the hub over the largest string's, or its movement over the net's size, taken as zero."""
+
+
+class NetForce(NamedTuple):
+    """Generalised force of a net at rest on a coordinate (N m), and its energy (J)."""
+
+    force: float
+    energy: float
+
+
+class FreeHub:
+    """Springs from so many corners to a free hub; ``corners`` have the shape (corners, 3), m."""
+
+    def __init__(self, net: SpringNet, corners: int) -> None:
+        self._net = at_section(net, np.arange(corners))
+        self._stiffness = spread(net.stiffness, corners)
+
+    def hub(self, corners: Array) -> Array:
+        """Where it lies, shape (3,), m: midway while all is slack."""
+        return self._balance(corners)[0]
+
+    def force(self, corners: Array, slopes: Array) -> NetForce:
+        """On a coordinate after which ``slopes`` are the corners' derivatives, shape (corners, 3),
+        m/rad.
+        """
+        _, _, units, still = self._balance(corners)
+        longer = np.sum(units * slopes, axis=1)
+        # A difference, not a negative: a slack net pulls with 0, not -0.
+        return NetForce(0.0 - float(still.elastic @ longer), float(np.sum(still.stored)))
+
+    def _balance(self, corners: Array) -> tuple[Array, Array, Array, Reaction]:
+        """The hub, and the strings' lengths, directions and reaction at rest there."""
+        hub, size, moved = corners.mean(axis=0), float(np.ptp(corners)), np.inf
+        for _ in range(_MOST):
+            arms = corners - hub
+            lengths = np.maximum(np.linalg.norm(arms, axis=1), 1e-300)
+            units = arms / lengths[:, None]
+            still = self._net.tension(lengths - self._net.neutral_length, 0.0)
+            pull = still.elastic @ units
+            balanced = np.abs(pull).max() <= _BALANCED * np.abs(still.elastic).max()
+            if balanced or moved < _BALANCED * size:
+                break
+            matrix = self._rates(lengths, units, still).sum(axis=0)
+            step = np.linalg.lstsq(matrix, pull, rcond=1e-9)[0]
+            moved = float(np.abs(step).max())
+            hub = hub + (step if moved <= 0.1 * size else step * (0.1 * size / moved))
+        return hub, lengths, units, still
+
+    def _rates(self, lengths: Array, units: Array, still: Reaction) -> Array:
+        """The matrices A_i, shape (corners, 3, 3), N/m."""
+        acting = self._stiffness * ((still.elastic > 0.0) | self._net.two_sided)
+        along = units[:, :, None] * units[:, None, :]
+        across = (still.elastic / lengths)[:, None, None]
+        return np.asarray(acting[:, None, None] * along + across * (np.eye(3) - along))
+
+
+# A layout under construction: what a structure calls to say what it consists of.
+#
+# Places and axes are given at q + i STEP (ringsim.layout.bodies): no structure differentiates
+# anything.
+
 
 _CLOSE = 1e-9
 """Points that coincide, over the size of the part: round-off leaves 1e-15."""

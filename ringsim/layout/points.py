@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.layout.bodies import InSpace, Mount, OnBody, OnRod
-from ringsim.layout.joints import Joint, JointOpening
+from ringsim.layout.bodies import Array, InSpace, Joint, JointOpening, Mount, OnBody, OnRod
 from ringsim.layout.layout import Layout
-from ringsim.layout.pose import Array
 
 HUB, BOOM_TIP = "hub", "boom tip"
 """Points that stand on no body and no rod: the net's hub, the free end of a flexible boom."""
@@ -36,7 +34,7 @@ class Points:
 
     @property
     def coordinates(self) -> dict[str, NDArray[np.str_]]:
-        """Of the dimensions of ``ringsim.outputs.position``."""
+        """Of the dimensions of ``ringsim.outputs.corners``."""
         return {"point": np.array(self.names), "axis": np.array(["x", "y", "z"])}
 
     def drawn(self, places: Array, taut_beyond: float | Array = 0.0) -> dict[str, Array]:

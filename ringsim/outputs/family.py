@@ -1,22 +1,301 @@
-"""The family of outputs, and what all of them together declare."""
+"""The family of outputs: series over time, largest values, and what all of them declare."""
 
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, ClassVar
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsim.cable.chain import ChainState
 from ringsim.cable.records import Cable
-from ringsim.cable.winding.motor import MotorWinding
+from ringsim.cable.winding import MotorWinding
 from ringsim.choice import kind_of
-from ringsim.outputs.peaks import Peak, SpanNames, Values
-from ringsim.outputs.series import Reading, Run, Series, output_times
-from ringsim.parts.net.boundary import BoundaryNet
+from ringsim.hermite import cubic, monotone_slopes
+from ringsim.parts.net import BoundaryNet
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
-from ringsim.stepping.instant import Array
+from ringsim.stepping.instant import Array, Instant
+from ringsim.stepping.locks import history
 from ringsim.variables import ErrorBar, Variable
+
+# What outputs read of a state, the readings over time, and a run that has ended.
+
+
+_SAME = 1.0 + 1e-12
+"""Times that differ by round-off alone are the same."""
+
+
+class Carried(NamedTuple):
+    """What base and stops carry.
+
+    Force (N) and torque (N m) of the base on the structure, shape (2, 3), about the base's origin,
+    None of a base that floats alone; rotation matrix of the base since the start, None without a
+    base; torque of the stop on every V-joint, shape (planes, sections), N m, None without stops.
+    """
+
+    reaction: Array | None
+    turn: Array | None
+    stops: Array | None
+
+
+class Put(NamedTuple):
+    """Places of the corners, shape (planes, corners, 3), m, and elastic energy of the rods, J."""
+
+    corners: Array
+    rods: float
+
+
+@dataclass(frozen=True)
+class Reading(Instant):
+    """An instant with all that outputs read; to them its energies tell ``work`` with what the
+    winches put in, and ``lost``, since the start.
+    """
+
+    chain: ChainState | None = None
+    """All cables; None if the scene has none."""
+    planes: tuple[tuple[int, ...], ...] = ()
+    """Planes of each cable of the chain: one may stand for two cables that pull alike."""
+    stress: Array | None = None
+    """Axial + bending stress, shape (rod halves, sections), Pa; None unless recorded."""
+    places: Array | None = None
+    """Places (m) and velocities (m/s) of the structure's points, shape (points, 2, 3); None unless
+    recorded."""
+    strain: Array | None = None
+    """Bending strain at the stations of the rod with the gauge, if the structure has one."""
+
+    carried: Carried | None = None
+    """What base and stops carry; None unless recorded."""
+    accelerations: Array | None = None
+    """Of the corners, shape (planes, corners, 3), m/s^2; None unless recorded."""
+
+    put: Put | None = None
+    """Where corners are and what the rods store; None unless recorded."""
+    edge: Array | None = None
+    """Tension of the cables along a net's edge, shape (planes, sections), N; None without."""
+
+    def by_plane(self, of_cables: NDArray[Any]) -> Array:
+        """A number for each plane, from one for each cable; NaN where a plane has no cable."""
+        found = np.full(len(self.angles), np.nan)
+        for planes, value in zip(self.planes, of_cables, strict=True):
+            found[list(planes)] = value
+        return found
+
+
+@dataclass(frozen=True)
+class Series:
+    """Readings of one thing at all instants of a run."""
+
+    times: Array
+    """Shape (n,), s."""
+    values: Array
+    """Shape (n, ...), in the reading's unit."""
+    grid: Array
+    """The scene's output times, s."""
+
+    def on_grid(self, rates: Array | None = None) -> Array:
+        """Values at the output times, which are the last axis; see :meth:`at`."""
+        return np.moveaxis(self.at(self.grid, rates), 0, -1)
+
+    def at(self, where: Array, rates: Array | None = None) -> Array:
+        """Values at increasing times (s), which are the first axis; NaN after the end of the run,
+        and where they are not known throughout, as of a plane without a cable.
+
+        Cubic Hermite interpolation with ``rates``, the values' derivatives, else PCHIP.
+        """
+        found = np.full((len(where), *self.values.shape[1:]), np.nan)
+        inside = where <= self.times[-1] * _SAME
+        found[inside] = self._within(np.minimum(where[inside], self.times[-1]), rates)
+        found[:, ~np.isfinite(self.values).all(axis=0)] = np.nan
+        return found
+
+    def _within(self, where: Array, rates: Array | None) -> Array:
+        found = np.empty((len(where), *self.values.shape[1:]))
+        values = np.nan_to_num(self.values, posinf=0.0, neginf=0.0)
+        # Two readings of one time are a jump, which no curve goes through.
+        jumps = np.flatnonzero(np.diff(self.times) <= 0.0) + 1
+        for begin, end in pairwise([0, *jumps, len(self.times)]):
+            times, known = self.times[begin:end], values[begin:end]
+            own = (where >= times[0]) & (where <= times[-1])
+            if len(times) == 1:
+                found[own] = known
+            else:
+                slopes = monotone_slopes(times, known) if rates is None else rates[begin:end]
+                found[own] = cubic(times, known, slopes, where[own])
+        return found
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that has ended."""
+
+    scene: Scene
+    angles: Series
+    """Opening angles, shape (n, planes, sections), rad."""
+    rates: Series
+    """Their rates, rad/s."""
+    locks: Array
+    """When each V-joint reached 180 deg, shape (planes, sections), s; NaN if it did not."""
+    counts: Mapping[str, int]
+    """What the solver has counted, by variable."""
+    coordinates: Mapping[str, NDArray[Any]]
+    """Values of all dimensions."""
+    before: tuple[tuple[float, Scene], ...] = ()
+    """Scenes that it had before its own, each with the time up to which it did, s."""
+    caught: NDArray[np.bool_] | None = None
+    """Which latches hold at its end, shape (planes, sections); None if it did not tell."""
+
+    def stretches(self) -> list[tuple[NDArray[np.intp], Scene]]:
+        """Numbers of the steps that a scene held for, and this scene, one after the other.
+
+        A step to the very time of a change belongs to the scene before.
+        """
+        times = self.angles.times
+        ends = [int(np.searchsorted(times, time * _SAME, side="right")) for time, _ in self.before]
+        bounds = pairwise([0, *ends, len(times)])
+        scenes = [*(scene for _, scene in self.before), self.scene]
+        return [
+            (np.arange(begin, end), scene)
+            for (begin, end), scene in zip(bounds, scenes, strict=True)
+        ]
+
+    @property
+    def held(self) -> Array:
+        """When each V-joint locked, shape (planes, sections), s: when its latch caught, or, without
+        latches, when it reached 180 deg; NaN if it did not.
+        """
+        if self.scene.stop is None or not self.scene.stop.latch:
+            return self.locks
+        series = self.angles.times, self.angles.values, self.rates.values
+        caught_at = history(self.scene, *series).caught_at
+        if self.caught is None:
+            return caught_at
+        # A run that went on may have had other latches before.
+        known = np.where(np.isnan(caught_at), self.locks, caught_at)
+        return np.where(self.caught, known, np.nan)
+
+    @property
+    def until(self) -> float:
+        """When the last V-joint reached 180 deg, s; infinite if one did not."""
+        return float(np.nan_to_num(self.locks, nan=math.inf).max())
+
+
+def output_times(scene: Scene) -> Array:
+    """The scene's output grid in s: multiples of ``record.interval`` up to the end time."""
+    count = math.floor(scene.solver.end_time / scene.record.interval * _SAME)
+    return np.asarray(np.arange(count + 1) * scene.record.interval, dtype=float)
+
+
+# When and where the largest of an output's readings was.
+
+
+Values = dict[str, Any]
+"""Arrays and numbers by the names of their variables."""
+SpanNames = Mapping[str, Sequence[str]]
+"""By plane, from the winch on."""
+
+
+_ROUND_OFF = 1e-6
+"""Places that symmetry makes alike differ by less: 1e-10 in tensions and 2e-7 in stresses of rings
+without a boom.  A boom, which holds one plane only, makes 3e-4."""
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Variables ``NAME_time`` and ``NAME_DIM`` for each dimension of a reading."""
+
+    name: str
+    dims: tuple[str, ...]
+    words: str
+    """What is the largest."""
+    series: str = ""
+    """Variable (*dims, time) that tells which other places are alike."""
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """Whole numbers where the dimension has numbers (-1 if missing), text elsewhere."""
+        types = {"section": "i4", "span": "i4"}
+        where = (
+            Variable(f"{self.name}_{d}", (), "1", f"{d} of {self.words}", types.get(d, "str"))
+            for d in self.dims
+        )
+        return (Variable(f"{self.name}_time", (), "s", f"time of {self.words}"), *where)
+
+    def of(self, run: Run, times: Array, values: Array) -> Values:
+        """Of values with the shape (times, *dims); the first of equal ones, NaN counts as none."""
+        moment, *where = np.unravel_index(int(np.nanargmax(values)), values.shape)
+        found: Values = {f"{self.name}_time": times[moment]}
+        for dim, place in zip(self.dims, where, strict=True):
+            found[f"{self.name}_{dim}"] = run.coordinates[dim][place]
+        return found
+
+    def at(self, run: Run, times: Array, values: Array) -> Values:
+        """Of values that each place has at a time of its own, both of shape (*dims); nothing where
+        all are NaN.
+        """
+        if not np.isfinite(values).any():
+            return {}
+        where = np.unravel_index(int(np.nanargmax(values)), values.shape)
+        places = zip(self.dims, where, strict=True)
+        found: Values = {f"{self.name}_{dim}": run.coordinates[dim][k] for dim, k in places}
+        return found | {f"{self.name}_time": times[where]}
+
+    def told(self, values: Values, span_names: SpanNames) -> str:
+        """As "at 0.3 s: upper, span 1 (winch to section 1 first hinge)"; empty if it is unknown."""
+        found = [values.get(f"{self.name}_{dim}", np.nan) for dim in ("time", *self.dims)]
+        time, *places = (np.asarray(value).item() for value in found)
+        if any(each == "" or each != each for each in (time, *places)):
+            return ""
+        where = dict(zip(self.dims, places, strict=True))
+        words = [v if isinstance(v, str) else f"{dim} {v:.0f}" for dim, v in where.items()]
+        names = span_names.get(where.get("plane", ""), ())
+        if "span" in where and names:
+            words[-1] += f" ({names[int(where['span']) - 1]})"
+        alike = ties(values, self.series, self.dims, places, time)
+        words[0], more = with_ties(tuple(places), alike)
+        return f"at {time:.4g} s: {', '.join(words)}{more}"
+
+
+def ties(
+    values: Values, series: str, dims: Sequence[str], own: Sequence[Any], until: float,
+    size: float | None = None,
+) -> list[tuple[Any, ...]]:  # fmt: skip
+    """The places at which a series was that of the ``own`` place up to a time (s), itself included.
+
+    Alike means to round-off of ``size``, by default the largest value there; the own place alone
+    where ``values`` hold neither the series nor its coordinates.
+    """
+    if any(name not in values for name in (series, "time", *dims)):
+        return [tuple(own)]
+    labels = [np.asarray(values[dim]).tolist() for dim in dims]
+    place = tuple(each.index(label) for each, label in zip(labels, own, strict=True))
+    end = int(np.searchsorted(values["time"], until)) + 1
+    curves = np.asarray(values[series])[..., :end]
+    size = float(np.nanmax(np.abs(curves[place]))) if size is None else size
+    near = np.isclose(curves, curves[place], rtol=0.0, atol=_ROUND_OFF * size, equal_nan=True)
+    return [
+        tuple(each[k] for each, k in zip(labels, where, strict=True))
+        for where in np.argwhere(near.all(axis=-1)).tolist()
+    ]
+
+
+def with_ties(own: tuple[Any, ...], alike: Sequence[tuple[Any, ...]]) -> tuple[str, str]:
+    """The first label of a place, with that of a tie if it is the only one to differ in it alone;
+    and how many more ties there are.
+
+    >>> with_ties(("lower", 1), [("upper", 1), ("upper", 9), ("lower", 1), ("lower", 9)])
+    ('upper and lower', ' (and 2 more alike)')
+    """
+    first = [str(place[0]) for place in alike if place[1:] == own[1:]]
+    first = first if len(first) == 2 else [str(own[0])]
+    more = len(alike) - len(first)
+    return " and ".join(first), f" (and {more} more alike)" if more else ""
+
+
+# The family of outputs, and what all of them together declare.
+
 
 __all__ = [
     "Array",
@@ -66,7 +345,7 @@ class Output:
     peak: ClassVar[Peak | None] = None
     """Variables that tell when and where the value in its summary was."""
     limit: ClassVar[str] = ""
-    """Field of ``ringsim.parts.limits.Limits`` that its largest reading must not pass."""
+    """Field of ``ringsim.parts.solver.Limits`` that its largest reading must not pass."""
     of_antenna: ClassVar[bool] = True
     """Whether it tells of the antenna, so that engines are compared by it, not of the run."""
     rank: ClassVar[int] = 50

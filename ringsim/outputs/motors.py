@@ -1,4 +1,4 @@
-"""What the motors of the winches give."""
+"""The motors and the margin of the drive."""
 
 import math
 from collections.abc import Iterator
@@ -8,9 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.cable.records import Winch
-from ringsim.cable.winding.motor import MotorWinding
-from ringsim.outputs.family import Array, Output, Reading, Run, Series, Values, Variable, holds
-from ringsim.parts.faults.family import AT_ONCE
+from ringsim.cable.winding import MotorWinding
+from ringsim.outputs.family import (
+    Array,
+    Output,
+    Reading,
+    Run,
+    Series,
+    SpanNames,
+    Values,
+    Variable,
+    holds,
+)
+from ringsim.parts.faults import AT_ONCE
+
+# What the motors of the winches give.
+
 
 _CONSTANTS = ("torque_constant",)
 
@@ -143,3 +156,98 @@ def _motors(
             for end, winch in enumerate(cable.winches):
                 if isinstance(winch.winding, MotorWinding):
                     yield steps, (plane, end), winch, winch.winding
+
+
+# Drive and resistance by kind along a run, and the static margin between them by a standard.
+
+
+LAST_LOCK = "deployment_time"
+"""What is open needs no drive any more."""
+
+
+class DriveMargins(Output):
+    """Static generalised forces on the opening angle of the ideal ring at the mean one of the run.
+
+    See ``ringsim.theory.margin``.
+    """
+
+    rank = 46
+    needs = ("margin",)
+    coordinates = (
+        Variable("resistance", ("resistance",), "1", "kind of resistance to opening", "str"),
+    )
+    variables = (
+        Variable(
+            "drive_available", ("time",), "N m",
+            "what winches that stall, loads and springs drive without friction in the pulleys",
+            until=LAST_LOCK,
+        ),
+        Variable(
+            "drive_resistance", ("resistance", "time"), "N m",
+            "static resistance to opening by its kind, without factors",
+            until=LAST_LOCK,
+        ),
+        Variable(
+            "drive_margin", ("time",), "1",
+            "static margin of the drive by the standard on the ideal ring at the mean opening "
+            "angle, with the faults so far, as check --margin tells it",
+            until=LAST_LOCK,
+        ),
+        Variable(
+            "least_drive_margin", (), "1",
+            "smallest static margin of the drive at any angle that the run passed",
+            summary=("least drive margin", "10.3f"), worse="smaller", least_of="drive_margin",
+        ),
+        Variable("least_drive_margin_time", (), "s", "time of least_drive_margin"),
+        Variable("least_drive_margin_angle", (), "degree", "mean opening angle then"),
+    )  # fmt: skip
+
+    def told(self, values: Values, span_names: SpanNames) -> str:
+        """As "at 20.5 deg and 0.1 s: NOT enough"."""
+        names = [f"least_drive_margin{end}" for end in ("", "_angle", "_time")]
+        margin, angle, time = (float(values.get(name, math.nan)) for name in names)
+        word = "enough" if margin >= 0.0 else "NOT enough"
+        return f"at {angle:.4g} deg and {time:.4g} s: {word}"
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Nothing: ``ringsim.theory.margin`` knows them."""
+        return {}
+
+
+# What a run took: steps, iterations, starts, times, and the settings that it ended up with.
+
+
+def _number(name: str, long_name: str, summary: tuple[str, str] | None = None) -> Variable:
+    return Variable(name, (), "1", long_name, "i4", summary=summary)
+
+
+class Effort(Output):
+    """Counts of the last attempt; ``ringsim.stepping.ending`` adds those of all attempts."""
+
+    rank = 70
+    of_antenna = False
+    variables = (
+        _number("steps", "time steps of the last attempt", ("steps", "10d")),
+        _number("repeated_steps", "steps that were repeated with a smaller one"),
+        _number("newton_iterations", "Newton iterations of the last attempt"),
+        _number("jacobians", "Jacobian factorisations of the last attempt"),
+        _number("restarts", "restarts with smaller steps after a failed attempt"),
+        _number(
+            "total_steps", "time steps of all attempts of the run", ("steps of all attempts", "10d")
+        ),
+        _number("total_newton_iterations", "Newton iterations of all attempts"),
+        _number("total_jacobians", "Jacobian factorisations of all attempts"),
+        _number(
+            "fidelity",
+            "model: 0 full multibody, 2 rods in joint coordinates",
+        ),
+        Variable("step_used", (), "s", "largest step allowed, solver.step, of the last attempt"),
+        Variable("tolerance_used", (), "1", "solver.tolerance of the last attempt"),
+        Variable("final_time", (), "s", "time at which the run ended"),
+        Variable("wall_time", (), "s", "elapsed time of the run", summary=("wall time", "10.2f")),
+        Variable("cpu_time", (), "s", "processor time of the run"),
+    )
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """As counted."""
+        return {**run.counts, "final_time": series.times[-1]}

@@ -23,8 +23,8 @@ from PIL import Image
 
 from ringsim.files import whole, writing
 from ringsim.plots import style
-from ringsim.plots.opening_angles import LEAST_SPAN
 from ringsim.plots.ring import LOOKS, facing_azimuth, view
+from ringsim.plots.run import LEAST_SPAN
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
 from ringsim.shapes import ByLine, Shape, shape_of

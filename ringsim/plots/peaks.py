@@ -12,7 +12,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from ringsim.outputs.family import Array
-from ringsim.plots import free_labels, style
+from ringsim.plots import style
+from ringsim.plots import style as free_labels
 
 
 class Peak(NamedTuple):

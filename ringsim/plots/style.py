@@ -1,22 +1,92 @@
-"""Style, words and axes shared by all figures."""
+"""Style, words, labels and axes shared by all figures."""
 
+import base64
+import html
+import io
 import math
 import re
 import textwrap
+from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import matplotlib.style
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.path import Path as Outline
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.transforms import Bbox
+from PIL import Image
 
-from ringsim.plots import free_labels
 from ringsim.variables import Fate, Status
+
+# Words inside axes, put where they cover no curve.
+
+
+FREE = "free-label"
+"""Gid of the words that may be moved."""
+_ACROSS = {"left": 0.02, "right": 0.98, "center": 0.5}
+_HEIGHTS = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2)
+"""Upper edges that are tried, in shares of the axes, for lines that leave room in one corner."""
+
+
+def free(text: Text) -> None:
+    """Let these words be moved by :func:`settle`; where they stand now is preferred."""
+    text.set_gid(FREE)
+
+
+def settle(figure: Figure) -> None:
+    """Move free words of a drawn figure to where they cover least, best of all nothing."""
+    movable = [(a, [t for t in a.texts if t.get_gid() == FREE]) for a in figure.axes]
+    if any(texts for _, texts in movable):
+        figure.draw_without_rendering()  # settles the layout, on which positions depend
+    for axes, texts in movable:
+        curves, taken = list(_curves(axes)), list[Bbox]()
+        for text in texts:
+            own = (text.get_position(), text.get_horizontalalignment())
+            places = [own, *(((_ACROSS[ha], y), ha) for y, ha in product(_HEIGHTS, _ACROSS))]
+            costs = [_cost(axes, text, place, curves, taken) for place in places]
+            _move(text, places[costs.index(min(costs))])
+            taken.append(text.get_window_extent())
+
+
+def _move(text: Text, place: tuple[tuple[float, float], str]) -> None:
+    text.set(position=place[0], horizontalalignment=place[1])
+
+
+def _cost(
+    axes: Axes, text: Text, place: tuple[tuple[float, float], str], curves: list[Outline],
+    taken: list[Bbox],
+) -> int:  # fmt: skip
+    """How many curves words would cover there; other words and the frame count more."""
+    _move(text, place)
+    box, frame = text.get_window_extent(), axes.get_window_extent()
+    words = sum(box.overlaps(other) for other in taken)
+    outside = box.y0 < frame.y0 or box.x0 < frame.x0 or box.x1 > frame.x1
+    covered = sum(bool(one.intersects_bbox(box.padded(2.0), filled=False)) for one in curves)
+    return covered + (len(curves) + 1) * int(words + outside)
+
+
+def _curves(axes: Axes) -> Iterator[Outline]:
+    """All curves and edges of bands, on the sheet."""
+    for line in axes.lines:
+        yield line.get_transform().transform_path(line.get_path()).cleaned(remove_nans=True)
+    for collection in axes.collections:
+        if isinstance(collection, (LineCollection, PolyCollection)):
+            for path in collection.get_paths():
+                yield collection.get_transform().transform_path(path).cleaned(remove_nans=True)
+
+
+# Style, words and axes shared by all figures.
+
 
 INK, GREY, PALE = "#222222", "#6e6e6e", "#e4e4e4"
 BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE = (
@@ -116,7 +186,7 @@ def head(figure: Figure, axes: Axes, dataset: xr.Dataset, subject: str, pad: flo
     end = textwrap.wrap(ending(dataset), int(11.5 * inches), max_lines=2, placeholder=" ...")
     # The second of two lines reaches to what stands above the axes at their right end.
     axes.set_title("\n".join(end), pad=pad + 12.0 * (len(end) > 1))
-    free_labels.settle(figure)
+    settle(figure)
 
 
 def scene_title(dataset: xr.Dataset) -> str:
@@ -231,7 +301,7 @@ def plain_numbers(axis: Axis) -> None:
 
 def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
     """A bold name in the upper left corner of the frame, or where it covers no curve."""
-    free_labels.free(axes.text(
+    free(axes.text(
         0.02, height, text, transform=axes.transAxes, va="top", weight="bold", zorder=5, bbox=PAPER
     ))  # fmt: skip
 
@@ -240,3 +310,44 @@ def name_panel(axes: Axes, text: str, height: float = 0.95) -> None:
 def write(figure: Figure, path: Path) -> None:
     """Write a file of the kind that its name tells: png, svg or pdf."""
     figure.savefig(path)
+
+
+# A figure as text for an HTML page: SVG where it is light, PNG where it is not.
+
+
+HEAVY = 120_000
+"""Bytes of SVG above which a figure goes into a page as PNG."""
+_DPI = 110
+_PIXELS = 96.0
+"""Of a page in an inch; figures larger than drawn would have words larger than the page's."""
+
+
+@styled
+def inline(figure: Figure, name: str, words: str) -> str:
+    """An ``<svg>`` or ``<img>`` element that loads nothing and is described by ``words``.
+
+    The same figure gives the same text.  Ids begin with ``name``, since all figures of a page
+    share one space of them, and matplotlib numbers them alike in each.
+    """
+    size = f'style="max-width: {_PIXELS * figure.get_size_inches()[0]:.0f}px"'
+    held = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": name}):
+        figure.savefig(held, format="svg", metadata={"Date": None})
+    text = held.getvalue()
+    if len(text) > HEAVY:
+        picture = io.BytesIO()
+        figure.savefig(picture, format="png", dpi=_DPI, metadata={"Software": None})
+        with Image.open(picture) as drawn:
+            # 256 colours are a third of the bytes, and nobody sees a difference.
+            few = drawn.convert("RGB").quantize(dither=Image.Dither.NONE)
+        picture = io.BytesIO()
+        few.save(picture, format="png", optimize=True)
+        data = base64.b64encode(picture.getvalue()).decode("ascii")
+        return f'<img alt="{html.escape(words)}" {size} src="data:image/png;base64,{data}">'
+    text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+    text = re.sub(r'\bid="', f'id="{name}-', text)
+    text = re.sub(r'(xlink:href="|url\()#', rf"\g<1>#{name}-", text)
+    # In a page the size is that of the column; the names of its XML dialects are known there.
+    opening = re.sub(r' (xmlns(:xlink)?|width|height|version)="[^"]*"', "", text[: text.index(">")])
+    label = f' role="img" aria-label="{html.escape(words)}" {size}'
+    return opening + label + text[text.index(">") :]

@@ -10,14 +10,12 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from ringsim.cable.faults.family import CableFault
-from ringsim.cable.friction.family import PulleyFriction
-from ringsim.cable.places import CABLES
+from ringsim.cable.faults import CableFault
+from ringsim.cable.friction import PulleyFriction
+from ringsim.cable.records import CABLES
 from ringsim.choice import OneOf, kinds_of
-from ringsim.reference.docstrings import words_of
-from ringsim.reference.keys import keys_of
-from ringsim.reference.tree import ROOTS
-from ringsim.reference.words import facts
+from ringsim.reference.keys import keys_of, words_of
+from ringsim.reference.tree import ROOTS, facts
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.units import LEFT_OUT, Model
 
@@ -74,7 +72,7 @@ class _Schema(GenerateJsonSchema):
 
 
 def _in_words(model: type[Model], name: str) -> list[JsonSchemaValue]:
-    """What a key of places on cables may also be: their names; see ``ringsim.cable.places``."""
+    """What a key of places on cables may also be: their names; see ``ringsim.cable.records``."""
     if issubclass(model, PulleyFriction) and name == "coefficient":
         numbers = {"type": "object", "additionalProperties": {"type": "number"}}
         return [numbers | {"required": ["default"]}]

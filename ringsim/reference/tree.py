@@ -1,16 +1,21 @@
-"""Where keys stand: paths through scenes and campaigns, and what a path leads to."""
+"""Where keys stand: paths through scenes and campaigns, and their words."""
 
 import difflib
 import functools
 import re
+import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ringsim.campaign.specification import Specification
-from ringsim.reference.keys import Key, keys_of, kind_in
+from ringsim.overrides import place_of
+from ringsim.reference.keys import Key, keys_of, kind_in, words_of
 from ringsim.refusal import InputError, known_or_nearest
 from ringsim.scene import Scene
-from ringsim.units import Model
+from ringsim.units import LEFT_OUT, Model
+
+# Where keys stand: paths through scenes and campaigns, and what a path leads to.
+
 
 ROOTS: dict[str, type[Model]] = {"scene": Scene, "campaign": Specification}
 """What a file may be."""
@@ -107,3 +112,108 @@ def known(path: str, others: list[str]) -> list[Found]:
     raise InputError(
         f"{path}: no key of a scene or a campaign, and no variable of a result ({hint})"
     )
+
+
+# Keys in words, as the command line tells them.
+
+
+_WIDTH = 100
+
+
+def facts(key: Key, path: str = "") -> str:
+    """What a key takes: form, unit, range and default, in one line.
+
+    ``path`` decides for what a list of it has values.
+    """
+    unit = "" if key.unit == "1" else f" in {key.unit}"
+    each = f", or a list with one for each {_place(path)}" if key.each else ""
+    default = "must be given" if key.required else _default(key.default)
+    return "; ".join(filter(None, [f"{key.form}{unit}{each}", key.range, default]))
+
+
+def told(found: Found) -> str:
+    """One key with all that stands below it."""
+    key, path = found.key, found.path
+    kinds = f", of kind {' or '.join(found.kinds)}" if found.kinds else ""
+    lines = [f"{path} ({found.root} file{kinds})", *_indented(facts(key, path), 2)]
+    lines += _indented(key.meaning, 2)
+    return "\n".join([*lines, *_tables(key.models, path)])
+
+
+def all_of(root: str) -> str:
+    """The keys at the top of a scene or a campaign file."""
+    model = ROOTS[root]
+    return "\n".join(
+        [f"{root} file", *_indented(words_of(model), 2), *_keys(keys_of(model), "", 2)]
+    )
+
+
+def names_of_pulleys(path: str) -> str:
+    """How the values of single pulleys are named, at a path whose lists have one for each."""
+    return _PULLEYS.format(path=path)
+
+
+_PULLEYS = """\
+{path}: one value for all pulleys, or a list with one for each from the winch on.
+  A single one has a name: {path}["section 6 V"] = VALUE
+  Each section has a "first hinge", a "V" and a "second hinge", seen from section 1.
+  The last hinge before a cable's end holds the cable, and is no pulley.
+  In a scene file: coefficient = {{ default = VALUE, "section 6 V" = VALUE }}
+  Faults: pulley = "section 6 V", span = "section 6 V to second hinge" (all: span_name of a run)"""
+
+
+def _tables(models: list[type[Model]], path: str) -> Iterator[str]:
+    """What tables hold: what all kinds have, then what each kind has of its own."""
+    if not models:
+        return
+    shared = common(models)
+    if len(models) > 1 and shared:
+        yield "  all kinds:"
+        yield from _keys(shared, path, 4)
+    names = {key.name for key in shared} if len(models) > 1 else set()
+    for model in models:
+        kind = kind_in(model)
+        yield f'  kind = "{kind}":' if kind else "  keys:"
+        yield from _indented(words_of(model).partition("\n\n")[0], 4)
+        yield from _keys([key for key in keys_of(model) if key.name not in names], path, 4)
+
+
+def common(models: list[type[Model]]) -> list[Key]:
+    """Keys that all kinds have, and have in the same way."""
+    first, *others = ({key.name: key for key in keys_of(model)} for model in models)
+    return [
+        key for name, key in first.items()
+        if all(name in other and facts(other[name]) == facts(key) for other in others)
+        and all(other[name].meaning == key.meaning for other in others)
+    ]  # fmt: skip
+
+
+def _keys(keys: list[Key], path: str, indent: int) -> Iterator[str]:
+    for key in keys:
+        said = f"{key.name}: {facts(key, f'{path}.{key.name}'.lstrip('.'))}"
+        yield from _indented(f"{said}. {key.meaning}" if key.meaning else said, indent, hang=4)
+
+
+def _place(path: str) -> str:
+    """What a list at a path has values for."""
+    found = dict.fromkeys(place_of(path, closed=closed) for closed in (True, False))
+    return " (of an open ring ".join(filter(None, found)) + ")" * (len(found) - 1)
+
+
+def _default(value: str) -> str:
+    """What holds where a key is not given; nothing for a table whose keys have their defaults."""
+    return {LEFT_OUT: "left out by default", "": ""}.get(value, f"default {value}")
+
+
+def _indented(text: str, indent: int, hang: int = 0) -> list[str]:
+    """Lines of a text, wrapped; lines that are set in by themselves, such as equations, stay."""
+    found: list[str] = []
+    for paragraph in text.replace("``", "").split("\n\n"):
+        if paragraph.startswith("    "):
+            found += [" " * indent + line for line in paragraph.splitlines()]
+            continue
+        found += textwrap.wrap(
+            " ".join(paragraph.split()), _WIDTH, initial_indent=" " * indent,
+            subsequent_indent=" " * (indent + hang), break_long_words=False,
+        )  # fmt: skip
+    return found

@@ -1,31 +1,108 @@
 """One page about a campaign, out of its merged file."""
 
+import re
+import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jinja2
 import xarray as xr
 
-from ringsim.analysis.brief import what_matters, what_separates
-from ringsim.analysis.campaign_notes import budget_lines, override_lines, peak_lines, restart_lines
-from ringsim.analysis.campaign_samples import campaign_file, endings, scalars
-from ringsim.analysis.design import placement
-from ringsim.analysis.influence_text import influence_tables
-from ringsim.analysis.losses import losses
-from ringsim.analysis.quantities import good
-from ringsim.analysis.sensitivity_text import sensitivity_tables
-from ringsim.analysis.stopping import stopping_lines
+from ringsim.analysis.brief import (
+    budget_lines,
+    override_lines,
+    peak_lines,
+    restart_lines,
+    what_matters,
+    what_separates,
+)
+from ringsim.analysis.design import campaign_file, endings, inputs, paths_of, placement, scalars
+from ringsim.analysis.influence_text import influence_tables, sensitivity_tables
+from ringsim.analysis.intervals import good
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import error_table, outcome_table, verdict_table
-from ringsim.analysis.unusual import NOTE
-from ringsim.analysis.worst import worst_tables
+from ringsim.analysis.verdicts import stopping_lines
+from ringsim.analysis.worst import NOTE_ON_UNUSUAL, losses, worst_tables
+from ringsim.campaign.specification import flat
 from ringsim.files import write_text
 from ringsim.plots.campaign.figures import figures_of
-from ringsim.plots.inline import inline
-from ringsim.report import model, tables
+from ringsim.plots.style import inline
+from ringsim.refusal import show
+from ringsim.report import tables
 from ringsim.report.player import player
-from ringsim.report.tail import rare_event
+from ringsim.report.tables import rare_event
+from ringsim.scene import builtin_scenes
 from ringsim.tables import slim
+
+# The model of a campaign: every value of its scene, and where it comes from.
+
+
+class Value(NamedTuple):
+    """One value of the scene."""
+
+    path: str
+    value: str
+    origin: str
+    """drawn, drawn in part, campaign, inferred, scene or default."""
+    comment: str
+
+
+def values_of(campaign: xr.Dataset) -> tuple[list[Value], str]:
+    """All values of the scene with their origin, and what the scene's file says at its head.
+
+    Comments are known of built-in scenes only: of a scene of the user's own the dataset holds the
+    values, and nothing tells which of them are defaults.
+    """
+    wanted = campaign_file(campaign)
+    settings = flat(wanted.get("set", {}))
+    called = str(campaign.attrs.get("campaign", ""))
+    settings |= dict.fromkeys(re.findall(r"^# called with --set (\S+) =", called, re.MULTILINE))
+    drawn = [path for name in inputs(campaign) for path in paths_of(campaign[name])]
+    text = builtin_scenes().get(str(wanted.get("scene", "")), "")
+    written, comments = flat(tomllib.loads(text)), _comments(text)
+    rows = []
+    for path, value in flat(tomllib.loads(str(campaign.attrs["scene"]))).items():
+        comment, origin = comments.get(path, ""), "scene"
+        if _under(path, drawn):
+            origin = "drawn"
+        elif _holds(path, drawn):
+            origin = "drawn in part"
+        elif _under(path, settings):
+            origin, comment = "campaign", ""
+        elif "inferred" in comment:
+            origin = "inferred"
+        elif text and path not in written:
+            origin = "default"
+        rows.append(Value(path, show(value), origin, comment))
+    known = [row.path for row in rows]
+    unset = [path for path in drawn if not _under(path, known) and not _holds(path, known)]
+    rows += [Value(path, "-", "drawn", "") for path in unset]
+    head = re.match(r"(?:#.*\n)+", text)
+    return rows, " ".join(re.sub(r"^# ?", "", head[0], flags=re.MULTILINE).split()) if head else ""
+
+
+def _under(path: str, others: Any) -> bool:
+    return any(path == each or path.startswith((f"{each}.", f"{each}[")) for each in others)
+
+
+def _holds(path: str, others: Any) -> bool:
+    return any(_under(each, [path]) for each in others)
+
+
+def _comments(text: str) -> dict[str, str]:
+    """Comments behind values, by path; of a table on one line for each value in it."""
+    found, table = dict[str, str](), ""
+    for line in text.splitlines():
+        if header := re.match(r"\[([^\]]+)\]", line):
+            table = f"{header[1]}."
+        elif match := re.match(r"([^#=]+?)\s*=\s*((?:\"[^\"]*\"|[^#\"])*)#\s*(.*)", line):
+            inner = flat(tomllib.loads(f"{match[1]} = {match[2]}"))
+            found |= {table + path: match[3] for path in inner}
+    return found
+
+
+# One page about a campaign, out of its merged file.
+
 
 LARGEST = 2_000_000
 """Bytes of a page: it is to go by mail."""
@@ -54,7 +131,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
     failures, more = tables.failures(campaign, folder)
     shown = player(campaign, analysis)
     places = {} if shown is None else {e["sample"]: k for k, e in enumerate(shown["samples"])}
-    values, head = model.values(campaign)
+    values, head = values_of(campaign)
     figures = [(p.name, p.words, inline(f, p.name, p.words)) for p, f in figures_of(campaign)]
     notes = [*restart_lines(campaign), *override_lines(campaign), *budget_lines(campaign)]
     shell = jinja2.Environment(
@@ -85,7 +162,7 @@ def page(campaign: xr.Dataset, folder: str, analysis: xr.Dataset | None = None) 
         "fidelity": campaign.attrs.get("fidelity", ""), "engine": campaign.attrs.get("source", ""),
         "peaks": peak_lines(campaign), "stopping": stopping, "lost": lost.note,
         "figures": figures, "player": shown, "failures": failures, "more": more,
-        "worst": worst_tables(analysis, folder), "worst_note": NOTE,
+        "worst": worst_tables(analysis, folder), "worst_note": NOTE_ON_UNUSUAL,
         "players": {str(sample): k for sample, k in places.items()},
         "truth": tables.truth(campaign), "notes": notes, "inputs": tables.drawn(campaign),
         "values": values, "head": head, "campaign_text": campaign.attrs.get("campaign", ""),

@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.campaign_samples import endings, judged_by, median_and_worst
-from ringsim.analysis.quantities import used
+from ringsim.analysis.design import endings, judged_by, median_and_worst
+from ringsim.analysis.intervals import used
 from ringsim.layout.layout import layout_at_opening, layout_of
 from ringsim.layout.points import points_of
 from ringsim.scene import Scene, scene_from_toml

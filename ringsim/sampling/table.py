@@ -13,12 +13,10 @@ from ringsim.choice import OneOf, kind_of
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.overrides import field_at, place_of, pulleys_at, section_of, with_number
 from ringsim.refusal import InputError, known_or_nearest, show
-from ringsim.sampling.columns import BLOCK_ROW, Column, Table
-from ringsim.sampling.correlation import Correlation
+from ringsim.sampling.columns import BLOCK_ROW, Column, Correlation, Table
+from ringsim.sampling.designs.blocks import Grouped
 from ringsim.sampling.designs.family import Design
-from ringsim.sampling.designs.grouped import Grouped
-from ringsim.sampling.distributions.family import Distribution
-from ringsim.sampling.values import Values, extremes_of, is_label, plain
+from ringsim.sampling.distributions import Distribution, Values, extremes_of, is_label, plain
 from ringsim.scene import Scene
 from ringsim.units import unit_at
 

@@ -11,29 +11,18 @@ from typing import Annotated, Any, Self, get_origin
 import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
-from ringsim.cable.places import CABLES, numbered, path_of, spans_of
-from ringsim.cable.records import Cable, Cables
+from ringsim.cable.records import CABLES, Cable, Cables, numbered, path_of, spans_of
 from ringsim.choice import OneOf
 from ringsim.files import parse_toml, read_text
 from ringsim.overrides import at_path, length_at, points_in, set_path
-from ringsim.parts.boom.family import Boom
-from ringsim.parts.faults.family import Fault
-from ringsim.parts.gravity import Gravity
-from ringsim.parts.hinge_spring.family import HingeSpring
-from ringsim.parts.joints import Joints
-from ringsim.parts.latch import Latch
-from ringsim.parts.limits import Limits
-from ringsim.parts.loads import Loads
-from ringsim.parts.margin.family import MarginStandard
-from ringsim.parts.net.family import Net
-from ringsim.parts.offload import Offload
-from ringsim.parts.rods.ancf import AncfRods
-from ringsim.parts.rods.family import Rods
-from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
-from ringsim.parts.solver import Record, Solver
-from ringsim.parts.spacecraft import Spacecraft
-from ringsim.parts.stop.family import Stop
-from ringsim.parts.stop.spring_damper import SpringDamperStop
+from ringsim.parts.boom import Boom, Spacecraft
+from ringsim.parts.faults import Fault
+from ringsim.parts.ground import Gravity, Loads, Offload
+from ringsim.parts.joints import HingeSpring, Joints, Latch, SpringDamperStop, Stop
+from ringsim.parts.margin import MarginStandard
+from ringsim.parts.net import Net
+from ringsim.parts.rods import AncfRods, GeometricallyExactRods, Rods
+from ringsim.parts.solver import Limits, Record, Solver
 from ringsim.parts.temperature import Temperature
 from ringsim.refusal import InputError, explain, known_or_nearest, models_in, show
 from ringsim.scene.checks import check_layout, check_parts

@@ -2,13 +2,12 @@
 
 from typing import TYPE_CHECKING
 
-from ringsim.cable.faults.family import CableFault
-from ringsim.cable.limited import why_unlimited
+from ringsim.cable.faults import CableFault
+from ringsim.cable.winches import why_unlimited
 from ringsim.choice import kind_of
 from ringsim.layout.layout import Layout, layout_of
-from ringsim.parts.faults.failed_latch import FailedLatch
-from ringsim.parts.faults.failed_spring import FailedSpring
-from ringsim.parts.rods.length_error import LengthError
+from ringsim.parts.faults import FailedLatch, FailedSpring
+from ringsim.parts.rods import LengthError
 from ringsim.scene.substituted import strained
 
 if TYPE_CHECKING:

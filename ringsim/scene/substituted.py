@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ringsim.parts.rods.length_error import LengthError
+from ringsim.parts.rods import LengthError
 from ringsim.parts.temperature import RodTemperature
-from ringsim.structures.hinge_error import HingeError
+from ringsim.structures.family import HingeError
 
 if TYPE_CHECKING:
     from ringsim.scene import Scene

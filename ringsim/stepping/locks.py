@@ -1,18 +1,20 @@
-"""Which V-joints have reached their stops, when, and how steps should meet them."""
+"""V-joints that reach their stops: when, how latches take them, how steps meet them."""
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ringsim.hermite import first_zero
-from ringsim.stepping.instant import Array, Instant
-from ringsim.stepping.memory import Remembering
+from ringsim.parts.faults import FailedLatch
+from ringsim.parts.persection import spread
+from ringsim.stepping.instant import Array, Instant, Remembering
 from ringsim.variables import PLANES, Fate
 
-if TYPE_CHECKING:
-    from ringsim.stepping.latches import Latches
+# Which V-joints have reached their stops, when, and how steps should meet them.
+
 
 _NEAR = 0.1
 """A V-joint that has reached a stop counts as resting on it within this angle of it, rad."""
@@ -199,3 +201,195 @@ def lock_times(times: Array, angles: Array, rates: Array) -> Array:
 def crossing(times: Array, past: Array, rates: Array) -> float:
     """Time (s) at which an angle past 180 deg (rad) passes zero in a step."""
     return float(times[0]) + first_zero(float(times[1] - times[0]), past, rates)
+
+
+# Which V-joints their latches hold, and how fast they met them.
+
+
+Flags = NDArray[np.bool_]
+"""A truth for each V-joint."""
+ON_STOP = 1e-9
+"""Angle past 180 deg at which a stop has hardly begun to push, rad."""
+
+
+class Meeting(NamedTuple):
+    """A V-joint, (plane, section), comes to 180 deg at a time (s) and an opening rate (rad/s)."""
+
+    place: tuple[int, int]
+    time: float
+    rate: float
+
+
+class History(NamedTuple):
+    """Opening rate (rad/s) at which each V-joint first came to 180 deg, and when (s) its latch
+    caught, both of shape (planes, sections); NaN if that did not happen.
+    """
+
+    rates: Array
+    caught_at: Array
+
+
+class Latches(Remembering):
+    """The latches of a scene; ``caught`` is whether each holds, shape (planes, sections).
+
+    ``deployed`` are everywhere the V-joints that have reached 180 deg, of the same shape.
+    """
+
+    changing = ("caught", "_past")
+
+    def __init__(self, scene: Any) -> None:
+        shape = len(scene.structure.planes), scene.structure.sections
+        self.caught = np.zeros(shape, dtype=bool)
+        self._present = scene.stop is not None and scene.stop.latch
+        least = spread(0.0 if scene.latch is None else scene.latch.min_rate, shape[1])
+        self._least = np.broadcast_to(np.where(least > 0.0, least, -math.inf), shape)
+        self._fails = np.full(shape, math.inf)
+        for fault in (one for one in scene.faults if isinstance(one, FailedLatch)):
+            place = scene.structure.planes.index(fault.plane), fault.section - 1
+            self._fails[place] = min(self._fails[place], fault.time)
+        self._past: list[Instant] = []
+        self._sure = not (np.isfinite(self._least).any() or np.isfinite(self._fails).any())
+
+    def missing(self, deployed: Flags) -> Flags:
+        """V-joints that have come to their latches, which have not caught."""
+        return deployed & ~self.caught & self._present
+
+    def locked(self, deployed: Flags) -> Flags:
+        """V-joints that have locked: that their latches hold; without latches the deployed ones."""
+        return self.caught if self._present else deployed
+
+    def note(self, before: Instant, now: Instant) -> None:
+        """Go on by a step."""
+        if not self._present:
+            return
+        if self._sure:
+            self.caught = self.caught | (now.angles >= math.pi)
+            return
+        known = [*self._past, before, now]
+        self._past = known[-3:-1]
+        times = np.array([each.time for each in known])
+        angles, rates = (np.array([getattr(one, k) for one in known]) for k in ("angles", "rates"))
+        self.meet(one for one in meetings(times, angles, rates) if one.time > before.time)
+
+    def meet(self, met: Iterable[Meeting]) -> None:
+        """Let those catch that can, of meetings in the order of their times."""
+        for place, time, rate in met:
+            if self._present and rate >= self._least[place] and time < self._fails[place]:
+                self.caught[place] = True
+
+
+def history(scene: Any, times: Array, angles: Array, rates: Array) -> History:
+    """What became of the latches of a scene in a run; see ``meetings``."""
+    latches, found = Latches(scene), History(*np.full((2, *angles.shape[1:]), np.nan))
+    for one in meetings(times, angles, rates):
+        if np.isnan(found.rates[one.place]):
+            found.rates[one.place] = one.rate
+        latches.meet([one])
+        if latches.caught[one.place] and np.isnan(found.caught_at[one.place]):
+            found.caught_at[one.place] = one.time
+    return found
+
+
+def meetings(times: Array, angles: Array, rates: Array) -> Iterator[Meeting]:
+    """Every arrival at 180 deg, of angles (rad) and rates (rad/s) of shape (n, planes, sections) at
+    times (s).
+
+    The step that meets a stop brakes, so that the rate is that of its begin, with the acceleration
+    of the steps before over the angle that is left; unless it ends on the stop, whose rate is then
+    that of its end.
+    """
+    past = angles - math.pi
+    for step, plane, section in np.argwhere((past[:-1] < 0.0) & (past[1:] >= 0.0)).tolist():
+        ends, place = slice(step, step + 2), (plane, section)
+        own, speed = past[:, plane, section], rates[:, plane, section]
+        time = crossing(times[ends], own[ends], speed[ends])
+        if own[step + 1] < ON_STOP:
+            met = max(float(speed[step + 1]), 0.0)
+        else:
+            bend = _acceleration(times, own, speed, step)
+            met = math.sqrt(max(max(speed[step], 0.0) ** 2 - 2.0 * bend * own[step], 0.0))
+        yield Meeting(place, time, met)
+
+
+def _acceleration(times: Array, past: Array, rates: Array, step: int) -> float:
+    """That of the two steps before, the smaller one; none where they differ in sign, or one touched
+    the stop.
+
+    A lock of another joint jerks all rates within one step: foretold from that step alone, rates
+    of coarse runs were off by half, or negative.
+    """
+    if step < 2 or (past[step - 2 : step] >= 0.0).any():
+        return 0.0
+    one, two = np.diff(rates[step - 2 : step + 1]) / np.diff(times[step - 2 : step + 1])
+    return float(min(one, two, key=abs)) if one * two > 0.0 else 0.0
+
+
+# Slopes of dry friction for Newton, where ropes or joints turn round within a step.
+#
+# A law like p = tanh(s / s_slip) is flat on both sides of the passage at s = 0.  Tangents jump
+# across it to and fro for ever; a step that a rope stops in needs thousands of times s_slip.  Once
+# Newton has seen a pulley, or a joint, on both sides, the slope is at least that of the secant to
+# the last iterate on the other side, as in the method of false position.  Kept there it would
+# converge from one side only, and slowly: it halves with every further iterate on the same side, as
+# in the Illinois method (Dowell and Jarratt, BIT 11 (1971) 168).
+
+
+_NUDGE = 1e-7
+"""Change of rate (rad/s) by which tangents of laws are measured."""
+_ENDS = np.array([[1.0], [-1.0]])
+
+
+class Turning:
+    """Newton's iterates of one step, as far as slopes need them."""
+
+    def __init__(self) -> None:
+        self._owner: object = None
+        self._noted: list[Array] = []
+        """Rates that no slope has been asked for yet."""
+        self._seen = np.empty((2, 0))
+        """Last rate on either side."""
+        self._back = np.empty(0, dtype=bool)
+        self._stayed = np.empty(0)
+        """Iterates on one side in a row, less one."""
+
+    def forget(self) -> None:
+        """Begin a step."""
+        self._owner = None
+
+    def note(self, owner: object, rates: Array) -> None:
+        """Remember an iterate: rates, shape (n,), of pulleys or joints, whose meaning changes with
+        their ``owner``, as speeds (m/s) of the ropes that a fault may split.
+        """
+        if self._owner is not owner:
+            self._owner, self._noted = owner, []
+            self._seen = np.full((2, len(rates)), np.nan)
+            self._back, self._stayed = rates < 0.0, -np.ones(len(rates))
+        self._noted.append(rates.copy())
+
+    def _take(self, rates: Array) -> None:
+        back = rates < 0.0
+        self._stayed = (self._stayed + 1.0) * (back == self._back)
+        self._back = back
+        np.copyto(self._seen[0], rates, where=~back)
+        np.copyto(self._seen[1], rates, where=back)
+
+    def slopes(
+        self, owner: object, rates: Array, own: Array, law: Callable[[Array], Array]
+    ) -> Array:
+        """Slopes of a law at the iterate noted last, shape (n,), in its unit over that of the
+        rates: ``own``, its derivatives there, or what the other side asks for.
+        """
+        if self._owner is not owner:
+            return own
+        for noted in self._noted:
+            self._take(noted)
+        self._noted = []
+        other = self._seen[1 - self._back.astype(int), np.arange(len(rates))]
+        secants = (law(rates) - law(other)) / (rates - other)
+        # fmax: NaN where the other side was never seen.
+        return np.asarray(np.fmax(own, secants * 0.5**self._stayed))
+
+    def tangents(self, owner: object, rates: Array, law: Callable[[Array], Array]) -> Array:
+        """``slopes`` of a law whose derivatives are those of central differences."""
+        ahead, behind = law(rates + _NUDGE * _ENDS)
+        return self.slopes(owner, rates, (ahead - behind) / (2.0 * _NUDGE), law)

@@ -1,19 +1,23 @@
-"""Steps across which an indicator exceeds its allowance are repeated with a smaller one.
-
-An indicator falls with the p-th power of the step.  The controller is the standard one of step
-sizes: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.4, where such
-a safety factor and bounds of the ratio stand, too.
-"""
+"""Steps that are repeated with a smaller one, and what they are judged by."""
 
 import math
 from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
 
 from ringsim.parts.solver import TENSION_BEND, Solver
-from ringsim.stepping.instant import Array, Energies, Instant, Scales
-from ringsim.stepping.memory import Remembering
+from ringsim.stepping.instant import Array, Energies, Instant, Memory, Remembering, Scales
+from ringsim.stepping.locks import StopContact
+
+# Steps across which an indicator exceeds its allowance are repeated with a smaller one.
+#
+# An indicator falls with the p-th power of the step.  The controller is the standard one of step
+# sizes: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.4, where
+# such a safety factor and bounds of the ratio stand, too.
+
 
 GROWTH, FALL = 1.5, 0.2
 """Largest and smallest ratio of successive steps: a step behind a much shorter one would see that
@@ -174,3 +178,157 @@ class TensionBend(Indicator):
         if before.tensions is not None and after.tensions is not None:
             self._largest = max(self._largest, float(after.tensions.max()))
             self._past = after.time - before.time, before.tensions
+
+
+# Steps that follow the mean opening angle and the joints' deviations from it, and meet stops.
+
+
+_LOCAL_ERROR = 0.1
+"""Local error constant C of the integrator, error = C h^3 d3(angle)/dt3.  Generalised-alpha has
+beta - (alpha_f - alpha_m) / 2 - 1/6: 0.086 at the spectral radius 0.8, 1/12 at 1, 1/3 at 0."""
+_FINEST = 400.0
+"""The motion alone asks for no step below ``solver.step`` over this: noise of the rates must not
+stop a run."""
+_AT = 1e-4
+"""Tolerance at which ``_DEPTH``, ``Scales.contact_step`` and the distance of readings hold; the
+first two go with its square root, as all steps do."""
+_DEPTH = math.radians(0.05)
+"""Angle by which a V-joint may pass its stop within one step, at the tolerance ``_AT``.  On a ring
+of 6 sections with cables four times as much moves the largest asynchrony by 2 % and trebles the
+energy error; a quarter of it moves the asynchrony by 0.5 %."""
+_FIRST = 20.0
+"""The first step is ``solver.step`` over this at most: generalised-alpha starts from rest without
+an acceleration, which delays the motion by a third of the first step."""
+_ANEW = 10.0
+"""The first step under other forces is so much shorter than one from rest: the integrator's
+accelerations are still those of the forces before, also where these moved it."""
+_APPROACH = 0.02
+"""Largest first step over the time to the first stop, as it is chosen without knowing the motion: a
+winch may take a ring that is nearly open to its stops within it."""
+_GLOBAL_ERROR = _LOCAL_ERROR / 15.0
+"""C of deviations.  Local errors of a vibration cancel for the most part: on rings of 6 and 18
+sections errors against MBDyn are a fifteenth of what their sum would be, so that
+``solver.deviation_tolerance`` is the error found there (docs/cross_validation.md)."""
+MOST = 2000.0
+"""Steps that the deviations may ask for over a run.  The ovalisation of 18 sections takes 1300, and
+a shorter step would follow what Newton leaves of the residual."""
+_LEAST = math.radians(1e-4)
+"""Deviations below this are what Newton's tolerance leaves, rad."""
+_FADING = 20.0
+"""Steps over which the largest d''' fades, so that its passage through zero opens no step."""
+
+
+class MotionSteps(Remembering):
+    """Steps that keep the relative error in time of the mean opening angle a near a tolerance,
+
+        h = sqrt(tolerance |a'| / (C |a'''|)),
+
+    and that meet stops with small ones.  ``step`` is the one wanted next, s.
+    """
+
+    changing = ("step", "_bend", "_past")
+
+    def __init__(self, solver: Solver, scales: Scales) -> None:
+        self._solver, self._reference, self._bend = solver, scales.rate, 0.0
+        finer, contact = math.sqrt(solver.tolerance / _AT), scales.contact_step
+        contact = contact if math.isfinite(contact) else solver.step
+        self._contact, self._depth = min(contact * finer, solver.step), _DEPTH * finer
+        # Below ``_AT`` readings stay as far apart as at it: closer ones would see the rods vibrate.
+        self._stride = max(1.0, math.sqrt(_AT / solver.tolerance))
+        self._past: deque[tuple[float, float]] = deque()
+        self.step = self._first = min(solver.step / _FIRST, scales.first_step)
+
+    def recall(self, memory: Memory) -> None:
+        """See ``Remembering``."""
+        super().recall(memory)
+        self.step = min(self.step, self._solver.step)
+
+    def begin_anew(self) -> None:
+        """Go on with other forces: nothing that is known tells how they move it."""
+        self._past.clear()
+        self.step = min(self.step, self._first / _ANEW)
+
+    def advance(self, now: Instant, stops: StopContact) -> None:
+        """Choose the step after an accepted one."""
+        self._past.append((now.time, float(now.rates.sum()) / now.rates.size))
+        wanted = max(self._from_motion(), self._solver.step / _FINEST)
+        if stops.resting_rate > 0.0:
+            wanted = max(min(wanted, self._depth / stops.resting_rate), self._contact)
+        if math.isfinite(stops.time_to_next):
+            meeting = max(self._depth / stops.rate_of_next, self._contact)
+            wanted = min(wanted, max(0.5 * stops.time_to_next, meeting))
+        self.step = min(wanted, GROWTH * self.step, self._solver.step)
+
+    def towards(self, left: float) -> float:
+        """The next step in s if only so much time is left to an event.
+
+        It shares the rest with the one after it: behind a long step a tiny one would read
+        velocities that are still the long one's.
+        """
+        if left <= self.step or left >= 2.0 * self.step:
+            return min(self.step, left)
+        return 0.5 * left
+
+    def shorter_first(self, step: float, stops: Callable[[], StopContact]) -> float | None:
+        """A smaller first step in s, where this one leads too close to a stop; else None."""
+        if self._past or step <= SHORTEST * self._solver.step:
+            return None
+        return FALL * step if step > _APPROACH * (step + stops().time_to_next) else None
+
+    def _from_motion(self) -> float:
+        t2, r2 = self._past[-1]
+        apart = (self._stride - 0.5) * self.step
+        middle = self._before(t2 - apart)
+        first = None if middle is None else self._before(middle[0] - apart)
+        if middle is None or first is None:
+            return self.step
+        (t0, r0), (t1, r1) = first, middle
+        while self._past[0][0] < t0:
+            self._past.popleft()
+        early, late = (r1 - r0) / (t1 - t0), (r2 - r1) / (t2 - t1)
+        third = abs(2.0 * (late - early) / (t2 - t0))
+        bend = third / max(abs(r2), self._reference)
+        fading = max(0.0, 1.0 - (t2 - t1) * math.sqrt(self._bend))
+        self._bend = max(bend, fading * self._bend)
+        if self._bend == 0.0:
+            return self._solver.step
+        return math.sqrt(self._solver.tolerance / _LOCAL_ERROR / self._bend)
+
+    def _before(self, time: float) -> tuple[float, float] | None:
+        """The latest reading not after ``time``."""
+        return next((past for past in reversed(self._past) if past[0] <= time), None)
+
+
+class DeviationSteps(Remembering):
+    """Steps that resolve how a ring vibrates about its mean motion over a run of duration T,
+
+        h = sqrt(e |d| / (C T |d'''|)),
+
+    at least T / MOST, with the largest deviation d from the mean angle of all V-joints.
+    """
+
+    changing = ("_past", "_largest", "_bend", "_limit")
+
+    def __init__(self, tolerance: float, duration: float) -> None:
+        """Let errors add up to so much of the largest deviation over the ``duration`` (s)."""
+        self._share = tolerance / (_GLOBAL_ERROR * duration)
+        self._shortest = duration / MOST
+        self._past: list[tuple[float, Array]] = []
+        self._largest, self._bend, self._limit = _LEAST, 0.0, math.inf
+
+    def limit(self, now: Instant) -> float:
+        """Largest next step, s; infinite until three readings far enough apart are known."""
+        time, angles, rates = now.time, now.angles, now.rates
+        self._largest = max(self._largest, float(np.max(np.abs(angles - angles.mean()))))
+        if self._past and time - self._past[-1][0] < 0.9 * self._shortest:
+            return self._limit
+        self._past = [*self._past[-2:], (time, rates - rates.mean())]
+        if len(self._past) < 3:
+            return self._limit
+        (t0, r0), (t1, r1), (t2, r2) = self._past
+        third = 2.0 * ((r2 - r1) / (t2 - t1) - (r1 - r0) / (t1 - t0)) / (t2 - t0)
+        self._bend = max(float(np.max(np.abs(third))), self._bend * (1.0 - 1.0 / _FADING))
+        if self._bend > 0.0:
+            wanted = math.sqrt(self._share * self._largest / self._bend)
+            self._limit = max(wanted, self._shortest)
+        return self._limit

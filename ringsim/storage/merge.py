@@ -9,7 +9,7 @@ import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.analysis.quantities import CHECKED
+from ringsim.analysis.intervals import CHECKED
 from ringsim.files import whole
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME, span_names

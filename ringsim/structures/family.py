@@ -1,13 +1,17 @@
-"""The family of structures."""
+"""The family of structures, and errors of their hinge assemblies."""
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from ringsim.cable.places import points_of
+from ringsim.cable.records import points_of
 from ringsim.layout.layout import Layout
-from ringsim.units import Model
+from ringsim.parts.persection import PerSection
+from ringsim.units import Model, Unit
+
+# The family of structures.
 
 
 class Structure(Model):
@@ -62,7 +66,7 @@ class Structure(Model):
     def layout(self, scene: Any, coordinate: Any) -> Layout:
         """What it consists of at a value of the coordinate, with all parts of a scene.
 
-        The imaginary part ``ringsim.layout.pose.STEP`` of the coordinate carries the derivatives:
+        The imaginary part ``ringsim.layout.bodies.STEP`` of the coordinate carries the derivatives:
         compute places with functions that take complex numbers, without ``float`` and ``abs``.
         """
         raise NotImplementedError
@@ -100,3 +104,26 @@ class Structure(Model):
 
     def check(self, scene: Any) -> None:
         """Raise a ValueError with part, value and cure where a scene does not go with this kind."""
+
+
+# Pins of hinge assemblies that do not stand where they are drawn.
+
+
+Shift = Annotated[float, Field(ge=-0.01, le=0.01), Unit("m")]
+
+
+class HingeError(Model):
+    """How much further than ``hinge_offset`` pins stand from the line of their hinge assembly.
+
+    Each pin carries an end of a diagonal and one of a folding bar; pulleys stay where they are
+    drawn.  The structure is put together as with errors of its rods (``rods.length_error``).
+    """
+
+    upper_left: PerSection[Shift] = 0.0
+    """Of the upper pin at the first corner of a section."""
+    upper_right: PerSection[Shift] = 0.0
+    """Of the upper pin at the second corner of a section."""
+    lower_left: PerSection[Shift] = 0.0
+    """Of the lower pin at the first corner of a section."""
+    lower_right: PerSection[Shift] = 0.0
+    """Of the lower pin at the second corner of a section."""

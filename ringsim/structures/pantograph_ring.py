@@ -1,7 +1,8 @@
 """The pantograph ring: closed, or an open arc of the same polygon (two sections: the truss)."""
 
+import functools
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -10,14 +11,246 @@ from pydantic import Field, model_validator
 
 from ringsim.choice import kind_of
 from ringsim.layout.bodies import Lump
-from ringsim.layout.draft import Draft
+from ringsim.layout.draft import BodyRef, Draft, Track
 from ringsim.layout.layout import Layout
 from ringsim.parts.persection import PerSection, spread
-from ringsim.structures.family import Structure
-from ringsim.structures.hinge_error import HingeError
-from ringsim.structures.pantograph_sections import add_sections
-from ringsim.structures.ring_geometry import RingGeometry
+from ringsim.parts.rods import errors_of
+from ringsim.structures.family import HingeError, Structure
 from ringsim.units import Degree, KilogramOrZero, Metre, MetreOrZero, Unit
+
+# Fold states of the pantograph ring: every point as a function of one angle.
+#
+# Two planes (0 upper, 1 lower), ``sections`` sections, and ``corners`` corners (one more than the
+# sections in an open arc).  phi is the angle of a bar half from the horizontal; the opening angle
+# between the halves is delta = pi - 2 phi.  With half bar l and half diagonal d, the width between
+# the pins of a section is w = 2 l cos(phi) and its height h = sqrt(4 d^2 - w^2): every fold state
+# keeps all rod lengths, so each is an exact, stress-free configuration.
+
+
+Array = NDArray[np.float64]
+_UP = np.array([0.0, 0.0, 1.0])
+_SIGNED = np.array([_UP, -_UP])[:, None]
+"""Outward in the upper and in the lower plane, shape (2, 1, 3)."""
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Point positions of one fold state, in metre."""
+
+    corners: Array
+    """Centres of the hinge assemblies, shape (2, corners, 3)."""
+    left: Array
+    """Pins of a section at its first corner, shape (2, sections, 3)."""
+    right: Array
+    """Pins of a section at its second corner, shape (2, sections, 3)."""
+    pivots: Array
+    """Crossing points of the diagonals, shape (sections, 3)."""
+    vjoints: Array
+    """Middle joints of the folding bars, shape (2, sections, 3)."""
+
+
+@dataclass(frozen=True)
+class RingGeometry:
+    """An ideal ring: unit directions of its sections and the lengths of one section (metre)."""
+
+    plan: Array
+    """Corners in plan view in units of the chord, shape (corners, 3), z = 0."""
+    closed: bool
+    half_bar: float
+    half_diagonal: float
+    hinge_offset: float
+
+    @classmethod
+    def of_polygon(
+        cls,
+        sections: int,
+        *,
+        closed: bool,
+        polygon_sections: int,
+        aspect_ratio: float,
+        **lengths: float,
+    ) -> "RingGeometry":
+        """A closed ring, or the first ``sections`` sides of a polygon left open; with its
+        ``lengths`` half_bar, half_diagonal and hinge_offset.
+        """
+        sides = sections if closed else polygon_sections
+        corners = np.arange(sections if closed else sections + 1) % sides
+        return cls(polygon_corners(sides, aspect_ratio)[corners], closed, **lengths)
+
+    @property
+    def sections(self) -> int:
+        """Number of sections."""
+        return len(self.plan) if self.closed else len(self.plan) - 1
+
+    @property
+    def directions(self) -> Array:
+        """Unit vector e_k from corner k to corner k + 1, shape (sections, 3)."""
+        following = np.roll(self.plan, -1, axis=0)[: self.sections]
+        return np.asarray(following - self.plan[: self.sections])
+
+    @property
+    def normals(self) -> Array:
+        """Outward normal n_k = e_k x z of each section's plane, shape (sections, 3)."""
+        return np.cross(self.directions, _UP)
+
+    def width(self, phi: Any) -> Any:
+        """Horizontal distance between the pins of a section, in metre."""
+        return 2.0 * self.half_bar * np.cos(phi)
+
+    def height(self, phi: Any) -> Any:
+        """Vertical distance between upper and lower corners, in metre."""
+        return np.sqrt(4.0 * self.half_diagonal**2 - self.width(phi) ** 2)
+
+    def fold(self, phi: Any) -> Fold:
+        """Positions at the bar angle ``phi`` (rad, 0 deployed .. pi/2 stowed), complex at complex
+        ``phi``, whose imaginary part carries derivatives.
+        """
+        half_height, half_chord = 0.5 * self.height(phi), 0.5 * self.width(phi) + self.hinge_offset
+        lift, offset = half_height * _SIGNED, self.hinge_offset * self.directions
+        chord = 2.0 * half_chord
+        first, second = self.plan[: self.sections], np.roll(self.plan, -1, axis=0)[: self.sections]
+        pivots = half_chord * (first + second)
+        return Fold(
+            corners=chord * self.plan + lift,
+            left=chord * first + offset + lift,
+            right=chord * second - offset + lift,
+            pivots=pivots,
+            vjoints=pivots + (half_height - self.half_bar * np.sin(phi)) * _SIGNED,
+        )
+
+
+@functools.lru_cache(maxsize=64)  # the scenes of a campaign ask for the same ones again and again
+def polygon_corners(sides: int, aspect_ratio: float) -> Array:
+    """Corners of the closed polygon with equal chords of length 1, inscribed in an ellipse.
+
+    The first corner lies on the major axis (+x), the polygon runs anticlockwise and is centred on
+    the origin.  Read-only, shape (sides, 3), in units of the chord, z = 0.  The unknowns are the
+    ellipse parameters of the other corners and the chord; Newton's method starts from the regular
+    polygon.
+
+    Raises
+    ------
+    ValueError
+        With less than 3 sides, minor over major axis not in (0, 1], or no polygon found.
+    """
+    if sides < 3:
+        raise ValueError(f"a closed polygon needs at least 3 sides, not {sides}")
+    if not 0.0 < aspect_ratio <= 1.0:
+        raise ValueError(f"aspect_ratio = {aspect_ratio} must be in (0, 1]")
+    parameters = 2.0 * np.pi * np.arange(sides) / sides
+    steps = 1 + int(np.ceil(8 * np.log(1.0 / aspect_ratio)))
+    for ratio in (aspect_ratio ** (np.arange(1, steps + 1) / steps)).tolist():
+        parameters, chord = _equal_chords(parameters, ratio)
+    points = np.stack([np.cos(parameters), ratio * np.sin(parameters), 0.0 * parameters], axis=-1)
+    found: Array = points / chord
+    found.flags.writeable = False
+    return found
+
+
+def _equal_chords(t: Array, ratio: float) -> tuple[Array, float]:
+    """Newton's method on |r(t_k+1) - r(t_k)|^2 = c^2, k = 0..sides-1, with t_0 = 0 fixed."""
+    sides = len(t)
+    square = 4.0 * np.sin(np.pi / sides) ** 2 * (0.5 * (1.0 + ratio**2))
+    this, following = np.arange(sides), (np.arange(sides) + 1) % sides
+    for _ in range(60):
+        place = np.stack([np.cos(t), ratio * np.sin(t)])
+        slope = np.stack([-np.sin(t), ratio * np.cos(t)])
+        run = place[:, following] - place
+        jacobian = np.zeros((sides, sides + 1))
+        jacobian[this, this] = -2.0 * np.sum(run * slope, axis=0)
+        jacobian[this, following] += 2.0 * np.sum(run * slope[:, following], axis=0)
+        jacobian[:, sides] = -1.0
+        change = np.linalg.solve(jacobian[:, 1:], square - np.sum(run**2, axis=0))
+        largest = np.abs(change[:-1]).max()
+        change *= min(1.0, np.pi / sides / max(largest, 1e-300))
+        t = t + np.append(0.0, change[:-1])
+        square += change[-1]
+        if largest < 1e-14 * sides:
+            break
+    if not (np.all(np.diff(t) > 0.0) and t[-1] < 2.0 * np.pi and square > 0.0):
+        raise ValueError(f"no equal-chord polygon with {sides} sides and axis ratio {ratio:.6g}")
+    return t, float(np.sqrt(square))
+
+
+# Pantograph sections between hinge assemblies: rods, joints and the tracks of their cables.
+
+
+def add_sections(
+    draft: Draft,
+    geometry: RingGeometry,
+    fold: Fold,
+    corners: list[list[BodyRef]],
+    vjoint_mass: float,
+    *,
+    plane: int = 0,
+    prefix: str = "",
+    errors: HingeError | None = None,
+) -> None:
+    """Add the sections of a closed ring or an arc, with V-joints of ``vjoint_mass`` (kg) each.
+
+    ``fold`` tells where their points are at a complex coordinate (``ringsim.layout.bodies``),
+    ``corners`` the hinge assemblies by plane (upper, lower) and corner.  Of several rings
+    ``plane`` is the number of the upper plane, which the lower one follows, and ``prefix`` that of
+    the rods' names.  ``errors`` are those of the pins.
+    """
+    rods = draft.scene.rods
+    young, young_bar = (
+        spread(rods.young_of(group), geometry.sections).tolist() for group in ("diagonal", "bar")
+    )
+    strains = errors_of(rods, geometry.sections)
+    whole, half = (np.arange(n + 1) / n for n in (2 * rods.elements, rods.elements))
+    middle = ((rods.elements, vjoint_mass, "V-joints"),) if vjoint_mass > 0.0 else ()
+    tracks: tuple[list[Any], list[Any]] = ([], [])
+    for section, normal in enumerate(geometry.normals):
+        pins = fold.left[:, section], fold.right[:, section]
+        wrong = [_shifts(errors, end, section, geometry) for end in (0, 1)]
+        held = [[plane[(section + end) % len(plane)] for plane in corners] for end in (0, 1)]
+        diagonals = []
+        for name, sides in (("rising", (1, 0)), ("falling", (0, 1))):
+            ends = [pins[end][side] for end, side in enumerate(sides)]
+            diagonals.append(
+                draft.rod(f"{prefix}diagonal_{name}", section, "diagonals", ends, normal,
+                          rods.diagonal, whole, young[section],
+                          strain=strains[f"diagonal_{name}"][section])
+            )  # fmt: skip
+            for end, side in enumerate(sides):
+                parts = diagonals[-1], held[end][side]
+                draft.joint("revolute", "hinge", section, parts, ends[end], error=wrong[end][side])
+        draft.joint("revolute", "pivot", section, diagonals, fold.pivots[section])
+        for side, (name, sense) in enumerate((("upper", 1.0), ("lower", -1.0))):
+            at, bars, track = fold.vjoints[side, section], [], tracks[side]
+            for end, name_of_half in enumerate(("left", "right")):
+                pin, body = pins[end][side], held[end][side]
+                bars.append(
+                    draft.rod(f"{prefix}bar_{name}_{name_of_half}", section, "bars",
+                              (at, pin) if end else (pin, at), normal, rods.bar, half,
+                              young_bar[section], () if end else middle,
+                              strains[f"bar_{name}_{name_of_half}"][section])
+                )  # fmt: skip
+                draft.joint(
+                    "revolute", "hinge", section, (bars[end], body), pin, error=wrong[end][side]
+                )
+                track.append(draft.on(body, pin))
+            track.insert(-1, section)
+            joint = draft.joint("revolute", "vjoint", section, bars, at)
+            draft.opening(plane + side, joint, sense, [0.0, 0.0, sense])
+    for side, sense in enumerate((1.0, -1.0)):
+        draft.tracks[plane + side] = Track(tracks[side], np.array([0.0, 0.0, -sense]))
+
+
+def _shifts(
+    errors: HingeError | None, end: int, section: int, geometry: RingGeometry
+) -> list[Array] | list[None]:
+    """By how much the upper and the lower pin at an end of a section stand off, m."""
+    if errors is None:
+        return [None, None]
+    away = geometry.directions[section] * (1.0 - 2.0 * end)
+    sides = (getattr(errors, f"{plane}_{('left', 'right')[end]}") for plane in ("upper", "lower"))
+    return [spread(value, geometry.sections)[section] * away for value in sides]
+
+
+# The pantograph ring: closed, or an open arc of the same polygon (two sections: the truss).
+
 
 AngleError = Annotated[float, Field(ge=-20.0, le=20.0), Unit("deg")]
 LEAST_OPENING = 1.0

@@ -1,32 +1,146 @@
-"""A structure put together from parts that are not as drawn.
+"""A structure put together from parts that are not as drawn."""
 
-Where all parts are, places x and axes R of bodies and of the rods' nodes, is what has the least
-elastic energy of the rods,
-
-    sum_e (u . K_u u + psi . K_psi psi) / 2,   with joints closed and the mean opening angle held,
-
-or every opening angle, where sections are held at their own; u and psi are strains against the
-natural lengths (``ringsim.theory.screws``).  Loads, net and springs do not act yet.  Stationary
-points are found by Gauss and Newton's method with Lagrange's multipliers for joints and angles.
-How a free structure lies in space, and what else its joints leave free, stays as near to the
-drawing as a weak spring on every frame in each iteration keeps it.
-"""
-
+import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, eye_array
 from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
-from ringsim.layout.bodies import InSpace, Mount, OnBody
-from ringsim.layout.free_hub import FreeHub
-from ringsim.layout.joints import Joint, JointOpening
-from ringsim.layout.layout import Layout
-from ringsim.layout.pose import Array, Pose
-from ringsim.layout.stiffness import stiffness_of
-from ringsim.parts.rods.family import Rods
-from ringsim.theory import screws
+from ringsim.layout.bodies import (
+    STEP,
+    Array,
+    InSpace,
+    Joint,
+    JointOpening,
+    Mount,
+    OnBody,
+    Pose,
+    stiffness_of,
+)
+from ringsim.layout.draft import FreeHub
+from ringsim.layout.layout import Layout, layout_at_opening
+from ringsim.outputs.corners import deviations
+from ringsim.parts.rods import Rods
+from ringsim.scene import Scene
+from ringsim.scene.substituted import substituted
+
+# Strains of rods' elements and gaps of joints, for numbers real and complex.
+#
+# Frames are places, shape (n, 3), m, and axes, (n, 3, 3); a function of two of them has derivatives
+# after the first one's place and turn and the second one's, (x_1, phi_1, x_2, phi_2), by the
+# complex step (``ringsim.layout.bodies``): exact, and without a second set of equations.
+
+
+Of = NDArray[Any]
+"""Real or complex."""
+OfTwo = Callable[[Of, Of, Of, Of], Of]
+"""Place and axes of a first and a second frame give numbers, shape (n, m)."""
+
+
+def values_and_slopes(function: OfTwo, ends: tuple[Array, ...]) -> tuple[Array, Array]:
+    """Values, shape (n, m), and derivatives, (n, m, 12), at places and axes of n pairs."""
+    values = np.asarray(function(*ends), dtype=float)
+    slopes = np.empty((*values.shape, 12))
+    unit = np.eye(3)
+    for k in range(12):
+        moved: list[Of] = [*ends]
+        where, axis = 2 * (k // 6) + (k % 6) // 3, unit[k % 3]
+        by = axis if k % 6 < 3 else np.cross(axis, ends[where], axisb=1, axisc=1)
+        moved[where] = ends[where] + 1j * STEP * by
+        slopes[..., k] = function(*moved).imag / STEP
+    return values, slopes
+
+
+def strains(lengths: Array) -> OfTwo:
+    """Strains u (m) and psi (rad) of elements with these natural lengths (m), shape (n, 6).
+
+    Those of ``ringsim.frame.kernels``: u = Z R^T d - L e_x and psi = log(R_1^T R_2), with series
+    for psi, which is below 0.1 rad wherever rods hardly bend: what they leave out is below 1e-11.
+    """
+
+    def of(x1: Of, r1: Of, x2: Of, r2: Of) -> Of:
+        between = np.swapaxes(r1, 1, 2) @ r2
+        sine = 0.5 * _axial(between - np.swapaxes(between, 1, 2))
+        s = np.sum(sine * sine, axis=1)[:, None]
+        arc = 1 + s * (1 / 6 + s * (3 / 40 + s * (15 / 336 + s * (105 / 3456 + s * 945 / 42240))))
+        psi = arc * sine
+        along = np.einsum("nji,nj->ni", r1 @ _turned(0.5 * psi), x2 - x1)
+        square = np.sum(psi * psi, axis=1)[:, None]
+        c = -(1 / 24 + square * (7 / 5760 + square * (31 / 967680 + square * 127 / 154828800)))
+        u = along + c * _crossed(psi, _crossed(psi, along))
+        return np.concatenate([u - lengths[:, None] * np.eye(3)[0], psi], axis=1)
+
+    return of
+
+
+def apart(x1: Of, r1: Of, x2: Of, r2: Of) -> Of:
+    """How far the second place is from the first, in space, shape (n, 3), m."""
+    del r1, r2
+    return x2 - x1
+
+
+def aside(x1: Of, r1: Of, x2: Of, r2: Of) -> Of:
+    """How far the second place is from the first frame's z axis, shape (n, 2), m."""
+    del r2
+    return np.asarray(np.einsum("nji,nj->ni", r1, x2 - x1)[:, :2])
+
+
+def off_x(x1: Of, r1: Of, x2: Of, r2: Of) -> Of:
+    """How far the second place is from the first frame's x axis, shape (n, 2), m."""
+    del r2
+    return np.asarray(np.einsum("nji,nj->ni", r1, x2 - x1)[:, 1:])
+
+
+def tilted(x1: Of, r1: Of, x2: Of, r2: Of) -> Of:
+    """How far the second frame's x and y axes are from normal to the first one's z, (n, 2)."""
+    del x1, x2
+    return np.asarray(np.einsum("nk,nki->ni", r1[:, :, 2], r2)[:, :2])
+
+
+def turned_aside(x1: Of, r1: Of, x2: Of, r2: Of) -> Of:
+    """How far the second frame's y axis is from normal to the first one's x, shape (n, 1)."""
+    del x1, x2
+    return np.asarray(np.sum(r1[:, :, 0] * r2[:, :, 1], axis=1)[:, None])
+
+
+def _axial(skewed: Of) -> Of:
+    """Vectors a of matrices [a], shape (n, 3)."""
+    return np.stack([skewed[:, 2, 1], skewed[:, 0, 2], skewed[:, 1, 0]], axis=1)
+
+
+def _crossed(a: Of, b: Of) -> Of:
+    return np.cross(a, b, axis=1)
+
+
+def _turned(phi: Of) -> Of:
+    """Rotations by small vectors (rad), shape (n, 3, 3), by series."""
+    square = np.sum(phi * phi, axis=1)[:, None, None]
+    sine = 1 - square * (1 / 6 - square * (1 / 120 - square / 5040))
+    cosine = 0.5 - square * (1 / 24 - square * (1 / 720 - square / 40320))
+    x, y, z = phi.T
+    zero = 0 * x
+    spun = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    return np.asarray(np.eye(3) + sine * spun + cosine * (spun @ spun))
+
+
+# A structure put together from parts that are not as drawn.
+#
+# Where all parts are, places x and axes R of bodies and of the rods' nodes, is what has the least
+# elastic energy of the rods,
+#
+#     sum_e (u . K_u u + psi . K_psi psi) / 2,   with joints closed and the mean opening angle held,
+#
+# or every opening angle, where sections are held at their own; u and psi are strains against the
+# natural lengths (``ringsim.theory.assembling``).  Loads, net and springs do not act yet.
+# Stationary points are found by Gauss and Newton's method with Lagrange's multipliers for joints
+# and angles. How a free structure lies in space, and what else its joints leave free, stays as near
+# to the drawing as a weak spring on every frame in each iteration keeps it.
+
 
 _MOST = 60
 _BALANCED = 1e-8
@@ -36,11 +150,11 @@ _CLOSED = 1e-12
 _WEAK = 1e-9
 """Springs that hold what is free, over the stiffness of the stiffest rod: a millionth of how stiff
 a ring of 18 is against becoming an oval."""
-_CLOSES: dict[str, tuple[screws.OfTwo, ...]] = {
-    "revolute": (screws.apart, screws.tilted),
-    "sleeve": (screws.aside,),
-    "prismatic": (screws.off_x, screws.tilted, screws.turned_aside),
-    "weld": (screws.apart, screws.tilted, screws.turned_aside),
+_CLOSES: dict[str, tuple[OfTwo, ...]] = {
+    "revolute": (apart, tilted),
+    "sleeve": (aside,),
+    "prismatic": (off_x, tilted, turned_aside),
+    "weld": (apart, tilted, turned_aside),
 }
 """What must vanish of each kind of joint."""
 
@@ -75,7 +189,7 @@ class Frames:
                 stiffness.append(stiffness_of(rod, rods, length))
         self._elements = np.array(pairs)
         self._stiffness = np.array(stiffness)
-        self._strains = screws.strains(np.array(lengths))
+        self._strains = strains(np.array(lengths))
         self._scale = float(self._stiffness[:, 0].max())
         self._joints = []
         for kind in sorted({joint.kind for joint in layout.all_joints}):
@@ -196,12 +310,12 @@ class Frames:
         return self._place[pairs] + np.einsum("nsij,nsj->nsi", axes, arms), axes @ turns
 
     def _over_mounts(
-        self, function: screws.OfTwo, pairs: Array, arms: Array, turns: Array
+        self, function: OfTwo, pairs: Array, arms: Array, turns: Array
     ) -> tuple[Array, Array]:
         """Values of a function of mounts, and derivatives after the frames that carry them."""
         place, axes = self._mounted(pairs, arms, turns)
         ends = place[:, 0], axes[:, 0], place[:, 1], axes[:, 1]
-        values, slopes = screws.values_and_slopes(function, ends)
+        values, slopes = values_and_slopes(function, ends)
         # A mount moves by the turn of its frame, too: dx = dX - a x d phi.
         lever = place - self._place[pairs]
         for side in (0, 1):
@@ -211,13 +325,13 @@ class Frames:
         return values, slopes
 
     def _over(
-        self, function: screws.OfTwo, pairs: Array, frames: tuple[Array, Array]
+        self, function: OfTwo, pairs: Array, frames: tuple[Array, Array]
     ) -> tuple[Array, Array]:
         """Values and derivatives of a function of two frames."""
         place, axes = frames
         first, second = pairs.T
         ends = place[first], axes[first], place[second], axes[second]
-        return screws.values_and_slopes(function, ends)
+        return values_and_slopes(function, ends)
 
     def _spots(self, pairs: Array) -> Array:
         """Unknowns of pairs of frames, shape (n, 12)."""
@@ -253,3 +367,69 @@ class Frames:
             corners = np.array([bodies[number].pose.place for number in net.bodies])
             net = net._replace(hub=FreeHub(net.law, len(corners)).hub(corners))
         return replace(layout, bodies=bodies, rods=rods, net=net)
+
+
+# The structure as it is put together before a run.
+
+
+class Assembled(NamedTuple):
+    """A layout whose bodies and rods' nodes are where they balance, and their elastic energy, J."""
+
+    layout: Layout
+    energy: float
+
+
+def assembled(layout: Layout, rods: Rods, *, locked: bool = False) -> Assembled:
+    """The structure as it is put together; the layout itself if that is as drawn.
+
+    Where it is ``locked`` every opening angle is held, not only their mean.
+
+    Raises
+    ------
+    ValueError
+        If nothing balances near the drawing.
+    """
+    wrong = any(rod.strain for rod in layout.rods) or any(
+        joint.error is not None for joint in layout.joints
+    )
+    if not wrong and (locked or layout.held is None):
+        return Assembled(layout, 0.0)
+    # here: it loads scipy, and few scenes need it
+
+    frames = Frames(layout, rods, locked=locked)
+    return Assembled(frames.relax(), frames.energy)
+
+
+# The shape of a structure that has opened and locked.
+
+
+class Deployed(NamedTuple):
+    """Deviations of the corners from the design, shape (planes, corners), m, and the elastic energy
+    of the rods, J.
+    """
+
+    deviations: Array
+    energy: float
+
+    @property
+    def rms(self) -> float:
+        """Root of their mean square, m."""
+        return float(np.sqrt(np.mean(self.deviations**2)))
+
+
+def deployed(scene: Scene) -> Deployed:
+    """At rest with every opening angle at 180 deg, unloaded: what is left where all vibrations are.
+
+    Raises
+    ------
+    ValueError
+        If nothing balances near the drawing.
+    """
+    scene = substituted(scene)
+    drawn = layout_at_opening(scene, math.pi)
+    found = assembled(drawn, scene.rods, locked=True)
+    places, wanted = (
+        np.array([[layout.bodies[k].pose.place for k in plane] for plane in layout.corners])
+        for layout in (found.layout, drawn)
+    )
+    return Deployed(deviations(places, wanted), found.energy)

@@ -9,7 +9,7 @@ import xarray as xr
 from click.testing import CliRunner, Result
 
 from ringsim import simulation
-from ringsim.analysis.evidence import evidence_for, read_evidence
+from ringsim.analysis.study import evidence_for, read_evidence
 from ringsim.cli import cli
 from ringsim.scene import builtin_scenes, load_scene
 

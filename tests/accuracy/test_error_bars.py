@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from ringsim.analysis.campaign_notes import budget_lines
-from ringsim.campaign.cases import run_cases
+from ringsim.analysis.brief import budget_lines
+from ringsim.campaign.run import run_cases
 from ringsim.campaign.specification import load_campaign
 from ringsim.dataset import to_dataset
 from ringsim.engine import integrate
-from ringsim.outputs.error_bars import error_bars, refined, rules
+from ringsim.outputs.balance import error_bars, refined, rules
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run, run_frame
-from ringsim.stepping.constant_steps import ConstantSteps
+from ringsim.stepping.guard import ConstantSteps
 from ringsim.stepping.instant import Energies, Instant, Scales
 from ringsim.stepping.locks import StopContact
-from ringsim.stepping.motion_steps import MotionSteps
+from ringsim.stepping.repeats import MotionSteps
 from ringsim.variables import Fate, Outcome, Status
 
 TIMES = np.linspace(0.0, 4.0, 41)

@@ -7,10 +7,9 @@ import pytest
 import tomli_w
 import xarray as xr
 
-from ringsim.analysis.accuracy import NEEDED, Truth, judge
-from ringsim.analysis.accuracy_text import in_words, tables
-from ringsim.analysis.evidence import evidence_for, evidence_of, read_evidence
+from ringsim.analysis.accuracy import NEEDED, Truth, in_words, judge, tables
 from ringsim.analysis.ladder import PATHS, Rung, by_frames, ladder, references
+from ringsim.analysis.study import evidence_for, evidence_of, read_evidence
 from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
 

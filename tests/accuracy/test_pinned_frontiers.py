@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import pytest
 
-from ringsim.analysis.evidence import evidence_for
+from ringsim.analysis.study import evidence_for
 from ringsim.parts.solver import NO_DEVIATIONS
 from ringsim.scene import load_scene
 from ringsim.simulation import FIDELITIES

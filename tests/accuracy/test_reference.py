@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from ringsim.analysis.errors import limit, order, reference
+from ringsim.analysis.engines import limit, order, reference
 
 
 def levels(*values: object) -> xr.DataArray:

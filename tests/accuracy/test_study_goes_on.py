@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from ringsim.analysis.accuracy import NEEDED
-from ringsim.analysis.accuracy_text import tables
-from ringsim.analysis.errors import limit
+from ringsim.analysis.accuracy import NEEDED, tables
+from ringsim.analysis.engines import limit
 from ringsim.analysis.ladder import GRADED, ladder, left_out, references
 from ringsim.campaign import accuracy
 from ringsim.campaign.accuracy import ReferenceRunError, run_ladder

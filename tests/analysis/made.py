@@ -7,9 +7,8 @@ import json
 import numpy as np
 import xarray as xr
 
-from ringsim.sampling.designs.latin_hypercube import LatinHypercube
-from ringsim.sampling.designs.sobol import Sobol
-from ringsim.sampling.distributions.uniform import Uniform
+from ringsim.sampling.designs.independent import LatinHypercube, Sobol
+from ringsim.sampling.distributions import Uniform
 from ringsim.variables import Fate, Status
 
 AXES = dict.fromkeys("abc")

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from preloaded import ringsim
 
 from made import campaign
-from ringsim.cli.analyse import command
+from ringsim.cli.results import analyse_command
 from ringsim.refusal import InputError
 
 CAMPAIGN = """
@@ -44,7 +44,7 @@ def run(scene):
 
 
 def analyse(*arguments):
-    return CliRunner().invoke(command, [*map(str, arguments)], catch_exceptions=False)
+    return CliRunner().invoke(analyse_command, [*map(str, arguments)], catch_exceptions=False)
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,7 @@ from made import drawn_campaign
 from ringsim.analysis.brief import output_table, what_matters, what_separates
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
-from ringsim.sampling.designs.random import RandomDesign
-from ringsim.sampling.designs.sobol import Sobol
+from ringsim.sampling.designs.independent import RandomDesign, Sobol
 
 
 def linear(x):

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from made_campaign import made_campaign
 
-from ringsim.analysis.campaign_notes import latch_lines, peak_lines
+from ringsim.analysis.brief import latch_lines, peak_lines
 from ringsim.variables import Fate
 
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from made import drawn_campaign
-from ringsim.analysis import given_data, ranks
+from ringsim.analysis import indices
 from ringsim.analysis.brief import what_matters, what_separates
 from ringsim.analysis.study import analyse
-from ringsim.sampling.designs.random import RandomDesign
-from ringsim.sampling.designs.sobol import Sobol
+from ringsim.sampling.designs.independent import RandomDesign, Sobol
 
 NOISE = 400
 # The share of 400 campaigns has a standard error of 1.1 %.
@@ -23,9 +22,9 @@ def test_the_level_is_that_of_the_largest_index_of_all_columns_by_chance():
         columns, output = random.random((20, 100)), random.random(100)
         columns[10:] = (columns[10:] > 0.5) + 0.0
         columns[1] = columns[0] + 0.1 * columns[1]  # alike: no two chances
-        bins = [given_data.Bins(column) for column in columns]
-        largest = max(given_data.index(each, output, none)[0] for each in bins)
-        found.append(largest > given_data.chance_level(bins, output))
+        bins = [indices.Bins(column) for column in columns]
+        largest = max(indices.index(each, output, none)[0] for each in bins)
+        found.append(largest > indices.chance_level(bins, output))
     assert LEAST <= np.mean(found) <= MOST
 
 
@@ -33,24 +32,24 @@ def test_shuffles_of_all_columns_at_once_are_those_one_by_one():
     random, none = np.random.default_rng(6), np.zeros(80, dtype=int)
     columns, output = random.random((4, 80)), random.random(80)
     columns[3] = columns[3] > 0.3
-    bins = [given_data.Bins(column) for column in columns]
+    bins = [indices.Bins(column) for column in columns]
     shuffle = np.random.default_rng(0)
     each = [shuffle.permutation(output) for _ in range(199)]
-    largest = [max(given_data.index(one, y, none)[0] for one in bins) for y in each]
-    assert given_data.chance_level(bins, output) == pytest.approx(np.quantile(largest, 0.95))
+    largest = [max(indices.index(one, y, none)[0] for one in bins) for y in each]
+    assert indices.chance_level(bins, output) == pytest.approx(np.quantile(largest, 0.95))
 
 
-@pytest.mark.parametrize("measure", [ranks.correlations, ranks.partial_correlations])
+@pytest.mark.parametrize("measure", [indices.correlations, indices.partial_correlations])
 @pytest.mark.parametrize("samples", [12, 60])
 def test_the_largest_rank_correlation_by_chance(measure, samples):
     random, among = np.random.default_rng(7), 30 if samples > 40 else 4
-    held = among - 1 if measure is ranks.partial_correlations else 0
-    level, found = ranks.largest_by_chance(samples, np.array(held), among), []
+    held = among - 1 if measure is indices.partial_correlations else 0
+    level, found = indices.largest_by_chance(samples, np.array(held), among), []
     for _ in range(NOISE):
         columns, output = random.random((samples, among)), random.random(samples)
-        found.append(np.abs(measure(ranks.centred_ranks(columns), output)).max() > level)
+        found.append(np.abs(measure(indices.centred_ranks(columns), output)).max() > level)
     assert LEAST <= np.mean(found) <= MOST
-    assert ranks.largest_by_chance(5, np.array(3), 3) == np.inf
+    assert indices.largest_by_chance(5, np.array(3), 3) == np.inf
 
 
 @pytest.mark.parametrize("design", [RandomDesign(samples=100), Sobol(samples=128, replicates=8),
@@ -87,7 +86,7 @@ def test_inputs_are_chosen_by_the_correlation_that_holds_the_others():
     found = analyse(drawn_campaign(RandomDesign(samples=22), output, 3, 4))
     plain = found.asynchrony_max_rank_correlation.sel(input="x2").item()
     partial = found.asynchrony_max_partial_rank_correlation.sel(input="x2").item()
-    assert abs(plain) < ranks.largest_by_chance(22, np.array(0), 3) < partial
+    assert abs(plain) < indices.largest_by_chance(22, np.array(0), 3) < partial
     table = what_matters(found)
     assert [row[1] for row in table.rows] == ["x1", "x2"]
     place = table.head.index("partial rank correlation")
@@ -100,10 +99,10 @@ def test_of_many_samples_the_distribution_tells_what_shuffles_do(
 ) -> None:
     """39 shuffles give the level with a scatter of some 3 % of itself."""
     random = np.random.default_rng(8)
-    columns = [given_data.Bins(column) for column in random.random((30, 20_000))]
+    columns = [indices.Bins(column) for column in random.random((30, 20_000))]
     output = (random.random(20_000) < rare).astype(float)
-    quick = given_data.chance_level(columns, output)
-    monkeypatch.setattr(given_data, "_MANY", 10**9)
-    shuffled = given_data.chance_level(columns, output)
+    quick = indices.chance_level(columns, output)
+    monkeypatch.setattr(indices, "_MANY", 10**9)
+    shuffled = indices.chance_level(columns, output)
     assert quick != shuffled
     assert quick == pytest.approx(shuffled, rel=0.1)

@@ -13,13 +13,12 @@ from scipy.stats import multinomial, ttest_ind
 
 from made import campaign, drawn_campaign, ishigami, response
 from ringsim.analysis import intervals
-from ringsim.analysis.binomial import difference_of_pairs, difference_of_shares
-from ringsim.analysis.blocks import population_of
-from ringsim.analysis.comparison import compare
-from ringsim.analysis.comparison_text import compared
-from ringsim.cli.compare import command
+from ringsim.analysis.comparison import compare, compared
+from ringsim.analysis.design import population_of
+from ringsim.analysis.intervals import difference_of_pairs, difference_of_shares
+from ringsim.cli.results import compare_command
 from ringsim.refusal import InputError
-from ringsim.sampling.designs.saltelli import Saltelli
+from ringsim.sampling.designs.blocks import Saltelli
 from ringsim.variables import Fate, Status
 
 RANDOM = np.random.default_rng(0)
@@ -222,7 +221,7 @@ def test_two_runs_are_compared(tmp_path):
         run.to_netcdf(tmp_path / f"{name}.nc")
     arguments = [str(tmp_path / name) for name in ("a.nc", "b.nc", "c.nc")]
     done = CliRunner().invoke(
-        command, [*arguments[:2], "--out", arguments[2]], catch_exceptions=False
+        compare_command, [*arguments[:2], "--out", arguments[2]], catch_exceptions=False
     )
     assert done.exit_code == 0
     assert xr.load_dataset(arguments[2]).asynchrony_max_difference.item() == 0.5
@@ -235,5 +234,5 @@ def test_a_run_and_a_campaign_are_not_compared(tmp_path):
     campaign([1.0]).isel(sample=0, drop=True).to_netcdf(tmp_path / "run.nc")
     with pytest.raises(InputError, match="a run and the other a campaign"):
         CliRunner().invoke(
-            command, [str(tmp_path), str(tmp_path / "run.nc")], catch_exceptions=False
+            compare_command, [str(tmp_path), str(tmp_path / "run.nc")], catch_exceptions=False
         )

@@ -7,13 +7,12 @@ import pytest
 from scipy.stats import spearmanr
 
 from made import drawn_campaign
-from ringsim.analysis import given_data
+from ringsim.analysis import indices
 from ringsim.analysis.brief import what_matters
-from ringsim.analysis.confounded import pairs
+from ringsim.analysis.influence import pairs
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
-from ringsim.sampling.designs.random import RandomDesign
-from ringsim.sampling.designs.sobol import Sobol
+from ringsim.sampling.designs.independent import RandomDesign, Sobol
 
 FEW = Sobol(samples=250, replicates=10)
 """25 points a replicate in 40 dimensions: some lie on lines."""
@@ -50,12 +49,12 @@ def test_pairs_are_those_of_scipy_and_bent_ones_are_found_by_their_share():
 
 
 def test_the_level_of_one_index_is_that_of_normal_outputs():
-    random, bins = np.random.default_rng(6), given_data.Bins(np.random.default_rng(5).random(120))
+    random, bins = np.random.default_rng(6), indices.Bins(np.random.default_rng(5).random(120))
     outputs = random.normal(size=(120, 40_000))
-    found = given_data.indices(bins, outputs - outputs.mean(axis=0))
+    found = indices.given_data_indices(bins, outputs - outputs.mean(axis=0))
     # A quantile of 40,000 has a standard error of 0.001 in its probability.
-    assert np.mean(found > given_data.level_of_normal(bins, 0.05)) == pytest.approx(0.05, abs=0.004)
-    assert np.isnan(given_data.level_of_normal(given_data.Bins(np.arange(5.0)), 0.05))
+    assert np.mean(found > indices.level_of_normal(bins, 0.05)) == pytest.approx(0.05, abs=0.004)
+    assert np.isnan(indices.level_of_normal(indices.Bins(np.arange(5.0)), 0.05))
 
 
 def test_an_input_is_not_told_for_the_effect_of_one_that_it_goes_with():

@@ -7,9 +7,8 @@ import pytest
 from scipy.stats import binom
 
 from made import campaign, points, response
-from ringsim.analysis.binomial import share_bounds
 from ringsim.analysis.design import placement
-from ringsim.analysis.intervals import ranks
+from ringsim.analysis.intervals import ranks, share_bounds
 from ringsim.analysis.study import QUANTILES, STATISTICS, _share_interval, interval_of
 from ringsim.analysis.verdicts import bounds
 
@@ -78,7 +77,7 @@ def test_openturns_agrees_with_exact_bounds_and_ranks():
 
 def test_openturns_agrees_with_rank_correlations():
     ot = pytest.importorskip("openturns", reason="extra oracle")
-    from ringsim.analysis.ranks import centred_ranks, correlations, partial_correlations
+    from ringsim.analysis.indices import centred_ranks, correlations, partial_correlations
 
     columns = points("random", 300, 1, 7)
     output = response(columns)

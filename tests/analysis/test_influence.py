@@ -9,8 +9,8 @@ from scipy.special import expit, logit
 from scipy.stats import norm, spearmanr
 
 from made import campaign, points
-from ringsim.analysis import ranks
-from ringsim.analysis.drawn import drawn
+from ringsim.analysis import indices
+from ringsim.analysis.design import drawn
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.variables import Fate, Status
@@ -35,7 +35,7 @@ def test_rank_correlations_are_those_of_scipy():
     columns = random.integers(0, 5, (50, 3)).astype(float)
     output = columns @ [1.0, -0.5, 0.0] + random.normal(size=50)
     expected = [spearmanr(column, output).statistic for column in columns.T]
-    found = ranks.correlations(ranks.centred_ranks(columns), output)
+    found = indices.correlations(indices.centred_ranks(columns), output)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
@@ -47,7 +47,7 @@ def test_partial_correlations_are_those_of_residuals():
     from scipy.stats import rankdata
 
     x, y = rankdata(columns, axis=0), rankdata(output)
-    for k, found in enumerate(ranks.partial_correlations(ranks.centred_ranks(columns), output)):
+    for k, found in enumerate(indices.partial_correlations(indices.centred_ranks(columns), output)):
         others = np.column_stack([np.ones(60), np.delete(x, k, axis=1)])
         fits = [np.linalg.lstsq(others, each, rcond=None)[0] for each in (x[:, k], y)]
         left = [each - others @ fit for each, fit in zip((x[:, k], y), fits, strict=True)]
@@ -61,8 +61,8 @@ def test_intervals_of_correlations_cover_normal_pairs():
     ends = []
     for _ in range(CAMPAIGNS):
         x, y = random.normal(size=(2, 60))
-        found = ranks.correlations(ranks.centred_ranks(x[:, None]), 0.6 * x + 0.8 * y)
-        ends.append(np.ravel(ranks.correlation_interval(found, 60)))
+        found = indices.correlations(indices.centred_ranks(x[:, None]), 0.6 * x + 0.8 * y)
+        ends.append(np.ravel(indices.correlation_interval(found, 60)))
     assert 0.92 <= covered(np.transpose(ends), true) <= 0.98
 
 
@@ -70,7 +70,7 @@ def test_intervals_of_areas_cover_normal_groups():
     random, true = np.random.default_rng(3), norm.cdf(1 / np.sqrt(2))
     inside = np.arange(80) < 15
     columns = random.normal(size=(80, CAMPAIGNS)) + inside[:, None]
-    ends = ranks.area_interval(ranks.areas(columns, inside), 15, 65)
+    ends = indices.area_interval(indices.areas(columns, inside), 15, 65)
     assert 0.92 <= covered(ends, true) <= 0.98
 
 
@@ -84,17 +84,20 @@ def test_intervals_from_replicates_cover(kind):
     many = np.random.default_rng(5).random((400_000, 3))
     first = many[:, :1]
     high = output(many) > 1.2
-    true = ranks.correlations(ranks.centred_ranks(first), output(many)), ranks.areas(first, high)
+    true = (
+        indices.correlations(indices.centred_ranks(first), output(many)),
+        indices.areas(first, high),
+    )
     which = np.arange(128) % 8
     ends = [[], []]
     for seed in range(300):
         x = points(kind, 128, 8, seed)
         y = output(x)
-        of = ranks.Columns(x[:, :1])
-        correlate = lambda rows: ranks.correlations(of.ranks(rows), y[rows])  # noqa: B023, E731
-        area = lambda rows: ranks.areas(x[rows, :1], y[rows] > 1.2)  # noqa: B023, E731
-        ends[0].append(np.ravel(ranks.replicate_interval(correlate, which, np.arctanh, np.tanh)))
-        ends[1].append(np.ravel(ranks.replicate_interval(area, which, logit, expit)))
+        of = indices.Columns(x[:, :1])
+        correlate = lambda rows: indices.correlations(of.ranks(rows), y[rows])  # noqa: B023, E731
+        area = lambda rows: indices.areas(x[rows, :1], y[rows] > 1.2)  # noqa: B023, E731
+        ends[0].append(np.ravel(indices.replicate_interval(correlate, which, np.arctanh, np.tanh)))
+        ends[1].append(np.ravel(indices.replicate_interval(area, which, logit, expit)))
     for each, value in zip(ends, true, strict=True):
         # 300 campaigns leave a standard error of 1.3 % of the share.
         assert 0.91 <= covered(np.transpose(each), value) <= 0.99
@@ -108,9 +111,9 @@ def test_a_perfect_correlation_of_a_few_samples_has_no_interval():
 
 
 def test_a_perfect_separation_has_an_interval_below_one():
-    found = ranks.areas(np.arange(20.0)[:, None], np.arange(20) >= 15)
+    found = indices.areas(np.arange(20.0)[:, None], np.arange(20) >= 15)
     assert found.tolist() == [1.0]
-    low, high = ranks.area_interval(found, 5, 15)
+    low, high = indices.area_interval(found, 5, 15)
     assert 0.7 < low.item() < 0.95
     assert high.item() == pytest.approx(1.0)
 

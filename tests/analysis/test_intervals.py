@@ -7,8 +7,8 @@ import pytest
 
 from made import points, response
 from ringsim.analysis import intervals
-from ringsim.analysis.binomial import samples_needed, share_bounds, share_interval
 from ringsim.analysis.design import Placement
+from ringsim.analysis.intervals import samples_needed, share_bounds, share_interval
 from ringsim.analysis.study import STATISTICS, interval_of
 
 CAMPAIGNS = 1000

@@ -7,12 +7,10 @@ import pytest
 from scipy.stats import binom
 
 from made import campaign
-from ringsim.analysis.binomial import samples_needed, share_bounds
 from ringsim.analysis.design import placement
-from ringsim.analysis.looks import Condition, Rule
-from ringsim.analysis.requirements import Requirement
-from ringsim.analysis.stopping import holds
+from ringsim.analysis.intervals import samples_needed, share_bounds
 from ringsim.analysis.study import analyse
+from ringsim.analysis.verdicts import Condition, Requirement, Rule, holds
 
 RULE = Rule(conditions=[Condition(requirement="asynchrony_max")])
 MOST = 2500

@@ -15,19 +15,17 @@ from made_campaign import made_campaign
 
 from made import drawn_campaign
 from ringsim.analysis.accessor import register
-from ringsim.analysis.campaign_notes import budget_lines
-from ringsim.analysis.comparison import compare
-from ringsim.analysis.comparison_text import compared
+from ringsim.analysis.brief import budget_lines
+from ringsim.analysis.comparison import compare, compared
 from ringsim.analysis.design import placement
-from ringsim.analysis.losses import MARK, NOTE, losses
-from ringsim.analysis.requirements import read_requirements, to_json
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told, verdict_lines
-from ringsim.analysis.verdicts import Verdict, judge
-from ringsim.plots.campaign.distributions import distributions
+from ringsim.analysis.verdicts import Verdict, judge, read_requirements, to_json
+from ringsim.analysis.worst import MARK, NOTE, losses
+from ringsim.plots.campaign.numbers import distributions
 from ringsim.report import page as of_pages
-from ringsim.sampling.designs.random import RandomDesign
-from ringsim.sampling.designs.saltelli import Saltelli
+from ringsim.sampling.designs.blocks import Saltelli
+from ringsim.sampling.designs.independent import RandomDesign
 
 WANTED = {
     "asynchrony_max": {"max": 9.0, "probability": 0.9, "confidence": 0.9},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ringsim.analysis.requirements import parse_requirements, read_requirements
+from ringsim.analysis.verdicts import parse_requirements, read_requirements
 from ringsim.campaign.specification import load_campaign
 from ringsim.refusal import InputError
 

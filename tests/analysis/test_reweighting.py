@@ -10,17 +10,15 @@ from click.testing import CliRunner
 from scipy.stats import norm, truncnorm
 
 from made import UNIT, campaign, drawn_campaign, points
-from ringsim.analysis import binomial, weighted
-from ringsim.analysis.capped import Cap, Pair
-from ringsim.analysis.reweighting import parse_reweighted, read_distributions, weights_of
+from ringsim.analysis import intervals, reweighting
+from ringsim.analysis.reweighting import Cap, Pair, parse_reweighted, read_distributions, weights_of
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.analysis.verdicts import Verdict, verdict_of
-from ringsim.cli.analyse import command
+from ringsim.cli.results import analyse_command
 from ringsim.refusal import InputError
-from ringsim.sampling.designs.morris import Morris
-from ringsim.sampling.designs.random import RandomDesign
-from ringsim.sampling.designs.saltelli import Saltelli
+from ringsim.sampling.designs.blocks import Morris, Saltelli
+from ringsim.sampling.designs.independent import RandomDesign
 
 FEW, MANY = (100, 0.88, 1.0), (1000, 0.92, 0.98)
 SOME = [pytest.param(FEW, id="few"), pytest.param(MANY, id="many", marks=pytest.mark.slow)]
@@ -146,7 +144,7 @@ def test_a_mean_that_few_samples_decide_is_marked():
         apart = np.abs(weights * (x**power - np.average(x**power, weights=weights)))
         decisive = found.asynchrony_max_decisive_samples.sel(reweighted_statistic="mean").item()
         assert decisive == pytest.approx(apart.sum() ** 2 / (apart**2).sum())
-        assert (decisive < weighted.LEAST_OF_MEAN) == few
+        assert (decisive < reweighting.LEAST_OF_MEAN) == few
         lines = [line.split() for line in told(found)]
         (row,) = (
             line for line in lines
@@ -159,7 +157,7 @@ def test_bounds_with_equal_weights_are_hardly_wider_than_those_of_plain_samples(
     alike, own = shifted(0.0), np.arange(100) < 5
     for confidence in (0.5, 0.9, 0.999):
         low, high = Cap(alike, 100, 1 - confidence).bounds(own, np.ones(100), None)
-        exact = binomial.share_bounds(5, 100, confidence)
+        exact = intervals.share_bounds(5, 100, confidence)
         assert low <= exact[0] <= exact[1] <= high
         assert high - low < 1.6 * (exact[1] - exact[0]) + 0.05
     none = Cap(alike, 100, 0.1).bounds(own & False, np.ones(100), None)
@@ -207,10 +205,10 @@ def test_intervals_of_weighted_estimates_cover(kind, case):
         y, weights = value(x), TRUE.pdf(x[:, 0])
         replicate = None if kind == "random" else np.arange(samples) % replicates
         found = {
-            "mean": weighted.mean_interval(y, weights, replicate),
-            "share": weighted.share_interval(y > 1.9, weights, replicate),
+            "mean": reweighting.mean_interval(y, weights, replicate),
+            "share": reweighting.share_interval(y > 1.9, weights, replicate),
         } | {
-            level: weighted.quantile_interval(y, weights, level, replicate)
+            level: reweighting.quantile_interval(y, weights, level, replicate)
             for level in (0.05, 0.5, 0.95)
         }  # fmt: skip
         for name, (low, high) in found.items():
@@ -222,10 +220,12 @@ def test_intervals_of_weighted_estimates_cover(kind, case):
 def test_equal_weights_change_nothing():
     values = np.random.default_rng(1).random(200)
     one = np.full(200, 0.3)
-    assert weighted.effective(one) == pytest.approx(200)
-    assert weighted.mean(values, one) == pytest.approx(values.mean())
-    assert weighted.quantile(values, one, 0.3) == pytest.approx(np.quantile(values, 0.3), abs=0.01)
-    assert weighted.share_interval(values < 2, one, None)[1] == 1.0
+    assert reweighting.effective(one) == pytest.approx(200)
+    assert reweighting.mean(values, one) == pytest.approx(values.mean())
+    assert reweighting.quantile(values, one, 0.3) == pytest.approx(
+        np.quantile(values, 0.3), abs=0.01
+    )
+    assert reweighting.share_interval(values < 2, one, None)[1] == 1.0
 
 
 def test_blocks_are_reweighted_by_the_samples_that_stand_for_the_population():
@@ -300,7 +300,7 @@ def test_the_command_line_takes_inputs_as_campaign_files_write_them(tmp_path):
     made.to_netcdf(tmp_path / "campaign.nc")
     text = 'x1 = { kind = "normal", mean = 0.5, standard_deviation = 0.12 }'
     call = [str(tmp_path), "--reweight", text, "--out", str(tmp_path / "out.nc")]
-    done = CliRunner().invoke(command, call, catch_exceptions=False)
+    done = CliRunner().invoke(analyse_command, call, catch_exceptions=False)
     assert done.exit_code == 0
     assert "500 samples count as 2" in done.output
     assert any(line.startswith("asynchrony_max  degree         mean") for line in

@@ -17,18 +17,15 @@ from made import (
     points,
     response,
 )
-from ringsim.analysis import effects, given_data, sobol_indices
-from ringsim.analysis.blocks import blocks_of
-from ringsim.analysis.dependence import dependence
+from ringsim.analysis import indices
+from ringsim.analysis.design import blocks_of
+from ringsim.analysis.indices import dependence
+from ringsim.analysis.influence_text import sensitivity_tables
 from ringsim.analysis.intervals import of_independent, spread
-from ringsim.analysis.sensitivity_text import sensitivity_tables
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
-from ringsim.sampling.designs.latin_hypercube import LatinHypercube
-from ringsim.sampling.designs.morris import Morris
-from ringsim.sampling.designs.random import RandomDesign
-from ringsim.sampling.designs.saltelli import Saltelli
-from ringsim.sampling.designs.sobol import Sobol
+from ringsim.sampling.designs.blocks import Morris, Saltelli
+from ringsim.sampling.designs.independent import LatinHypercube, RandomDesign, Sobol
 from ringsim.variables import Fate, Status
 
 PAIR = {"pair": ("x1", "x2")}
@@ -68,9 +65,7 @@ def test_intervals_of_sobol_indices_cover(name, case, lost):
     for seed in range(campaigns):
         values = blocked(function, design, seed)
         kept = ~(np.random.default_rng(seed).random(values.shape) < lost).any(axis=1)
-        ends.append(
-            sobol_indices.indices_with_intervals(values[kept], len(true) // 2, which[kept])[1]
-        )
+        ends.append(indices.indices_with_intervals(values[kept], len(true) // 2, which[kept])[1])
     share = covered(ends, true)
     assert ((share >= least) & (share <= most)).all(), share
 
@@ -85,7 +80,7 @@ def test_intervals_of_indices_of_failures_cover(case):
 
     true = [0.158, 0.071, 0.133, 0.725, 0.517, 0.675]
     ends = [
-        sobol_indices.indices_with_intervals(
+        indices.indices_with_intervals(
             blocked(beyond, Saltelli(samples=1024), seed), 3, np.arange(1024) % 8
         )[1]
         for seed in range(campaigns)
@@ -99,11 +94,11 @@ def test_indices_are_those_of_salib_s_own_analysis():
     values = blocked(ishigami, design, 3)
     problem = {"num_vars": 3, "names": list("abc"), "bounds": [[0, 1]] * 3}
     known = salib_sobol.analyze(problem, values.ravel(), num_resamples=2, seed=1)
-    found = sobol_indices.indices(values, 3)
+    found = indices.sobol_indices(values, 3)
     # It scales by the spread of all rows, and centres by their mean; ours by those of A and B.
     np.testing.assert_allclose(found[3:6], known["ST"], rtol=1e-9)
     np.testing.assert_allclose(found[:3], known["S1"], atol=0.02)
-    second = [known["S2"][j, k] for j, k in sobol_indices.pairs(3)]
+    second = [known["S2"][j, k] for j, k in indices.pairs(3)]
     np.testing.assert_allclose(found[6:], second, atol=0.04)
 
 
@@ -114,8 +109,8 @@ def test_a_bootstrap_over_the_blocks_of_one_sequence_would_be_too_long():
     for seed in range(60):
         values = blocked(ishigami, Saltelli(samples=512, replicates=1), seed)
         chosen = random.integers(512, size=(30, 512))
-        again = [sobol_indices.indices(values[each], 3) for each in chosen]
-        centre, scatter = sobol_indices.indices(values, 3)[4], np.std(again, axis=0, ddof=1)[4]
+        again = [indices.sobol_indices(values[each], 3) for each in chosen]
+        centre, scatter = indices.sobol_indices(values, 3)[4], np.std(again, axis=0, ddof=1)[4]
         hits += abs(centre - true) < 1.96 * scatter
     assert hits == 60
     found = analyse(drawn_campaign(Saltelli(samples=64, replicates=1), ishigami, 3, 0))
@@ -234,7 +229,7 @@ def moved(design, function, seed):
     made = drawn_campaign(design, function, 3, seed)
     blocks = blocks_of(made)
     values = made.asynchrony_max.values.reshape(blocks.rows.shape)
-    return made, blocks, effects.effects(values, blocks, ("x1", "x2", "x3"))
+    return made, blocks, indices.effects(values, blocks, ("x1", "x2", "x3"))
 
 
 def test_effects_are_those_of_salib():
@@ -242,7 +237,7 @@ def test_effects_are_those_of_salib():
     x = np.stack([made[f"x{k}"] for k in (1, 2, 3)], axis=1)
     problem = {"num_vars": 3, "names": ["x1", "x2", "x3"], "bounds": [[0, 1]] * 3}
     known = salib_morris.analyze(problem, x, made.asynchrony_max.values, num_levels=4)
-    rows = effects.measured(found, np.zeros(3, dtype=bool))[..., 0]
+    rows = indices.measured(found, np.zeros(3, dtype=bool))[..., 0]
     # A move crosses 2/3 of the range.
     for row, name in zip(rows, ("mu_star", "mu", "sigma"), strict=True):
         np.testing.assert_allclose(row, np.asarray(known[name]) * 2 / 3, rtol=1e-9)
@@ -288,7 +283,7 @@ def test_intervals_of_effects_cover(case):
 def test_few_trajectories_have_no_intervals():
     for count, known in ((19, [False] * 3), (20, [True, True, False]), (60, [True] * 3)):
         found = moved(Morris(samples=count), ishigami_like, 1)[2]
-        ends = effects.measured(found, np.zeros(3, dtype=bool))[..., 1:]
+        ends = indices.measured(found, np.zeros(3, dtype=bool))[..., 1:]
         assert np.isfinite(ends).all(axis=(1, 2)).tolist() == known
 
 
@@ -313,9 +308,9 @@ def test_intervals_of_given_data_indices_cover(kind, case):
     for seed in range(campaigns):
         x = points(kind, 400, 8, seed)
         y = ishigami(x)
-        part = np.arange(400) % (given_data.PARTS if kind == "random" else 8)
-        bins = [given_data.Bins(column) for column in x.T]
-        ends.append([given_data.interval(*given_data.index(each, y, part)) for each in bins])
+        part = np.arange(400) % (indices.PARTS if kind == "random" else 8)
+        bins = [indices.Bins(column) for column in x.T]
+        ends.append([indices.interval(*indices.index(each, y, part)) for each in bins])
     share = covered(ends, true)
     assert ((share[:2] >= least) & (share[:2] <= most)).all(), share
     assert share[2] >= least
@@ -326,10 +321,10 @@ def test_given_data_indices_are_corrected_for_chance():
     random, found = np.random.default_rng(3), []
     for _ in range(100):
         x, y = random.random((2, 1000))
-        found.append(given_data.index(given_data.Bins(x), y, np.zeros(1000, dtype=int))[0])
+        found.append(indices.index(indices.Bins(x), y, np.zeros(1000, dtype=int))[0])
     # Standard error of the mean of 100: sqrt(2 * 19) / 1000 / 10 = 0.0006.
     assert abs(np.mean(found)) < 0.002
-    levels = [given_data.chance_level([given_data.Bins(x)], y)]
+    levels = [indices.chance_level([indices.Bins(x)], y)]
     assert 0.02 < np.mean(np.array(found) > levels) * 2 < 0.2
     assert levels[0] == pytest.approx(np.quantile(found, 0.95), abs=0.006)
 
@@ -337,7 +332,7 @@ def test_given_data_indices_are_corrected_for_chance():
 def test_words_are_bins_of_their_own():
     random = np.random.default_rng(3)
     word, noise = random.integers(0, 2, 4000), random.normal(size=4000)
-    index, _ = given_data.index(given_data.Bins(word.astype(float)), 2 * word + noise, word * 0)
+    index, _ = indices.index(indices.Bins(word.astype(float)), 2 * word + noise, word * 0)
     assert index == pytest.approx(0.5, abs=0.03)  # variances 1 and 1
 
 

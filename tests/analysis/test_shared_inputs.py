@@ -10,18 +10,17 @@ import pytest
 import xarray as xr
 from made_campaign import made_campaign
 
-from ringsim.analysis.campaign_samples import called, inputs
 from ringsim.analysis.comparison import compare
-from ringsim.analysis.drawn import drawn
+from ringsim.analysis.design import called, drawn, inputs
 from ringsim.analysis.reweighting import read_distributions, weights_of
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.campaign.specification import load_campaign
-from ringsim.export.words import meaning_of
-from ringsim.plots.campaign.by_input import by_input
+from ringsim.export.tables import meaning_of
+from ringsim.plots.campaign.numbers import by_input
 from ringsim.plots.campaign.tornado import bars_of
 from ringsim.refusal import InputError
-from ringsim.report import model, tables
+from ringsim.report import page, tables
 from ringsim.storage.netcdf import read_design, write_design
 
 PATHS = ["temperature.joint.value", "temperature.pulley.value"]
@@ -82,7 +81,7 @@ def test_one_column_one_row_and_one_panel() -> None:
     assert row[1:3] == ["K", "1"]
     assert row[-1] == ", ".join(PATHS)
     assert len(tables.drawn(made)) == 4
-    origins = {value.path: value.origin for value in model.values(made)[0]}
+    origins = {value.path: value.origin for value in page.values_of(made)[0]}
     assert [origins[path] for path in PATHS] == ["drawn", "drawn"]
     panels = [axes.get_xlabel() for axes in by_input(made).axes if axes.get_xlabel()]
     assert [label for label in panels if label.startswith(("cold", "temperature"))] == ["cold (K)"]

@@ -9,8 +9,8 @@ from made import drawn_campaign
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.plots.campaign.tornado import explained
-from ringsim.report.tail import rare_event
-from ringsim.sampling.designs.subset_simulation import SubsetSimulation
+from ringsim.report.tables import rare_event
+from ringsim.sampling.designs.levels import SubsetSimulation
 
 FACTORS = dict.fromkeys(("x1", "x2"))
 

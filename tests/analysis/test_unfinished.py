@@ -10,10 +10,8 @@ from made import drawn_campaign, ishigami
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.plots.campaign.tornado import bars_of
-from ringsim.sampling.designs.morris import Morris
-from ringsim.sampling.designs.random import RandomDesign
-from ringsim.sampling.designs.saltelli import Saltelli
-from ringsim.sampling.designs.sobol import Sobol
+from ringsim.sampling.designs.blocks import Morris, Saltelli
+from ringsim.sampling.designs.independent import RandomDesign, Sobol
 from ringsim.variables import Fate
 
 NOT_RUN = -1

@@ -8,14 +8,12 @@ import xarray as xr
 from made_campaign import made_campaign, with_motors
 
 from made import campaign
-from ringsim.analysis.brief import output_table
-from ringsim.analysis.campaign_notes import peak_lines
-from ringsim.analysis.campaign_samples import median_and_worst
-from ringsim.analysis.comparison import compare
-from ringsim.analysis.comparison_text import compared
-from ringsim.analysis.quantities import quantities, worst_sample
-from ringsim.analysis.requirements import read_requirements
+from ringsim.analysis.brief import output_table, peak_lines
+from ringsim.analysis.comparison import compare, compared
+from ringsim.analysis.design import median_and_worst
+from ringsim.analysis.intervals import quantities, worst_sample
 from ringsim.analysis.study import analyse
+from ringsim.analysis.verdicts import read_requirements
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 

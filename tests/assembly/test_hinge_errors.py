@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from ringsim.layout.layout import layout_at_opening, layout_of
-from ringsim.parts.rods.length_error import LengthError
+from ringsim.parts.rods import LengthError
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
-from ringsim.structures.hinge_error import HingeError
-from ringsim.theory.assembled import assembled
-from ringsim.theory.deployed import deployed
+from ringsim.structures.family import HingeError
+from ringsim.theory.assembling import assembled, deployed
 from test_length_errors import Bar, of_pin_jointed_truss, ring, scattered
 
 PINS = tuple(HingeError.model_fields)

@@ -11,16 +11,13 @@ import pytest
 
 from ringsim.engine.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
-from ringsim.layout.bodies import Lump, Rod
+from ringsim.layout.bodies import STEP, Lump, Rod
 from ringsim.layout.draft import Draft
 from ringsim.layout.layout import Layout, layout_at_opening, layout_of
-from ringsim.layout.pose import STEP
-from ringsim.parts.rods.length_error import LengthError
+from ringsim.parts.rods import LengthError
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
-from ringsim.theory.assembled import assembled
-from ringsim.theory.deployed import deployed
-from ringsim.theory.screws import strains
+from ringsim.theory.assembling import assembled, deployed, strains
 from ringsim.variables import Cause
 
 NAMES = tuple(LengthError.model_fields)

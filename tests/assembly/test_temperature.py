@@ -11,7 +11,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.scene.substituted import substituted
 from ringsim.simulation import run_frame
-from ringsim.theory.deployed import deployed
+from ringsim.theory.assembling import deployed
 from test_length_errors import ring
 
 HEAT = {

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ringsim.cable.chain import Chain
-from ringsim.cable.friction.bearing import BearingFriction
-from ringsim.cable.friction.bearing_exact import ExactBearingFriction
-from ringsim.cable.friction.capstan import CapstanFriction
-from ringsim.cable.friction.frictionless import Frictionless
+from ringsim.cable.friction import (
+    BearingFriction,
+    CapstanFriction,
+    ExactBearingFriction,
+    Frictionless,
+)
 from ringsim.cable.records import Cable, Winch
-from ringsim.cable.winding.constant import ConstantWinding
+from ringsim.cable.winding import ConstantWinding
 
 RADIUS = 0.01
 LAWS = {

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ringsim.cable.tangent import decay_tangent, rope_tangent
+from ringsim.cable.chain import decay_tangent, rope_tangent
 
 
 @dataclass

@@ -7,10 +7,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from cable_cases import cable
-from ringsim.cable.bracket.bar_half import BarHalfBracket
-from ringsim.cable.bracket.bisector import BisectorBracket
-from ringsim.cable.bracket.family import Bracket
-from ringsim.cable.records import AnyBracket
+from ringsim.cable.records import AnyBracket, BarHalfBracket, BisectorBracket, Bracket
 from ringsim.choice import kinds_of
 
 BAR, REACH = 0.2889, 0.105

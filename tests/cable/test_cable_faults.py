@@ -9,10 +9,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from cable_cases import LAWS, random_case, still
-from ringsim.cable.faults.cut_cable import CutCable
-from ringsim.cable.faults.family import CableFault
-from ringsim.cable.faults.jammed_pulley import JammedPulley
-from ringsim.cable.faults.off_sheave import OffSheave
+from ringsim.cable.faults import CableFault, CutCable, JammedPulley, OffSheave
 from ringsim.choice import OneOf
 
 PATH = [[0, 0, 0], [1, 0, 0], [1.5, 0.6, 0], [2, 0, 0.4], [3, 0, 0], [3, 1, 0]]

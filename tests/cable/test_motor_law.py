@@ -11,8 +11,7 @@ from pydantic import ValidationError
 from cable_cases import still
 from ringsim.cable.records import Winch
 from ringsim.cable.winches import Winches
-from ringsim.cable.winding.motor import MotorWinding
-from ringsim.cable.winding.stall import StallWinding
+from ringsim.cable.winding import MotorWinding, StallWinding
 
 FIELDS = {
     "no_load_speed": 600.0, "stall_torque": 0.002, "gear_ratio": 100.0, "efficiency": 0.6,

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from cable_cases import LAWS, RADIUS, cable, eta
-from ringsim.cable.friction.bearing import BearingFriction
-from ringsim.cable.friction.bearing_exact import ExactBearingFriction
-from ringsim.cable.friction.capstan import CapstanFriction
-from ringsim.cable.friction.family import PulleyFriction
+from ringsim.cable.friction import (
+    BearingFriction,
+    CapstanFriction,
+    ExactBearingFriction,
+    PulleyFriction,
+)
 from ringsim.choice import kinds_of
 
 ANGLES = np.linspace(0.0, np.pi, 181)

@@ -7,12 +7,11 @@ import pytest
 from pydantic import TypeAdapter
 
 from cable_cases import RADIUS, cable
-from ringsim.cable import regularisation
+from ringsim.cable import friction
 from ringsim.cable.chain import Chain
-from ringsim.cable.friction.bearing import BearingFriction
+from ringsim.cable.friction import BearingFriction
 from ringsim.cable.records import AnyWinding, Winch
-from ringsim.cable.winding.constant import ConstantWinding
-from ringsim.cable.winding.family import PrescribedWinding, Winding
+from ringsim.cable.winding import ConstantWinding, PrescribedWinding, Winding
 from ringsim.choice import kinds_of
 
 HALF, BLOCK, SHORT, DISTANCE = 0.29, 0.105, 0.013, 0.3
@@ -88,7 +87,7 @@ def test_the_stated_excess_is_that_of_the_chain(sections, share):
     winding, pulleys = 0.002, 3 * sections - 1
     slip = share * winding / (pulleys + 1)
     decay = -pulled(sections, 0.04, slip, winding).log_decays[-1]
-    stated = regularisation.excess(slip, winding, pulleys, decay)
+    stated = friction.excess(slip, winding, pulleys, decay)
     measured = too_high(sections, 0.04, slip, winding)
     # Above, because the decay is the largest, by no more than that of the hinge pulleys.
     assert measured <= stated * 1.0001
@@ -98,7 +97,7 @@ def test_the_stated_excess_is_that_of_the_chain(sections, share):
 def test_a_scene_that_says_it_is_obeyed_and_a_rope_at_rest_has_the_largest():
     assert cable(slip_speed=3e-3).slip_speed_over(17) == 3e-3
     still = Winch(winding=ConstantWinding(speed=0.0))
-    assert cable(winch=still).slip_speed_over(17) == regularisation.LARGEST_SLIP_SPEED
+    assert cable(winch=still).slip_speed_over(17) == friction.LARGEST_SLIP_SPEED
     slow, back = (Winch(winding=ConstantWinding(speed=v)) for v in (2e-3, -2e-3))
     both = cable(winch=slow, end="both").slip_speed_over(54)
     # Twice the rope over one span more.
@@ -136,13 +135,13 @@ def test_usual_speed_of_a_law(kind):
         times = np.linspace(0.0, 15.0, 1501)
         wound = np.array([law.wound(t) for t in times])
         # What a run is judged by afterwards; cubics between the table's points wind unevenly.
-        found = regularisation.usual_winding(times, wound)
+        found = friction.usual_winding(times, wound)
         assert found == pytest.approx(speed, rel=0.5 if kind == "table" else 1e-9)
 
 
 def test_the_speed_of_a_record_leaves_out_rest_and_what_was_not_reached():
     times = np.arange(8.0)
     wound = np.array([0.0, 0.0, 0.0, 0.1, 0.2, 0.3, np.nan, np.nan])
-    assert regularisation.usual_winding(times, wound) == pytest.approx(0.1, rel=1e-14)
-    assert regularisation.usual_winding(times, np.zeros(8)) == 0.0
-    assert regularisation.usual_winding(times, np.full(8, np.nan)) == 0.0
+    assert friction.usual_winding(times, wound) == pytest.approx(0.1, rel=1e-14)
+    assert friction.usual_winding(times, np.zeros(8)) == 0.0
+    assert friction.usual_winding(times, np.full(8, np.nan)) == 0.0

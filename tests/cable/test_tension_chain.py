@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cable_cases import LAWS, RADIUS, Case, cable, decays, eta, random_case, still
-from ringsim.cable import slack
+from ringsim.cable import ropes
 from ringsim.cable.chain import Chain
-from ringsim.cable.friction.bearing import BearingFriction
+from ringsim.cable.friction import BearingFriction
 
 # Tension is so far above the smoothing width that softplus equals its argument to 1e-16.
 TAUT = {"axial_stiffness": 1e4, "slack_width": 0.01}
@@ -116,10 +116,10 @@ def test_a_slack_rope_pulls_less_than_its_width_and_a_taut_one_like_a_spring():
 def test_the_energy_of_slack_is_the_integral_of_its_tension(force):
     width = np.array(0.05)
     step = max(1e-4, 1e-6 * abs(force))
-    above, below = (slack.energy(np.array(force + s * step), width) for s in (1, -1))
+    above, below = (ropes.energy(np.array(force + s * step), width) for s in (1, -1))
     # Central difference: step^2 q'' / 6 <= 1e-8, plus rounding of the energy over the step.
     assert (above - below) / (2 * step) == pytest.approx(
-        slack.tension(np.array(force), width), rel=1e-9, abs=2e-8
+        ropes.tension(np.array(force), width), rel=1e-9, abs=2e-8
     )
 
 

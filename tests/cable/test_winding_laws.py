@@ -14,13 +14,15 @@ from scipy.integrate import quad, solve_ivp
 from cable_cases import LAWS, cable, random_case, still
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.winches import Winches
-from ringsim.cable.winding.constant import ConstantWinding
-from ringsim.cable.winding.family import Winding
-from ringsim.cable.winding.motor import MotorWinding
-from ringsim.cable.winding.ramp import RampWinding
-from ringsim.cable.winding.stall import StallWinding
-from ringsim.cable.winding.table import TableWinding
-from ringsim.cable.winding.tension_feedback import TensionFeedbackWinding
+from ringsim.cable.winding import (
+    ConstantWinding,
+    MotorWinding,
+    RampWinding,
+    StallWinding,
+    TableWinding,
+    TensionFeedbackWinding,
+    Winding,
+)
 from ringsim.choice import kinds_of
 
 TIMES = (0.0, 1.0, 1.5, 4.0, 5.0, 7.0)

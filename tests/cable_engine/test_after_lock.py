@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from driven import truss
-from ringsim.cable.winding.stall import StallWinding
+from ringsim.cable.winding import StallWinding
+from ringsim.outputs.family import Reading
 from ringsim.outputs.recorder import Recorder
-from ringsim.outputs.series import Reading
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run, run_frame

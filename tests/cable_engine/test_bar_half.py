@@ -12,7 +12,7 @@ from driven import outcome, truss
 from ringsim.engine.build import build
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
-from ringsim.theory.ideal_mechanism import Mechanism
+from ringsim.theory.mechanism import Mechanism
 from ringsim.variables import Outcome, Status
 
 

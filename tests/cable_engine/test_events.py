@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from ringsim.outputs.family import Reading
 from ringsim.outputs.recorder import Recorder
-from ringsim.outputs.series import Reading
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run, run_frame
 from ringsim.variables import Outcome, Status

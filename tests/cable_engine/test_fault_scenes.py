@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from driven import outcome, truss
-from ringsim.stepping.rest import MOVED
+from ringsim.stepping.ending import MOVED
 from ringsim.variables import Fate, Outcome
 
 STRIKES = 0.7

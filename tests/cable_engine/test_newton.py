@@ -10,7 +10,7 @@ import pytest
 
 from driven import truss, write_all
 from ringsim.engine.build import build
-from ringsim.engine.settings import solver_settings
+from ringsim.engine.integrate import solver_settings
 
 
 def residuals(*, whole: bool, step: float) -> list[float]:

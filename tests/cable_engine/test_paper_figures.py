@@ -9,8 +9,7 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.plots.cables import section_series
-from ringsim.plots.section_spans import pulley_forces
+from ringsim.plots.rods_and_cables import pulley_forces, section_series
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 

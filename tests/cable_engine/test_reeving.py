@@ -13,13 +13,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ringsim.cable.records import Cable, Cables, Winch
-from ringsim.cable.sheaves import FixedSheave
-from ringsim.cable.winding.constant import ConstantWinding
+from ringsim.cable.records import Cable, Cables, FixedSheave, Winch
+from ringsim.cable.winding import ConstantWinding
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.cable_path import CablePath
 from ringsim.engine.cables import CableDrive
-from ringsim.layout.pose import Pose
+from ringsim.layout.bodies import Pose
 
 Array = NDArray[np.float64]
 STIFFNESS, STRETCH, GRAVITY = 2e3, 0.014, 9.81

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 
-from ringsim.analysis.campaign_samples import endings
+from ringsim.analysis.design import endings
 
 FATED = "fake_solver:fated"
 """Deploys, stalls or fails, by the force that was drawn."""

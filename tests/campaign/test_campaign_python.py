@@ -23,8 +23,8 @@ from ringsim import Campaign, CampaignError, InputError, open_campaign
 from ringsim.campaign.specification import SOLVERS
 from ringsim.cli import cli
 from ringsim.exit_codes import EXIT_BAD_INPUT
-from ringsim.sampling.distributions.uniform import Uniform
-from ringsim.storage.locks import locked
+from ringsim.sampling.distributions import Uniform
+from ringsim.storage.netcdf import locked
 
 TABLE: dict[str, Any] = {
     "name": "small", "seed": 5, "scene": "ring18", "fidelity": "full",

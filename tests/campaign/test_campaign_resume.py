@@ -11,10 +11,10 @@ import xarray as xr
 
 from campaign_bench import START, assert_same, finished, journals, lose
 from ringsim.campaign.folder import open_folder
-from ringsim.execution.solve import load_solver, solve
+from ringsim.execution.work import load_solver, solve
 from ringsim.refusal import InputError
 from ringsim.storage.journal import FOLDER, Journal, read_journal, survey
-from ringsim.storage.locks import reserved
+from ringsim.storage.netcdf import reserved
 from ringsim.storage.result import Result
 from ringsim.variables import Status
 

@@ -10,11 +10,10 @@ import pytest
 
 from campaign_bench import START, assert_same, finished, journals
 from ringsim.campaign.folder import open_folder
-from ringsim.campaign.merging import merge
+from ringsim.campaign.stopping import merge
 from ringsim.storage import journal as journal_file
-from ringsim.storage.journal import FOLDER, Journal, survey
+from ringsim.storage.journal import FOLDER, NAME, Journal, survey
 from ringsim.storage.result import Result
-from ringsim.storage.verified import NAME
 from ringsim.variables import Status
 
 

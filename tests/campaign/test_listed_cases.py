@@ -8,7 +8,7 @@ import netCDF4
 import pytest
 
 from campaign_bench import HERE, opened
-from ringsim.campaign.cases import run_cases
+from ringsim.campaign.run import run_cases
 from ringsim.campaign.specification import SOLVERS
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from campaign_bench import Bench, assert_same, finished, opened
-from ringsim.analysis.looks import Looks
+from ringsim.analysis.verdicts import Looks
 from ringsim.campaign.specification import load_campaign
 from ringsim.refusal import InputError
 

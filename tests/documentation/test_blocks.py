@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import re
 import subprocess
 import sys
@@ -13,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from pages import PAGES, ROOT, blocks, calls
-from ringsim.cli import VERBS, cli
+from ringsim.cli import VERBS, cli, command_of
 
 TUTORIAL = ROOT / "docs" / "tutorial.md"
 CALLS = [
@@ -32,7 +31,7 @@ SCRIPTS = [
 def test_commands_and_their_options_exist(call: list[str]) -> None:
     verb, *arguments = call
     assert verb in VERBS
-    command = importlib.import_module(f"ringsim.cli.{verb}").command
+    command = command_of(verb)
     arguments = [each.strip("[]").split("|")[0] for each in arguments if each != "|"]
     command.make_context(verb, arguments).close()
 

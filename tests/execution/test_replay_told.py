@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ringsim.cli.replay import judged
+from ringsim.cli.run import judged
 
 OLD = {
     "deployment_time": np.array(20.0),

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from ringsim.execution import scratch
-from ringsim.execution.scratch import scratch_folder
+from ringsim.execution import child
+from ringsim.execution.child import scratch_folder
 
 OWNER = """
 import sys
-from ringsim.execution.scratch import scratch_folder
+from ringsim.execution.child import scratch_folder
 print(scratch_folder(), flush=True)
 sys.stdin.read()
 """
@@ -80,7 +80,7 @@ def test_nothing_is_removed_where_processes_cannot_be_looked_at(owners, tmp_path
     dead, lost = owners()
     dead.kill()
     dead.wait()
-    monkeypatch.setattr(scratch, "_world", lambda: "")
-    monkeypatch.setattr(scratch.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(child, "_world", lambda: "")
+    monkeypatch.setattr(child.tempfile, "tempdir", str(tmp_path))
     shutil.rmtree(scratch_folder())
     assert lost.exists()

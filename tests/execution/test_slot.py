@@ -13,8 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from ringsim.execution.local import Local
-from ringsim.execution.slot import Slot
+from ringsim.execution.slot import Local, Slot
 from ringsim.execution.work import Allowance, Work
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene

@@ -16,7 +16,7 @@ from scipy.io import loadmat
 
 from ringsim.cli import cli
 from ringsim.dataset import save
-from ringsim.export import csv, matlab
+from ringsim.export import tables
 from ringsim.shapes import COMPUTED, FROM_ANGLES, shape_of
 
 
@@ -60,7 +60,7 @@ def test_tables(
     file: Path, campaign: xr.Dataset, block: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same whether they are written at once or in blocks of samples."""
-    monkeypatch.setattr(csv, "BLOCK", block)
+    monkeypatch.setattr(tables, "BLOCK", block)
     printed = export(file.parent, "--out", file.parent / "tables")
     known = {Path(line.removeprefix("wrote ")).name for line in printed.splitlines()}
     assert known == {path.name for path in (file.parent / "tables").iterdir()}
@@ -106,9 +106,9 @@ def test_long_tables_are_told_before_they_are_written(
 ) -> None:
     rows = campaign["position"].size
     assert rows > campaign["opening_angle"].size
-    monkeypatch.setattr(csv, "MANY", rows - 1)
+    monkeypatch.setattr(tables, "MANY", rows - 1)
     assert f"the longest table has up to {rows:,} rows: choose variables" in export(file)
-    monkeypatch.setattr(csv, "MANY", rows)
+    monkeypatch.setattr(tables, "MANY", rows)
     assert "rows" not in export(file)
 
 
@@ -197,6 +197,6 @@ def test_what_cannot_be_exported_is_refused(
         ("LONGEST_NAME", 20, "and MATLAB's names at most 20"),
     ):
         with monkeypatch.context() as patched:
-            patched.setattr(matlab, bound, most)
+            patched.setattr(tables, bound, most)
             assert told in export(file, "--format=mat", code=2)
     assert not list(file.parent.glob("*.mat"))

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from ringsim.analysis.engines import check_lines, differences, main_outputs
-from ringsim.analysis.quantities import quantities
+from ringsim.analysis.intervals import quantities
 from ringsim.variables import Fate, Status
 
 NAN = np.nan

@@ -9,7 +9,7 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.frame.element import carried, coefficients, element_tangent, middle, scaled
+from ringsim.frame.kernels import carried, coefficients, element_tangent, middle, scaled
 from ringsim.frame.vectors import turned
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from ringsim.frame.integrate import Integration
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.frame.model import FrameModel
 from ringsim.outputs.base import BaseReaction, BaseRotation
-from ringsim.outputs.lock_impulse import first_impulse
+from ringsim.outputs.joints import first_impulse
 from ringsim.scene import Scene, load_scene
 
 CRAFT = {"mass": 20.0, "inertia": [2.0, 3.0, 4.0], "centre": [0.3, 0.1, 0.2]}

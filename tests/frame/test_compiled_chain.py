@@ -7,18 +7,24 @@ import pytest
 
 from law_scenes import CABLES as CABLES_AND_FAULTS
 from law_scenes import of_cables
-from ringsim.cable.chain import Chain
-from ringsim.cable.friction.bearing import BearingFriction
-from ringsim.cable.friction.capstan import CapstanFriction
+from ringsim.cable.chain import Chain, ChainState, decay_factors, rope_tangent
+from ringsim.cable.friction import BearingFriction, CapstanFriction
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.ropes import Ropes
-from ringsim.cable.state import ChainState
-from ringsim.cable.tangent import decay_factors, rope_tangent
-from ringsim.cable.winding.constant import ConstantWinding
-from ringsim.frame.chain import Drums, RopeTable, Spans, measure, tighten
-from ringsim.frame.chain_tangent import PASSING, border, factors_needed, felt_slopes
+from ringsim.cable.winding import ConstantWinding
 from ringsim.frame.integrate import Integration
 from ringsim.frame.model import FrameModel
+from ringsim.frame.ropes import (
+    PASSING,
+    Drums,
+    RopeTable,
+    Spans,
+    border,
+    factors_needed,
+    felt_slopes,
+    measure,
+    tighten,
+)
 
 ROUND_OFF = 1e-11
 """Sums of a dozen terms in another order, through exponentials of their logarithms."""

@@ -8,7 +8,7 @@ import pytest
 from ringsim.engine.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.scene import load_scene
-from ringsim.stepping.losses import Passing, lost_between
+from ringsim.stepping.instant import Passing, lost_between
 
 
 @pytest.mark.parametrize(

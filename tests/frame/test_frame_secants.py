@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ringsim.frame.secants import Secants
+from ringsim.frame.integrate import Secants
 
 
 def test_one_unknown_is_the_secant_method() -> None:

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from numeric_tangent import Probe, error
-from ringsim.frame.eights import EIGHT
-from ringsim.frame.elimination import Fronts, factor, solve, solve_one
+from ringsim.frame.elimination import EIGHT, Fronts, factor, solve, solve_one
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.model import FrameModel
 from ringsim.scene import Scene, load_scene

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from ringsim.cli import cli
 from ringsim.dataset import save
-from ringsim.outputs.stored import StoredState
+from ringsim.outputs.recorder import StoredState
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate

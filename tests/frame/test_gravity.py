@@ -18,7 +18,7 @@ from ringsim.frame.integrate import solve as by_frames
 from ringsim.frame.model import FrameModel
 from ringsim.layout.layout import layout_of
 from ringsim.scene import Scene, load_scene
-from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.theory.statics import OneCoordinate, opening_time
 from test_base_reaction import Course, about_base, impulses, ring
 
 ASLANT = [0.3, 0.2, -1.0]

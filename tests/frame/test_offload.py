@@ -11,9 +11,9 @@ from numeric_tangent import Probe, error
 from ringsim.engine.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.layout.layout import layout_of
-from ringsim.parts.offload import Offload
+from ringsim.parts.ground import Offload
 from ringsim.scene import Scene
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.statics import OneCoordinate
 from test_base_reaction import ring
 
 DOWN = {"gravity.vector": [0.0, 0.0, -9.81]}

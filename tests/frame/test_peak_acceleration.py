@@ -12,8 +12,7 @@ from ringsim.engine.build import build
 from ringsim.engine.integrate import Integration as Exudyn
 from ringsim.frame.integrate import Integration as Frames
 from ringsim.frame.model import FrameModel
-from ringsim.outputs.acceleration import PeakAcceleration
-from ringsim.outputs.position import Position
+from ringsim.outputs.corners import PeakAcceleration, Position
 from ringsim.outputs.recorder import Recorder
 from ringsim.scene import load_scene
 

@@ -19,8 +19,8 @@ from pydantic import BaseModel
 from law_scenes import STOPS, of_cables, of_forces
 from ringsim.cable.winches import Winches
 from ringsim.dataset import save
+from ringsim.frame.integrate import Storing
 from ringsim.frame.model import FrameModel
-from ringsim.frame.storing import Storing
 from ringsim.scene import Scene
 from ringsim.simulation import simulate
 from ringsim.stored_state import read_state

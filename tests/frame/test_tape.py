@@ -7,19 +7,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringsim.cable.friction.bearing import BearingFriction
-from ringsim.cable.friction.bearing_exact import ExactBearingFriction
-from ringsim.cable.friction.capstan import CapstanFriction
-from ringsim.cable.friction.frictionless import Frictionless
-from ringsim.frame.tape import Tape, play, taped
-from ringsim.parts.faults.stuck_vjoint import StuckVJoint
-from ringsim.parts.hinge_spring.linear import LinearSpring
-from ringsim.parts.hinge_spring.table import TableSpring
-from ringsim.parts.hinge_spring.tape import TapeSpring
-from ringsim.parts.joint_friction.viscous_coulomb import ViscousCoulombFriction
-from ringsim.parts.latch import Latch
-from ringsim.parts.net.hub import SpringNet
-from ringsim.parts.stop.spring_damper import SpringDamperStop
+from ringsim.cable.friction import (
+    BearingFriction,
+    CapstanFriction,
+    ExactBearingFriction,
+    Frictionless,
+)
+from ringsim.frame.laws import Tape, play, taped
+from ringsim.parts.faults import StuckVJoint
+from ringsim.parts.joints import (
+    Latch,
+    LinearSpring,
+    SpringDamperStop,
+    TableSpring,
+    TapeSpring,
+    ViscousCoulombFriction,
+)
+from ringsim.parts.net import SpringNet
 from ringsim.refusal import InputError
 
 SHAPE = (2, 5)

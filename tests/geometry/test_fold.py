@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from ringsim.scene import load_scene
-from ringsim.structures.ring_geometry import Fold, RingGeometry
+from ringsim.structures.pantograph_ring import Fold, RingGeometry
 
 Array = NDArray[np.float64]
 

@@ -7,11 +7,9 @@ import pytest
 from fold_rates import fold_rate
 from numpy.typing import NDArray
 
-from ringsim.layout.layout import layout_of
-from ringsim.layout.mobility import internal_mobility
+from ringsim.layout.layout import internal_mobility, layout_of
 from ringsim.scene import Scene, load_scene
-from ringsim.structures.pantograph_ring import PantographRing
-from ringsim.structures.ring_geometry import RingGeometry
+from ringsim.structures.pantograph_ring import PantographRing, RingGeometry
 
 Array = NDArray[np.float64]
 

@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 import ringsim
-from ringsim.layout.layout import layout_of
-from ringsim.layout.mobility import internal_mobility
-from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.layout.layout import internal_mobility, layout_of
+from ringsim.parts.margin import EcssMechanisms
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_toml
-from ringsim.theory.assembled import assembled
-from ringsim.theory.drive_margin import DriveMargin
-from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.theory.assembling import assembled
+from ringsim.theory.margin import DriveMargin
+from ringsim.theory.statics import OneCoordinate, opening_time
 from ringsim.variables import Fate, Status
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from ringsim.structures.truss_geometry import TrussGeometry
+from ringsim.structures.planar_truss import TrussGeometry
 
 LENGTHS = st.floats(0.05, 5.0)
 SHARES = st.floats(0.05, 0.95)

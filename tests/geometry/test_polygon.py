@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringsim.structures.ring_geometry import polygon_corners as corners
+from ringsim.structures.pantograph_ring import polygon_corners as corners
 
 SIDES = st.integers(3, 96)
 RATIOS = st.floats(0.05, 1.0)

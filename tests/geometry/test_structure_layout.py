@@ -8,15 +8,14 @@ import exudyn as exu
 import numpy as np
 import pytest
 
-from ringsim.cable.bracket.bar_half import BarHalfBracket
+from ringsim.cable.records import BarHalfBracket
 from ringsim.engine.build import build
-from ringsim.layout.bodies import InSpace, Lump, OnBody
+from ringsim.layout.bodies import InSpace, Lump, OnBody, Pose
 from ringsim.layout.draft import Draft
 from ringsim.layout.layout import Layout, layout_at_opening, layout_of
-from ringsim.layout.pose import Pose
 from ringsim.scene import Scene, builtin_scenes, load_scene
 from ringsim.structures.family import Structure
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.statics import OneCoordinate
 
 STEP = 1e-6
 CLOSE = 1e-9

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.parts.margin import EcssMechanisms
 from ringsim.scene import Scene, load_scene
 
 MOTOR = {

@@ -13,15 +13,15 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from motor_rings import ring
-from ringsim.layout.edge import natural_lengths
+from ringsim.layout.draft import natural_lengths
 from ringsim.layout.layout import layout_of
-from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.parts.margin import EcssMechanisms
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.shapes import shape_of
 from ringsim.simulation import simulate
-from ringsim.theory.drive_margin import DriveMargin
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.margin import DriveMargin
+from ringsim.theory.statics import OneCoordinate
 
 STIFFNESS, STRAIN = 2000.0, 0.01
 NET = {"kind": "boundary", "axial_stiffness": STIFFNESS, "strain": STRAIN}

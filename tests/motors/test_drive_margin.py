@@ -10,13 +10,10 @@ from pydantic import ValidationError
 
 from motor_rings import MOTOR, PLAIN, STALL, ring
 from ringsim.layout.layout import layout_of
-from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
-from ringsim.parts.margin.family import MarginStandard
-from ringsim.parts.margin.nasa_std_5017 import NasaMechanisms
+from ringsim.parts.margin import EcssMechanisms, MarginStandard, NasaMechanisms
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
-from ringsim.theory.drive_margin import PULLEYS, DriveMargin
-from ringsim.theory.plane_margin import PlaneMargin
+from ringsim.theory.margin import PULLEYS, DriveMargin, PlaneMargin
 
 ANGLES = np.radians([62.0, 90.0, 130.0, 170.0, 179.0])
 STEP = 1e-4

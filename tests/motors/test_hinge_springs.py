@@ -12,16 +12,13 @@ from scipy.integrate import quad
 
 from motor_rings import ring
 from ringsim.layout.layout import layout_of
-from ringsim.parts.hinge_spring.family import HingeSpring
-from ringsim.parts.hinge_spring.linear import LinearSpring
-from ringsim.parts.hinge_spring.table import TableSpring
-from ringsim.parts.hinge_spring.tape import TapeSpring
-from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.parts.joints import HingeSpring, LinearSpring, TableSpring, TapeSpring
+from ringsim.parts.margin import EcssMechanisms
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
-from ringsim.theory.drive_margin import DriveMargin
-from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.theory.margin import DriveMargin
+from ringsim.theory.statics import OneCoordinate, opening_time
 from ringsim.variables import Status
 
 LINEAR = {"kind": "linear", "stiffness": 0.004, "preload": 0.01}

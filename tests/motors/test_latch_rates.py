@@ -9,7 +9,7 @@ import pytest
 
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
-from ringsim.stepping.latches import meetings
+from ringsim.stepping.locks import meetings
 
 
 def met(times: list[float], angles: list[float], rates: list[float]) -> float:

@@ -12,19 +12,18 @@ from pydantic import ValidationError
 from scipy.integrate import quad
 
 from motor_rings import MOTOR, STALL, ring
-from ringsim.analysis.campaign_samples import endings
-from ringsim.analysis.quantities import quantities
-from ringsim.analysis.requirements import Requirement
-from ringsim.analysis.verdicts import violations
-from ringsim.outputs.latching import FastestLatch, Latching
-from ringsim.outputs.series import Run, Series
-from ringsim.parts.latch import Latch
-from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.analysis.design import endings
+from ringsim.analysis.intervals import quantities
+from ringsim.analysis.verdicts import Requirement, violations
+from ringsim.outputs.family import Run, Series
+from ringsim.outputs.joints import FastestLatch, Latching
+from ringsim.parts.joints import Latch
+from ringsim.parts.margin import EcssMechanisms
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
-from ringsim.theory.drive_margin import DriveMargin
-from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.theory.margin import DriveMargin
+from ringsim.theory.statics import OneCoordinate, opening_time
 from ringsim.variables import Fate
 
 LATCH = {"peak_torque": 0.3, "reach": 8.0}

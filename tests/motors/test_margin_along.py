@@ -14,13 +14,12 @@ from click.testing import CliRunner
 from motor_rings import PLAIN, ring
 from ringsim.cli import cli
 from ringsim.dataset import save
-from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.parts.margin import EcssMechanisms
 from ringsim.scene import Scene
 from ringsim.simulation import simulate
 from ringsim.stored_state import read_state
-from ringsim.theory import margin_along
-from ringsim.theory.drive_margin import DriveMargin
-from ringsim.theory.margin_along import Passed, least_along, passed, with_margin
+from ringsim.theory import margin
+from ringsim.theory.margin import DriveMargin, Passed, least_along, passed, with_margin
 from ringsim.variables import PLANES, Outcome, Status
 
 ECSS = {"kind": "ecss-e-st-33-01c"}
@@ -154,7 +153,7 @@ def test_a_run_that_went_on_keeps_the_margin_of_its_file(tmp_path: Path) -> None
 def test_a_run_tells_of_faults_that_its_margin_does_not_know(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(margin_along, "is_unknown", lambda fault: fault.kind == "cut-cable")
+    monkeypatch.setattr(margin, "is_unknown", lambda fault: fault.kind == "cut-cable")
     found = with_margin(opened(0.1), netted(faults=[CUT | {"time": 0.5}]))
     assert found.reason == "made; the margin of the drive does not know faults[1]"
 

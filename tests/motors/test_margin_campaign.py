@@ -10,16 +10,15 @@ import xarray as xr
 from made_campaign import made_campaign, with_motors
 
 from motor_rings import ring
-from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
-from ringsim.execution.solve import solve
+from ringsim.analysis.verdicts import read_requirements
+from ringsim.execution.work import solve
 from ringsim.plots.campaign import figures
 from ringsim.refusal import InputError
 from ringsim.report import tables
 from ringsim.report.page import page
-from ringsim.theory.drive_margin import MOST, DriveMargin
-from ringsim.theory.margin_along import with_margin
+from ringsim.theory.margin import MOST, DriveMargin, with_margin
 from ringsim.variables import PLANES, Fate, Outcome, Status
 
 REQUIRED = {

@@ -10,11 +10,9 @@ import pytest
 
 from motor_rings import PLAIN, ring
 from ringsim.layout.layout import layout_of
-from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
-from ringsim.parts.margin.family import MarginStandard
-from ringsim.parts.margin.nasa_std_5017 import NasaMechanisms
+from ringsim.parts.margin import EcssMechanisms, MarginStandard, NasaMechanisms
 from ringsim.scene import Scene
-from ringsim.theory.drive_margin import DriveMargin
+from ringsim.theory.margin import DriveMargin
 
 DRY = {"coulomb": 0.05}
 

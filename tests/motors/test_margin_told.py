@@ -11,12 +11,12 @@ from click.testing import CliRunner
 
 from motor_rings import ring
 from ringsim.cli import cli
-from ringsim.parts.margin.ecss_e_st_33_01c import EcssMechanisms
+from ringsim.parts.margin import EcssMechanisms
 from ringsim.plots import run
-from ringsim.plots.drive import drive
+from ringsim.plots.rods_and_cables import drive
 from ringsim.scene import Scene
 from ringsim.simulation import simulate
-from ringsim.theory.drive_margin import DriveMargin
+from ringsim.theory.margin import DriveMargin
 
 
 @pytest.fixture(scope="module")

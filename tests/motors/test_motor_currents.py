@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motor_rings import MOTOR, ring
-from ringsim.cable.winding.motor import MotorWinding
+from ringsim.cable.winding import MotorWinding
 from ringsim.simulation import simulate
 
 CONSTANT, IDLE = 0.01, 0.03

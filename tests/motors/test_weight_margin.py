@@ -11,9 +11,8 @@ import pytest
 
 from ringsim.layout.layout import layout_of
 from ringsim.scene import load_scene
-from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.theory.resistances.family import Opening, resistances
-from ringsim.theory.resistances.weight import WeightResistance
+from ringsim.theory.mechanism import Mechanism
+from ringsim.theory.resistances import Opening, WeightResistance, resistances
 
 VECTOR = np.array([0.3, -0.5, -9.0])
 

@@ -7,7 +7,7 @@ import pytest
 
 from ringsim import simulation
 from ringsim.engine import integrate
-from ringsim.execution.solve import solve
+from ringsim.execution.work import solve
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.result import Result

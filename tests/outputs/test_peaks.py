@@ -10,14 +10,12 @@ import xarray as xr
 from click.testing import CliRunner
 
 from ringsim.cli import cli
-from ringsim.outputs.asynchrony import Asynchrony
-from ringsim.outputs.cable_tension import CableTension
-from ringsim.outputs.drive_margin import DriveMargins
-from ringsim.outputs.family import axes
-from ringsim.outputs.net_tension import NetTension
-from ringsim.outputs.rod_stress import RodStress
-from ringsim.outputs.series import Run, Series
-from ringsim.outputs.summary import summary
+from ringsim.outputs.balance import summary
+from ringsim.outputs.cables import CableTension, NetTension
+from ringsim.outputs.family import Run, Series, axes
+from ringsim.outputs.joints import Asynchrony
+from ringsim.outputs.motors import DriveMargins
+from ringsim.outputs.rods import RodStress
 from ringsim.scene import load_scene
 from ringsim.simulation import FIDELITIES, simulate
 

@@ -10,11 +10,11 @@ import pytest
 import xarray as xr
 
 from ringsim.cable.chain import Chain
-from ringsim.cable.friction.bearing import BearingFriction
+from ringsim.cable.friction import BearingFriction
 from ringsim.cable.records import Cable, Winch
-from ringsim.cable.winding.constant import ConstantWinding
-from ringsim.outputs.pulley_ratio import PulleyRatio
-from ringsim.outputs.series import Series
+from ringsim.cable.winding import ConstantWinding
+from ringsim.outputs.cables import PulleyRatio
+from ringsim.outputs.family import Series
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 

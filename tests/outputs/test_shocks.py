@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from ringsim.outputs.series import Run, Series
-from ringsim.outputs.shocks import slowest_period, unresolved
+from ringsim.outputs.base import slowest_period, unresolved
+from ringsim.outputs.family import Run, Series
 from ringsim.scene import load_scene
 
 PERIOD = 2.0 * 0.855**2 / math.pi * 4.0 * math.sqrt(1800.0 / 120e9 / (0.01**2 + 0.00915**2))

@@ -14,14 +14,10 @@ from scipy.integrate import quad, solve_ivp
 from law_cases import records
 from ringsim.choice import kinds_of
 from ringsim.engine.assembly import SYMBOLIC, TORSION, Assembly
-from ringsim.parts.faults.stuck_vjoint import StuckVJoint
-from ringsim.parts.joint_friction.family import JointFriction
-from ringsim.parts.latch import Latch
-from ringsim.parts.net.boundary import pull
-from ringsim.parts.net.hub import SpringNet
+from ringsim.parts.faults import StuckVJoint
+from ringsim.parts.joints import JointFriction, Latch, SpringDamperStop, Stop
+from ringsim.parts.net import SpringNet, pull
 from ringsim.parts.persection import at_section
-from ringsim.parts.stop.family import Stop
-from ringsim.parts.stop.spring_damper import SpringDamperStop
 from ringsim.structures.planar_truss import DeployingSpring, Rest
 from ringsim.units import Model
 

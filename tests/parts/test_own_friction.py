@@ -13,7 +13,7 @@ from rigid_motion import RigidRing
 from ringsim.choice import kinds_of
 from ringsim.engine.build import build
 from ringsim.engine.integrate import Integration
-from ringsim.parts.joint_friction.family import JointFriction
+from ringsim.parts.joints import JointFriction
 from ringsim.parts.persection import PerSection
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene, scene_from_toml

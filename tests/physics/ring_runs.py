@@ -16,7 +16,7 @@ from ringsim.engine.integrate import Integration
 from ringsim.outputs.recorder import Recorder
 from ringsim.scene import Scene, load_scene
 from ringsim.stepping.locks import lock_times
-from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.theory.statics import OneCoordinate, opening_time
 
 Array = NDArray[np.float64]
 

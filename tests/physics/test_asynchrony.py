@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ring_runs import ring
-from ringsim.outputs.asynchrony import Spread, largest_spread
+from ringsim.outputs.joints import Spread, largest_spread
 from ringsim.simulation import run
 
 

@@ -8,16 +8,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ring_runs import Array, ring, run
+from ringsim.engine.assembly import axes_of, turn_rates
 from ringsim.engine.build import Built, build
 from ringsim.engine.integrate import Integration
 from ringsim.engine.integrate import solve as by_exudyn
 from ringsim.engine.meters import EnergyMeter
-from ringsim.engine.readings import Openings, State
-from ringsim.engine.rotations import axes_of, turn_rates
+from ringsim.engine.model import Openings, State
 from ringsim.frame.integrate import Integration as Frames
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.frame.model import FrameModel
-from ringsim.parts.boom.flexible import FlexibleBoom
+from ringsim.parts.boom import FlexibleBoom
 from ringsim.scene import Scene, load_scene
 
 

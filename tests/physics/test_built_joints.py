@@ -10,9 +10,8 @@ import pytest
 from ring_runs import ring
 from ringsim.engine.build import build
 from ringsim.layout.bodies import OnBody, OnRod
-from ringsim.parts.faults.stuck_vjoint import StuckVJoint
-from ringsim.parts.joints import Joints
-from ringsim.parts.stop.spring_damper import SpringDamperStop
+from ringsim.parts.faults import StuckVJoint
+from ringsim.parts.joints import Joints, SpringDamperStop
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 

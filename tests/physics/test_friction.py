@@ -8,9 +8,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ring_runs import Array, ideal_time, ring, run
-from ringsim.parts.joint_friction.viscous_coulomb import ViscousCoulombFriction
+from ringsim.parts.joints import ViscousCoulombFriction
 from ringsim.scene import Scene
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.statics import OneCoordinate
 
 LAWS: dict[str, dict[str, Any]] = {
     "vjoint-viscous": {"vjoint": {"viscous": 5e-4}},

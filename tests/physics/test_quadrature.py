@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from ring_runs import ideal_time, ring
 from ringsim.scene import Scene, load_scene
-from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.theory.statics import OneCoordinate, opening_time
 
 BARE = {"boom": "none", "rods__density": 1e-3}
 """Nothing but corners and V-joints: the rods weigh 1e-6 of them."""

@@ -7,7 +7,7 @@ import pytest
 from ring_runs import Array, ring, run
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.rods import GeometricallyExact
-from ringsim.layout.pose import Pose
+from ringsim.layout.bodies import Pose
 
 LENGTH, MASS, INERTIA, RELAXATION = 0.3, 1.0, 1e-2, 1e-3
 STIFFNESS = np.diag([1e4, 4e3, 4e3, 10.0, 20.0, 20.0])

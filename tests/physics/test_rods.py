@@ -8,10 +8,8 @@ import pytest
 from ring_runs import ring
 from ringsim.engine.assembly import Assembly
 from ringsim.engine.rods import GeometricallyExact, add_rod
-from ringsim.layout.bodies import Rod
-from ringsim.layout.pose import Pose
-from ringsim.parts.rods.geometrically_exact import GeometricallyExactRods
-from ringsim.parts.tube import Tube
+from ringsim.layout.bodies import Pose, Rod
+from ringsim.parts.rods import GeometricallyExactRods, Tube
 from ringsim.simulation import run
 
 TUBE = Tube(outer_diameter=0.01, inner_diameter=0.009)

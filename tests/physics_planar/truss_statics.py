@@ -36,8 +36,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ringsim.scene import Scene
-from ringsim.structures.planar_truss import PlanarTruss
-from ringsim.structures.truss_geometry import TrussGeometry
+from ringsim.structures.planar_truss import PlanarTruss, TrussGeometry
 
 Array = NDArray[np.float64]
 _REPETITIONS = 12

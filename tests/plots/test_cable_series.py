@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from ringsim.plots.cables import cables, section_series
-from ringsim.plots.section_spans import section_spans
+from ringsim.plots.rods_and_cables import cables, section_series, section_spans
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 

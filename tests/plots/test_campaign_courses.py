@@ -9,10 +9,9 @@ from made_campaign import SECTIONS, TIMES, lags, made_campaign
 from matplotlib.figure import Figure
 
 from ringsim.analysis import courses as courses_module
-from ringsim.analysis import reading as blocks_module
+from ringsim.analysis import design as blocks_module
 from ringsim.analysis.courses import course, courses
-from ringsim.plots.campaign.fan import fan
-from ringsim.plots.campaign.lag_map import lag_map
+from ringsim.plots.campaign.courses import fan, lag_map
 
 GOOD = [0, 1, 3, 4, 6]
 

@@ -12,23 +12,18 @@ from made_campaign import made_campaign, with_motors
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ringsim.analysis import reading as blocks_module
-from ringsim.analysis.campaign_samples import median_and_worst
+from ringsim.analysis import design as blocks_module
+from ringsim.analysis.design import median_and_worst
 from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.plots import style
-from ringsim.plots.campaign import by_ending
-from ringsim.plots.campaign.base import base_load
-from ringsim.plots.campaign.by_input import by_input, drawn
-from ringsim.plots.campaign.convergence import convergence
-from ringsim.plots.campaign.distributions import distributions
+from ringsim.plots.campaign import endings
+from ringsim.plots.campaign.courses import lock_order, shares
+from ringsim.plots.campaign.endings import base_load, margin, motors, tension
 from ringsim.plots.campaign.figures import PICTURES, draw_campaign, figures_of
-from ringsim.plots.campaign.lock_order import lock_order, shares
-from ringsim.plots.campaign.margin import margin
-from ringsim.plots.campaign.motors import motors
-from ringsim.plots.campaign.one_by_one import moves, named, one_by_one
-from ringsim.plots.campaign.tension import tension
+from ringsim.plots.campaign.numbers import by_input, convergence, distributions, drawn
+from ringsim.plots.campaign.tornado import moves, named, one_by_one
 from ringsim.variables import Fate
 
 GOOD = [0, 1, 3, 4, 6]
@@ -213,10 +208,10 @@ def test_motors_and_base_are_drawn_by_ending() -> None:
 
 
 def test_of_many_samples_some_of_every_ending_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(by_ending, "MOST", 3)
+    monkeypatch.setattr(endings, "MOST", 3)
     monkeypatch.setattr(blocks_module, "BLOCK_BYTES", 1)
     campaign = with_motors(made_campaign(9, stalled=(8,)))
-    read, ends = by_ending.chosen(campaign, ["motor_torque"])
+    read, ends = endings.chosen(campaign, ["motor_torque"])
     assert read["sample"].values.tolist() == [0, 3, 6, 8]
     assert ends.tolist() == ["deployed"] * 3 + ["stalled"]
     assert "4 of them are drawn" in words(motors(campaign))

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from scipy.stats import binomtest, t
 
 from ringsim.analysis.study import analyse
-from ringsim.plots.campaign.convergence import convergence
+from ringsim.plots.campaign.numbers import convergence
 
 GOOD = [0, 1, 3, 4, 6]
 

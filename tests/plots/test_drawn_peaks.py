@@ -8,12 +8,10 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from ringsim.plots.asynchrony import asynchrony
-from ringsim.plots.cables import cables
 from ringsim.plots.peaks import peak_of
-from ringsim.plots.planar_truss import strain_over_length, tension_over_length
-from ringsim.plots.rod_stress import rod_stress
-from ringsim.plots.run import draw_run
+from ringsim.plots.ring import strain_over_length, tension_over_length
+from ringsim.plots.rods_and_cables import cables, rod_stress
+from ringsim.plots.run import asynchrony, draw_run
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 

@@ -12,13 +12,17 @@ from matplotlib.collections import LineCollection
 
 from ringsim.dataset import to_dataset
 from ringsim.outputs import VARIABLES
-from ringsim.plots.asynchrony import asynchrony
-from ringsim.plots.energy import energy, imbalance
-from ringsim.plots.opening_angles import opening_angles
 from ringsim.plots.ring import ring
-from ringsim.plots.rod_stress import default_sections, rod_stress
-from ringsim.plots.run import PICTURES, draw_run
-from ringsim.plots.section_map import section_map
+from ringsim.plots.rods_and_cables import default_sections, rod_stress
+from ringsim.plots.run import (
+    PICTURES,
+    asynchrony,
+    draw_run,
+    energy,
+    imbalance,
+    opening_angles,
+    section_map,
+)
 from ringsim.refusal import InputError
 from ringsim.scene import scene_from_toml
 from ringsim.variables import Fate, Outcome, Status

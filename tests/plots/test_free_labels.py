@@ -9,12 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ringsim.plots import style
-from ringsim.plots.asynchrony import asynchrony
-from ringsim.plots.energy import energy
-from ringsim.plots.free_labels import FREE
-from ringsim.plots.opening_angles import opening_angles
 from ringsim.plots.peaks import Peak, mark
-from ringsim.plots.rod_stress import rod_stress
+from ringsim.plots.rods_and_cables import rod_stress
+from ringsim.plots.run import asynchrony, energy, opening_angles
+from ringsim.plots.style import FREE
 
 TIMES = np.linspace(0.0, 10.0, 400)
 STEEP = {

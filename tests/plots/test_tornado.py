@@ -12,16 +12,11 @@ from matplotlib.figure import Figure
 
 from ringsim.analysis.design import placement
 from ringsim.analysis.sensitivity import sensitivity
-from ringsim.plots.campaign.names import in_lines
-from ringsim.plots.campaign.tornado import (
-    bars_of,
-    explained,
-    tornado,
-)
-from ringsim.sampling.designs.morris import Morris
-from ringsim.sampling.designs.random import RandomDesign
-from ringsim.sampling.designs.saltelli import Saltelli
-from ringsim.sampling.distributions.uniform import Uniform
+from ringsim.plots.campaign.frame import in_lines
+from ringsim.plots.campaign.tornado import bars_of, explained, tornado
+from ringsim.sampling.designs.blocks import Morris, Saltelli
+from ringsim.sampling.designs.independent import RandomDesign
+from ringsim.sampling.distributions import Uniform
 from ringsim.variables import Status
 
 FACTORS = dict.fromkeys(("force", "modulus"), Uniform(low=0.0, high=1.0))

@@ -21,10 +21,9 @@ from matplotlib.lines import Line2D
 from scipy.interpolate import CubicSpline
 
 from main_line import README, ROOT, commands, run
-from ringsim.plots.asynchrony import asynchrony
-from ringsim.plots.opening_angles import opening_angles
+from ringsim.plots.run import asynchrony, opening_angles
 from ringsim.scene import load_scene
-from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.theory.statics import OneCoordinate, opening_time
 
 FIGURES = {"opening_angles", "asynchrony", "section_map", "ring", "energy"}
 

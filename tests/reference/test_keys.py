@@ -9,8 +9,7 @@ from click.testing import CliRunner
 
 from ringsim.cli import cli
 from ringsim.reference.keys import Key, keys_of
-from ringsim.reference.tree import ROOTS, find, known, paths, places
-from ringsim.reference.words import facts
+from ringsim.reference.tree import ROOTS, facts, find, known, paths, places
 from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
 from ringsim.units import Model

@@ -15,7 +15,7 @@ import xarray as xr
 from click.testing import CliRunner
 from made_campaign import made_campaign, with_motors
 
-from ringsim.analysis.campaign_notes import notes
+from ringsim.analysis.brief import notes
 from ringsim.analysis.study_text import verdict_lines
 from ringsim.cli import cli
 from ringsim.dataset import save

@@ -14,16 +14,17 @@ import xarray as xr
 from click.testing import CliRunner
 from made_campaign import SECTIONS, TIMES, made_campaign, made_scene, with_positions
 
-from ringsim.analysis.binomial import share_interval
 from ringsim.analysis.brief import what_matters
-from ringsim.analysis.sensitivity_text import sensitivity_tables
+from ringsim.analysis.influence_text import sensitivity_tables
+from ringsim.analysis.intervals import share_interval
 from ringsim.analysis.study import analyse
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.exit_codes import EXIT_BAD_INPUT, EXIT_DONE
 from ringsim.plots.campaign import figures as of_campaigns
 from ringsim.plots.ring import lines_at
-from ringsim.report import model, tables
+from ringsim.report import page as model
+from ringsim.report import tables
 from ringsim.report.page import LARGEST, page
 from ringsim.report.player import player
 from ringsim.shapes import COMPUTED, FROM_ANGLES
@@ -184,7 +185,7 @@ def test_inputs_of_one_place_and_of_several_paths_have_their_origin() -> None:
     campaign["rods_young_modulus"].attrs["distribution"] = json.dumps(law)
     one = 'cables.upper.friction.coefficient["section 3 V"]'
     campaign["cables_upper_friction_coefficient"].attrs["path"] = one
-    found = {each.path: each.origin for each in model.values(campaign)[0]}
+    found = {each.path: each.origin for each in model.values_of(campaign)[0]}
     assert found["rods.young_modulus"] == found["rods.density"] == "drawn"
     assert found["cables.upper.friction.coefficient"] == "drawn in part"
     assert found["cables.lower.friction.coefficient"] == "inferred"

@@ -11,9 +11,8 @@ from SALib.sample import sobol as salib_sobol
 
 from ringsim.campaign.specification import load_campaign
 from ringsim.refusal import InputError
-from ringsim.sampling.correlation import Correlation
-from ringsim.sampling.designs.morris import Morris
-from ringsim.sampling.designs.saltelli import Saltelli
+from ringsim.sampling.columns import Correlation
+from ringsim.sampling.designs.blocks import Morris, Saltelli
 from ringsim.sampling.table import AnyDistribution
 
 UNIFORM = {"kind": "uniform", "low": 0.0, "high": 1.0}

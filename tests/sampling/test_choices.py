@@ -10,8 +10,7 @@ import xarray as xr
 from pydantic import TypeAdapter
 
 from ringsim.refusal import InputError
-from ringsim.sampling.columns import Table
-from ringsim.sampling.correlation import Correlation
+from ringsim.sampling.columns import Correlation, Table
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import read_design, write_design

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 from scipy import stats
 
 from ringsim.choice import kinds_of
-from ringsim.sampling.distributions.family import Distribution
+from ringsim.sampling.distributions import Distribution
 from ringsim.sampling.table import AnyDistribution
 
 READ = TypeAdapter(AnyDistribution)

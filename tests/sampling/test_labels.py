@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringsim.sampling.values import label_of
+from ringsim.sampling.distributions import label_of
 
 SCALARS = st.one_of(
     st.booleans(), st.integers(-9, 9), st.floats(-9.0, 9.0),

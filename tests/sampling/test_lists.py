@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import Table
-from ringsim.sampling.designs.listed import Listed
+from ringsim.sampling.designs.independent import Listed
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import load_scene
 from ringsim.storage.netcdf import read_design, write_design

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 
-from ringsim.analysis.binomial import share_interval
+from ringsim.analysis.intervals import share_interval
 from ringsim.analysis.tails import DISAGREE, _unled, agreement, replicated_interval
-from ringsim.cable.friction.bearing import BearingFriction
+from ringsim.cable.friction import BearingFriction
 from ringsim.sampling.subset_levels import Answer, Repetition, _simulation
 from ringsim.scene import load_scene
 from ringsim.theory.drive import Drive
-from ringsim.theory.ideal_mechanism import Mechanism
+from ringsim.theory.mechanism import Mechanism
 
 AXES = 18
 

@@ -8,7 +8,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import norm
 
 from ringsim.refusal import InputError
-from ringsim.sampling.designs.subset_simulation import SubsetSimulation
+from ringsim.sampling.designs.levels import SubsetSimulation
 from ringsim.sampling.subset_levels import _variance
 
 AXES = dict.fromkeys("abcdefgh")

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ringsim.engine.build import build
 from ringsim.scene import Scene, load_scene
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.statics import OneCoordinate
 
 RING = load_scene("ring18")
 HEAVY = {"boom.length": 3.0, "boom.density": 18000.0}

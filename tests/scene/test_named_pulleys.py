@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from ringsim.cable.sheaves import BlockSheave
+from ringsim.cable.records import BlockSheave
 from ringsim.cli import cli
 from ringsim.layout.bodies import pose_of
 from ringsim.layout.layout import layout_of

@@ -9,8 +9,7 @@ import pytest
 
 from ringsim.analysis.stability import word_of
 from ringsim.parts.solver import Solver
-from ringsim.stepping.constant_steps import PEAK_BEND, STEPS
-from ringsim.stepping.guard import BLOW_UP, GAIN, GAP, LOSS, SLIGHT, Guard
+from ringsim.stepping.guard import BLOW_UP, GAIN, GAP, LOSS, PEAK_BEND, SLIGHT, STEPS, Guard
 from ringsim.stepping.instant import Energies, Instant, Scales
 
 TOLERANCE, LEAST, BAR = 0.02, 1e-3, 0.3

@@ -19,14 +19,14 @@ from ringsim.analysis.stability import (
     cells_of,
     checked,
     chosen_for_check,
+    compared,
     joined,
     judged,
     summary,
     to_markdown,
 )
-from ringsim.analysis.stability_engines import compared
 from ringsim.parts.solver import Solver
-from ringsim.plots.stability import stability
+from ringsim.plots.studies import stability
 from ringsim.variables import Cause, Fate, Status
 
 NEWTON = "the solver gave up at 1 s after 9 reductions of the step: reduce solver.step"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from ringsim.parts.solver import NO_DEVIATIONS, Solver
+from ringsim.stepping.control import RunControl
 from ringsim.stepping.instant import Energies, Instant, Scales
-from ringsim.stepping.motion_steps import MOST, DeviationSteps
-from ringsim.stepping.run_control import RunControl
+from ringsim.stepping.repeats import MOST, DeviationSteps
 
 AMPLITUDE, FREQUENCY, DURATION, TOLERANCE = 1e-3, 10.0, 20.0, 0.02
 REST = Energies(0.0, 0.0, 0.0, 0.0)

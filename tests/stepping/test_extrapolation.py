@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ringsim.stepping.extrapolation import extrapolated
+from ringsim.stepping.events import extrapolated
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])

@@ -10,9 +10,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringsim.stepping.instant import Energies, Instant
+from ringsim.stepping.instant import Energies, Instant, Remembering, pack, unpack
 from ringsim.stepping.locks import Overrun
-from ringsim.stepping.memory import Remembering, pack, unpack
 from ringsim.variables import Cause, Fate, Reason
 
 LEAVES = st.one_of(

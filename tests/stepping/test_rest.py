@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from ringsim.stepping.ending import MOVED, WINDOW, Rest
 from ringsim.stepping.instant import Energies, Instant
-from ringsim.stepping.rest import MOVED, WINDOW, Rest
 
 END, BEGIN = 10.0, 1.0
 """End time of the run, s, and the angle from which the joints start, rad."""

@@ -10,13 +10,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ringsim.parts.limits import Limits
-from ringsim.parts.solver import Solver
-from ringsim.stepping.instant import Energies, Instant, Scales
-from ringsim.stepping.latches import Latches
-from ringsim.stepping.locks import Locks
-from ringsim.stepping.memory import pack, unpack
-from ringsim.stepping.run_control import RunControl
+from ringsim.parts.solver import Limits, Solver
+from ringsim.stepping.control import RunControl
+from ringsim.stepping.instant import Energies, Instant, Scales, pack, unpack
+from ringsim.stepping.locks import Latches, Locks
 from ringsim.variables import Fate, Status
 
 INERTIA, TORQUE, BEGIN = 0.2, 0.01, math.radians(20.0)

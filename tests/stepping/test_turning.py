@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ringsim.parts.joint_friction.viscous_coulomb import ViscousCoulombFriction
-from ringsim.stepping.turning import Turning
+from ringsim.parts.joints import ViscousCoulombFriction
+from ringsim.stepping.locks import Turning
 
 SLIP = 2e-4
 FRICTION = ViscousCoulombFriction(coulomb=0.01, viscous=0.02, rate=5e-4)

@@ -10,7 +10,7 @@ from ringsim.cli import cli
 from ringsim.refusal import InputError
 from ringsim.scene import Scene
 from ringsim.simulation import run
-from ringsim.theory.one_coordinate import OneCoordinate, opening_time
+from ringsim.theory.statics import OneCoordinate, opening_time
 from small_rings import pulled, six
 
 WANTED = 7.0

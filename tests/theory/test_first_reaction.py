@@ -9,8 +9,7 @@ import pytest
 
 from ringsim.layout.layout import layout_of
 from ringsim.scene import load_scene
-from ringsim.theory.first_reaction import first_acceleration, first_reaction
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.statics import OneCoordinate, first_acceleration, first_reaction
 
 RING = load_scene("ring18").with_values(
     {

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from ringsim.layout.free_hub import FreeHub
+from ringsim.layout.draft import FreeHub
 from ringsim.parts.persection import at_section
-from ringsim.theory.ideal_mechanism import Mechanism
-from ringsim.theory.resistances.family import Opening
-from ringsim.theory.resistances.joint_friction import JointFrictionResistance
+from ringsim.theory.mechanism import Mechanism
+from ringsim.theory.resistances import JointFrictionResistance, Opening
 from small_rings import pulled
 
 

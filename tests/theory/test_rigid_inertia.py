@@ -10,7 +10,7 @@ from fold_rates import fold_rate
 
 from ringsim.scene import Scene
 from ringsim.structures.pantograph_ring import PantographRing
-from ringsim.theory.one_coordinate import OneCoordinate
+from ringsim.theory.statics import OneCoordinate
 from small_rings import pulled
 
 PIECES = 200

@@ -7,26 +7,15 @@ from typing import NamedTuple
 import xarray as xr
 from matplotlib.figure import Figure
 
-from ringsim.analysis.campaign_samples import inputs, judged_by, scalars
 from ringsim.analysis.courses import courses
-from ringsim.analysis.design import placement
-from ringsim.analysis.quantities import ran
-from ringsim.analysis.reading import any_finite
+from ringsim.analysis.design import any_finite, inputs, judged_by, placement, scalars
+from ringsim.analysis.intervals import ran
 from ringsim.files import writing
 from ringsim.plots import style
-from ringsim.plots.campaign.base import base_load
-from ringsim.plots.campaign.by_input import by_input
-from ringsim.plots.campaign.convergence import convergence
-from ringsim.plots.campaign.distributions import distributions
-from ringsim.plots.campaign.fan import fan
-from ringsim.plots.campaign.lag_map import lag_map
-from ringsim.plots.campaign.lock_order import lock_order
-from ringsim.plots.campaign.margin import margin
-from ringsim.plots.campaign.motors import motors
-from ringsim.plots.campaign.one_by_one import is_one_by_one, one_by_one
-from ringsim.plots.campaign.tail import rare_event, reached
-from ringsim.plots.campaign.tension import tension
-from ringsim.plots.campaign.tornado import explained, tornado
+from ringsim.plots.campaign.courses import fan, lag_map, lock_order
+from ringsim.plots.campaign.endings import base_load, margin, motors, tension
+from ringsim.plots.campaign.numbers import by_input, convergence, distributions, rare_event, reached
+from ringsim.plots.campaign.tornado import explained, is_one_by_one, one_by_one, tornado
 
 
 def _spread(campaign: xr.Dataset) -> bool:

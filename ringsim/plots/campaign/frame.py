@@ -1,4 +1,4 @@
-"""Head, caption and colours that the figures of a campaign share."""
+"""Head, caption, names and colours that the figures of a campaign share."""
 
 import textwrap
 from collections.abc import Sequence
@@ -9,10 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ringsim.analysis.blocks import population_of
 from ringsim.analysis.courses import QUANTILES
-from ringsim.analysis.losses import losses
+from ringsim.analysis.design import population_of
+from ringsim.analysis.worst import losses
 from ringsim.plots import style
+
+# Head, caption and colours that the figures of a campaign share.
+
 
 LOOKS = {
     "deployed": (style.BLUE, "o"),
@@ -68,3 +71,26 @@ def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:
 def bands(values: NDArray[np.floating]) -> NDArray[np.floating]:
     """``QUANTILES`` over the first axis, NaN left out; shape (5, ...)."""
     return np.asarray(np.nanquantile(values, QUANTILES, axis=0))
+
+
+# Names of inputs in the width that figures have for them.
+
+
+WIDE = 34
+"""Letters of a line, about."""
+
+
+def in_lines(name: str) -> str:
+    """A name on two lines of bearable length, the path on one of its own; three would overlap."""
+    if len(name) <= WIDE:
+        return name
+    mean, path = (
+        ("mean of", name.removeprefix("mean of ")) if name.startswith("mean") else ("", name)
+    )
+    path, bracket, place = path.partition("[")
+    if not mean:
+        # Between the parts of a path rather than within a word.
+        apart = textwrap.fill(path.replace(".", ". "), WIDE).replace(". ", ".")
+        return (apart if len(path) > WIDE else path) + ("\n" if bracket else "") + bracket + place
+    part = f" {bracket}{place} of" if bracket else ""
+    return f"{mean}{part}\n{path}"

@@ -8,9 +8,8 @@ from pydantic import Field
 
 from ringsim.choice import kind_of
 from ringsim.refusal import InputError
-from ringsim.sampling.correlation import Correlation, correlate
-from ringsim.sampling.distributions.family import Array, Distribution
-from ringsim.sampling.values import Values
+from ringsim.sampling.columns import Correlation, correlate
+from ringsim.sampling.distributions import Array, Distribution, Values
 from ringsim.units import Model
 
 Samples = Annotated[int, Field(ge=1, le=10_000_000)]

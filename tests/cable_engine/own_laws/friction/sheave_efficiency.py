@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from ringsim.cable.friction.family import PulleyFriction
+from ringsim.cable.friction import PulleyFriction
 from ringsim.cable.ropes import Array
 from ringsim.units import Ratio
 

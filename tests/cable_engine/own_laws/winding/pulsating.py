@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from ringsim.cable.winding.family import PrescribedWinding
+from ringsim.cable.winding import PrescribedWinding
 from ringsim.units import PositiveSpeed, Second
 
 

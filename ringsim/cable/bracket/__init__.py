@@ -1,1 +1,0 @@
-"""Kinds of brackets that hold the V pulleys, one file each."""

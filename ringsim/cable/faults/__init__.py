@@ -1,1 +1,0 @@
-"""Kinds of cable faults, one file each."""

@@ -1,1 +1,0 @@
-"""Kinds of friction between a rope and its pulleys, one file each."""

@@ -1,1 +1,0 @@
-"""Kinds of winding laws, one file each."""

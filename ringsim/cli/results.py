@@ -1,0 +1,360 @@
+"""``ringsim merge``, ``analyse``, ``report``, ``plot``, ``compare`` and ``export``."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+import xarray as xr
+
+from ringsim.analysis.brief import notes
+from ringsim.analysis.engines import check_lines
+from ringsim.campaign.folder import open_folder
+from ringsim.campaign.stopping import as_decided, merge
+from ringsim.cli.options import ANIMATE, COLOUR, FOLDER, PATH, PLOT_FORMAT, listed, require_animate
+from ringsim.files import require_place, writing
+from ringsim.refusal import InputError, known_or_nearest
+
+# Opening what verbs are called for: a folder that is not merged yet is merged first.
+
+
+def opened(path: Path) -> xr.Dataset:
+    """The dataset in a file, or of the campaign in a folder, as ``open_stored`` opens it.
+
+    Results of an interrupted campaign are merged first, which a line says.  While a campaign runs
+    there nothing is: its end merges them.  InputError if there is none.
+    """
+    from ringsim.analysis.design import MERGED, open_stored
+
+    if any(path.glob("journals/*")):
+        from ringsim.campaign.folder import open_folder
+        from ringsim.campaign.stopping import is_behind, merge
+        from ringsim.storage.netcdf import runs_in
+        from ringsim.tables import counted
+
+        if is_behind(path) and not runs_in(path):
+            left, _, _ = merge(open_folder(path), execution="merged on its own", partly=True)
+            told = f", {counted(left, 'sample')} not run" if left else ""
+            click.echo(f"{path}: merged its results into {MERGED} first{told}")
+    return open_stored(path)
+
+
+# ``ringsim merge``: put the results of a campaign into one file.
+
+
+@click.command()
+@FOLDER
+def merge_command(folder: Path) -> None:
+    """Write campaign.nc in FOLDER from the samples that are done; the others are missing values.
+
+    It may be called at any time and any number of times, also while the campaign runs.
+    """
+    from ringsim.analysis.study_text import verdict_lines
+
+    campaign = open_folder(folder)
+    left, failed, path = merge(campaign, execution="merged on its own", partly=True)
+    samples = as_decided(campaign).table.samples
+    click.echo(f"{path}: {samples} samples, {samples - left} done, {left} not run, {failed} failed")
+    if path is not None:
+        with xr.open_dataset(path) as dataset:
+            for line in [*notes(dataset), *check_lines(dataset), *verdict_lines(dataset)]:
+                click.echo(f"  {line}")
+
+
+# ``ringsim analyse DIR|FILE``.
+
+
+@click.command()
+@click.argument("source", metavar="DIR|FILE", type=PATH)
+@click.option(
+    "--require", "required", metavar="REQUIREMENT", multiple=True,
+    help="Judge a requirement, too, or in place of the file's on that output: 'asynchrony_max: max "
+    "10, probability 0.99, confidence 0.9', 'outcome: is deployed, probability ...'.",
+)  # fmt: skip
+@click.option(
+    "--reweight", "reweighted", metavar="INPUT", multiple=True,
+    help="Tell also what another distribution of a drawn input would give, without new runs: "
+    "'loads.force = { kind = \"normal\", mean = 0.012, standard_deviation = 1e-4 }'.",
+)  # fmt: skip
+@click.option(
+    "--full", is_flag=True,
+    help="Tell the interval and the convergence of every statistic, and every measure of what "
+    "matters, whatever chance would explain.",
+)  # fmt: skip
+@click.option("--out", metavar="FILE", type=PATH, help="Write all of it to a netCDF file.")
+def analyse_command(
+    source: Path, required: tuple[str, ...], reweighted: tuple[str, ...], full: bool,
+    out: Path | None,
+) -> None:  # fmt: skip
+    """Say what the campaign in DIR (or its campaign.nc) tells: verdicts on requirements, shares of
+    outcomes, statistics of outputs with intervals that fit the design, which error dominates, and
+    which inputs matter.
+
+    Exit codes: 0 done, whatever the verdicts; 2 bad input.
+    """
+    from ringsim.analysis.reweighting import parse_reweighted
+    from ringsim.analysis.study import analyse
+    from ringsim.analysis.study_text import told
+    from ringsim.analysis.verdicts import parse_requirements, read_requirements
+    from ringsim.dataset import require_file, save
+
+    others = parse_reweighted(reweighted)
+    wanted = parse_requirements(required)
+    if out is not None:
+        require_file(out)
+    with opened(source) as campaign:
+        own = json.loads(campaign.attrs.get("requirements", "{}"))
+        try:
+            judged = {**read_requirements(own, "requirements"), **wanted}
+            found = analyse(campaign, judged, others)
+        except InputError as error:
+            raise InputError(f"{source}: {error}") from None
+    folder = source if source.is_dir() else source.parent
+    for line in told(found, str(folder), full=full):
+        click.echo(line)
+    if out is not None:
+        save(found, out)
+        click.echo(f"wrote {out}")
+
+
+# ``ringsim report``: a campaign as one page.
+
+
+@click.command()
+@click.argument("folder", metavar="DIR", type=PATH)
+@click.option("--out", metavar="FILE", type=PATH, default=Path("report.html"), show_default=True)
+@click.option(
+    "--analysis", metavar="FILE", type=PATH,
+    help="File of ringsim analyse --out with what to show instead of an analysis of today.",
+)  # fmt: skip
+def report_command(folder: Path, out: Path, analysis: Path | None) -> None:
+    """Write one page about the campaign in DIR, or in a file campaign.nc.
+
+    The page holds all that it shows, and loads nothing: it can be mailed, printed and kept.
+    """
+    from ringsim.analysis.design import MERGED
+
+    require_place(out)
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"--out {out}: the page is HTML: write {out.stem}.html")
+    with opened(folder) as campaign:
+        _write(campaign, folder / MERGED if folder.is_dir() else folder, out, analysis)
+
+
+def _write(campaign: Any, file: Path, out: Path, analysis: Path | None) -> None:
+    from ringsim.report.page import LARGEST, write_report
+
+    if "sample" not in campaign.dims or not {"scene", "campaign"} <= campaign.attrs.keys():
+        raise InputError(f"{file}: holds no campaign: give the folder that ringsim campaign named")
+    known = None if analysis is None else _load(analysis)
+    if known is not None and "statistic" not in known.dims:
+        raise InputError(
+            f"--analysis {analysis}: holds no analysis: give what ringsim analyse --out has "
+            "written, or leave it out"
+        )
+    size = write_report(campaign, out, str(file.parent), known)
+    click.echo(f"wrote {out} ({size / 1e6:.2f} MB)")
+    if size > LARGEST:
+        click.echo(f"{out}: larger than {LARGEST / 1e6:g} MB, the size it is meant to have")
+
+
+def _load(file: Path) -> Any:
+    import xarray as xr
+
+    try:
+        return xr.load_dataset(file, engine="netcdf4")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"{file}: cannot be read as a netCDF file: {reason}; merge again, or give another one"
+        ) from None
+
+
+# ``ringsim plot FILE``.
+
+
+@click.command()
+@click.argument("file", type=PATH)
+@PLOT_FORMAT
+@ANIMATE
+@COLOUR
+@click.option(
+    "--sample", type=int, metavar="N",
+    help="The sample of a campaign that --animate shows (default: the worst).",
+)  # fmt: skip
+@click.option("--out", metavar="DIR", type=PATH, help="Folder for the figures (default: FILE's).")
+def plot_command(
+    file: Path, formats: tuple[str, ...] | None, *, animate: bool, colour: str | None,
+    sample: int | None, out: Path | None,
+) -> None:  # fmt: skip
+    """Draw the figures of a run, or of a campaign, from its FILE.
+
+    FILE is what ringsim run, ringsim replay --save, ringsim campaign or ringsim merge has written.
+    """
+    require_animate(colour, animate=animate)
+    if sample is not None and not animate:
+        raise InputError(f"--sample {sample}: says nothing without --animate; give both")
+    from ringsim.analysis.design import MERGED
+    from ringsim.plots.campaign.figures import draw_campaign
+    from ringsim.plots.run import draw_run
+
+    with opened(file) as dataset:
+        file = file / MERGED if file.is_dir() else file
+        campaign = "sample" in dataset.dims
+        needed = {"scene", "campaign"} if campaign else {"scene", "reason"}
+        if not needed <= dataset.attrs.keys() or "status" not in dataset:
+            raise InputError(
+                f"{file}: holds neither a run nor a campaign: give a file that ringsim run or "
+                "ringsim campaign has written (campaign.nc)"
+            )
+        draw, folder = draw_campaign if campaign else draw_run, out or file.parent
+        drawn = draw(dataset, folder, file.stem, formats or ("png",))
+        for picture in drawn:
+            click.echo(f"wrote {picture}")
+        if not drawn:
+            click.echo(f"{file}: nothing to draw: no run got as far as its first record")
+        elif animate:
+            from ringsim.plots.animation import animate as write_animation
+
+            run, name = _shown(dataset, sample, file)
+            moving = write_animation(run.load(), folder / f"{name}.gif", colour or "lag")
+            click.echo(f"wrote {moving}")
+
+
+def _shown(dataset: Any, sample: int | None, file: Path) -> tuple[Any, str]:
+    """The run to animate, and the name of its file."""
+    from ringsim.analysis.design import median_and_worst
+
+    if "sample" not in dataset.dims:
+        if sample is not None:
+            raise InputError(f"--sample {sample}: {file} holds one run: leave it out")
+        return dataset, file.stem
+    if sample is None:
+        chosen = median_and_worst(dataset)
+        sample = int(dataset["sample"][0]) if chosen is None else chosen[1]
+    if sample not in dataset["sample"]:
+        raise InputError(
+            f"--sample {sample}: {file} holds samples 0 to {dataset.sizes['sample'] - 1}"
+        )
+    return dataset.sel(sample=sample), f"{file.stem}-sample{sample}"
+
+
+# ``ringsim compare A B``.
+
+
+@click.command()
+@click.argument("first", type=PATH)
+@click.argument("second", type=PATH)
+@click.option("--out", metavar="FILE", type=PATH, help="Write all of it to a netCDF file.")
+def compare_command(first: Path, second: Path, out: Path | None) -> None:
+    """Say how SECOND differs from FIRST: two campaigns (folders or files), or two runs.
+
+    Samples with equal seeds or inputs are compared in pairs, which shows much smaller differences.
+    """
+    from ringsim.analysis.comparison import compare, compared
+    from ringsim.dataset import require_file, save
+
+    if out is not None:
+        require_file(out)
+    with opened(first) as one, opened(second) as other:
+        try:
+            found = compare(one, other)
+        except InputError as error:
+            raise InputError(f"{first}, {second}: {error}") from None
+    for line in compared(found):
+        click.echo(line)
+    if out is not None:
+        save(found, out)
+        click.echo(f"wrote {out}")
+
+
+# ``ringsim export``: results for other programs.
+
+
+FORMATS = ("csv", "mat", "pvd")
+
+
+def _formats(_context: Any, _option: Any, text: str) -> tuple[str, ...]:
+    return listed("--format", text, FORMATS, "is no format to export to")
+
+
+def _names(_context: Any, _option: Any, text: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(filter(None, (word.strip() for word in text.split(",")))))
+
+
+@click.command()
+@click.argument("file", type=PATH)
+@click.option(
+    "--format", "formats", metavar="csv,mat,pvd", default="csv", callback=_formats,
+    help="One or more: tidy tables with units, MATLAB, ParaView over time (default csv).",
+)  # fmt: skip
+@click.option(
+    "--sample", "samples", metavar="N", type=int, multiple=True,
+    help="Only this sample of a campaign; may be given more than once.",
+)  # fmt: skip
+@click.option(
+    "--variables", "names", metavar="NAME,NAME", default="", callback=_names,
+    help="Only these variables, in csv and mat (default: all; FILE-variables.csv lists them).",
+)  # fmt: skip
+@click.option("--out", metavar="DIR", type=PATH, help="Folder (default: FILE's).")
+def export_command(
+    file: Path, formats: tuple[str, ...], samples: tuple[int, ...], names: tuple[str, ...],
+    out: Path | None,
+) -> None:  # fmt: skip
+    """Write a run, or a campaign, from its FILE or folder in the formats of other programs."""
+    from ringsim.export.paraview import write_pvd
+    from ringsim.export.tables import MANY, most_rows, write_csv, write_mat
+
+    with opened(file) as dataset:
+        campaign = "sample" in dataset.dims
+        if "status" not in dataset or "scene" not in dataset.attrs:
+            raise InputError(
+                f"{file}: holds neither a run nor a campaign: give what ringsim run or ringsim "
+                "campaign has written"
+            )
+        if samples and not campaign:
+            raise InputError(f"--sample {samples[0]}: {file} holds one run: leave it out")
+        for sample in samples:
+            if sample not in dataset["sample"]:
+                raise InputError(
+                    f"--sample {sample}: {file} holds samples 0 to {dataset.sizes['sample'] - 1}"
+                )
+        if campaign and "pvd" in formats and not samples:
+            raise InputError(
+                "--format pvd: shows runs, and this is a campaign: choose some with --sample"
+            )
+        chosen = dataset.sel(sample=list(samples)) if samples else dataset
+        # Stored states mean nothing to other programs.
+        chosen = chosen.drop_dims(["state_entry", "state_time"], errors="ignore")
+        if names:
+            chosen = _only(chosen, names, formats)
+        if "csv" in formats and (rows := most_rows(chosen)) > MANY:
+            click.echo(
+                f"the longest table has up to {rows:,} rows: choose variables with --variables, or "
+                "samples with --sample, unless you need all",
+                err=True,
+            )
+        folder = out or (file if file.is_dir() else file.parent)
+        stem = "campaign" if file.is_dir() else file.stem
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            written = write_csv(chosen, folder, stem) if "csv" in formats else []
+            written += write_mat(chosen, folder, stem) if "mat" in formats else []
+            if "pvd" in formats:
+                runs = {f"{stem}-sample{n}": dataset.sel(sample=n) for n in samples}
+                for name, run in (runs or {stem: dataset}).items():
+                    written += write_pvd(run, folder, name)
+    for path in written:
+        click.echo(f"wrote {path}")
+
+
+def _only(dataset: Any, names: tuple[str, ...], formats: tuple[str, ...]) -> Any:
+    """The dataset with some of its variables; InputError if it has not all of them."""
+    if not {"csv", "mat"} & set(formats):
+        raise InputError("--variables: says nothing to --format pvd: leave it out")
+    known = [str(name) for name in dataset.data_vars]
+    for name in names:
+        if name not in known:
+            hint = known_or_nearest(name, known)
+            raise InputError(f"--variables {name}: is no variable of this file ({hint})")
+    return dataset[list(names)]

@@ -1,0 +1,380 @@
+"""``ringsim scenes``, ``check`` and ``explain``: scenes and keys, before a run."""
+
+import json
+import math
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from ringsim.cable.faults import CableFault
+from ringsim.choice import kind_of, kinds_of
+from ringsim.cli.options import PATH, SETTINGS
+from ringsim.files import require_place, write_text
+from ringsim.layout.layout import Layout, internal_mobility, layout_of
+from ringsim.outputs import COORDINATES, VARIABLES
+from ringsim.outputs.family import SPAN_NAME
+from ringsim.overrides import place_of
+from ringsim.parts.faults import AT_ONCE
+from ringsim.parts.margin import MarginStandard
+from ringsim.refusal import InputError, known_or_nearest, show
+from ringsim.scene import Scene, builtin_scenes, load_scene, scene_from_toml
+from ringsim.scene.substituted import strained, substituted
+from ringsim.tables import text_table
+from ringsim.theory.drive import changes_drive, told, turns_ever
+from ringsim.theory.margin import MOST, DriveMargin, Margin, PlaneMargin
+from ringsim.units import Model
+from ringsim.variables import Variable
+
+# ``ringsim scenes``: what is built in, and its text as a starting point.
+
+
+SCHEMA = "scene.schema.json"
+"""File beside a scene that editors check it by."""
+
+
+@click.command()
+@click.argument("name", required=False)
+@click.option(
+    "--out",
+    metavar="FILE",
+    type=PATH,
+    help="Write it to this file, and a schema for editors beside it.",
+)
+def scenes_command(name: str | None, out: Path | None) -> None:
+    """List the built-in scenes, or print the TOML of one.
+
+    To start a scene of your own: ringsim scenes ring18 > my.toml
+    """
+    texts = builtin_scenes()
+    if name is not None:
+        if name not in texts:
+            raise InputError(f"{name}: no built-in scene ({known_or_nearest(name, texts)})")
+        if out is None:
+            click.echo(texts[name], nl=False)
+        else:
+            _write_with_schema(texts[name], out)
+        return
+    if out is not None:
+        raise InputError(f"--out {out}: needs the name of a scene ({', '.join(texts)})")
+    longest = max(map(len, texts))
+    for key, text in texts.items():
+        scene = scene_from_toml(text, source=f"scene {key}")
+        sections = scene.structure.sections
+        count = f"{sections} section{'s' if sections > 1 else ''}"
+        click.echo(f"{key:<{longest}}  {count:>12}  {scene.title}")
+
+
+def _write_with_schema(text: str, out: Path) -> None:
+    """Write a scene whose first line names the schema file written beside it.
+
+    A name without a folder: both files may be moved, and nothing is looked up elsewhere.
+    """
+    from ringsim.reference.schema import schema_of  # reads every record of the package
+
+    require_place(out)
+    schema = out.with_name(SCHEMA)
+    for path, content in (
+        (out, f"#:schema {SCHEMA}\n{text}"),
+        (schema, json.dumps(schema_of("scene"), indent=1) + "\n"),
+    ):
+        write_text(path, content)
+        click.echo(f"wrote {path}")
+
+
+# ``ringsim check``: validate a scene and say what it builds.
+
+
+_ASKED = ("margin", "hinge_spring", "temperature")
+"""What few scenes name: not told of as left out."""
+MOST_SECTIONS_FOR_MOBILITY = 72
+"""Larger rings take seconds, and their answer is the same."""
+
+
+@click.command()
+@click.argument("scene", metavar="FILE")
+@SETTINGS
+@click.option(
+    "--deploys-in", "time", type=click.FloatRange(0.0, min_open=True), metavar="SECONDS",
+    help="Find the initial opening angle from which the scene deploys in this time (frame engine).",
+)  # fmt: skip
+@click.option(
+    "--margin", is_flag=True,
+    help="Tell what drives and what resists at every opening angle, and the margin by standards.",
+)  # fmt: skip
+def check_command(scene: str, settings: dict[str, Any], time: float | None, margin: bool) -> None:
+    """Check FILE (a scene file, or the name of a built-in scene) without running it.
+
+    Bad input ends with exit code 2 and one line that names the field, its value and the cure.
+    """
+    loaded = load_scene(scene).with_values(settings)
+    if time is not None:
+        from ringsim.calibration import opening_angle_for
+
+        angle = opening_angle_for(loaded, time)
+        click.echo(f"structure.opening_angle = {angle:.6g} deg: the ring deploys in {time:g} s")
+        return
+    if margin:
+        for text in margin_lines(substituted(loaded)):
+            click.echo(text)
+        return
+    for label, text in _summary(loaded).items():
+        if text:
+            click.echo(f"{label:<12}{text}")
+
+
+def _summary(scene: Scene) -> dict[str, str]:
+    """What a scene builds; an empty text has no line."""
+    friction = scene.joints.model_dump()
+    parts = {name: getattr(scene, name) for name in sorted(type(scene).parts())}
+    absent = {name: part is None for name, part in parts.items() if name not in _ASKED}
+    absent |= {"joint friction": not friction, "stress output": not scene.record.stress}
+    return {
+        "scene": f"{scene.name}: {scene.title}" if scene.title else scene.name,
+        **scene.structure.describe(),
+        **_layout(scene),
+        "assembly": _assembly(scene),
+        **{name: _fields(part) for name, part in parts.items() if part is not None},
+        "faults": "; ".join(map(_fields, scene.faults)),
+        "friction": ", ".join(friction),
+        "left out": ", ".join(name for name, out in absent.items() if out) or "nothing",
+        "solver": _fields(scene.solver),
+    }
+
+
+def _layout(scene: Scene) -> dict[str, str]:
+    layout = layout_of(scene)
+    counts = Counter(joint.kind for joint in layout.joints)
+    families = Counter(joint.family for joint in layout.joints)
+    masses = layout.masses()
+    parts = ", ".join(f"{name} {mass:.4g}" for name, mass in masses.items())
+    groups = {rod.group: _count(len(rod.stations) - 1, "element") for rod in layout.rods}
+    elements = ", ".join(f"{count} in {group}" for group, count in groups.items())
+    points = {
+        "hinge assemblies": sum(map(len, layout.corners)),
+        "V-joints": families["vjoint"], "pivots": families["pivot"],
+    }  # fmt: skip
+    return {
+        "rods": f"{len(layout.rods)} {kind_of(scene.rods)} ({elements})",
+        "points": ", ".join(f"{count} {name}" for name, count in points.items() if count),
+        "joints": ", ".join(_count(count, _JOINTS[kind]) for kind, count in counts.items()),
+        "mobility": _mobility(layout),
+        "mass": f"{sum(masses.values()):.4g} kg: {parts}",
+    }
+
+
+def _assembly(scene: Scene) -> str:
+    """What lengths of rods do without a run; empty if these are as drawn."""
+    if not strained(scene):
+        return ""
+    # Here: few scenes need them, and they load scipy.
+    from ringsim.theory.assembling import assembled, deployed
+
+    made = substituted(scene)
+    try:
+        start, end = assembled(layout_of(made), made.rods), deployed(made)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    return (
+        f"prestress {start.energy:.3g} J at the start, {end.energy:.3g} J deployed at rest, "
+        f"corners {end.rms:.3g} m (rms) from the design"
+    )
+
+
+_JOINTS = {
+    "revolute": "revolute", "prismatic": "prismatic joint",
+    "sleeve": "sliding joint", "weld": "clamp",
+}  # fmt: skip
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def _mobility(layout: Layout) -> str:
+    if len(layout.openings[0]) > MOST_SECTIONS_FOR_MOBILITY:
+        return f"not computed above {MOST_SECTIONS_FOR_MOBILITY} sections"
+    return f"{_count(internal_mobility(layout), 'internal degree')} of freedom with rigid rods"
+
+
+def _fields(part: Model) -> str:
+    table = part.model_dump()
+    return ", ".join(
+        str(value) if key == "kind" else f"{key} = {show(value)}" for key, value in table.items()
+    )
+
+
+# The table of ``ringsim check --margin``.
+
+
+_ANGLES = 13
+
+
+def margin_lines(scene: Scene) -> Iterator[str]:
+    """Drive, resistances and margins of the ideal ring over the opening angle.
+
+    By the scene's standard, or else by all there are with their own factors.
+    """
+    known = (kind.model_validate({}) for kind in kinds_of(MarginStandard).values())
+    standards = known if scene.margin is None else [scene.margin]
+    drives = {
+        kind_of(each): DriveMargin(scene, each)
+        for each in standards
+        if isinstance(each, MarginStandard)
+    }
+    courses = {name: drive.course(_ANGLES) for name, drive in drives.items()}
+    first = next(iter(courses.values()))
+    # At rest nothing is accelerated, and a net may be slack at every angle; springs may be gone.
+    kinds = [k for k in first[0].resisting if any(now.resisting[k] for now in first)]
+    known_sources = dict.fromkeys(
+        k for now in first for k, force in now.driving.items() if force > 0.0
+    )
+    sources = list(known_sources) if len(known_sources) > 1 else []
+    yield "Forces on the opening angle in N m, without factors; margins with those of the standard."
+    rows = [
+        [
+            f"{math.degrees(now.angle):.1f}",
+            *(
+                f"{force:.4g}"
+                for force in (
+                    now.available,
+                    *(now.driving.get(k, 0.0) for k in sources),
+                    *(now.resisting[k] for k in kinds),
+                )
+            ),
+            *(_told(course[row].margin) for course in courses.values()),
+        ]
+        for row, now in enumerate(first)
+    ]
+    of_it = [f"of it {source}" for source in sources]
+    yield from text_table(["angle (deg)", "drive", *of_it, *kinds, *drives], rows)
+    for name, drive in drives.items():
+        yield f"{name}: margin = {_formula(drive)}"
+    yield from _exceptions(scene, next(iter(drives.values())))
+    for name, drive in drives.items():
+        yield f"{name}: {_verdict(drive.least())}"
+        yield from (f"  {line}" for line in _by_plane(scene, drive.standard))
+
+
+def _formula(drive: DriveMargin) -> str:
+    """The standard's factors in words."""
+    standard = drive.standard
+    resisting = " + ".join(f"{factor:g} {kind}" for kind, factor in drive.factors.items())
+    springs = any(one in drive.factors for one in ("springs", "net", "lines"))
+    driving = f", springs times {standard.driving_spring:g}" if springs else ""
+    speed = f" + {standard.inertia:g} inertia" if standard.keep_speed else ""
+    return f"drive{driving} / ({standard.motorisation:g} x ({resisting}){speed}) - 1"
+
+
+def _exceptions(scene: Scene, drive: DriveMargin) -> Iterator[str]:
+    """What faults do to the margin, and winches that are not on all the time."""
+    for number, fault in enumerate(scene.faults, 1):
+        later = "strikes later, not counted here; a run counts it from then on"
+        words = later if fault.time > AT_ONCE and changes_drive(fault) else told(fault)
+        yield f"faults[{number}], {kind_of(fault)} at {fault.time:g} s: {words}"
+    names = [] if scene.cables is None else [number for number, _ in scene.cables.present()]
+    for (cable, end), winch in drive.conditions.winches.items():
+        place = f"cables.{scene.structure.planes[names[cable]]}.{('winch', 'far_winch')[end]}"
+        if not turns_ever(winch):
+            yield f"{place}: never turns, not counted"
+            continue
+        if winch.start_time > drive.conditions.begin:
+            yield f"{place}: starts at {winch.start_time:g} s, not counted here"
+        if winch.stop_time is not None:
+            yield f"{place}: stops at {winch.stop_time:g} s; a run counts it until then"
+
+
+def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
+    """The margin of each plane, if both have cables and these are not alike."""
+    cables = scene.cables
+    if cables is None or None in (cables.upper, cables.lower):
+        return
+    struck = any(isinstance(one, CableFault) and one.time <= AT_ONCE for one in scene.faults)
+    if cables.upper == cables.lower and not struck:
+        yield "each plane has half of the drive"
+        return
+    for number, plane in enumerate(scene.structure.planes):
+        drive = PlaneMargin(scene, standard, number)
+        least = drive.least()
+        whole = drive.whole(least.angle).available
+        share = f"{100.0 * least.available / whole:.3g}" if whole > 0.0 else "0"
+        yield f"{plane}: {share} % of the drive against half of all that resists: {_verdict(least)}"
+
+
+def _told(margin: float) -> str:
+    """A dash where next to nothing resists."""
+    return f"{margin:.3f}" if margin < MOST else "-"
+
+
+def _verdict(least: Margin) -> str:
+    if least.margin >= MOST:
+        return "nothing resists"
+    word = "enough" if least.margin >= 0.0 else "NOT enough"
+    return f"least margin {least.margin:.3f} at {math.degrees(least.angle):.2f} deg: {word}"
+
+
+# ``ringsim explain``: what results, scenes and campaigns hold.
+
+
+def _names(_context: Any, _argument: Any, begun: str) -> list[CompletionItem]:
+    """Variables, and paths of keys as far as the next dot."""
+    from ringsim.reference import tree
+
+    every = [*VARIABLES, *tree.ROOTS, *(path for root in tree.ROOTS for path in tree.paths(root))]
+    depth = begun.count(".") + 1
+    found = {".".join(name.split(".")[:depth]) for name in every if name.startswith(begun)}
+    return [CompletionItem(name) for name in sorted(found)]
+
+
+@click.command()
+@click.argument("names", metavar="[NAME]...", nargs=-1, shell_complete=_names)
+@click.option("--schema", metavar="scene|campaign", help="Print the JSON Schema of such files.")
+def explain_command(names: tuple[str, ...], schema: str | None) -> None:
+    """Say what the variables of a result, or the keys of a scene or campaign file, mean.
+
+    NAME is a variable (asynchrony_max), the path of a key (cables.upper.winch, solver.step,
+    design), or one of the words scene and campaign for all keys of such files.  Without a name all
+    variables are listed.
+    """
+    if schema is not None:
+        _print_schema(schema, names)
+        return
+    known = COORDINATES | {SPAN_NAME.name: SPAN_NAME} | VARIABLES
+    # Paths are looked up before anything is printed, so that one that is refused stands alone.
+    told = [explained(known[name]) if name in known else _key(name, known) for name in names]
+    for text in told or map(explained, known.values()):
+        click.echo(text)
+
+
+def explained(variable: Variable) -> str:
+    """One line: name and dimensions, units, meaning, codes, and which scenes have it."""
+    text = f"{variable.name}({', '.join(variable.dims)})"
+    text = f"{text:44s} {variable.units:8s} {variable.long_name}"
+    if variable.flags is not None:
+        text += ": " + ", ".join(f"{int(code)} {code.word}" for code in variable.flags)
+    return text + (f" (only with {', '.join(variable.needs)})" if variable.needs else "")
+
+
+def _key(name: str, variables: dict[str, Variable]) -> str:
+    """A key of scenes or campaigns in words; InputError if there is none of that name."""
+    # Here, because variables are explained without reading every record of the package.
+    from ringsim.reference import tree
+    from ringsim.reference import tree as words
+
+    parts = [words.all_of(name)] if name in tree.ROOTS else []
+    found = tree.find(name) if parts else tree.known(name, list(variables))
+    parts += [words.told(each) for each in found]
+    if any(place_of(each.path, closed=True) == "pulley" for each in found):
+        parts.append(words.names_of_pulleys(found[0].path))
+    return "\n".join(parts)
+
+
+def _print_schema(kind: str, names: tuple[str, ...]) -> None:
+    from ringsim.reference.schema import schema_of
+
+    if names:
+        raise InputError(f"--schema {kind}: says nothing of {names[0]}: give one of both")
+    click.echo(json.dumps(schema_of(kind), indent=2))

@@ -1,0 +1,160 @@
+"""``ringsim accuracy`` and ``stability``."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import tomli_w
+
+from ringsim.campaign.panels import Panel, by_engines, panels_over
+from ringsim.cli.options import PATH, SCENE, SETTINGS, WORKERS
+from ringsim.exit_codes import EXIT_DONE, EXIT_FAILED
+from ringsim.files import write_text
+from ringsim.scene import load_scene
+
+# ``ringsim accuracy SCENE``.
+
+
+@click.command()
+@SCENE
+@SETTINGS
+@click.option("--out", metavar="DIR", type=PATH, help="Folder (default runs/accuracy-SCENE).")
+@click.option("--workers", metavar="N", type=WORKERS, help="Solver processes (default: all cores).")
+@click.option(
+    "--timeout", metavar="SECONDS", type=click.FloatRange(0.0, min_open=True), default=1800.0,
+    show_default=True, help="Longest time of one setting.",
+)  # fmt: skip
+@click.option(
+    "--most-elements", type=click.Choice(["4", "8"]), default="4", show_default=True,
+    help="Elements up to so many times the scene's; 8 for peak stresses to 1e-3, at several times "
+    "the cost.",
+)  # fmt: skip
+@click.option(
+    "--brief", is_flag=True,
+    help="A quarter of the cost: steps down to a quarter of the scene's instead of a sixteenth, "
+    "elements up to twice the scene's, no constant steps, other rods, dissipation or Newton "
+    "tolerances.",
+)  # fmt: skip
+@click.option(
+    "--fidelity", type=click.Choice(["both", "frame"]), default="both", show_default=True,
+    help="Engines to try; frame: that one alone, at a tenth of the cost, with its own limit as the "
+    "reference.",
+)  # fmt: skip
+def accuracy_command(
+    scene: str, settings: dict[str, Any], out: Path | None, workers: int | None, timeout: float,
+    most_elements: str, brief: bool, fidelity: str,
+) -> int:  # fmt: skip
+    """Compare numerical settings of SCENE: error against run time, and which to choose.
+
+    Writes accuracy.nc, accuracy.md, accuracy.png and settings.toml (for ringsim run --accuracy);
+    the same command again goes on with an interrupted study, and tries settings again that took
+    longer than --timeout.  Exit codes: 0 done, 2 bad input, 3 too few runs for a reference ended
+    well.
+    """
+    chosen = load_scene(scene).with_values(settings)
+    folder = out or Path("runs") / f"accuracy-{chosen.name}"
+
+    from ringsim.analysis.accuracy import tables
+    from ringsim.analysis.study import evidence_of
+    from ringsim.campaign.accuracy import ReferenceRunError, run_ladder
+    from ringsim.dataset import save
+    from ringsim.plots.studies import accuracy
+    from ringsim.plots.style import write
+
+    try:
+        cores = workers or len(os.sched_getaffinity(0))
+        engine = "frame" if fidelity == "frame" else "full"
+        found = run_ladder(
+            folder, chosen, cores, timeout, int(most_elements), brief=brief, fidelity=engine
+        )
+    except ReferenceRunError as error:
+        click.echo(f"{chosen.name}: {error}", err=True)
+        return EXIT_FAILED
+    title = f"Error against run time: {chosen.name}"
+    found.attrs |= {"title": title, "scene": chosen.to_toml()}
+    save(found, folder / "accuracy.nc")
+    text = tables(found, title)
+    write_text(folder / "accuracy.md", text)
+    write_text(folder / "settings.toml", tomli_w.dumps(evidence_of(found).model_dump()))
+    write(accuracy(found), folder / "accuracy.png")
+    click.echo(text)
+    for name in ("accuracy.nc", "accuracy.md", "accuracy.png", "settings.toml"):
+        click.echo(f"wrote {folder / name}")
+    return EXIT_DONE
+
+
+# ``ringsim stability SCENE``: where the solver is sound, and how it ends where it is not.
+
+
+@click.command()
+@SCENE
+@SETTINGS
+@click.option(
+    "--over", metavar="PATH=LOW..HIGH", multiple=True,
+    help="Axis of a panel; every two make one (x, then y). cables.*.NAME is that of all cables. "
+    "Default: panels chosen from what the scene holds.",
+)  # fmt: skip
+@click.option(
+    "--points", metavar="N", type=click.IntRange(2, 30), default=5, show_default=True,
+    help="Values of each axis.",
+)  # fmt: skip
+@click.option(
+    "--out", metavar="DIR", type=PATH,
+    help="Folder for the map and its campaigns (default runs/stability-SCENE).",
+)  # fmt: skip
+@click.option(
+    "--workers", metavar="N", type=WORKERS, default=1, show_default=True, help="Solver processes."
+)
+@click.option(
+    "--check", "percent", metavar="PERCENT", type=click.FloatRange(0.0, 100.0, min_open=True),
+    default=10.0, show_default=True,
+    help="Share of the ok cells that are run again with smaller steps.",
+)  # fmt: skip
+@click.option(
+    "--fidelity",
+    type=click.Choice(["full", "frame", "both"]),
+    default="full",
+    show_default=True,
+    help="Engine of the runs; both: side by side, with their error bars and a mark on cells in "
+    "which they differ.",
+)
+def stability_command(
+    scene: str, settings: dict[str, Any], over: tuple[str, ...], points: int, out: Path | None,
+    workers: int, percent: float, fidelity: str,
+) -> int:  # fmt: skip
+    """Map around SCENE: which pairs of values run well, and how runs end elsewhere.
+
+    Each panel has two axes, for example --over cables.*.axial_stiffness=1e3..1e7 --over
+    solver.step=0.01..1; each of its cells is one run.  From HIGH = 10 LOW on values are spaced
+    geometrically.  Writes stability.nc, stability.png and stability.md; the same command goes on
+    after an interruption.  Exit codes: 0 every cell is ok, or ended with a named cause; 2 bad
+    input; 3 some cells are wrong.
+    """
+    chosen = load_scene(scene).with_values(settings)
+    panels = by_engines(panels_over(chosen, over, points), fidelity)
+    for panel in panels:
+        x, y = (f"--over {s.label}={s.values[0]:g}..{s.values[-1]:g}" for s in (panel.x, panel.y))
+        click.echo(f"{panel.title}: {x} {y}: {len(list(panel.cells()))} cells")
+    return draw_map(out or Path("runs") / f"stability-{chosen.name}", panels, workers, percent)
+
+
+def draw_map(folder: Path, panels: Sequence[Panel], workers: int, percent: float) -> int:
+    """Run panels, check some percent of the ok cells, and write the map; returns the exit code."""
+    from ringsim.analysis.stability import WRONG, summary, to_markdown
+    from ringsim.campaign.stability import run_check, run_map
+    from ringsim.dataset import save
+    from ringsim.plots import style
+    from ringsim.plots.studies import stability
+
+    whole = run_map(folder, panels, workers)
+    # The same seed at every resumption, so that the same cells are checked.
+    whole = run_check(folder, panels, whole, share=0.01 * percent, seed=1, workers=workers)
+    save(whole, folder / "stability.nc")
+    style.write(stability(whole), folder / "stability.png")
+    write_text(folder / "stability.md", to_markdown(whole))
+    click.echo(summary(whole))
+    for name in ("stability.nc", "stability.png", "stability.md"):
+        click.echo(f"wrote {folder / name}")
+    return EXIT_FAILED if (whole["verdict"] == WRONG).any() else EXIT_DONE

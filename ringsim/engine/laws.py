@@ -1,0 +1,417 @@
+"""What pushes, pulls and brakes between the parts of a model."""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import exudyn.itemInterface as item
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.engine.assembly import SYMBOLIC, TORSION, Array, axes_of
+from ringsim.engine.model import BuiltJoint, JointGroup, Multibody, State
+from ringsim.layout.bodies import turned_about_z
+from ringsim.layout.draft import natural_lengths
+from ringsim.layout.layout import Contact, EdgeNet, HubNet, Hung
+from ringsim.layout.points import HUB
+from ringsim.parts.joints import HingeSpring, JointFriction, Latch, Reaction, Stop
+from ringsim.parts.net import SpringNet, pull
+from ringsim.parts.persection import at_section
+from ringsim.refusal import InputError
+
+# Lines that carry corners, and their trolleys, as objects on the corners' nodes.
+
+
+class Hanging:
+    """Mass, stiffness, constant force and friction on the places of bodies; see ``Offload``."""
+
+    def __init__(self, model: Multibody, hung: Hung) -> None:
+        self._hung = hung
+        assembly, law, up = model.assembly, hung.law, hung.up
+        along, level = np.zeros((7, 7)), np.zeros((7, 7))
+        along[:3, :3] = np.outer(up, up)
+        level[:3, :3] = np.eye(3) - along[:3, :3]
+        for body, lift in zip(hung.bodies, hung.lifts.tolist(), strict=True):
+            rub = (
+                {} if law.friction == 0.0 else {"forceUserFunction": _trolley_friction(hung, lift)}
+            )
+            line = item.ObjectGenericODE2(
+                nodeNumbers=[model.bodies[body][1]],
+                massMatrix=law.trolley_mass * level,
+                stiffnessMatrix=law.stiffness * along,
+                forceVector=[*(lift * up), *[0.0] * 4],
+                **rub,
+            )
+            number = assembly.system.AddObject(line)
+            if law.trolley_mass > 0.0:
+                assembly.bodies.append(number)
+        nodes = [model.bodies[body][1] for body in hung.bodies]
+        self._where = np.array([assembly.coordinates_of(node)[:3] for node in nodes])
+
+    def reaction(self, state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
+        """See ``ringsim.engine.laws.Reacting``."""
+        moved = (state.position - state.begun)[self._where]
+        rates = state.velocity[self._where]
+        found = self._hung.law.hold(self._hung.up, self._hung.lifts, moved, rates)
+        return Reaction(0.0, -found.friction, found.stored), rates
+
+
+def _trolley_friction(hung: Hung, lift: float) -> Any:
+    """What exudyn calls for a trolley's friction."""
+    lifts = np.array([lift])
+
+    def force(_mbs: Any, _t: float, _item: int, q: Any, q_t: Any) -> list[float]:
+        moved, rates = np.array([q[:3]]), np.array([q_t[:3]])
+        found = hung.law.hold(hung.up, lifts, moved, rates)
+        return [*found.friction[0].tolist(), 0.0, 0.0, 0.0, 0.0]
+
+    return force
+
+
+# Weight of all masses of a model, and its work.
+
+
+class Weight:
+    """Loads in a uniform field, in a model before it is assembled.
+
+    An element that is straight between two nodes weighs on each by half.
+    """
+
+    def __init__(self, model: Multibody, gravity: Array) -> None:
+        self._assembly, self._gravity = model.assembly, gravity
+        self._masses: list[float] = []
+        self._places: list[Any] = []
+        for part, rod in zip(model.layout.rods, model.rods, strict=True):
+            own = np.zeros(len(rod.nodes))
+            shares = 0.5 * part.density * part.tube.area * part.lengths
+            own[:-1] += shares
+            own[1:] += shares
+            for station, mass, _ in part.masses:
+                own[station] += mass
+            for node, mass in zip(rod.nodes, own.tolist(), strict=True):
+                self.add_point(node, mass)
+        bodies = model.layout.bodies
+        for body, (number, _) in zip(bodies, model.bodies, strict=True):
+            self._load(model.assembly.body_marker(number, body.centre), body.mass)
+        self._bodies = np.array([b.mass for b in bodies]), np.array([b.centre for b in bodies])
+        self._where = np.array([model.assembly.coordinates_of(node) for _, node in model.bodies])
+
+    def add_point(self, node: Any, mass: float) -> None:
+        """A mass (kg) at a node."""
+        marker = item.MarkerNodePosition(nodeNumber=node)
+        self._load(self._assembly.system.AddMarker(marker), mass)
+        self._masses.append(mass)
+        self._places.append(self._assembly.coordinates_of(node)[:3])
+
+    def add_beam(self, cables: list[Any], nodes: list[Any], mass: float, length: float) -> None:
+        """ANCF cables of a length (m) between nodes; ``mass`` is that of each, kg.
+
+        Their cubic curves have the mean place (x_1 + x_2) / 2 + L (s_1 - s_2) / 12, with slopes s.
+        """
+        system, load = self._assembly.system, item.LoadMassProportional
+        for k, cable in enumerate(cables):
+            marker = system.AddMarker(item.MarkerBodyMass(bodyNumber=cable))
+            system.AddLoad(load(markerNumber=marker, loadVector=list(self._gravity)))
+            for node, sign in zip(nodes[k : k + 2], (1.0, -1.0), strict=True):
+                where = self._assembly.coordinates_of(node)
+                self._masses += [0.5 * mass, sign * mass * length / 12.0]
+                self._places += [where[:3], where[3:6]]
+
+    def add_lines(self, hung: Hung) -> None:
+        """Count the work of what lines carry: as much less mass that weighs."""
+        for place, lift in zip(hung.bodies, hung.lifts.tolist(), strict=True):
+            self._masses.append(-lift / float(np.linalg.norm(self._gravity)))
+            self._places.append(self._where[place, :3])
+
+    def work(self, state: State) -> float:
+        """Up to a constant, J."""
+        masses, centres = self._bodies
+        turned = np.einsum("nij,nj->ni", axes_of(state.position[self._where[:, 3:7]]), centres)
+        moments = masses @ (state.position[self._where[:, :3]] + turned)
+        moments += np.array(self._masses) @ state.position[np.array(self._places)]
+        return float(moments @ self._gravity)
+
+    def _load(self, marker: Any, mass: float) -> None:
+        force = partial(item.LoadForceVector, loadVector=list(mass * self._gravity))
+        self._assembly.system.AddLoad(force(markerNumber=marker))
+
+
+# What pushes, pulls and brakes between the parts of a model.
+#
+# Each law of ``ringsim.parts`` acts in exudyn's connectors, as exudyn's expression, while a step is
+# solved, and is evaluated again with numpy for the energy balance.
+
+
+Reacting = Callable[[State, Array, Array], tuple[Reaction, Array]]
+"""The reactions of one law at all its places, and the rates (m/s or rad/s) that they resist, from
+the state, the opening angles and their rates, shape (planes, sections), rad and rad/s."""
+
+
+def connect(model: Multibody, weight: Weight | None = None) -> list[Reacting]:
+    """Springs, contacts, net and friction of a model; before ``Assembly.finish``."""
+    layout, found = model.layout, []
+    for spring in layout.springs:
+        law, ends = spring.law, [model.bodies[k][1] for k in (spring.first, spring.second)]
+        linear = {"stiffness": law.stiffness, "damping": law.damping}
+        found.append(_strings(model, [ends], law.tension, law.free_length, [linear]))
+    found += [_contact(model, contact) for contact in layout.contacts]
+    if layout.net is not None:
+        found.append(_net(model, layout.net, weight))
+    if layout.hung is not None and weight is not None:
+        weight.add_lines(layout.hung)
+        found.append(Hanging(model, layout.hung).reaction)
+    return found + [_friction(model, *one) for one in model.scene.joints.present().items()]
+
+
+class Stops:
+    """A stop on every V-joint, with its latch.
+
+    exudyn measures the angle from the half-open joint, a quarter turn away, so that neither end of
+    the range lies near the jump of the measured angle at 180 deg.
+    """
+
+    def __init__(self, model: Multibody, stop: Stop) -> None:
+        self._law, self._system = stop, model.assembly.system
+        planes = opening_joints(model, "stop", 'stop = "none"')
+        self._objects = [[self._add(model, *one) for one in plane] for plane in planes]
+        self._latched = np.zeros((len(planes), len(planes[0])), dtype=bool)
+
+    def _add(self, model: Multibody, joint: BuiltJoint, sense: float) -> Any:
+        def torque(angle: Any, rate: Any, offset: Any) -> Any:
+            folded = sense * angle + 0.5 * math.pi
+            return sense * self._law.torque(folded, sense * rate, offset > 0.5, SYMBOLIC).total
+
+        quarter = turned_about_z(sense * 0.5 * math.pi)
+        markers = model.assembly.node_marker(joint.nodes[0], quarter), joint.markers[1]
+        law = model.assembly.symbolic_law(TORSION, ("stop", sense), torque)
+        return torsion(model, markers, **law)
+
+    def latch(self, deployed: NDArray[np.bool_]) -> None:
+        """Hold these V-joints, (planes, sections), from both sides from now on, if it latches."""
+        if self._law.latch:
+            for plane, section in np.argwhere(deployed & ~self._latched):
+                # A stop has no use for the connector's offset; its law reads it as a switch.
+                self._system.SetObjectParameter(self._objects[plane][section], "offset", 1.0)
+            self._latched |= deployed
+
+    def reaction(self, _: State | None, angles: Array, rates: Array) -> tuple[Reaction, Array]:
+        """See ``Reacting``."""
+        return self._law.torque(np.pi - angles, -rates, self._latched), -rates
+
+
+class Springs:
+    """A spring, or the ramp of a latch, in every V-joint; the angle is measured as in ``Stops``."""
+
+    def __init__(self, model: Multibody, part: str, spring: HingeSpring | Latch) -> None:
+        self._system = model.assembly.system
+        planes = opening_joints(model, part, f'{part} = "none"')
+        self._objects = [
+            [self._add(model, *one, spring.at(k)) for k, one in enumerate(plane)]
+            for plane in planes
+        ]
+        self._law = spring.at(np.arange(len(planes[0])))
+        self._alive = np.ones((len(planes), len(planes[0])))
+
+    def _add(
+        self, model: Multibody, joint: BuiltJoint, sense: float, law: HingeSpring | Latch
+    ) -> Any:
+        def torque(angle: Any, rate: Any, _: Any) -> Any:
+            return sense * law.torque(sense * angle + 0.5 * math.pi, SYMBOLIC).elastic
+
+        quarter = turned_about_z(sense * 0.5 * math.pi)
+        markers = model.assembly.node_marker(joint.nodes[0], quarter), joint.markers[1]
+        return torsion(model, markers, **model.assembly.symbolic_law(TORSION, (law, sense), torque))
+
+    def fail(self, place: tuple[int, int]) -> None:
+        """Break the spring of a V-joint, (plane, section)."""
+        self._alive[place] = 0.0
+        self._system.SetObjectParameter(self._objects[place[0]][place[1]], "activeConnector", False)
+
+    def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
+        """See ``Reacting``."""
+        reaction = self._law.torque(np.pi - angles)
+        return Reaction(*(self._alive * part for part in reaction)), -rates
+
+
+def opening_joints(model: Multibody, part: str, out: str) -> list[list[tuple[BuiltJoint, float]]]:
+    """The V-joints with their senses, by plane; InputError, which names ``part``, without any."""
+    planes = model.openings()
+    if not all(planes):
+        raise InputError(
+            f"{part}: this structure has no joints that open, which would be held: leave it out "
+            f"({out})"
+        )
+    return planes
+
+
+def torsion(model: Multibody, markers: Sequence[Any], **settings: Any) -> Any:
+    """A torsion spring-damper about the common z axis of two markers."""
+    return model.assembly.system.AddObject(
+        item.ObjectConnectorTorsionalSpringDamper(markerNumbers=list(markers), **settings)
+    )
+
+
+def _friction(model: Multibody, family: str, law: JointFriction) -> Reacting:
+    """Friction of the joints of a family."""
+    joints = [joint for joint in model.joints if joint.part.family == family]
+    if not joints:
+        known = ", ".join(sorted({joint.part.family for joint in model.joints} - {""}))
+        raise InputError(
+            f"joints.{family}: this structure has no joint of that family (it has: "
+            f'{known or "none"}): leave it out (joints.{family} = "none")'
+        )
+
+    dry = []
+    for joint in joints:
+        damping = at_section(law, joint.part.section).linear_damping()
+        if damping is None:
+            dry.append(joint)
+        elif damping > 0.0:
+            torsion(model, joint.markers, damping=damping)
+
+    def each(some: list[BuiltJoint]) -> JointFriction:
+        return at_section(law, np.array([joint.part.section for joint in some]))
+
+    if dry:
+        model.assembly.dry_joints.add(each(dry), [joint.markers for joint in dry])
+    group = JointGroup(model, joints)
+    own = each(joints)
+
+    def reaction(state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
+        rate = group.rate(state)
+        return Reaction(0.0, own.torque(rate), 0.0), rate
+
+    return reaction
+
+
+def _net(model: Multibody, held: HubNet, weight: Weight | None) -> Reacting:
+    """The net's strings and their hub.
+
+    The hub starts where its strings balance: from anywhere else it would swing for the whole run,
+    next to weightless as it is, with the energy of its first stretch.
+    """
+    assembly, net = model.assembly, held.law
+    nodes = [model.bodies[number][1] for number in held.bodies]
+    hub = assembly.add_node(
+        item.NodePoint(referenceCoordinates=list(held.hub)),
+        np.mean([assembly.starts[int(node)][:3] for node in nodes], axis=0),
+    )
+    model.loose[HUB] = hub
+    mass = item.ObjectMassPoint(nodeNumber=hub, mass=net.hub_mass)
+    assembly.bodies.append(assembly.system.AddObject(mass))
+    if weight is not None:
+        weight.add_point(hub, net.hub_mass)
+
+    def settings(law: SpringNet) -> dict[str, Any]:
+        if law.two_sided:
+            return {"stiffness": law.stiffness, "damping": law.damping}
+        return assembly.symbolic_law(
+            "ObjectConnectorSpringDamper",
+            law,
+            lambda stretch, rate, _: law.tension(stretch, rate, SYMBOLIC).total,
+        )
+
+    own = [settings(at_section(net, k)) for k in range(len(nodes))]
+    each, free = at_section(net, np.arange(len(nodes))), net.neutral_length
+    pairs = [(hub, node) for node in nodes]
+    return _strings(model, pairs, lambda s, rate: each.tension(s - free, rate), free, own)
+
+
+def _strings(
+    model: Multibody,
+    pairs: Sequence[Sequence[Any]],
+    law: Callable[[Array, Array], Reaction],
+    free_length: float,
+    settings: Sequence[dict[str, Any]],
+) -> Reacting:
+    """Springs with dampers along the lines between pairs of nodes, with exudyn's settings of each.
+
+    ``law`` is the reaction to the lengths (m) and their rates (m/s).
+    """
+    system = model.assembly.system
+    for pair, own in zip(pairs, settings, strict=True):
+        ends = [system.AddMarker(item.MarkerNodePosition(nodeNumber=node)) for node in pair]
+        system.AddObject(
+            item.ObjectConnectorSpringDamper(markerNumbers=ends, referenceLength=free_length, **own)
+        )
+    places = [[model.assembly.coordinates_of(node)[:3] for node in pair] for pair in pairs]
+    near, far = np.array(places).transpose(1, 0, 2)
+
+    def reaction(state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
+        arms, moving = (x[far] - x[near] for x in (state.position, state.velocity))
+        lengths = np.linalg.norm(arms, axis=1)
+        rates = np.sum(arms * moving, axis=1) / lengths
+        return law(lengths, rates), rates
+
+    return reaction
+
+
+def _contact(model: Multibody, contact: Contact) -> Reacting:
+    """One-sided contact of a body with a plane."""
+    law, system, node = contact.law, model.assembly.system, model.bodies[contact.body][1]
+    markers = [
+        system.AddMarker(item.MarkerNodeCoordinate(nodeNumber=end, coordinate=contact.axis))
+        for end in (system.AddNode(item.NodePointGround()), node)
+    ]
+    settings = model.assembly.symbolic_law(
+        "ObjectConnectorCoordinateSpringDamper",
+        law,
+        lambda moved, rate, room: -law.push(room - moved, -rate, SYMBOLIC).total,
+    )
+    start = float(model.layout.bodies[contact.body].pose.place[contact.axis])
+    system.AddObject(
+        item.ObjectConnectorCoordinateSpringDamper(
+            markerNumbers=markers, offset=contact.room - start, **settings
+        )
+    )
+    where = model.assembly.coordinates_of(node)[contact.axis]
+
+    def reaction(state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
+        closer = -state.velocity[where]
+        return law.push(contact.room - state.position[where], closer), closer
+
+    return reaction
+
+
+# Cables along a net's edge, as exudyn's springs between the corners' nodes.
+
+
+class EdgeCables:
+    """Cables between the nodes of bodies."""
+
+    def __init__(self, model: Multibody, edge: EdgeNet) -> None:
+        self._present, natural = edge.present, natural_lengths(model.scene, edge)
+        self._natural = natural[self._present]
+        self._rates = edge.law.rates(natural)[self._present]
+        assembly = model.assembly
+        nodes = [[model.bodies[k][1] for k in pair] for pair in edge.pairs.tolist()]
+        for pair, free, rate in zip(
+            nodes, self._natural.tolist(), self._rates.tolist(), strict=True
+        ):
+            ends = [assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=k)) for k in pair]
+            law = assembly.symbolic_law("ObjectConnectorSpringDamper", ("edge", rate), _law(rate))
+            assembly.system.AddObject(
+                item.ObjectConnectorSpringDamper(markerNumbers=ends, referenceLength=free, **law)
+            )
+        places = [[assembly.coordinates_of(node)[:3] for node in pair] for pair in nodes]
+        self._first, self._second = np.array(places).transpose(1, 0, 2)
+
+    def reaction(self, state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
+        """See ``ringsim.engine.laws.Reacting``."""
+        reaction = pull(self._stretched(state), self._rates)
+        return reaction, np.zeros(len(self._rates))
+
+    def tensions(self, state: State) -> Array:
+        """Of the cables, N, shape (planes, sections); NaN in planes without."""
+        found = np.full(self._present.shape, np.nan)
+        found[self._present] = pull(self._stretched(state), self._rates).elastic
+        return found
+
+    def _stretched(self, state: State) -> Array:
+        arms = state.position[self._second] - state.position[self._first]
+        return np.asarray(np.linalg.norm(arms, axis=1) - self._natural)
+
+
+def _law(rate: float) -> Any:
+    return lambda stretch, _rate, _offset: pull(stretch, rate, SYMBOLIC).elastic

@@ -1,0 +1,178 @@
+"""Tidy tables: one file for each set of dimensions, as CSV or for MATLAB."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.io import savemat
+
+from ringsim.files import whole
+from ringsim.refusal import InputError
+
+# Codes and units of variables in words.
+
+
+def in_words(variable: xr.DataArray) -> xr.DataArray:
+    """The variable, with words instead of codes; what has none stays a number.
+
+    >>> codes = {"flag_values": [-1, 0], "flag_meanings": "not_run ok"}
+    >>> in_words(xr.DataArray([0, -1, 5], attrs=codes)).values.tolist()
+    ['ok', 'not_run', '5']
+    """
+    if "flag_meanings" not in variable.attrs:
+        return variable
+    values = np.atleast_1d(variable.attrs["flag_values"]).tolist()
+    words = dict(zip(values, str(variable.attrs["flag_meanings"]).split(), strict=True))
+    told = [words.get(code, f"{code:g}") for code in variable.to_numpy().ravel().tolist()]
+    return variable.copy(data=np.array(told, dtype=object).reshape(variable.shape))
+
+
+def units_of(variable: xr.DataArray) -> str:
+    """Unit of a variable; empty of words and of numbers without one."""
+    units = str(variable.attrs.get("units", ""))
+    return "" if units == "1" else units
+
+
+def meaning_of(variable: xr.DataArray) -> str:
+    """What it is: of an input its scene path, and its name if it has another one."""
+    words, path = (str(variable.attrs.get(name, "")) for name in ("long_name", "path"))
+    own = str(variable.attrs.get("input", path))
+    return words if not path else path if own == path else f"{own}: {path}"
+
+
+# Tidy tables: one file for each set of dimensions, a column for each of them and each variable.
+
+
+BLOCK = 1 << 22
+"""Rows, about, that are held at once."""
+MANY = 5_000_000
+"""Rows of a table above which few programs open it, and it takes minutes to write."""
+
+
+def write_csv(dataset: xr.Dataset, folder: Path, stem: str) -> list[Path]:
+    """Write STEM-DIM-DIM.csv for every set of dimensions, and STEM-variables.csv on what the
+    columns mean; returns the files.
+
+    A header is a name with its unit: ``opening_angle (degree)``.  Codes are words.  Times without
+    any value, as after the end of a run, are left out.
+    """
+    written = []
+    for dims, names in _tables(dataset).items():
+        path = folder / f"{stem}-{'-'.join(dims) or 'numbers'}.csv"
+        with whole(path, lasting=False) as draft, draft.open("w", encoding="utf-8") as file:
+            for number, block in enumerate(_blocks(dataset[names], dims)):
+                _table(block, dims).to_csv(file, index=False, header=number == 0)
+        written.append(path)
+    path = folder / f"{stem}-variables.csv"
+    about: dict[str, list[str]] = {"units": [], "meaning": [], "dimensions": []}
+    for each in (dataset[name] for name in dataset.variables):
+        about["units"].append(units_of(each))
+        about["meaning"].append(meaning_of(each))
+        about["dimensions"].append(" ".join(map(str, each.dims)))
+    columns = {name: ("name", words) for name, words in about.items()}
+    table = xr.Dataset(columns, coords={"name": [str(name) for name in dataset.variables]})
+    with whole(path, lasting=False) as draft:
+        table.to_dataframe().to_csv(draft)
+    return [*written, path]
+
+
+def most_rows(dataset: xr.Dataset) -> int:
+    """Rows of the longest table that ``write_csv`` would write, at most."""
+    return max((_rows(dataset, dims) for dims in _tables(dataset)), default=0)
+
+
+def _rows(dataset: xr.Dataset, dims: tuple[str, ...]) -> int:
+    return int(np.prod([dataset.sizes[dim] for dim in dims], dtype=np.int64))
+
+
+def _tables(dataset: xr.Dataset) -> dict[tuple[str, ...], list[str]]:
+    """Names of variables by their dimensions."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for name, variable in dataset.data_vars.items():
+        found.setdefault(tuple(map(str, variable.dims)), []).append(str(name))
+    return found
+
+
+def _blocks(dataset: xr.Dataset, dims: tuple[str, ...]) -> Iterator[xr.Dataset]:
+    """The dataset in pieces along its first dimension, so that any campaign fits into memory."""
+    rows = _rows(dataset, dims)
+    if rows <= BLOCK or not dims:
+        yield dataset
+        return
+    length = dataset.sizes[dims[0]]
+    step = max(1, BLOCK * length // rows)
+    for start in range(0, length, step):
+        yield dataset.isel({dims[0]: slice(start, start + step)})
+
+
+def _table(block: xr.Dataset, dims: tuple[str, ...]) -> Any:
+    """A pandas table of a block, with units in its headers."""
+    told = block.map(in_words, keep_attrs=True)
+    if not dims:
+        return told.expand_dims("row").to_dataframe().rename(columns=_headers(block))
+    numbers = [n for n, v in told.data_vars.items() if v.dtype.kind == "f"]
+    table = told.to_dataframe(dim_order=list(dims))
+    if "time" in dims and len(numbers) == len(told.data_vars):
+        table = table.dropna(how="all", subset=numbers)
+    return table.reset_index().rename(columns=_headers(block))
+
+
+def _headers(block: xr.Dataset) -> dict[str, str]:
+    units = {str(name): units_of(block[name]) for name in block.variables}
+    return {name: f"{name} ({unit})" if unit else name for name, unit in units.items()}
+
+
+# MATLAB's files, level 5: every variable under its name, with what it means beside it.
+
+
+LONGEST_NAME = 63
+"""Characters of a name; MATLAB cuts longer ones."""
+MOST_BYTES = (1 << 31) - 1
+"""Of one variable in files of this level."""
+
+
+def write_mat(dataset: xr.Dataset, folder: Path, stem: str) -> list[Path]:
+    """Write STEM.mat; returns it.
+
+    Beside the variables and coordinates ``units``, ``meaning`` and ``dimensions`` are structs with
+    their words by name, ``attributes`` those of the dataset.  Words are cells; codes stay numbers,
+    with their words in ``codes``.
+
+    Raises
+    ------
+    InputError
+        If a variable is larger, or a name longer, than such files can hold.
+    """
+    path = folder / f"{stem}.mat"
+    content: dict[str, Any] = {}
+    about: dict[str, dict[str, Any]] = {"units": {}, "meaning": {}, "dimensions": {}, "codes": {}}
+    for each in dataset.variables:
+        name, variable = str(each), dataset[each]
+        if len(name) > LONGEST_NAME:
+            raise InputError(
+                f"{path}: {name} has {len(name)} characters, and MATLAB's names at most "
+                f"{LONGEST_NAME}: choose --format csv"
+            )
+        if variable.nbytes > MOST_BYTES:
+            raise InputError(
+                f"{path}: {name} takes {variable.nbytes / 1e9:.1f} GB, and a variable of a MATLAB "
+                "file at most 2.1 GB: choose fewer samples with --sample, or --format csv"
+            )
+        words = variable.dtype.kind in "OU"
+        content[name] = variable.to_numpy().astype(object) if words else variable.to_numpy()
+        about["units"][name] = str(variable.attrs.get("units", ""))
+        about["meaning"][name] = meaning_of(variable)
+        about["dimensions"][name] = " ".join(map(str, variable.dims)) or "none"
+        if "flag_meanings" in variable.attrs:
+            values = np.atleast_1d(variable.attrs["flag_values"]).tolist()
+            named = zip(values, str(variable.attrs["flag_meanings"]).split(), strict=True)
+            about["codes"][name] = ", ".join(f"{code:g} {word}" for code, word in named)
+    attributes = {str(name)[:LONGEST_NAME]: value for name, value in dataset.attrs.items()}
+    with whole(path, lasting=False) as draft, draft.open("wb") as file:
+        savemat(
+            file, content | about | {"attributes": attributes}, do_compression=True,
+            long_field_names=True, oned_as="column",
+        )  # fmt: skip
+    return [path]

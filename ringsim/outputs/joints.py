@@ -1,0 +1,353 @@
+"""The V-joints: opening angles, asynchrony, locks, latches."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ringsim.outputs.family import (
+    Array,
+    ErrorBar,
+    Output,
+    Peak,
+    Reading,
+    Run,
+    Series,
+    SpanNames,
+    Values,
+    Variable,
+    ties,
+    with_ties,
+)
+from ringsim.stepping.locks import history
+
+# The opening angles of all V-joints.
+
+
+class OpeningAngle(Output):
+    """Angle between the bar halves; of a planar truss, between its beams and the axis."""
+
+    rank = 10
+    variables = (
+        Variable(
+            "opening_angle", ("plane", "section", "time"), "degree", "angle between the bar halves",
+            error_bar=ErrorBar("opening angles", safety=1.7),
+        ),
+    )  # fmt: skip
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Cubic Hermite interpolation of angles and rates."""
+        return {"opening_angle": np.degrees(run.angles.on_grid(run.rates.values))}
+
+
+# How far the V-joints are apart.
+
+
+_POINTS = 8
+"""Points in each step at which the largest spread is looked for: a parabola rises above the largest
+of so many by at most a 64th of what it rises above the chord of the step."""
+_TOLD = 5e-5
+"""Below this it is told as 0.0000 deg, and nobody is behind."""
+
+
+class Asynchrony(Output):
+    """Largest difference of opening angles between V-joints over time, and its maximum."""
+
+    rank = 20
+    variables = (
+        Variable(
+            "asynchrony", ("time",), "degree",
+            "largest difference of opening angles between V-joints",
+            error_bar=ErrorBar("asynchrony", safety=5.0),
+        ),
+        Variable(
+            "asynchrony_max", (), "degree", "largest asynchrony up to the deployment time",
+            error_bar=ErrorBar("largest asynchrony", safety=1.8),
+            summary=("largest asynchrony", "10.4f"), worse="larger", largest_of="asynchrony",
+        ),
+        Variable("asynchrony_max_time", (), "s", "time of the largest asynchrony"),
+        *(
+            Variable(f"asynchrony_{who}_{dim}", (), "1", f"{dim} of the {most} V-joint then", dtype)
+            for who, most in (("leader", "most open"), ("laggard", "least open"))
+            for dim, dtype in (("plane", "str"), ("section", "i4"))
+        ),
+    )  # fmt: skip
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Differences on the output grid; the maximum is looked for between readings, too."""
+        if not run.scene.structure.locks:
+            return {}
+        joints = run.locks.size
+        opening = np.degrees(run.angles.on_grid(run.rates.values)).reshape(joints, -1)
+        apart = opening.max(axis=0) - opening.min(axis=0)
+        angles, rates = (each.values.reshape(-1, joints) for each in (run.angles, run.rates))
+        largest = largest_spread(run.angles.times, angles, rates, run.until)
+        found = largest._replace(angle=math.degrees(largest.angle))
+        on_time = np.nan_to_num(np.where(run.angles.grid <= run.until, apart, np.nan))
+        if on_time[k := int(on_time.argmax())] > found.angle:
+            time, seen = float(run.angles.grid[k]), opening[:, k]
+            found = Spread(float(on_time[k]), time, int(seen.argmax()), int(seen.argmin()))
+        values: Values = {
+            "asynchrony": apart,
+            "asynchrony_max": found.angle,
+            "asynchrony_max_time": found.time,
+        }
+        for who, joint in (("leader", found.leader), ("laggard", found.laggard)):
+            plane, section = divmod(joint, run.locks.shape[1])
+            values[f"asynchrony_{who}_plane"] = run.coordinates["plane"][plane]
+            values[f"asynchrony_{who}_section"] = run.coordinates["section"][section]
+        return values
+
+    def told(self, values: Values, span_names: SpanNames) -> str:
+        """As "at 16.1 s: upper 10 behind lower 2"; empty if all joints are told alike."""
+        known = str(values.get("asynchrony_leader_plane", ""))
+        if not (known and values["asynchrony_max"] >= _TOLD):
+            return ""
+        time, size = (float(values[f"asynchrony_max{end}"]) for end in ("_time", ""))
+        joints, dims = list[str](), ("plane", "section")
+        for who in ("laggard", "leader"):
+            own = tuple(np.asarray(values[f"asynchrony_{who}_{dim}"]).item() for dim in dims)
+            first, more = with_ties(own, ties(values, "opening_angle", dims, own, time, size))
+            joints.append(f"{first} {own[1]:.0f}{more}")
+        return f"at {time:.4g} s: {' behind '.join(joints)}"
+
+
+class Spread(NamedTuple):
+    """How far the most open joint is from the least open one (rad), when (s), and which."""
+
+    angle: float
+    time: float
+    leader: int
+    laggard: int
+
+
+def largest_spread(times: Array, angles: Array, rates: Array, until: float) -> Spread:
+    """Largest difference between the joints' angles up to the time ``until``.
+
+    Looked for at ``_POINTS`` points in each step, on the cubics that fit angles and rates at its
+    ends, and at ``until`` itself: a few long steps step over the moment of the largest one.
+    ``angles`` and ``rates`` have shape (n, joints), rad and rad/s.
+    """
+    largest = _spread(float(times[0]), angles[0])
+    begun = int(np.searchsorted(times[:-1], until))
+    span = np.diff(times[: begun + 1])[:, None]
+    left = np.minimum(until - times[:begun, None], span)
+    part = np.divide(left, span, out=np.zeros_like(span), where=span > 0.0)
+    first, last = angles[:begun], angles[1 : begun + 1]
+    leaving, arriving = rates[:begun], rates[1 : begun + 1]
+    for point in range(1, _POINTS + 1) if begun else ():
+        s = point / _POINTS * part
+        value = s**2 * (3.0 - 2.0 * s) * (last - first)  # in place: no spline of the whole run
+        value += first
+        value += s * (1.0 - s) ** 2 * span * leaving
+        value -= s**2 * (1.0 - s) * span * arriving
+        k = int(np.ptp(value, axis=1).argmax())
+        found = _spread(float(times[k] + s[k, 0] * span[k, 0]), value[k])
+        largest = max(largest, found, key=lambda spread: spread.angle)
+    return largest
+
+
+def _spread(time: float, angles: Array) -> Spread:
+    return Spread(float(np.ptp(angles)), time, int(angles.argmax()), int(angles.argmin()))
+
+
+# When the V-joints reached 180 deg.
+
+
+class Deployment(Output):
+    """The lock time of every V-joint, and the latest of them."""
+
+    rank = 0
+    variables = (
+        Variable(
+            "deployment_time", (), "s", "time at which the last V-joint reached 180 deg",
+            error_bar=ErrorBar("deployment time", safety=2.7),
+            summary=("deployment time", "10.4f"), worse="larger", largest_of="lock_time",
+        ),
+        Variable(
+            "lock_time", ("plane", "section"), "s", "time at which the V-joint reached 180 deg"
+        ),
+        Variable(
+            "locked_joints", (), "1", "V-joints that have reached 180 deg", "i4", worse="smaller"
+        ),
+    )  # fmt: skip
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """As the run knows them; see ``ringsim.stepping.locks.lock_times``."""
+        if not run.scene.structure.locks:
+            return {}
+        return {
+            "lock_time": run.locks,
+            "deployment_time": run.locks.max(),
+            "locked_joints": np.isfinite(run.locks).sum(),
+        }
+
+
+# How fast V-joints met their latches, and which of these caught.
+
+
+_PLACE = ("plane", "section")
+LEAST = Peak("least_latch_rate", _PLACE, "the smallest latch rate", "opening_angle")
+LARGEST = Peak("peak_latch_rate", _PLACE, "the largest latch rate", "opening_angle")
+
+
+class Latching(Output):
+    """The opening rate at which every V-joint first reached 180 deg, and whether its latch holds.
+
+    ECSS-E-ST-33-01C, 4.7.5.4.3, wants latching shown over temperature and tolerances.
+    """
+
+    rank = 5
+    needs = ("latches",)
+    peak = LEAST
+    variables = (
+        Variable(
+            "latch_rate", ("plane", "section"), "rad/s",
+            "opening rate at which the V-joint first met its latch; missing if it did not",
+        ),
+        Variable(
+            "least_latch_rate", (), "rad/s",
+            "smallest opening rate at which a V-joint first met its latch",
+            summary=("least latch rate", "10.3g"), worse="smaller", least_of="latch_rate",
+        ),
+        *LEAST.variables,
+        Variable("latched", ("plane", "section"), "1", "1 if the latch of the V-joint holds", "i4"),
+        Variable("latched_joints", (), "1", "V-joints that are held by their latches", "i4",
+                 worse="smaller"),
+    )  # fmt: skip
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """From the steps, as the engines do while they run."""
+        rates = _rates(run)
+        caught = np.isfinite(run.held).astype(np.int32)
+        return {
+            "latch_rate": rates,
+            "least_latch_rate": rates.min(),
+            # Of a ring in which some joint did not come to its latch there is no least rate.
+            **LEAST.at(run, run.locks, np.where(np.isfinite(rates).all(), -rates, np.nan)),
+            "latched": caught,
+            "latched_joints": caught.sum(),
+        }
+
+
+class FastestLatch(Output):
+    """The largest opening rate at which a V-joint met its latch: the shock of latching grows with
+    it (I w (1 + e), see ``LockImpulse``).
+    """
+
+    rank = 5
+    needs = ("latches",)
+    peak = LARGEST
+    variables = (
+        Variable(
+            "peak_latch_rate", (), "rad/s",
+            "largest opening rate at which a V-joint first met its latch; missing if none did",
+            summary=("largest latch rate", "10.3g"), worse="larger", largest_of="latch_rate",
+        ),
+        *LARGEST.variables,
+    )  # fmt: skip
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Of the joints that came to their latches, also where others did not."""
+        rates = _rates(run)
+        return {"peak_latch_rate": np.fmax.reduce(rates, axis=None)} | LARGEST.at(
+            run, run.locks, rates
+        )
+
+
+def _rates(run: Run) -> Array:
+    """Shape (planes, sections), rad/s; NaN where a joint did not come to its latch."""
+    return history(run.scene, run.angles.times, run.angles.values, run.rates.values).rates
+
+
+def missed(values: Values, planes: Sequence[str]) -> str:
+    """Which latches did not catch though their joints came to them, in words; empty if none."""
+    if "latched" not in values:
+        return ""
+    open_ = np.argwhere(np.isfinite(values["lock_time"]) & (values["latched"] == 0)).tolist()
+    if not open_:
+        return ""
+    names = [f"{planes[plane]} {section + 1}" for plane, section in open_]
+    more = f" and {len(names) - 6} more" if len(names) > 6 else ""
+    count = f"{len(names)} of {values['latched'].size} latches did not catch"
+    return f"; {count}: {', '.join(names[:6])}{more}"
+
+
+# The shock of every lock.
+
+
+class LockImpulse(Output):
+    """Angular impulse of the stop on every V-joint while it first holds it: from its lock until the
+    torque ends or turns round.
+
+    A V-joint that meets its stop alone, at the rate w and with the inertia I, takes I w (1 + e), e
+    its coefficient of restitution.
+    """
+
+    rank = 48
+    needs = ("reactions", "stop")
+    variables = (
+        Variable(
+            "lock_impulse", ("plane", "section"), "N m s",
+            "angular impulse of the stop on the V-joint at its lock; missing if it did not lock",
+        ),
+        Variable(
+            "peak_lock_impulse", (), "N m s",
+            "largest angular impulse of a stop at a lock; missing if no V-joint has locked",
+            summary=("largest lock impulse", "10.3g"), worse="larger", largest_of="lock_impulse",
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> Array | None:
+        """Shape (planes, sections), N m."""
+        return None if now.carried is None else now.carried.stops
+
+    def reduce(self, run: Run, series: Series) -> Values:
+        """Trapezoids over the steps, which resolve a bounce."""
+        found = np.full(run.locks.shape, np.nan)
+        for place in np.argwhere(np.isfinite(run.locks)):
+            where = tuple(place)
+            found[where] = first_impulse(series.times, series.values[:, *where], run.locks[where])
+        peak = np.fmax.reduce(found, axis=None)  # without a lock NaN
+        return {"lock_impulse": found, "peak_lock_impulse": peak}
+
+
+def first_impulse(times: Array, torques: Array, lock: float) -> float:
+    """Impulse (N m s) of the first contact after a lock (s), of torques (N m) at times (s)."""
+    begun = max(int(np.searchsorted(times, lock)) - 1, 0)
+    pushed = np.flatnonzero(torques[begun:]) + begun
+    if not len(pushed):
+        return 0.0
+    first = int(pushed[0])
+    over = np.flatnonzero(torques[first:] * torques[first] <= 0.0) + first
+    last = int(over[0]) if len(over) else len(torques)
+    # The contact begins at the lock and ends between two steps.
+    held = slice(first, last)
+    own = np.concatenate([[min(lock, times[first])], times[held], times[last : last + 1]])
+    from scipy.integrate import trapezoid  # here: only scenes that record reactions need it
+
+    ends = np.zeros(1 + len(times[last : last + 1]))
+    return float(abs(trapezoid(np.concatenate([ends[:1], torques[held], ends[1:]]), own)))
+
+
+# How well the joints hold together.
+
+
+class JointGaps(Output):
+    """Largest distance of points that a joint should hold together."""
+
+    rank = 61
+    of_antenna = False
+    variables = (
+        Variable("constraint_violation", ("time",), "m", "largest gap in any joint"),
+        Variable(
+            "constraint_error", (), "m", "largest gap in any joint at any step",
+            summary=("constraint error", "10.1e"), worse="larger",
+            largest_of="constraint_violation",
+        ),
+    )  # fmt: skip
+
+    def read(self, now: Reading) -> float:
+        """The gap, m."""
+        return now.gap

@@ -1,1 +1,0 @@
-"""Kinds of boom, one file each."""

@@ -1,1 +1,0 @@
-"""Faults of the structure, one file each."""

@@ -1,1 +1,0 @@
-"""Kinds of springs in the V-joints, one file each."""

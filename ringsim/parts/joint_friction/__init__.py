@@ -1,1 +1,0 @@
-"""Kinds of friction in the joints, one file each."""

@@ -1,1 +1,0 @@
-"""Standards for the margin of a drive, one file each."""

@@ -1,1 +1,0 @@
-"""Kinds of nets, one file each."""

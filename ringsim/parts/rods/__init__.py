@@ -1,1 +1,0 @@
-"""Kinds of rods, one file each."""

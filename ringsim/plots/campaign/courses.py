@@ -1,0 +1,205 @@
+"""Courses of all samples of a campaign: the fan, lags by section, the order of locks."""
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from ringsim.analysis.courses import Courses, course, courses
+from ringsim.analysis.design import median_and_worst, told
+from ringsim.analysis.intervals import good
+from ringsim.outputs.family import Array
+from ringsim.plots import style
+from ringsim.plots.campaign.frame import head
+from ringsim.plots.run import LEAST_SPAN
+
+# How far each section is ahead or behind, over all samples.
+
+
+_LOOKS = ((style.BLUE, "solid", 1.9), (style.ORANGE, (0, (3, 1.5)), 1.2))
+"""Colour, dashes and width of each plane's median: alike ones are both seen, one on the other."""
+_WIDEST = 6
+
+
+@style.styled
+def fan(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
+    """A panel a section: median, 5-95 % and 0-100 % of its deviation, in each plane; a row of
+    panels has one scale.
+
+    ``campaign`` has ``opening_angle`` (sample, plane, section, time).  The sample with the largest
+    asynchrony is drawn on its own.  ``read`` is what ``courses`` gives, if it is there already.
+    """
+    read = courses(campaign) if read is None else read
+    found = read.bands
+    planes, sections = found["plane"].values.tolist(), found["section"].values.tolist()
+    looks = dict(zip(planes, _LOOKS, strict=False))
+    chosen = median_and_worst(campaign)
+    worst = chosen[1] if chosen is not None and chosen[1] in read.samples else None
+    one = None if worst is None else course(campaign, worst, found)
+    columns = min(_WIDEST, len(sections))
+    rows = -(-len(sections) // columns)
+    figure = Figure(figsize=(max(1.75 * columns, 7.0), max(1.75 * rows, 2.4) + 1.7))
+    grid = figure.subplots(rows, columns, sharex=True, sharey="row", squeeze=False)
+    for number, axes in enumerate(grid.ravel()):
+        if number >= len(sections):
+            axes.set_visible(False)
+            continue
+        for plane in planes:
+            own = found.sel(plane=plane, section=sections[number])
+            low, lower, middle, upper, high = own.values
+            colour, dashes, width = looks[plane]
+            for ends, alpha, edge in (((low, high), 0.08, 0.5), ((lower, upper), 0.2, 0.0)):
+                axes.fill_between(own["time"], *ends, facecolor=(colour, alpha), linewidth=edge,
+                                  edgecolor=colour)  # fmt: skip
+            axes.plot(own["time"], middle, color=colour, linewidth=width, linestyle=dashes,
+                      label="median", zorder=4)  # fmt: skip
+            if one is not None:
+                single = one.sel(plane=plane, section=sections[number])
+                axes.plot(single["time"], single, color=style.INK, linewidth=0.8, linestyle=dashes,
+                          zorder=3)  # fmt: skip
+        axes.set_title(f"section {sections[number]}", fontsize=9, pad=3)
+        if number + columns >= len(sections):
+            axes.tick_params(labelbottom=True)
+            axes.set_xlabel(style.label(found["time"], width=24), fontsize=8)
+    drawn = [each for each in (found, one) if each is not None]
+    for row, axes_of in enumerate(grid):
+        axes_of[0].set_ylim(*_limits(drawn, slice(row * columns, (row + 1) * columns)))
+    grid[0, 0].set_xlim(0.0, float(found["time"][-1]) or 1.0)
+    grid[0, 0].xaxis.set_major_locator(MaxNLocator(3))
+    figure.supylabel(style.label(found, width=26), fontsize=10)
+    words = [
+        Line2D([], [], color=colour, linestyle=dashes, linewidth=width, label=f"{plane} plane")
+        for plane, (colour, dashes, width) in looks.items()
+    ]
+    shades = (("5-95 %", 0.28, 0.0), ("0-100 %", 0.08, 0.5))
+    bands = [
+        Patch(facecolor=(style.GREY, alpha), edgecolor=style.GREY, linewidth=edge, label=word)
+        for word, alpha, edge in shades
+    ]
+    lines = [Line2D([], [], color=style.GREY, linewidth=1.8, label="median")]
+    if one is not None:
+        lines += [Line2D([], [], color=style.INK, linewidth=0.9, label=f"worst: sample {worst}")]
+    figure.legend(handles=[*words, *bands, *lines], loc="outside lower center", ncols=3)
+    note = "Runs that are over count on: deployed without deviation, others as they ended."
+    head(figure, campaign, "Ahead and behind", f"{told(campaign, len(read.samples))}. {note}")
+    return figure
+
+
+def _limits(drawn: list[xr.DataArray], sections: slice) -> tuple[float, float]:
+    """What the curves of these sections need, and some air."""
+    ends = [np.nan_to_num(each.isel(section=sections).values) for each in drawn]
+    low, high = min(float(each.min()) for each in ends), max(float(each.max()) for each in ends)
+    air = max(0.06 * (high - low), LEAST_SPAN)
+    return low - air, high + air
+
+
+# Section by time: the lag of the median over the samples, and of the worst sample.
+
+
+@style.styled
+def lag_map(campaign: xr.Dataset, read: Courses | None = None) -> Figure:
+    """Deviation from the mean opening angle as a colour: at each place the median of all samples,
+    beside the sample with the largest asynchrony, with one colour scale.  ``read`` is what
+    ``courses`` gives, if it is there already.
+    """
+    read = courses(campaign) if read is None else read
+    found = read.bands
+    chosen = median_and_worst(campaign)
+    columns = [("median of all samples", read.median)]
+    if chosen is not None and chosen[1] in read.samples:
+        one = course(campaign, chosen[1], found)
+        columns.append((f"worst: sample {chosen[1]}", one))
+    planes, sections = found["plane"].values.tolist(), found["section"].values
+    figure = Figure(figsize=(4.9 * len(columns), 2.2 * len(planes) + 1.3))
+    grid = figure.subplots(len(planes), len(columns), sharex=True, sharey=True, squeeze=False)
+    time = found["time"].values
+    edges = np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])
+    span = max(LEAST_SPAN, *(style.largest_magnitude(values) for _, values in columns))
+    for (name, values), axes_of in zip(columns, grid.T, strict=True):
+        for plane, axes in zip(planes, axes_of, strict=True):
+            image = axes.pcolormesh(
+                edges, np.append(sections, sections[-1] + 1) - 0.5,
+                values.sel(plane=plane).transpose("section", "time").values,
+                cmap="PuOr_r", vmin=-span, vmax=span, rasterized=True,
+            )  # fmt: skip
+            axes.grid(visible=False)
+            axes.set_title(f"{plane} plane, {name}", fontsize=9.5)
+        axes_of[-1].set_xlabel(style.label(found["time"], width=44))
+    bar = figure.colorbar(image, ax=grid.ravel().tolist(), pad=0.015)
+    bar.outline.set_visible(False)
+    bar.set_label(style.label(found, width=30), fontsize=9)
+    grid[0, 0].yaxis.set_major_locator(MaxNLocator(10, integer=True, min_n_ticks=1))
+    figure.supylabel(style.label(campaign["section"]), fontsize=10.5)
+    head(figure, campaign, "Lag map", f"{told(campaign, len(read.samples))}.")
+    return figure
+
+
+# Which V-joints lock first and last, and which never.
+
+
+def locks_of(campaign: xr.Dataset) -> Array:
+    """Lock times of the samples whose numbers hold, (sample, plane, section), s."""
+    times = campaign["lock_time"].transpose("sample", "plane", "section").to_numpy()
+    return np.asarray(times[good(campaign)])
+
+
+def shares(campaign: xr.Dataset) -> tuple[Array, Array, Array]:
+    """How often each V-joint locks first, last and not at all, (plane, section), of all used.
+
+    V-joints that lock at one time share it; nobody is last in a sample in which some stay open.
+    """
+    locks = locks_of(campaign)
+    flat = locks.reshape(len(locks), -1)
+    none = np.isnan(flat)
+    begun, done = ~none.all(axis=1), ~none.any(axis=1)
+    first, last = np.zeros(flat.shape[1]), np.zeros(flat.shape[1])
+    for rows, total, extreme in ((flat[begun], first, np.nanmin), (flat[done], last, np.nanmax)):
+        if len(rows):
+            own = rows == extreme(rows, axis=1, keepdims=True)
+            total += (own / own.sum(axis=1, keepdims=True)).sum(axis=0)
+    count = max(len(flat), 1)
+    first, last, never = (
+        each.reshape(locks.shape[1:]) / count for each in (first, last, none.sum(axis=0))
+    )
+    return first, last, never
+
+
+@style.styled
+def lock_order(campaign: xr.Dataset) -> Figure:
+    """Bars by plane and section from ``lock_time`` (sample, plane, section)."""
+    sections, planes = campaign["section"].values, campaign["plane"].values.tolist()
+    figure = Figure(
+        figsize=(float(np.clip(0.42 * len(sections) + 2.0, 6.4, 11.0)), 1.9 * len(planes) + 1.4)
+    )
+    grid = figure.subplots(len(planes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    looks = (("locks first", style.BLUE, ""), ("locks last", style.ORANGE, "//"),
+             ("does not lock", style.GREY, ".."))  # fmt: skip
+    drawn = [
+        (look, table) for look, table in zip(looks, shares(campaign), strict=True) if table.any()
+    ]
+    width = 0.8 / max(len(drawn), 1)
+    for row, (plane, axes) in enumerate(zip(planes, grid, strict=True)):
+        for place, ((label, colour, hatch), table) in enumerate(drawn):
+            at = sections + width * (place - 0.5 * (len(drawn) - 1))
+            axes.bar(at, table[row], width, color=colour, hatch=hatch, edgecolor="white",
+                     linewidth=0.3, label=label)  # fmt: skip
+        axes.set_title(f"{plane} plane", fontsize=9.5)
+        axes.grid(visible=False, axis="x")
+    grid[0].set_xlim(sections[0] - 0.6, sections[-1] + 0.6)
+    grid[0].yaxis.set_major_formatter(PercentFormatter(1.0))
+    grid[-1].set_xlabel(style.label(campaign["section"]))
+    grid[-1].xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
+    figure.supylabel("Share of the samples", fontsize=10.5)
+    handles, labels = grid[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    locks = locks_of(campaign)
+    done = int(np.isfinite(locks).all(axis=(1, 2)).sum())
+    head(
+        figure,
+        campaign,
+        "Lock order",
+        f"{told(campaign, len(locks))}; all V-joints lock in {done}, only these have a last one.",
+    )
+    return figure

@@ -1,0 +1,283 @@
+"""Courses by how samples ended: bands, margins, motors, base, tensions."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from ringsim.analysis.courses import ends
+from ringsim.analysis.design import blocks, endings, requirements_of, told, values_of
+from ringsim.analysis.intervals import good, used
+from ringsim.outputs.family import Array
+from ringsim.plots import style
+from ringsim.plots.campaign.frame import FAILED, LOOKS, bands, head
+
+# Courses of some samples of every ending: bands that tell what those have in common that stall.
+
+
+MOST = 200
+"""Samples of an ending that are read at most, evenly spread over all."""
+
+
+def chosen(campaign: xr.Dataset, names: Sequence[str]) -> tuple[xr.Dataset, NDArray[np.str_]]:
+    """Some variables of up to ``MOST`` samples of each ending that hold, and their endings."""
+    words, ok = endings(campaign), good(campaign)
+    taken = np.zeros(len(words), dtype=bool)
+    for word in set(words[ok].tolist()):
+        own = np.flatnonzero(ok & (words == word))
+        taken[own[:: -(-len(own) // MOST)]] = True
+    parts, start = [], 0
+    for block in blocks(campaign, names):
+        size = block.sizes["sample"]
+        parts.append(block.isel(sample=np.flatnonzero(taken[start : start + size])))
+        start += size
+    return xr.concat(parts, "sample", data_vars="all"), words[taken]
+
+
+def counted(campaign: xr.Dataset, words: NDArray[np.str_]) -> str:
+    """How many samples hold, how many of them are drawn, and what bands and lines are."""
+    count = int(good(campaign).sum())
+    drawn = "" if len(words) == count else f" {len(words)} of them are drawn."
+    return f"{told(campaign, count)}.{drawn} Bands: all of an ending, lines: their median."
+
+
+def bands_by_ending(axes: Axes, x: Array, values: Array, words: NDArray[np.str_]) -> None:
+    """Range and median of the curves (sample, x) of each ending, as long as any of them lasts."""
+    others = sorted(set(words.tolist()) - LOOKS.keys())
+    looks = LOOKS | dict(zip(others, FAILED, strict=False))
+    for number, word in enumerate(filter(set(words.tolist()).__contains__, looks)):
+        own = values[words == word]
+        own = own[:, known := np.isfinite(own).any(axis=0)]
+        if not own.size:
+            continue
+        colour = looks[word][0]
+        axes.fill_between(x[known], np.nanmin(own, axis=0), np.nanmax(own, axis=0), color=colour,
+                          alpha=0.22, linewidth=0.0)  # fmt: skip
+        dashes = ("solid", (0, (5, 2)), (0, (2, 1.5)), (0, (6, 1.5, 1, 1.5)))[number % 4]
+        axes.plot(x[known], np.nanmedian(own, axis=0), color=colour, linestyle=dashes,
+                  label=f"{word} ({len(own)})")  # fmt: skip
+
+
+def legend(figure: Figure, panels: Sequence[Axes]) -> None:
+    """One legend of all panels below the figure."""
+    found = dict[str, Any]()
+    for axes in panels:
+        handles, labels = axes.get_legend_handles_labels()
+        found |= dict(zip(labels, handles, strict=True))
+    figure.legend(
+        [*found.values()], [*found], loc="outside lower center", ncols=max(1, min(4, len(found)))
+    )
+
+
+def over_time(
+    figure: Figure, panels: Sequence[Axes], campaign: xr.Dataset, curves: Sequence[Array],
+    words: NDArray[np.str_],
+) -> None:  # fmt: skip
+    """A panel a set of curves (sample, time), up to the last time at which any is known."""
+    time = campaign["time"].to_numpy()
+    last = 0
+    for axes, values in zip(panels, curves, strict=True):
+        bands_by_ending(axes, time, values, words)
+        if (known := np.flatnonzero(np.isfinite(values).any(axis=0))).size:
+            last = max(last, int(known[-1]))
+    panels[0].set_xlim(time[0], time[max(last, 1)])
+    panels[-1].set_xlabel(style.label(campaign["time"]))
+    legend(figure, panels)
+
+
+# What the base carries over time, by ending.
+
+
+_WORDS = {"base_force": "force at the base", "base_torque": "torque at the base"}
+
+
+@style.styled
+def base_load(campaign: xr.Dataset) -> Figure:
+    """Magnitudes of ``base_force`` and ``base_torque`` (sample, axis, time)."""
+    read, words = chosen(campaign, [*_WORDS])
+    figure = Figure(figsize=(8.4, 5.6))
+    panels = figure.subplots(2, 1, sharex=True).tolist()
+    curves = []
+    for axes, (name, text) in zip(panels, _WORDS.items(), strict=True):
+        parts = read[name].transpose("sample", "axis", "time")
+        curves.append(np.linalg.norm(parts.to_numpy(), axis=1))
+        axes.set_ylabel(style.label(parts.assign_attrs(long_name=text), width=30))
+        style.span_sizes(axes, curves[-1])
+    over_time(figure, panels, read, curves, words)
+    note = f"{counted(campaign, words)} At recorded times: peaks may be higher."
+    head(figure, campaign, "What the base carries", note)
+    return figure
+
+
+# The margin of the drive: the smallest of each sample by its ending, and its course.
+
+
+_GOLDEN = 0.618034
+"""Multiples of it fill a row evenly, whatever the number of marks."""
+_ANGLES = 161
+
+
+@style.styled
+def margin(campaign: xr.Dataset) -> Figure:
+    """``least_drive_margin`` (sample) by ending; below, ``drive_margin`` (sample, time) over the
+    mean opening angle.
+    """
+    figure = Figure(figsize=(8.6, 6.2))
+    upper, lower = figure.subplots(2, 1, height_ratios=(2, 3))
+    samples, values = values_of(campaign, "least_drive_margin")
+    _strips(upper, campaign, samples, values)
+    read, words = chosen(campaign, ["drive_margin", "opening_angle"])
+    angles = read["opening_angle"].mean(("plane", "section")).transpose("sample", "time").to_numpy()
+    margins = read["drive_margin"].transpose("sample", "time").to_numpy()
+    rows = [_over_angle(*each) for each in zip(angles, margins, strict=True)]
+    grid = _grid(rows)
+    bands_by_ending(lower, grid, np.array([_laid(grid, *row) for row in rows]), words)
+    least = float(values.min())
+    lower.set_ylim(min(-0.1, 1.08 * least), max(1.0, 1.5 * abs(least)))
+    lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+    lower.set_ylabel("Margin of the drive")
+    lower.set_xlabel("Mean opening angle (degree)")
+    handles, labels = lower.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=max(1, min(4, len(labels))))
+    note = f"{counted(campaign, words)} Dashed: the margin of 0 that the standard requires."
+    head(figure, campaign, "Drive margin", note)
+    return figure
+
+
+def _strips(axes: Axes, campaign: xr.Dataset, samples: Array, values: Array) -> None:
+    """A row an ending, a mark a sample at its smallest margin; limits of the campaign."""
+    words = endings(campaign)[np.searchsorted(campaign["sample"].to_numpy(), samples)]
+    others = sorted(set(words.tolist()) - LOOKS.keys())
+    looks = LOOKS | dict(zip(others, FAILED, strict=False))
+    shown = [word for word in looks if (words == word).any()]
+    for row, word in enumerate(shown):
+        own = values[words == word]
+        heights = row + 0.5 * (np.arange(len(own)) * _GOLDEN % 1.0 - 0.5)
+        colour, marker = looks[word]
+        axes.scatter(own, heights, s=22, color=colour, marker=marker, alpha=0.7, linewidths=0.5,
+                     rasterized=len(own) > 500)  # fmt: skip
+    axes.set_yticks(range(len(shown)), [f"{word} ({(words == word).sum()})" for word in shown])
+    axes.set_ylim(len(shown) - 0.5, -0.5)
+    axes.grid(visible=False, axis="y")
+    wanted = requirements_of(campaign).get("least_drive_margin", {})
+    for limit in [float(wanted[word]) for word in ("min", "max") if word in wanted]:
+        axes.axvline(limit, color=style.VERMILLION, linewidth=1.3)
+        axes.annotate(f"required {limit:g}", (limit, 1.0), rotation=0, ha="center", va="bottom",
+                      color=style.VERMILLION, fontsize=9,
+                      xycoords=axes.get_xaxis_transform())  # fmt: skip
+    if values.size and values.min() < 0.0 < values.max():
+        axes.axvline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+    axes.set_xlabel(style.label(campaign["least_drive_margin"]))
+
+
+def _over_angle(angle: Array, margins: Array) -> tuple[Array, Array]:
+    """Both as long as the ring opens, the angle growing."""
+    known = np.isfinite(angle) & np.isfinite(margins)
+    angle, margins = angle[known], margins[known]
+    grows = np.append(True, angle[1:] > np.maximum.accumulate(angle)[:-1])[: len(angle)]
+    return angle[grows], margins[grows]
+
+
+def _grid(rows: list[tuple[Array, Array]]) -> Array:
+    known = [angle for angle, _ in rows if len(angle)]
+    low = min((float(angle[0]) for angle in known), default=0.0)
+    return np.linspace(low, max((float(angle[-1]) for angle in known), default=180.0), _ANGLES)
+
+
+def _laid(grid: Array, angle: Array, margins: Array) -> Array:
+    """NaN where a run has not been."""
+    if not len(angle):
+        return np.full(len(grid), np.nan)
+    return np.asarray(np.interp(grid, angle, margins, left=np.nan, right=np.nan))
+
+
+# Torque and speed of the motors over time, by ending.
+
+
+@style.styled
+def motors(campaign: xr.Dataset) -> Figure:
+    """A row a motor, from ``motor_torque`` and ``motor_speed`` (sample, plane, winch, time)."""
+    names = ["motor_torque", "motor_speed", "final_time", "deployment_time"]
+    read, words = chosen(campaign, names)
+    # Motors that have done their work stand still, and would hide those that still wind.
+    read = read.where(read["time"] <= xr.DataArray(ends(read), dims="sample"))
+    read = read.transpose("sample", "plane", "winch", "time")
+    there = np.isfinite(read["motor_torque"].to_numpy()).any(axis=(0, 3))
+    places = np.argwhere(there).tolist()
+    figure = Figure(figsize=(9.2, 2.2 * len(places) + 1.3))
+    grid = figure.subplots(len(places), 2, sharex=True, sharey="col", squeeze=False)
+    curves = []
+    for row, (plane, winch) in zip(grid, places, strict=True):
+        name = f"{read['plane'].values[plane]} cable"
+        name += f", winch {read['winch'].values[winch]}" if there.shape[1] > 1 else ""
+        for axes, what in zip(row, ("motor_torque", "motor_speed"), strict=True):
+            curves.append(read[what].to_numpy()[:, plane, winch])
+            axes.set_title(name, fontsize=9.5)
+            axes.set_ylabel(style.label(read[what], width=22), fontsize=9)
+    over_time(figure, grid.ravel().tolist(), read, curves, words)
+    grid[-1, 0].set_xlabel(style.label(read["time"]))
+    head(figure, campaign, "Motors", counted(campaign, words))
+    return figure
+
+
+# The largest tension of each span along the cables, over all samples.
+
+
+def peaks(campaign: xr.Dataset) -> xr.DataArray:
+    """Largest recorded tension of each span until the last lock, (sample, plane, span), N."""
+    found = []
+    for block in blocks(campaign, ["cable_tension", "status", "final_time", "deployment_time"]):
+        own = used(block)
+        until = xr.DataArray(ends(own), dims="sample")
+        found.append(own["cable_tension"].where(own["time"] <= until).max("time", keep_attrs=True))
+    return xr.concat(found, "sample")
+
+
+@style.styled
+def tension(campaign: xr.Dataset) -> Figure:
+    """A panel a cable: median, 5-95 % and 0-100 % over the samples, from the winch on."""
+    found = peaks(campaign)
+    planes = [p for p in found["plane"].values.tolist() if found.sel(plane=p).notnull().any()]
+    figure = Figure(figsize=(8.4, 2.3 * len(planes) + 1.3))
+    grid = figure.subplots(len(planes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    worst, names = _worst(campaign), ""
+    for plane, axes in zip(planes, grid, strict=True):
+        own = found.sel(plane=plane).transpose("sample", "span")
+        own = own.dropna("span", how="all").dropna("sample", how="all")
+        low, lower, middle, upper, high = bands(own.values)
+        look = {"color": style.BLUE, "linewidth": 0.0}
+        axes.fill_between(own["span"], low, high, alpha=0.18, label="0-100 %", **look)
+        axes.fill_between(own["span"], lower, upper, alpha=0.35, label="5-95 %", **look)
+        axes.plot(own["span"], middle, color=style.BLUE, marker="o", markersize=3, label="median")
+        if worst in own["sample"]:
+            names = f"largest tension: sample {worst}"
+            axes.plot(own["span"], own.sel(sample=worst), color=style.INK, linewidth=0.9,
+                      linestyle=(0, (3, 1.5)), label=names)  # fmt: skip
+        axes.set_title(f"{plane} cable", fontsize=9.5)
+        axes.xaxis.set_major_locator(MaxNLocator(20, integer=True, min_n_ticks=1))
+    grid[0].set_ylim(bottom=0.0)  # all panels share it
+    grid[-1].set_xlabel(style.label(campaign["span"]))
+    figure.supylabel(style.label(found.assign_attrs(long_name="largest recorded tension")),
+                     fontsize=10.5)  # fmt: skip
+    handles, labels = grid[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    counted = int(np.isfinite(found.to_numpy()).any(axis=(1, 2)).sum())
+    head(
+        figure,
+        campaign,
+        "Tension along the cables",
+        f"{told(campaign, counted)}. At recorded times until the last lock.",
+    )
+    return figure
+
+
+def _worst(campaign: xr.Dataset) -> int:
+    if "peak_tension" not in campaign:
+        return -1
+    samples, values = values_of(campaign, "peak_tension")
+    return int(samples[np.argmax(values)]) if len(samples) else -1

@@ -1,0 +1,359 @@
+"""Main numbers of all samples: distributions, convergence, by input, the tail."""
+
+import itertools
+import textwrap
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+from numpy.typing import NDArray
+
+from ringsim.analysis.design import (
+    Placement,
+    called,
+    endings,
+    inputs,
+    judged_by,
+    placement,
+    requirements_of,
+    scalars,
+    told,
+    values_of,
+)
+from ringsim.analysis.intervals import (
+    good,
+    numbers,
+    of_independent,
+    of_replicates,
+    quantile,
+    ran,
+    tells_of,
+)
+from ringsim.analysis.tails import approach, subset_simulation, tail
+from ringsim.analysis.verdicts import OUTCOME, Requirement, judge, read_requirements, violations
+from ringsim.outputs.family import Array
+from ringsim.plots import style
+from ringsim.plots.campaign.frame import FAILED, LOOKS, WIDE, head, in_lines, legend, standing
+
+# Cumulative distribution of the main numbers, with the limits that the campaign sets them.
+
+
+_LEVELS = [0.05, 0.5, 0.95]
+"""Where dots are."""
+_STEPS = 2000
+"""Steps of a curve at most: more than a figure resolves."""
+
+
+def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
+    """The least and the largest value of a number that ``[requirements]`` of the campaign allow."""
+    wanted = requirements_of(campaign).get(name, {})
+    return [(word, float(wanted[word])) for word in ("min", "max") if word in wanted]
+
+
+def points(values: Array, of: int) -> tuple[Array, Array]:
+    """Quantiles of ``_LEVELS`` and their levels, of so many samples of which some have no value.
+
+    Those count as beyond all values; quantiles that lie among them are left out.
+    """
+    # Places among all, as places among those that have a value.
+    places = np.array(_LEVELS) * (of - 1) / max(len(values) - 1, 1)
+    known = places <= 1.0
+    return quantile(values, places[known].tolist()), np.array(_LEVELS)[known]
+
+
+@style.styled
+def distributions(campaign: xr.Dataset) -> Figure:
+    """Share of the samples at or below each value, a step a sample; dots at 5, 50 and 95 %.
+
+    Samples whose run ended before what a number is about happened count, too, as they do in
+    verdicts: their curve ends below 100 %.
+    """
+    campaign, blocks = standing(campaign)
+    names = scalars(campaign)
+    figure, panels, columns = style.new_panels(len(names), 3.7, 3.0, 0.9)
+    short, limited = False, any(limits(campaign, name) for name in names)
+    for number, (axes, name) in enumerate(zip(panels, names, strict=True)):
+        values = np.sort(values_of(campaign, name)[1])
+        of = int(tells_of(campaign, name).sum())
+        short = short or len(values) < of
+        share = np.arange(1, len(values) + 1) / of
+        shown = np.unique(np.linspace(0, len(values) - 1, min(len(values), _STEPS)).astype(int))
+        axes.step(np.append(values[:1], values[shown]), np.append(0.0, share[shown]), where="post",
+                  color=style.BLUE)  # fmt: skip
+        if len(values) > 1:
+            axes.plot(*points(values, of), "o", color=style.INK, markersize=4, clip_on=False,
+                      zorder=4)  # fmt: skip
+        for word, limit in limits(campaign, name):
+            axes.axvline(limit, color=style.VERMILLION, linestyle=(0, (5, 2)), linewidth=1.3)
+            # Above the frame, where no curve runs.
+            axes.annotate(f"{word} {limit:g}", (limit, 1.0), xytext=(0, 2), ha="center",
+                          color=style.VERMILLION, xycoords=axes.get_xaxis_transform(),
+                          textcoords="offset points", fontsize=9)  # fmt: skip
+        axes.set_ylim(0.0, 1.02)
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+        style.plain_numbers(axes.xaxis)
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+        axes.set_xlabel(style.label(campaign[name], width=38))
+        words = f"n = {len(values)} of {campaign.sizes['sample']}"
+        axes.set_title(words, fontsize=9, pad=16.0 if limited else None)
+        if number % columns == 0:
+            axes.set_ylabel("Samples at or below")
+    most = max((int(tells_of(campaign, name).sum()) for name in names), default=0)
+    notes = f" Dots: quantiles of 5, 50 and 95 %.{blocks}"
+    ends = (
+        " Where a curve ends below 100 %, it did not happen in the other samples: they count in "
+        "shares and dots, and violate limits."
+    )
+    head(
+        figure,
+        campaign,
+        "Distributions",
+        f"{told(campaign, most)}.{notes}{ends if short else ''}",
+    )
+    return figure
+
+
+# Main numbers and probabilities of requirements, as samples come in.
+
+
+_POINTS = 400
+_INTERVALS = 20
+"""Points of the band: each costs a bootstrap."""
+
+
+def _counts(samples: int, most: int) -> NDArray[np.int64]:
+    return np.unique(np.linspace(1, samples, min(most, samples)).astype(int))
+
+
+def running(values: Array) -> tuple[NDArray[np.int64], Array, Array]:
+    """Counts, and mean and 95 % quantile of so many first samples each."""
+    counts = _counts(len(values), _POINTS)
+    mean = np.array([values[:n].mean() for n in counts])
+    return counts, mean, np.array([quantile(values[:n], 0.95) for n in counts])
+
+
+def band(
+    values: Array, samples: NDArray[np.int64], placed: Placement
+) -> tuple[NDArray[np.int64], Array]:
+    """Counts, and the interval of the mean that the analysis gives for so many first samples,
+    shape (counts, 2); only counts that have one, with two samples of each replicate at least.
+    """
+    counts, replicate = _counts(len(values), _INTERVALS), placed.replicate_of(samples)
+    if not placed.has_intervals:
+        return counts[:0], np.empty((0, 2))
+    if replicate is None:
+        ends = np.array([of_independent(values[:n], np.mean) for n in counts])
+    else:
+        size = placed.replicates
+        told_twice = [np.bincount(replicate[:n], minlength=size).min() >= 2 for n in counts]
+        counts = counts[told_twice]
+        ends = np.array([of_replicates(values[:n], replicate[:n], np.mean) for n in counts])
+    ends = ends.reshape(-1, 2)
+    known = np.isfinite(ends).all(axis=1)
+    return counts[known], ends[known]
+
+
+def judged(
+    campaign: xr.Dataset, name: str, wanted: Requirement, placed: Placement
+) -> tuple[NDArray[np.int64], Array]:
+    """Counts of samples that hold, and the bounds by which the analysis judges a requirement on so
+    many first ones, shape (counts, 2).
+    """
+    place = np.flatnonzero(good(campaign))
+    counts = _counts(len(place), _INTERVALS)
+    until = [*(place[counts[:-1] - 1] + 1), campaign.sizes["sample"]]
+    found = [judge(campaign.isel(sample=slice(n)), {name: wanted}, placed) for n in until]
+    ends = [[float(each[f"probability_{end}"][0]) for end in ("lower", "upper")] for each in found]
+    return counts, np.array(ends)
+
+
+def _required(campaign: xr.Dataset) -> Mapping[str, Requirement]:
+    """The requirements that samples can be judged by."""
+    wanted = read_requirements(requirements_of(campaign), "requirements")
+    return {
+        name: each for name, each in wanted.items()
+        if name in campaign and (name == OUTCOME or tells_of(campaign, name)[good(campaign)].all())
+    }  # fmt: skip
+
+
+@style.styled
+def convergence(campaign: xr.Dataset) -> Figure:
+    """A panel a number, then one a requirement, in the order of the samples.
+
+    Means have their interval where the design allows it, probabilities the bounds of verdicts.
+    """
+    names, placed, wanted = scalars(campaign), placement(campaign), _required(campaign)
+    campaign, blocks = standing(campaign)
+    count = len(names) + len(wanted)
+    figure, panels, _ = style.new_panels(count, 3.7, 2.9, 1.3)
+    for axes, name in zip(panels, names, strict=False):
+        samples, values = values_of(campaign, name)
+        counts, mean, upper = running(values)
+        known, ends = band(values, samples, placed)
+        if len(known):
+            axes.fill_between(known, *ends.T, color=style.SKY, alpha=0.3, linewidth=0.0,
+                              label="95 % interval of the mean")  # fmt: skip
+        size = 2.5 if len(counts) < 50 else 0.0
+        axes.plot(counts, mean, color=style.BLUE, label="mean", marker="o", markersize=size)
+        axes.plot(counts, upper, color=style.VERMILLION, linestyle="dashed", marker="s",
+                  markersize=size, label="95 % quantile")  # fmt: skip
+        axes.ticklabel_format(axis="y", useOffset=False)
+        _named(axes, style.label(campaign[name], width=42), len(values))
+    for axes, (name, each) in zip(panels[len(names) :], wanted.items(), strict=True):
+        kept = ~violations(campaign, name, each)[good(campaign)]
+        counts = _counts(len(kept), _POINTS)
+        share = np.cumsum(kept)[counts - 1] / counts
+        known, ends = judged(campaign, name, each, placed)
+        axes.fill_between(known, *ends.T, color=style.GREEN, alpha=0.2, linewidth=0.0,
+                          label="bounds of the probability")  # fmt: skip
+        axes.plot(counts, share, color=style.GREEN, label="share that keeps to it")
+        axes.axhline(each.probability, color=style.INK, linewidth=1.1, linestyle=(0, (4, 3)),
+                     label="required probability")  # fmt: skip
+        axes.set_ylim(max(0.0, min(share.min(), ends.min()) - 0.02), 1.02)
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+        _named(axes, each.told(name), len(kept))
+    legend(figure, panels)
+    most = max((len(values_of(campaign, name)[0]) for name in names), default=0)
+    caption = f"{told(campaign, most)}.{blocks}"
+    if not placed.has_intervals:
+        caption += " No interval of the mean: the points of this design are not independent."
+    if wanted:
+        caption += " Bounds: each with the confidence that the verdict takes."
+    head(figure, campaign, "Convergence", caption)
+    return figure
+
+
+def _named(axes: Axes, words: str, count: int) -> None:
+    axes.set_title(f"{words}\nn = {count}", fontsize=9.5, color=style.INK)
+    axes.set_xlabel("Samples")
+    axes.xaxis.set_major_locator(MaxNLocator(5, integer=True, min_n_ticks=1))
+
+
+# What becomes of a sample, by each of its drawn inputs.
+
+
+_MANY = 500
+"""Samples from which on marks are drawn as dots: as shapes they would make a page too large."""
+
+
+def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
+    """An input as one number a sample: the mean of its places, or the place of its word in the
+    list that comes second, which is empty for numbers.
+    """
+    values = variable.to_numpy()
+    if values.dtype.kind not in "OU":
+        numbers = values.astype(float)
+        return (numbers if numbers.ndim == 1 else numbers.mean(axis=1)), []
+    rows = values.reshape(len(values), -1).astype(str)
+    texts = np.array([", ".join(dict.fromkeys(row.tolist())) for row in rows])
+    words, places = np.unique(texts, return_inverse=True)
+    return places.astype(float), words.tolist()
+
+
+@style.styled
+def by_input(campaign: xr.Dataset) -> Figure:
+    """A panel an input: the main number of each sample that has run over the value drawn for it.
+
+    Colour and marker say how the sample ended; samples without the number stand below the line at
+    the foot of each panel.
+    """
+    every = campaign.sizes["sample"]
+    campaign = campaign.isel(sample=np.flatnonzero(ran(campaign)))
+    names, name = inputs(campaign), judged_by(campaign)
+    words = endings(campaign)
+    height = np.where(good(campaign), numbers(campaign, name), np.nan)
+    known = height[np.isfinite(height)]
+    low, high = (known.min(), known.max()) if known.size else (0.0, 1.0)
+    size = high - low or max(abs(high), 1.0)
+    foot = low - 0.16 * size
+    height = np.where(np.isfinite(height), height, foot)
+    figure, panels, columns = style.new_panels(len(names), 3.5, 2.8, 1.4)
+    for number, (axes, each) in enumerate(zip(panels, names, strict=True)):
+        places, labels = drawn(campaign[each])
+        _scatter(axes, places, height, words)
+        if not known.size or (height == foot).any():
+            axes.axhline(low - 0.08 * size, color=style.GREY, linewidth=0.8)
+        if labels:
+            axes.set_xticks(range(len(labels)), [textwrap.shorten(w, 18) for w in labels])
+            axes.set_xlim(-0.5, len(labels) - 0.5)
+        else:
+            axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
+            axes.xaxis.set_major_locator(MaxNLocator(5))
+        axes.set_ylim(low - 0.24 * size, high + 0.1 * size)
+        axes.set_xlabel(_label(campaign[each]), fontsize=9, labelpad=15)
+        if number % columns == 0 and name:
+            axes.set_ylabel(style.label(campaign[name], width=30), fontsize=9)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)))
+    lost = int((height == foot).sum())
+    below = f"; {lost} without the number stand below the line" if lost else ""
+    note = (
+        " Inputs of many places by their mean." if any(campaign[n].ndim > 1 for n in names) else ""
+    )
+    count = f"{len(words)} of {every} samples run" if len(words) < every else f"All {every} samples"
+    head(figure, campaign, "Outcome by input", f"{count}{below}.{note}")
+    return figure
+
+
+def _scatter(axes: Axes, x: Any, y: Any, words: NDArray[np.str_]) -> None:
+    others = sorted(set(words.tolist()) - LOOKS.keys())
+    looks = LOOKS | dict(zip(others, itertools.cycle(FAILED), strict=False))
+    for word in filter(set(words.tolist()).__contains__, looks):
+        own = words == word
+        colour, marker = looks[word]
+        axes.scatter(x[own], y[own], s=26, color=colour, marker=marker, alpha=0.8,
+                     linewidths=1.2 if marker in "x+1234|" else 0.0,
+                     label=f"{word} ({own.sum()})", zorder=3,
+                     rasterized=len(words) > _MANY)  # fmt: skip
+
+
+def _label(variable: xr.DataArray) -> str:
+    units = str(variable.attrs.get("units", "1"))
+    words = called(variable)
+    what = ", mean" if variable.ndim > 1 else ""
+    what += "" if units == "1" else f" ({units})"
+    words = in_lines(words)
+    if len(words.rpartition("\n")[2]) + len(what) > WIDE:
+        what = "\n" + what.lstrip(", ")
+    return words + what
+
+
+# How a campaign of subset simulation came to its rare event.
+
+
+def reached(campaign: xr.Dataset) -> bool:
+    """Whether any level of a rare event has been reached."""
+    return any(len(places) for places, _ in approach(campaign))
+
+
+@style.styled
+def rare_event(campaign: xr.Dataset) -> Figure:
+    """Probability to be at or beyond the values that levels reached, a line a replicate; the
+    event's own with its interval.
+    """
+    design, found = subset_simulation(campaign), tail(campaign)
+    assert design is not None
+    figure = Figure(figsize=(8.0, 4.6))
+    axes = figure.subplots()
+    lines = [each for each in approach(campaign) if len(each[0])]
+    for number, (places, shares) in enumerate(lines):
+        axes.plot(places, shares, color=style.BLUE, marker="o", markersize=4, linewidth=1.0,
+                  alpha=0.7, label="" if number else "levels, a line a replicate")  # fmt: skip
+    target = design.sign * design.target
+    axes.axvline(target, color=style.VERMILLION, linestyle=(0, (5, 2)), linewidth=1.3)
+    probability, (low, high) = found["tail_probability"][1], found["tail_probability_interval"][1]
+    if probability > 0.0 and np.isfinite([low, high]).all():
+        axes.errorbar(target, probability, [[probability - low], [high - probability]],
+                      color=style.INK, marker="s", markersize=6, capsize=4, zorder=4,
+                      label=f"event: {probability:.2g}, 95 % {low:.2g} .. {high:.2g}")  # fmt: skip
+    axes.set_yscale("log")
+    axes.set_xlabel(style.label(campaign[design.of]))
+    axes.set_ylabel("Probability of this or beyond")
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    head(figure, campaign, "Rare event", f"{told(campaign, int(good(campaign).sum()))}.")
+    return figure

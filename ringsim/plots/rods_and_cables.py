@@ -1,0 +1,429 @@
+"""Figures of a run's rods, cables, pulleys and drive."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from ringsim.cable.records import Cable
+from ringsim.plots import style
+from ringsim.plots.peaks import mark, peak_of
+from ringsim.scene import scene_from_toml
+from ringsim.structures.pantograph_ring import PantographRing
+
+# Stress in the rods over time.
+
+
+_COLOURS = (style.INK, "#d00000", style.BLUE, style.GREEN, style.ORANGE, style.PURPLE)
+_HALVES: dict[str, Any] = {"left": "-", "right": (0, (4, 1.6))}
+
+
+@style.styled
+def rod_stress(dataset: xr.Dataset, sections: Sequence[int] | None = None) -> Figure:
+    """``rod_stress`` (rod, section, time), one axes a rod; its halves as in paper 002, figs 11-13.
+
+    Bands reach from the least to the largest of all sections, full lines are left halves, dashed
+    ones right halves.  The half with ``peak_rod_stress`` is drawn whatever its section.
+    ``sections`` are at most six section numbers, by default :func:`default_sections`.
+
+    Raises
+    ------
+    ValueError
+        If the run has no such section, or for more than six.
+    """
+    chosen = default_sections(dataset.sizes["section"]) if sections is None else tuple(sections)
+    missing = set(chosen) - set(dataset["section"].values.tolist())
+    if missing or not 0 < len(chosen) <= len(_COLOURS):
+        raise ValueError(
+            f"sections = {list(chosen)} must be one to {len(_COLOURS)} of the sections "
+            f"1..{dataset.sizes['section']}"
+        )
+    stress = dataset["rod_stress"]
+    factor, units = style.readable_units(stress, dataset.get("peak_rod_stress", stress))
+    peak = peak_of(dataset, "rod_stress", "peak_rod_stress", "peak_stress", np.inf)
+    rods = list(dict.fromkeys(rod.rpartition("_")[0] for rod in stress["rod"].values.tolist()))
+    figure = Figure(figsize=(11.0, 2.7 * -(-len(rods) // 2) + 1.1))
+    grid = figure.subplots(-(-len(rods) // 2), 2, sharex=True, sharey=True)
+    coloured = list(zip(chosen, _COLOURS, strict=False))
+    style.time_axes(dataset, stress.max("section"), *grid[:, 0])
+    style.time_axes(dataset, stress.max("section"), *grid[:, 1], named=False)
+    style.span_sizes(grid[0, 0], factor * np.append(stress.values, peak.value))
+    for axes, rod in zip(grid.flat, rods, strict=False):
+        halves = factor * stress.sel(rod=stress["rod"].str.startswith(f"{rod}_"))
+        least, most = (reduced(("rod", "section")) for reduced in (halves.min, halves.max))
+        axes.fill_between(halves["time"], least, most, color=style.PALE, linewidth=0.0)
+        for section, colour in coloured:
+            for half, dashes in _HALVES.items():
+                values = halves.sel(rod=f"{rod}_{half}", section=section)
+                axes.plot(values["time"], values, color=colour, linestyle=dashes, linewidth=1.2)
+        name = " ".join(reversed(rod.split("_")))
+        style.name_panel(axes, name)
+        if peak.place["rod"].startswith(f"{rod}_"):
+            worst = peak.within(stress.sel(peak.place), factor)
+            axes.plot(*worst, color=style.VERMILLION, linewidth=1.0, zorder=3)
+            half = peak.place["rod"].rpartition("_")[-1]
+            place = f"section {peak.place['section']}, {name}, {half} half"
+            mark(axes, peak, units, place, factor)
+    figure.supylabel(style.label(stress, units), fontsize=10.5)
+    entries = [Line2D([], [], color=colour, label=f"section {n}") for n, colour in coloured]
+    entries += [
+        Line2D([], [], color=style.GREY, linestyle=dashes, linewidth=1.2, label=f"{half} half")
+        for half, dashes in _HALVES.items()
+    ]
+    entries += [
+        Line2D([], [], color=style.PALE, linewidth=7.0, label="all sections"),
+        Line2D([], [], color=style.VERMILLION, linewidth=1.0, label="half with the largest"),
+    ]
+    figure.legend(handles=entries, loc="outside lower center", ncols=len(entries))
+    style.head(figure, grid[0, 0], dataset, "Rod stress")
+    return figure
+
+
+def default_sections(sections: int) -> tuple[int, ...]:
+    """The section at the boom, in black, and the one opposite, in red: 1 and 9 of 18."""
+    return tuple(dict.fromkeys((1, max(sections // 2, min(2, sections)))))
+
+
+# Spans and pulleys of a cable section by section, on the ideal geometry of a section.
+
+
+Array = NDArray[np.floating[Any]]
+NODES = ("first hinge", "V", "second hinge")
+"""Where a section has pulleys, from the winch on."""
+COMPONENTS = ("along", "inwards", "across")
+"""Of forces: away from the winch along the section's bars, from its plane towards the other one,
+and to the right of someone who goes that way and has z above (in a ring away from its middle, if it
+is run through counter-clockwise)."""
+
+
+@dataclass(frozen=True)
+class SectionSpans:
+    """Of one cable, sections in the order from its winch; arrays have the shape (section, time).
+
+    Between its hinge pulleys a section has an entry span to its V pulley and a span behind that.
+    """
+
+    cable: Cable
+    pulleys: int
+    """Of the whole cable."""
+    arriving: Array
+    entry: Array
+    behind: Array
+    after: Array
+    """Tensions in N: in the span to the first hinge pulley, in both spans of the section, in the
+    next span; where the cable ends at the second hinge, again the one behind the V pulley."""
+    lengths: tuple[Array, Array]
+    """Of the spans before and behind the V pulley, m."""
+    level: tuple[Array, Array]
+    """The part of each that is along the section, m."""
+    drop: Array
+    """How far inwards of the hinge pulleys the V pulley stands, m."""
+    half_turns: tuple[Array, Array]
+    """Angles (rad) by which the spans on the hinge assemblies before and behind a section are
+    turned from its direction, to the right positive, shape (section,); NaN where there is none."""
+
+
+def section_spans(dataset: xr.Dataset, plane: str) -> SectionSpans:
+    """What the opening angles and tensions of a recorded run of a ring say of a cable's sections.
+
+    Nothing else is taken from the run: hinge pulleys stand in one line along each section, and its
+    V pulley where ``ringsim.cable.bracket`` puts it at the section's opening angle.  ``dataset``
+    has ``cable_tension`` and ``opening_angle``; ``plane`` is one with a cable.
+    """
+    scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
+    ring = scene.structure
+    assert isinstance(ring, PantographRing)
+    cable = getattr(scene.cables, plane)
+    backwards = cable.end == "last"
+    order = slice(None, None, -1 if backwards else 1)
+    own = dataset.sel(plane=plane)
+    opening = np.radians(own["opening_angle"].transpose("section", "time").values[order])
+    pulleys = scene.pulleys_of(cable)
+    spans = own["cable_tension"].transpose("span", "time").values[: pulleys + 1]
+    arriving, entry, behind = (spans[first::3][: len(opening)] for first in range(3))
+    fold = 0.5 * (np.pi - opening)
+    aside, inward = cable.bracket.place(fold, cable.block_offset)
+    aside = -aside if backwards else aside
+    reach = ring.half_bar * np.cos(fold)
+    lengths = cable.bracket.spans(ring.half_bar, cable.block_offset, opening)[order]
+    directions = ring.geometry().directions[order] * (-1.0 if backwards else 1.0)
+    turned = np.array([
+        np.arctan2(np.cross(one, other)[2], one @ other)
+        for one, other in pairwise(directions)
+    ])  # fmt: skip
+    # Halfway between both sections' directions: behind the one, before the other.
+    return SectionSpans(
+        cable, pulleys, arriving, entry, behind, np.concatenate([arriving[1:], spans[-1:]]),
+        lengths, (reach + aside, reach - aside), ring.half_bar * np.sin(fold) + inward,
+        (np.append(np.nan, 0.5 * turned), np.append(-0.5 * turned, np.nan)),
+    )  # fmt: skip
+
+
+def pulley_forces(dataset: xr.Dataset, plane: str) -> xr.DataArray:
+    """Forces of a cable on its pulleys, from measured angles and tensions alone.
+
+    The sum of the two pulls on a pulley, T_behind u_behind - T_before u_before: with the
+    inclination gamma of the spans of eq. 20 they are paper 000's eqs 28 to 31 with the signs of
+    docs/cables.md.  The rope comes to the first pulley, and goes to a winch at its other end, along
+    the boom; where it ends at the last hinge, the force is on its end.
+
+    Returns
+    -------
+    xr.DataArray
+        In N, over (section, node, component, time), sections in the order from the winch; see
+        ``NODES`` and ``COMPONENTS``.
+    """
+    at = section_spans(dataset, plane)
+    cos_entry, cos_behind = (np.divide(*each) for each in zip(at.level, at.lengths, strict=True))
+    sin_entry, sin_behind = (at.drop / length for length in at.lengths)
+    found = np.zeros((len(at.entry), len(NODES), len(COMPONENTS), at.entry.shape[1]))
+    found[:, 0, 0], found[:, 0, 1] = at.entry * cos_entry, at.entry * sin_entry
+    found[:, 1, 0] = at.behind * cos_behind - at.entry * cos_entry
+    found[:, 1, 1] = -at.behind * sin_behind - at.entry * sin_entry
+    found[:, 2, 0], found[:, 2, 1] = -at.behind * cos_behind, at.behind * sin_behind
+    turn = [angle[:, None] for angle in at.half_turns]
+    found[1:, 0, 0] -= (at.arriving * np.cos(turn[0]))[1:]
+    found[1:, 0, 2] -= (at.arriving * np.sin(turn[0]))[1:]
+    found[:-1, 2, 0] += (at.after * np.cos(turn[1]))[:-1]
+    found[:-1, 2, 2] += (at.after * np.sin(turn[1]))[:-1]
+    found[0, 0, 1] += at.arriving[0]
+    if at.cable.end == "both":
+        found[-1, 2, 1] += at.after[-1]
+    coordinates = {
+        "node": list(NODES), "component": list(COMPONENTS), "time": dataset["time"]
+    }  # fmt: skip
+    words = {"long_name": "force of the cable on a pulley", "units": "N"}
+    dims = ("section", "node", "component", "time")
+    return xr.DataArray(found, coordinates, dims, "nodal_force", words)
+
+
+# Spans and tensions of a cable over time.
+
+
+def section_series(dataset: xr.Dataset, plane: str) -> xr.Dataset:
+    """A cable's quantities by section over time from a recorded run of a ring.
+
+    Tensions and the rope's strain are recorded; span lengths are recomputed from the opening angles
+    on the ideal geometry of one section (see ``ringsim.plots.rods_and_cables``).
+
+    ``dataset`` has ``cable_tension``, ``rope_strain`` and ``opening_angle``; ``plane`` is one with
+    a cable, whose rope no fault has split.
+
+    Returns
+    -------
+    xr.Dataset
+        Over (section, time), sections in the order from the winch: ``neutral_length`` (m, rope
+        without tension: a slack rope has more of it than length), ``elongation`` (mm) and
+        ``tension`` (N) of the span between the section's first hinge pulley and its V pulley;
+        ``decay``, the tension behind the section over that before it, NaN while the rope is slack.
+    """
+    at = section_spans(dataset, plane)
+    taut = at.arriving > at.cable.slack_width
+    strain = at.entry / at.cable.axial_stiffness
+    loose = np.minimum(dataset["rope_strain"].sel(plane=plane).values, 0.0)
+    neutral = at.lengths[0] / (1.0 + np.where(loose < 0.0, loose, strain))
+    decay = np.where(taut, at.after / np.where(taut, at.arriving, 1.0), np.nan)
+    found = xr.Dataset(coords={"time": dataset["time"]})
+    for name, values, words, units in (
+        ("neutral_length", neutral, "neutral length of a span", "m"),
+        ("elongation", 1e3 * strain * neutral, "span elongation", "mm"),
+        ("decay", decay, "decay factor of a section", "1"),
+        ("tension", at.entry, "tension at section start", "N"),
+    ):
+        found[name] = (("section", "time"), values, {"long_name": words, "units": units})
+    return found
+
+
+@style.styled
+def cables(dataset: xr.Dataset) -> Figure:
+    """Neutral lengths, elongations, decays and tensions, section by section.
+
+    One column for each plane with a cable; colour counts the sections from the winch.  Bands hold
+    the tensions of all spans, and the span with ``peak_tension`` is drawn beside the sections'.
+    """
+    tension = dataset["cable_tension"]
+    planes = tension.dropna("plane", how="all")["plane"].values.tolist()
+    series = {plane: section_series(dataset, plane) for plane in planes}
+    names = list(series[planes[0]])
+    sections = dataset.sizes["section"]
+    colours = style.section_colours(sections)
+    until = style.deployment_time(dataset)
+    until = until if math.isfinite(until) else math.inf
+    peak = peak_of(dataset, "cable_tension", "peak_tension", "peak_tension", until)
+    figure = Figure(figsize=(5.4 * len(planes) + 0.4, 2.1 * len(names) + 0.8))
+    grid = figure.subplots(len(names), len(planes), sharex=True, sharey="row", squeeze=False)
+    for number, (column, plane) in enumerate(zip(grid.T, planes, strict=True)):
+        style.time_axes(dataset, dataset["opening_angle"], *column, named=number == 0)
+        for axes, name in zip(column, names, strict=True):
+            for section, row in enumerate(series[plane][name].values):
+                axes.plot(
+                    dataset["time"], row, color=colours(section), linewidth=1.2,
+                    label=f"section {section + 1}",
+                )  # fmt: skip
+        style.name_panel(column[0], f"{plane} cable", height=0.2)
+    for row, name in zip(grid, names, strict=True):
+        drawn = np.concatenate([series[plane][name].values for plane in planes])
+        if name == "tension":
+            drawn = np.append(tension.values, peak.value)
+        row[0].set_ylabel(style.label(series[planes[0]][name], width=26))
+        if name not in ("neutral_length", "decay"):
+            style.span_sizes(row[0], np.where(drawn > 1e-6, drawn, np.nan))
+    for axes, plane in zip(grid[names.index("tension")], planes, strict=True):
+        spans = tension.sel(plane=plane)
+        least, most = spans.min("span"), spans.max("span")
+        axes.fill_between(dataset["time"], least, most, color=style.PALE, linewidth=0.0)
+        if plane == peak.place["plane"]:
+            worst = peak.within(spans.sel(span=peak.place["span"]))
+            axes.plot(*worst, color=style.VERMILLION, linewidth=1.0, zorder=3)
+            later = " until all have locked" if float(tension.max()) > peak.value else ""
+            name = spans.sel(span=peak.place["span"]).coords.get("span_name")
+            place = f"span {peak.place['span']}" + (f", {name.item()}" if name is not None else "")
+            mark(axes, peak, str(tension.attrs["units"]), place + later)
+    style.name_sections(figure, grid[0, 0], sections)
+    style.head(figure, grid[0, 0], dataset, "Cables")
+    return figure
+
+
+# How much of the tension every pulley passes on, over time.
+
+
+_SECTIONS = 4
+_LINES = ((style.BLUE, "-"), (style.ORANGE, "-"), (style.GREEN, (0, (5, 3))))
+"""Both hinge pulleys of a section between others are alike."""
+
+
+@style.styled
+def pulleys(dataset: xr.Dataset) -> Figure:
+    """``pulley_ratio`` (plane, pulley, time), three curves a section (paper 000, figs 6 and 7).
+
+    One column for each plane with a cable; rows are sections in the order from the winch, of many
+    the first, the last and two between.
+    """
+    ratio = dataset["pulley_ratio"].dropna("plane", how="all")
+    planes, sections = ratio["plane"].values.tolist(), dataset.sizes["section"]
+    shown = style.some_sections(sections, _SECTIONS)
+    figure = Figure(figsize=(5.4 * len(planes) + 0.4, 2.3 * len(shown) + 1.0))
+    grid = figure.subplots(len(shown), len(planes), sharex=True, sharey=True, squeeze=False)
+    for number, (column, plane) in enumerate(zip(grid.T, planes, strict=True)):
+        style.time_axes(dataset, dataset["opening_angle"], *column, named=number == 0)
+        own = ratio.sel(plane=plane).transpose("pulley", "time").values
+        for axes, section in zip(column, shown, strict=True):
+            for node, (colour, dash), row in zip(NODES, _LINES, own[3 * section :], strict=False):
+                line = {"color": colour, "linestyle": dash, "label": f"{node} pulley"}
+                axes.plot(dataset["time"], row, linewidth=1.5, **line)
+            style.name_panel(axes, f"{plane} cable, section {section + 1} from the winch")
+    known = own[np.isfinite(own)]
+    for axes in grid[:, 0]:
+        axes.set_ylabel("Tension behind\nover before")
+    low = float(known.min()) if known.size else 0.0
+    grid[0, 0].set_ylim(low - 0.1 * (1.0 - low), 1.0 + 0.1 * (1.0 - low))
+    lines = grid[0, 0].get_legend_handles_labels()[0]
+    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))
+    style.head(figure, grid[0, 0], dataset, "Pulleys")
+    return figure
+
+
+# Forces of the cables on the pulleys of every section over time.
+
+
+_DRAWN = ("along", "inwards")
+
+
+@style.styled
+def nodal_forces(dataset: xr.Dataset) -> Figure:
+    """Components of the force on the pulleys of every section (paper 000, figs 9 and 10).
+
+    One column for each plane with a cable; colour counts the sections from the winch.
+    """
+    tension = dataset["cable_tension"]
+    planes = tension.dropna("plane", how="all")["plane"].values.tolist()
+    forces = {plane: pulley_forces(dataset, plane) for plane in planes}
+    rows = [(node, component) for node in NODES for component in _DRAWN]
+    sections = dataset.sizes["section"]
+    colours = style.section_colours(sections)
+    figure = Figure(figsize=(5.4 * len(planes) + 0.4, 1.9 * len(rows) + 0.8))
+    grid = figure.subplots(len(rows), len(planes), sharex=True, sharey="row", squeeze=False)
+    for number, (column, plane) in enumerate(zip(grid.T, planes, strict=True)):
+        style.time_axes(dataset, dataset["opening_angle"], *column, named=number == 0)
+        for axes, (node, component) in zip(column, rows, strict=True):
+            for section, row in enumerate(forces[plane].sel(node=node, component=component).values):
+                axes.plot(
+                    dataset["time"], row, color=colours(section), linewidth=1.2,
+                    label=f"section {section + 1}",
+                )  # fmt: skip
+            axes.axhline(0.0, color=style.GREY, linewidth=0.8, zorder=1.4)
+        style.name_panel(column[0], f"{plane} cable", height=0.2)
+    for row, (node, component) in zip(grid, rows, strict=True):
+        drawn = np.stack(
+            [one.sel(node=node, component=component).values for one in forces.values()]
+        )
+        row[0].set_ylabel(f"{node[:1].upper()}{node[1:]},\n{component} (N)")
+        style.signed_sizes(row[0], drawn)
+    style.name_sections(figure, grid[0, 0], sections)
+    style.head(figure, grid[0, 0], dataset, "Forces on the pulleys")
+    return figure
+
+
+# Resistance by kind against the drive, and the margin, over the opening angle.
+
+
+_SOURCES = (
+    style.SKY, style.ORANGE, style.GREEN, style.VERMILLION, style.PURPLE, style.BLUE, style.GREY,
+)  # fmt: skip
+
+
+@style.styled
+def drive(dataset: xr.Dataset) -> Figure:
+    """``drive_available``, ``drive_resistance`` and ``drive_margin`` (time) of a run, and
+    ``least_drive_margin``.
+
+    Drawn over the mean opening angle of all V-joints, as long as it grows; resistances that drive
+    are left out.
+    """
+    known = dataset.isel(time=np.flatnonzero(np.isfinite(dataset["drive_margin"].values)))
+    angle = known["opening_angle"].mean(("plane", "section")).values
+    grows = angle >= np.maximum.accumulate(angle)
+    angle, known = angle[grows], known.isel(time=grows)
+    figure = Figure(figsize=(8.0, 6.8))
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(5, 3))
+    kinds = [k for k in known["resistance"].values if (known["drive_resistance"].sel(
+        resistance=k) > 0.0).any()]  # fmt: skip
+    heights = [known["drive_resistance"].sel(resistance=k).clip(min=0.0) for k in kinds]
+    if kinds:
+        upper.stackplot(
+            angle, *(each.values for each in heights), labels=kinds,
+            colors=[_SOURCES[k % len(_SOURCES)] for k in range(len(kinds))], alpha=0.7,
+        )  # fmt: skip
+    upper.plot(
+        angle, known["drive_available"], color=style.INK, label="drive without pulleys' loss"
+    )
+    upper.set_ylim(bottom=0.0)
+    upper.set_ylabel(f"Force on the opening angle ({known['drive_available'].attrs['units']})")
+    figure.legend(*upper.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    margin = known["drive_margin"].values
+    lower.plot(angle, margin, color=style.BLUE)
+    lower.axhline(0.0, color=style.VERMILLION, linewidth=1.0, linestyle=(0, (4, 3)))
+    names = ("least_drive_margin_angle", "least_drive_margin")
+    where, least = (float(dataset[name]) for name in names)
+    lower.plot(where, least, "o", color=style.VERMILLION, markersize=6, zorder=4)
+    lower.annotate(
+        f"least margin {least:.2f} at {where:.0f} deg", (0.98, 0.95),
+        xycoords="axes fraction", ha="right", va="top",
+    )  # fmt: skip
+    lower.set_ylim(min(-0.2, 1.1 * least), _roof(margin))
+    lower.set_ylabel("Margin by the standard")
+    lower.set_xlabel("Mean opening angle (deg)")
+    style.head(figure, upper, dataset, "Drive and resistance")
+    return figure
+
+
+def _roof(margin: np.ndarray) -> float:
+    """Where the axis of the margin ends: a margin without resistance has no bound."""
+    return float(max(1.3 * np.median(margin), 2.0 * margin.min(), 0.5))

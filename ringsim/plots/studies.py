@@ -1,0 +1,198 @@
+"""Figures of accuracy and stability studies."""
+
+import textwrap
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.ticker import LogLocator
+
+from ringsim.analysis.engines import OUTPUTS
+from ringsim.analysis.stability import AGREE, ENGINES, OK, WRONG, axis_label
+from ringsim.plots import style
+
+# Error against cost: the work-precision figure of an accuracy study.
+
+
+_LOOKS = {
+    "as it stands": (style.INK, "*"),
+    "steps": (style.BLUE, "o"),
+    "constant step": (style.SKY, "s"),
+    "elements": (style.GREEN, "D"),
+    "formulation": (style.ORANGE, "^"),
+    "dissipation": (style.PURPLE, "v"),
+    "newton": (style.VERMILLION, "P"),
+    "setting": (style.GREY, "X"),
+}
+
+_WIDE = 300.0
+"""Ratio of costs from which on there is no room for numbers between powers of ten."""
+
+
+@style.styled
+def accuracy(found: xr.Dataset) -> Figure:
+    """One panel an output: relative error over processor time.
+
+    The line is the frontier of both engines: what settings are good for, which is no less than the
+    error of any finer one.  Hollow marks are runs of the frame engine.  ``found`` is from
+    ``ringsim.analysis.accuracy.judge``.
+    """
+    titles = OUTPUTS | {"energy": "energy balance"}
+    outputs = [name for name in titles if name in found.output.values]
+    figure, panels, columns = style.new_panels(len(outputs), 3.6, 3.0, 0.9, sharex=True)
+    for k, (panel, name) in enumerate(zip(panels, outputs, strict=True)):
+        _panel(panel, found.sel(output=name))
+        style.name_panel(panel, titles[name].capitalize())
+        if k % columns == 0:
+            panel.set_ylabel("Relative error")
+        if k + columns >= len(outputs):
+            panel.set_xlabel("Processor time of the run (s)")
+            panel.tick_params(labelbottom=True)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=5)
+    style.title(figure, str(found.attrs.get("title", "Accuracy")))
+    return figure
+
+
+def _panel(axes: Axes, found: xr.Dataset) -> None:
+    cost, error, ladder = found.cost.values, found.error.values, found.ladder.values
+    drawn, frame = np.isfinite(error) & (error > 0.0), found.fidelity.values == "frame"
+    axes.loglog()
+    wide = np.nanmax(cost) > _WIDE * np.nanmin(cost)
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
+    style.plain_numbers(axes.xaxis)
+    for name, (colour, marker) in _LOOKS.items():
+        for hollow in (False, True):
+            there = (ladder == name) & (frame == hollow)
+            if there.any():
+                own, (size, order) = there & drawn, (150, 4) if marker == "*" else (34, 3)
+                axes.scatter(
+                    cost[own], error[own], s=size, marker=marker, edgecolors=colour,
+                    facecolors="none" if hollow else colour, linewidths=1.0 if hollow else 0.0,
+                    label=f"frame: {name}" if hollow else name, alpha=0.9, zorder=order,
+                )  # fmt: skip
+    best = found.isel(rung=found.frontier.values & (error > 0.0)).sortby("cost")
+    axes.step(
+        best.cost, best.bound, where="post", color=style.INK, linewidth=1.1,
+        label="frontier: good for", zorder=2,
+    )  # fmt: skip
+    floor, known = float(found.uncertainty), error[drawn]
+    if known.size or floor > 0.0:
+        lowest = min(known.min(initial=np.inf), 0.5 * floor or np.inf)
+        axes.set_ylim(0.4 * lowest, 30.0 * max(known.max(initial=0.0), floor))
+    axes.axhspan(
+        (low := axes.get_ylim()[0]), max(floor, low), color=style.PALE, zorder=0.5, linewidth=0.0,
+        label="uncertainty of the reference",
+    )  # fmt: skip
+    if "engines_differ" in found:
+        axes.axhline(
+            float(found.engines_differ), color=style.GREY, linewidth=0.9, linestyle=":", zorder=1,
+            label="engines differ by",
+        )  # fmt: skip
+
+
+# The stability map: a panel for each pair of axes, a square for each cell.
+
+
+_AGAIN = "ok, after a new start"
+_CELLS: dict[str, tuple[str, str]] = {
+    OK: ("#cfe6f5", ""),
+    _AGAIN: (style.SKY, "r"),
+    "cut off": ("#d9d9d9", "t"),
+    "energy lost": (style.ORANGE, "L"),
+    "energy grew": (style.VERMILLION, "G"),
+    "blow-up": ("#7f0000", "B"),
+    "overloaded": (style.PURPLE, "P"),
+    "slackened": ("#b8860b", "k"),
+    "stalled": ("#bdbdbd", "s"),
+    "partly deployed": ("#b3cde3", "p"),
+    "not latched": ("#8c96c6", "l"),
+    "few steps": ("#fddbc7", "F"),
+    "tension bends": ("#f4a582", "W"),
+    "joint gap": ("#9970ab", "J"),
+    "Newton": (style.GREEN, "N"),
+    "step limit": ("#f0e442", "S"),
+    "time limit": ("#8c6d31", "T"),
+    "refused": ("#5e5e5e", "X"),
+    WRONG: ("black", "!"),
+}
+"""Colour and letter of each kind of cell; the letter tells what the colour may not."""
+_OTHER = ("#5e5e5e", "?")
+_OUTLINE: Any = {"facecolor": "none", "edgecolor": style.INK, "linewidth": 2.0}
+
+
+@style.styled
+def stability(whole: xr.Dataset) -> Figure:
+    """Panels over the values of two axes, which are listed, not to scale.
+
+    Panels of both engines stand side by side, and cells in which they differ have a frame.
+    ``whole`` is a judged map (``ringsim.analysis.stability.joined``).
+    """
+    most = 2 if ENGINES in whole else 3
+    figure, panels, columns = style.new_panels(whole.sizes["group"], 4.5, 3.5, 1.0, most=most)
+    seen: set[str] = set()
+    for number, axes in enumerate(panels):
+        cells = whole.isel(cell=(whole["of_group"] == number).values, group=number)
+        seen |= set(kinds := _kinds(cells))
+        _map(axes, cells, kinds)
+    handles = []
+    for word in [*filter(seen.__contains__, _CELLS), *sorted(seen - set(_CELLS))]:
+        colour, letter = _CELLS.get(word, _OTHER)
+        label = f"{letter}  {word}".strip()
+        handles.append(Patch(facecolor=colour, edgecolor=style.GREY, label=label))
+    if ENGINES in whole:
+        handles.append(Patch(label="the engines differ", **_OUTLINE))
+    most = min(len(handles), 2 * columns + 1)
+    figure.legend(handles=handles, loc="outside lower center", ncols=most)
+    style.title(figure, f"Stability map: {whole.sizes['cell']} runs and how they ended")
+    return figure
+
+
+def _map(axes: Axes, cells: xr.Dataset, kinds: list[str]) -> None:
+    x, column = np.unique(cells["x"].values, return_inverse=True)
+    y, row = np.unique(cells["y"].values, return_inverse=True)
+    for left, below, word in zip(column.tolist(), row.tolist(), kinds, strict=True):
+        colour, letter = _CELLS.get(word, _OTHER)
+        place = (left - 0.5, below - 0.5)
+        axes.add_patch(Rectangle(place, 1.0, 1.0, facecolor=colour, edgecolor="white", zorder=2))
+        # Dark by the eye's weights of red, green and blue.
+        ink = "white" if np.dot(to_rgb(colour), (0.3, 0.59, 0.11)) < 0.47 else style.INK
+        axes.text(left, below, letter, ha="center", va="center", fontsize=8, color=ink, zorder=3)
+    differ = ~cells[ENGINES].isin(["", AGREE]).values if ENGINES in cells else np.zeros(len(kinds))
+    for k in np.flatnonzero(differ).tolist():
+        axes.add_patch(
+            Rectangle((column[k] - 0.43, row[k] - 0.43), 0.86, 0.86, zorder=4, **_OUTLINE)
+        )
+    axes.set(xlim=(-0.5, len(x) - 0.5), ylim=(-0.5, len(y) - 0.5))
+    axes.set_xticks(range(len(x)), [_short(v) for v in x], fontsize=8)
+    axes.set_yticks(range(len(y)), [_short(v) for v in y], fontsize=8)
+    axes.grid(visible=False)
+    axes.set_title(str(cells["title"].values), color=style.INK, weight="bold")
+    axes.set_xlabel(_label(cells, "x", 44), fontsize=9)
+    axes.set_ylabel(_label(cells, "y", 32), fontsize=9)
+
+
+def _kinds(cells: xr.Dataset) -> list[str]:
+    restarted = cells["restarts"].values > 0.0
+    words = zip(cells["verdict"].values, cells["cause"].values, restarted, strict=True)
+    alone = {OK: OK, WRONG: WRONG}
+    return [_AGAIN if again and end == OK else alone.get(end, cause) for end, cause, again in words]
+
+
+def _label(group: xr.Dataset, axis: str, width: int) -> str:
+    label = axis_label(group, axis)
+    if "." not in label.split()[0]:  # a path stays as it is typed
+        label = label[:1].upper() + label[1:]
+    return textwrap.fill(label, width)
+
+
+def _short(value: float) -> str:
+    """A number as short as it is clear: 1e5, 0.03, 179.9."""
+    if value == 0.0 or 1e-3 <= abs(value) < 1e4:
+        return f"{value:.4g}"
+    digits, power = f"{value:.1e}".split("e")
+    return f"{digits.removesuffix('.0')}e{int(power)}"

@@ -1,0 +1,408 @@
+"""Distributions of inputs, and their values in arrays and in words."""
+
+import json
+import math
+import re
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+from scipy.special import ndtr, ndtri
+
+from ringsim.choice import OneOf
+from ringsim.overrides import section_of
+from ringsim.refusal import show
+from ringsim.scene import Scene
+from ringsim.units import ListIn, Model
+
+# Values of inputs: numbers, words, whole tables and lists of them, in arrays and in words.
+
+
+Values = NDArray[Any]
+"""Numbers, words, true and false; of dtype object where they are mixed, tables or lists."""
+
+_WORD = re.compile(r"(?!(true|false|inf|nan)$)[^\W\d_][\w .:/+-]*(?<! )")
+"""Texts that need no quotes in a label: others might read as several values, or as a number."""
+
+_ALIKE: tuple[tuple[type, ...], ...] = ((bool,), (int,), (int, float), (str,))
+
+
+def array_of(values: Sequence[Any]) -> Values:
+    """One entry for each value, of the narrowest type that holds them unchanged.
+
+    >>> array_of([1, 2.5]).tolist(), array_of([5.0, "none"]).tolist()
+    ([1.0, 2.5], [5.0, 'none'])
+    """
+    if any(all(type(value) in kinds for value in values) for kinds in _ALIKE):
+        return np.array(values)
+    # Entry by entry: numpy would take lists apart and turn numbers beside words into words.
+    array = np.empty(len(values), dtype=object)
+    for k, value in enumerate(values):
+        array[k] = value
+    return array
+
+
+def plain(entry: Any) -> Any:
+    """An entry or row of an array as TOML would give it."""
+    return entry.tolist() if isinstance(entry, (np.generic, np.ndarray)) else entry
+
+
+def label_of(value: Any) -> str:
+    """A value in a few words, the same ones for equal values and others for others.
+
+    Lists of tables, as of faults, have no brackets: no field takes both a table and a list of one,
+    and an empty list is what "none" gives.
+
+    >>> label_of([{"kind": "stall", "max_tension": 20.0}]), label_of([]), label_of([5.0, "x"])
+    ('stall(max_tension=20.0)', 'none', '[5.0, x]')
+    """
+    match value:
+        case list() | tuple() if value and all(isinstance(each, dict) for each in value):
+            return ", ".join(map(_part, value))
+        case list() | tuple() if not value:
+            return "none"
+        case _:
+            return _part(value)
+
+
+def _part(value: Any) -> str:
+    match value:
+        case dict():
+            parts = {key: _part(value[key]) for key in sorted(value)}
+            kind = parts.pop("kind", "")
+            return f"{kind}({', '.join(f'{_part(key)}={part}' for key, part in parts.items())})"
+        case list() | tuple():
+            return f"[{', '.join(map(_part, value))}]"
+        case bool():
+            return str(value).lower()
+        case str() if not _WORD.fullmatch(value):
+            return json.dumps(value)
+        case _:
+            return str(value)
+
+
+def labels_of(values: Values) -> Values:
+    """The labels of all values, same shape."""
+    labels: Values = np.array([label_of(plain(each)) for each in values.ravel()], dtype=str)
+    return labels.reshape(values.shape)
+
+
+def extremes_of(values: Values) -> set[int]:
+    """Samples, along the first axis, with the least and the greatest number and each other value.
+
+    >>> sorted(extremes_of(array_of([2.0, "none", 3.0, 1.0, "none"])))
+    [1, 2, 3]
+    """
+    width, flat = values[0].size if values.ndim > 1 else 1, values.ravel()
+    if flat.dtype.kind in "iuf":
+        return {int(flat.argmin()) // width, int(flat.argmax()) // width}
+    # Beside words numbers are many, and only their ends tell anything.
+    numbers = [float(v) if type(v) in (int, float) else np.nan for v in map(plain, flat)]
+    words = np.flatnonzero(~np.isfinite(numbers))
+    found = set(words[np.unique(labels_of(flat[words]), return_index=True)[1]].tolist())
+    if np.isfinite(numbers).any():
+        found |= {int(np.nanargmin(numbers)), int(np.nanargmax(numbers))}
+    return {int(k) // width for k in found}
+
+
+def is_label(name: str) -> bool:
+    """Whether a column of that name can only tell samples apart, as no scene has such a field."""
+    return "." not in name and section_of(name)[0] not in Scene.model_fields
+
+
+# The family of distributions: each one maps probabilities to values of an input.
+
+
+Array = NDArray[np.float64]
+
+
+class Distribution(Model):
+    """Distribution of one scene field, in the field's own unit."""
+
+    each_section: bool = False
+    """Draw one independent value for every section instead of one for all."""
+    shared: Annotated[tuple[str, ...], ListIn] = ()
+    """Scene paths that all take the value drawn; the key of the input is then only its name."""
+
+    def quantile(self, probability: Array) -> Values:
+        """Values at cumulative probabilities in the open interval (0, 1), same shape."""
+        raise NotImplementedError
+
+    def levels(self, count: int) -> Array:
+        """Probabilities of ``count`` grid points: middles of intervals of equal probability."""
+        return (np.arange(count) + 0.5) / count
+
+    def log_density(self, values: Values) -> Array:
+        """Logarithm of the density, or of the probability of each value; -inf where there is none.
+
+        Raises TypeError for what is no value of this kind of distribution.
+        """
+        raise NotImplementedError
+
+
+class Continuous(Distribution):
+    """A distribution over an interval of real numbers."""
+
+    def probability(self, value: float) -> float:
+        """Cumulative probability of ``value``."""
+        raise NotImplementedError
+
+
+def inside(probability: Array) -> Array:
+    """Probabilities moved off the ends 0 and 1, where quantiles may be infinite."""
+    return np.clip(probability, 2.0**-54, 1.0 - 2.0**-53)
+
+
+# A finite set of values.
+
+
+class Discrete(Distribution):
+    """Each of the values with its probability; all alike if none are given.
+
+    >>> rods = Discrete(values=("soft", "stiff"), probabilities=(0.3, 0.7))
+    >>> rods.quantile(np.array([0.2, 0.4])).tolist()
+    ['soft', 'stiff']
+    """
+
+    kind: Literal["discrete"] = "discrete"
+    values: Annotated[tuple[Any, ...], ListIn]
+    """Numbers, words, true and false, whole tables or lists of them, mixed as the field allows."""
+    probabilities: Annotated[tuple[Annotated[float, Field(gt=0.0)], ...] | None, ListIn] = None
+    """One for each value, which add up to 1; left out, all alike."""
+
+    @model_validator(mode="after")
+    def _fitting(self) -> Self:
+        if not self.values:
+            raise ValueError("values must hold at least one value")
+        for number, value in enumerate(self.values, 1):
+            try:
+                json.dumps(value, allow_nan=False)  # as files will hold it
+            except (TypeError, ValueError):
+                raise ValueError(
+                    f"values[{number}] = {show(value)} must be a finite number, text, true or "
+                    "false, a table, or a list of these"
+                ) from None
+        if len(set(labels_of(array_of(self.values)).tolist())) < len(self.values):
+            raise ValueError(f"values = {show(self.values)} must differ from each other")
+        if self.probabilities is not None:
+            if len(self.probabilities) != len(self.values):
+                raise ValueError(
+                    f"probabilities has {len(self.probabilities)} entries and must have "
+                    f"{len(self.values)}, one for each of the values"
+                )
+            if abs(sum(self.probabilities) - 1.0) > 1e-9:
+                raise ValueError(
+                    f"probabilities add up to {sum(self.probabilities):g} and must add up to 1"
+                )
+        return self
+
+    def _upper_ends(self) -> Array:
+        shares = self.probabilities or (1.0 / len(self.values),) * len(self.values)
+        upper: Array = np.cumsum(shares)
+        return upper
+
+    def quantile(self, probability: Array) -> Values:
+        """The value whose interval of cumulative probability holds the given one."""
+        chosen = np.searchsorted(self._upper_ends()[:-1], probability, side="right")
+        values: Values = array_of(self.values)[chosen]
+        return values
+
+    def log_density(self, values: Values) -> Array:
+        """Logarithm of the probability of each value; of words and tables also by their labels."""
+        shares = self.probabilities or (1.0 / len(self.values),) * len(self.values)
+        known: dict[Any, float] = {}
+        for value, share in zip(self.values, shares, strict=True):
+            number = type(value) in (int, float)
+            known |= {label_of(value): share, str(value): share}
+            known |= {float(value): share} if number else {}
+        plainly = (plain(each) for each in np.ravel(values))
+        keys = (float(v) if type(v) in (int, float) else v for v in plainly)
+        found = [known.get(k if isinstance(k, (str, float)) else label_of(k), 0.0) for k in keys]
+        with np.errstate(divide="ignore"):
+            logarithms: Array = np.log(np.array(found)).reshape(np.shape(values))
+        return logarithms
+
+    def levels(self, count: int) -> Array:
+        """One probability for each value, whatever ``count`` is: the middle of its interval."""
+        upper = self._upper_ends()
+        middle: Array = 0.5 * (upper + np.concatenate([[0.0], upper[:-1]]))
+        return middle
+
+
+# Normal distribution.
+
+
+class Normal(Continuous):
+    """Density exp(-(x - mean)^2 / (2 s^2)) / (s sqrt(2 pi)), s the standard deviation.
+
+    >>> Normal(mean=120e9, standard_deviation=6e9).quantile([0.5]).tolist()
+    [120000000000.0]
+    """
+
+    kind: Literal["normal"] = "normal"
+    mean: float
+    """Mean of the values, in the unit of the input."""
+    standard_deviation: Annotated[float, Field(gt=0.0)]
+    """Standard deviation, in the unit of the input."""
+
+    def quantile(self, probability: Array) -> Array:
+        """Inverse of the cumulative distribution."""
+        values: Array = self.mean + self.standard_deviation * ndtri(probability)
+        return values
+
+    def log_density(self, values: Values) -> Array:
+        """Logarithm of the density above."""
+        scaled = (np.asarray(values, dtype=float) - self.mean) / self.standard_deviation
+        found: Array = -0.5 * scaled**2 - math.log(self.standard_deviation * math.sqrt(2 * math.pi))
+        return found
+
+    def probability(self, value: float) -> float:
+        """Cumulative distribution."""
+        return float(ndtr((value - self.mean) / self.standard_deviation))
+
+
+# Lognormal distribution.
+
+
+class Lognormal(Continuous):
+    """ln x is normal; mean and standard deviation are those of x itself.
+
+    Variance of ln x: ln(1 + (s / mean)^2); mean of ln x: ln(mean) minus half of that.
+
+    >>> Lognormal(mean=1.0, standard_deviation=0.2).quantile([0.5]).round(4).tolist()
+    [0.9806]
+    """
+
+    kind: Literal["lognormal"] = "lognormal"
+    mean: Annotated[float, Field(gt=0.0)]
+    """Mean of the values themselves, in the unit of the input."""
+    standard_deviation: Annotated[float, Field(gt=0.0)]
+    """Standard deviation of the values themselves, in the unit of the input."""
+
+    @property
+    def _logarithm(self) -> Normal:
+        deviation = math.sqrt(math.log1p((self.standard_deviation / self.mean) ** 2))
+        mean = math.log(self.mean) - 0.5 * deviation**2
+        return Normal.model_construct(mean=mean, standard_deviation=deviation)
+
+    def quantile(self, probability: Array) -> Array:
+        """Inverse of the cumulative distribution."""
+        return np.exp(self._logarithm.quantile(probability))
+
+    def log_density(self, values: Values) -> Array:
+        """That of ln x, less ln x."""
+        known = np.asarray(values, dtype=float)
+        logarithm = np.log(np.where(known > 0.0, known, 1.0))
+        found = self._logarithm.log_density(logarithm) - logarithm
+        return np.where(known > 0.0, found, -np.inf)
+
+    def probability(self, value: float) -> float:
+        """Cumulative distribution."""
+        return self._logarithm.probability(math.log(value)) if value > 0.0 else 0.0
+
+
+# A continuous distribution cut off at one or both ends.
+
+
+LEAST_MASS = 1e-6
+"""Probability between the bounds, at least: less is a mistake in the bounds."""
+
+
+class Truncated(Distribution):
+    """The distribution ``of``, given that its value lies between ``low`` and ``high``.
+
+    >>> from ringsim.sampling.distributions import Normal
+    >>> force = Truncated(of=Normal(mean=0.015, standard_deviation=0.002), low=0.015)
+    >>> force.quantile(np.array([0.0])).tolist()
+    [0.015]
+    """
+
+    kind: Literal["truncated"] = "truncated"
+    of: Annotated[Continuous, OneOf()]
+    """Distribution that is cut off."""
+    low: float | None = None
+    """Smallest value; left out, no lower bound."""
+    high: float | None = None
+    """Largest value; left out, no upper bound."""
+
+    @model_validator(mode="after")
+    def _some_mass(self) -> Self:
+        if self.low is None and self.high is None:
+            raise ValueError("truncated needs low, high or both; without them use the kind in of")
+        for name in ("each_section", "shared"):
+            if getattr(self.of, name):
+                raise ValueError(f"of.{name} must be given beside kind, not inside of")
+        below, above = self._ends()
+        if above - below < LEAST_MASS:
+            raise ValueError(
+                f"low = {self.low}, high = {self.high} keep a probability of {above - below:.1e} "
+                f"only, must be at least {LEAST_MASS:g}: widen the bounds or move the mean"
+            )
+        return self
+
+    def _ends(self) -> tuple[float, float]:
+        below = 0.0 if self.low is None else self.of.probability(self.low)
+        above = 1.0 if self.high is None else self.of.probability(self.high)
+        return below, above
+
+    def log_density(self, values: Values) -> Array:
+        """That of the whole distribution over what the bounds keep of it."""
+        below, above = self._ends()
+        low = -np.inf if self.low is None else self.low
+        high = np.inf if self.high is None else self.high
+        found = self.of.log_density(values) - np.log(above - below)
+        return np.where((values >= low) & (values <= high), found, -np.inf)
+
+    def probability(self, value: float) -> float:
+        """Cumulative probability of ``value``."""
+        below, above = self._ends()
+        return float(np.clip((self.of.probability(value) - below) / (above - below), 0.0, 1.0))
+
+    def quantile(self, probability: Array) -> Values:
+        """Inverse of the cumulative distribution, inside the bounds to the bit."""
+        below, above = self._ends()
+        values = self.of.quantile(below + (above - below) * probability)
+        clipped: Values = np.clip(values, self.low, self.high)
+        return clipped
+
+
+# Uniform distribution.
+
+
+class Uniform(Continuous):
+    """Constant density between low and high.
+
+    >>> Uniform(low=1.0, high=3.0).quantile(np.array([0.0, 0.25, 1.0])).tolist()
+    [1.0, 1.5, 3.0]
+    """
+
+    kind: Literal["uniform"] = "uniform"
+    low: float
+    """Smallest value."""
+    high: float
+    """Largest value."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.low >= self.high:
+            raise ValueError(f"low = {self.low} must be below high = {self.high}")
+        return self
+
+    def quantile(self, probability: Array) -> Array:
+        """Inverse of the cumulative distribution; its ends are low and high to the bit."""
+        return self.low * (1.0 - probability) + self.high * probability
+
+    def levels(self, count: int) -> Array:
+        """From end to end: both are values that can occur."""
+        return np.linspace(0.0, 1.0, count) if count > 1 else super().levels(count)
+
+    def log_density(self, values: Values) -> Array:
+        """Of a constant density."""
+        within = (values >= self.low) & (values <= self.high)
+        return np.where(within, -np.log(self.high - self.low), -np.inf)
+
+    def probability(self, value: float) -> float:
+        """Cumulative distribution."""
+        return float(np.clip((value - self.low) / (self.high - self.low), 0.0, 1.0))

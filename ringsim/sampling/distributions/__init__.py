@@ -1,1 +1,0 @@
-"""Kinds of distributions, one file each."""

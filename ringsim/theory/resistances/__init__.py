@@ -1,1 +1,0 @@
-"""Kinds of resistance to opening, one file each."""
