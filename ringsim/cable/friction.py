@@ -20,7 +20,7 @@ from ringsim.units import FrictionCoefficient, MetreOrZero, Model
 # falling to v at the V pulley next to the fixed end; with two winches m counts from where the rope
 # rests between them.  The tension there is too high by
 #
-#     exp(sum over pulleys of \|ln eta\| (1 - tanh(m v / s_slip))) - 1,
+#     exp(sum over pulleys of |ln eta| (1 - tanh(m v / s_slip))) - 1,
 #
 # which hardly depends on N; docs/cables.md lists it.
 

@@ -1,7 +1,7 @@
-"""A new friction law and a new winding law: one file each, picked by its kind, nothing else.
+"""A new friction law and a new winding law: one record each, picked by its kind, nothing else.
 
-The files stand in ``own_laws`` and are put beside ringsim's own before it is imported, as if they
-lay in its folders; therefore this runs in a process of its own.
+The records stand in files of ``own_laws``, which a script imports before it reads its scene; they
+stay known as long as it runs, therefore it is a process of its own.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ RUN = """
 import importlib, json, sys
 sys.dont_write_bytecode = True
 folder, values = sys.argv[1], json.loads(sys.argv[2])
-for family in ("friction", "winding"):
-    importlib.import_module(f"ringsim.cable.{family}").__path__.append(f"{folder}/{family}")
+sys.path.insert(0, folder)
+for law in ("sheave_efficiency", "pulsating"):
+    importlib.import_module(law)
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
 scene = load_scene("truss2").with_values(values)
