@@ -134,7 +134,7 @@ def section_spans(dataset: xr.Dataset, plane: str) -> SectionSpans:
     """What the opening angles and tensions of a recorded run of a ring say of a cable's sections.
 
     Nothing else is taken from the run: hinge pulleys stand in one line along each section, and its
-    V pulley where ``ringsim.cable.bracket`` puts it at the section's opening angle.  ``dataset``
+    V pulley where ``ringsim.cable.records`` puts it at the section's opening angle.  ``dataset``
     has ``cable_tension`` and ``opening_angle``; ``plane`` is one with a cable.
     """
     scene = scene_from_toml(str(dataset.attrs["scene"]), source="attribute scene")
