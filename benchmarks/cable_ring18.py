@@ -17,9 +17,9 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
-from ringsim.engine.build import build
-from ringsim.engine.cables import CableDrive
-from ringsim.engine.integrate import Integration
+from ringsim.exudyn.build import build
+from ringsim.exudyn.cables import CableDrive
+from ringsim.exudyn.integrate import Integration
 from ringsim.outputs.recorder import Recorder
 from ringsim.scene import Scene, load_scene
 

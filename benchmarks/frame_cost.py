@@ -53,7 +53,7 @@ def scene_of(name: str) -> Any:
 
 def solve_of(fidelity: str) -> Any:
     if fidelity == "full":
-        from ringsim.engine.integrate import solve
+        from ringsim.exudyn.integrate import solve
     else:
         from ringsim.frame.integrate import solve
     return solve

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ringsim.choice import kind_of
-from ringsim.engine.build import build
+from ringsim.exudyn.build import build
 from ringsim.outputs.balance import differences, error_bars
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene

@@ -13,8 +13,8 @@ import statistics
 import subprocess
 import sys
 
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import load_scene
-from ringsim.theory.statics import OneCoordinate, opening_time
 
 OURS = """
 import ringsim, time

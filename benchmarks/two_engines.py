@@ -36,7 +36,7 @@ import random_load_scenes as loads
 import random_part_scenes as parts
 from random_scenes import random_scene
 
-from ringsim.engine.integrate import solve as by_exudyn
+from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.outputs.balance import differences, error_bars, largest, rules
 from ringsim.parts.solver import Solver

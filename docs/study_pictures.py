@@ -22,11 +22,11 @@ from ringsim.analysis.intervals import good, share_interval
 from ringsim.analysis.tails import replicated_interval, subset_simulation
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import LOOKS
+from ringsim.rigid.drive import Drive
+from ringsim.rigid.mechanism import Mechanism
+from ringsim.rigid.resistances import Opening, resistances
 from ringsim.sampling.subset_levels import Repetition, levels
 from ringsim.scene import scene_from_toml
-from ringsim.theory.drive import Drive
-from ringsim.theory.mechanism import Mechanism
-from ringsim.theory.resistances import Opening, resistances
 from ringsim.variables import PLANES
 
 NEVER = 66.0

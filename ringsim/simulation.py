@@ -22,12 +22,12 @@ from ringsim.outputs.family import holds
 from ringsim.outputs.recorder import StoredState
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError, known_or_nearest, show
+from ringsim.rigid.margin import with_margin
 from ringsim.scene import Scene, load_scene
 from ringsim.scene.substituted import substituted
 from ringsim.stepping.ending import run_with_restarts
 from ringsim.stepping.instant import Instant
 from ringsim.stored_state import require_fit
-from ringsim.theory.margin import with_margin
 from ringsim.threads import one_thread
 from ringsim.variables import GONE, Cause, Fidelity, Outcome, Status
 
@@ -63,14 +63,14 @@ def run(
     """
     require_fit(start, scene, "full")
     prepare_run(scene)
-    from ringsim.engine.integrate import solve
+    from ringsim.exudyn.integrate import solve
 
     return _run(solve, Fidelity.FULL, scene, watch)
 
 
 def prepare_run(scene: Scene) -> None:
     """Load what ``run`` needs, so that the time of the first run is that of a run."""
-    import ringsim.engine.integrate  # noqa: F401
+    import ringsim.exudyn.integrate  # noqa: F401
 
 
 def run_frame(

@@ -22,9 +22,9 @@ from ringsim.analysis.ladder import (  # fmt: skip
 )
 from ringsim.campaign.run import run_cases
 from ringsim.refusal import InputError
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene
 from ringsim.simulation import why_not_frame
-from ringsim.theory.statics import OneCoordinate, opening_time
 from ringsim.variables import GOALS, Fate, Status
 
 _STEP_LIMIT = 1_000_000

@@ -21,11 +21,11 @@ from ringsim.overrides import place_of
 from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.margin import MarginStandard
 from ringsim.refusal import InputError, known_or_nearest, show
+from ringsim.rigid.drive import changes_drive, told, turns_ever
+from ringsim.rigid.margin import MOST, DriveMargin, Margin, PlaneMargin
 from ringsim.scene import Scene, builtin_scenes, load_scene, scene_from_toml
 from ringsim.scene.substituted import strained, substituted
 from ringsim.tables import text_table
-from ringsim.theory.drive import changes_drive, told, turns_ever
-from ringsim.theory.margin import MOST, DriveMargin, Margin, PlaneMargin
 from ringsim.units import Model
 from ringsim.variables import Variable
 
@@ -171,7 +171,7 @@ def _assembly(scene: Scene) -> str:
     if not strained(scene):
         return ""
     # Here: few scenes need them, and they load scipy.
-    from ringsim.theory.assembling import assembled, deployed
+    from ringsim.rigid.assembling import assembled, deployed
 
     made = substituted(scene)
     try:

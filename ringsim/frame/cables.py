@@ -48,7 +48,7 @@ from ringsim.stepping.locks import Turning
 # A point stands at X + R (arm + C Rz(share theta) b) of a frame X, R: a pulley on a hinge assembly
 # has b = 0, one on a bar half turns with its joint (share 1, or 0 on the half that is the frame),
 # and a block on the bisector of two halves turns half as far, b = (0, -sense h, 0): the bisector of
-# ``ringsim.engine.cable_path`` for relative turns of the halves below three quarters of a turn.
+# ``ringsim.exudyn.cable_path`` for relative turns of the halves below three quarters of a turn.
 
 
 class Lines(NamedTuple):
@@ -300,7 +300,7 @@ class FrameCables:
     Attributes
     ----------
     present, winches, ropes
-        As of ``ringsim.engine.cables.CableDrive``.
+        As of ``ringsim.exudyn.cables.CableDrive``.
     lines, points
         What the paths run over; number of their points.
     """

@@ -19,12 +19,12 @@ from ringsim.layout.bodies import Array
 from ringsim.outputs.recorder import Recorder, States, StoredState, cleared, struck_by
 from ringsim.parts.faults import AT_ONCE, FailedSpring, Fault, StuckVJoint
 from ringsim.refusal import InputError
+from ringsim.rigid.statics import scales_of
 from ringsim.scene import Scene
 from ringsim.stepping.control import RunControl, go_on
 from ringsim.stepping.events import Events, extrapolated
 from ringsim.stepping.instant import Instant, Memory, Remembering, Strained
 from ringsim.stepping.locks import Latches, locks_of
-from ringsim.theory.statics import scales_of
 from ringsim.variables import Outcome
 
 # Broyden's method: what a tangent that is not renewed learns from the changes made with it.
@@ -186,7 +186,7 @@ class Integration(Remembering):
 
     def _damped(self, step: float, after: State) -> Strains:
         """How the rates of strains follow from strains: the backward differences of second order
-        of ringsim.engine.assembly.
+        of ringsim.exudyn.assembly.
         """
         now = self._now.strains
         if not self._steps:

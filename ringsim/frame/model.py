@@ -26,15 +26,15 @@ from ringsim.layout.bodies import Array
 from ringsim.layout.layout import layout_of
 from ringsim.parts.rods import GeometricallyExactRods
 from ringsim.refusal import InputError
-from ringsim.scene import Scene
-from ringsim.theory.assembling import assembled
-from ringsim.theory.statics import (
+from ringsim.rigid.assembling import assembled
+from ringsim.rigid.statics import (
     OneCoordinate,
     coordinates,
     first_acceleration,
     residual_tolerance,
     rope_reach,
 )
+from ringsim.scene import Scene
 
 
 class FrameModel:

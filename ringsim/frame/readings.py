@@ -12,9 +12,9 @@ from ringsim.layout.bodies import Array, OnBody, OnRod
 from ringsim.layout.points import BOOM_TIP, HUB, Where, points_of
 from ringsim.outputs.family import Carried, Put, Reading
 from ringsim.refusal import InputError
+from ringsim.rigid.statics import first_reaction
 from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Energies, Instant, Passing, Remembering, lost_between
-from ringsim.theory.statics import first_reaction
 
 # Places and velocities of a structure's points in joint coordinates.
 

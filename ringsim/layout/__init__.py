@@ -1,1 +1,1 @@
-"""What a structure consists of, in numpy: read by every engine, by theory, checks and drawings."""
+"""What a structure consists of, in numpy: read by engines, the rigid mechanism and drawings."""

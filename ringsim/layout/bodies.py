@@ -138,7 +138,7 @@ class Rod:
     length, from 0 to 1, at which nodes are, with elements between; ``masses`` are point masses on
     nodes: station, kg, and what they are called.  ``young_modulus`` in Pa, ``density`` in kg/m^3.
     It is made longer than it is drawn by the share ``strain``; an assembled structure
-    (``ringsim.theory.assembling``) tells where its ``nodes`` then are, one a station.
+    (``ringsim.rigid.assembling``) tells where its ``nodes`` then are, one a station.
     """
 
     name: str

@@ -168,7 +168,7 @@ LAST_LOCK = "deployment_time"
 class DriveMargins(Output):
     """Static generalised forces on the opening angle of the ideal ring at the mean one of the run.
 
-    See ``ringsim.theory.margin``.
+    See ``ringsim.rigid.margin``.
     """
 
     rank = 46
@@ -210,7 +210,7 @@ class DriveMargins(Output):
         return f"at {angle:.4g} deg and {time:.4g} s: {word}"
 
     def reduce(self, run: Run, series: Series) -> Values:
-        """Nothing: ``ringsim.theory.margin`` knows them."""
+        """Nothing: ``ringsim.rigid.margin`` knows them."""
         return {}
 
 

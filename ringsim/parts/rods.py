@@ -64,7 +64,7 @@ class LengthError(Model):
     """How much longer rods are made than they are drawn, (L - L_drawn) / L_drawn.
 
     The structure is put together with the least elastic energy at the mean opening angle with which
-    it starts (``ringsim.theory.assembling``), and released at rest; masses stay those that are
+    it starts (``ringsim.rigid.assembling``), and released at rest; masses stay those that are
     drawn.  ``diagonal_falling`` runs from the upper pin on the left to the lower one on the right.
     """
 
@@ -133,7 +133,7 @@ class AncfRods(Rods):
     Source: papers 000 and 002, eq. 1; exudyn ObjectANCFBeam.  It does not tell what its damping
     takes: with damping there is no stress, the dissipation and the energy error are NaN, and steps
     are not judged by their energy.  Its damping works against the integrator's own velocities,
-    which brake a rod that turns along its axis where steps are long (``ringsim.engine.assembly``
+    which brake a rod that turns along its axis where steps are long (``ringsim.exudyn.assembly``
     cures that for the other kind of rods): leave damping out, or take steps of some milliseconds.
 
     An element has constant curvature: a rod half in one is a quarter too stiff in bending, in n

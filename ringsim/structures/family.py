@@ -85,7 +85,8 @@ class Structure(Model):
 
     def basis(self, coordinate: float) -> NDArray[np.float64]:
         """Functions s of the coordinate in which all places are linear, if a kind has some, so
-        that theory need not build a layout at each coordinate: every place is P s with constant P.
+        that the rigid mechanism need not build a layout at each coordinate: every place is P s
+        with constant P.
 
         Shape (2, functions): s, of which the first is 1, and its derivative.
         """

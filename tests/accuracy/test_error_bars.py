@@ -12,7 +12,7 @@ from ringsim.analysis.brief import budget_lines
 from ringsim.campaign.run import run_cases
 from ringsim.campaign.specification import load_campaign
 from ringsim.dataset import to_dataset
-from ringsim.engine import integrate
+from ringsim.exudyn import integrate
 from ringsim.outputs.balance import error_bars, refined, rules
 from ringsim.parts.solver import Solver
 from ringsim.refusal import InputError

@@ -11,10 +11,10 @@ import pytest
 from ringsim.layout.layout import layout_at_opening, layout_of
 from ringsim.parts.rods import LengthError
 from ringsim.refusal import InputError
+from ringsim.rigid.assembling import assembled, deployed
 from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 from ringsim.structures.family import HingeError
-from ringsim.theory.assembling import assembled, deployed
 from test_length_errors import Bar, of_pin_jointed_truss, ring, scattered
 
 PINS = tuple(HingeError.model_fields)

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringsim.engine.integrate import solve as by_exudyn
+from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.layout.bodies import STEP, Lump, Rod
 from ringsim.layout.draft import Draft
 from ringsim.layout.layout import Layout, layout_at_opening, layout_of
 from ringsim.parts.rods import LengthError
 from ringsim.refusal import InputError
+from ringsim.rigid.assembling import assembled, deployed, strains
 from ringsim.scene import Scene, load_scene
-from ringsim.theory.assembling import assembled, deployed, strains
 from ringsim.variables import Cause
 
 NAMES = tuple(LengthError.model_fields)
@@ -248,7 +248,7 @@ def test_a_start_that_assembly_does_not_account_for_is_told(
         longer = replace(first, strain=first.strain + 1e-4)
         return made._replace(layout=replace(made.layout, rods=(longer, *others)))
 
-    engine = {by_exudyn: "ringsim.engine.model", by_frames: "ringsim.frame.model"}[solve]
+    engine = {by_exudyn: "ringsim.exudyn.model", by_frames: "ringsim.frame.model"}[solve]
     monkeypatch.setattr(f"{engine}.assembled", wrong)
     found = solve(scene)
     assert found.status.word == "diverged"

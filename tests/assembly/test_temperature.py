@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from ringsim.refusal import InputError
+from ringsim.rigid.assembling import deployed
 from ringsim.scene import Scene, load_scene
 from ringsim.scene.substituted import substituted
 from ringsim.simulation import run_frame
-from ringsim.theory.assembling import deployed
 from test_length_errors import ring
 
 HEAT = {

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ringsim.engine.assembly import turn_rates
-from ringsim.engine.build import Built, build
-from ringsim.engine.cables import CableDrive
+from ringsim.exudyn.assembly import turn_rates
+from ringsim.exudyn.build import Built, build
+from ringsim.exudyn.cables import CableDrive
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run
 from ringsim.variables import Outcome

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from driven import outcome, truss
-from ringsim.engine.build import build
+from ringsim.exudyn.build import build
 from ringsim.refusal import InputError
+from ringsim.rigid.mechanism import Mechanism
 from ringsim.scene import Scene
-from ringsim.theory.mechanism import Mechanism
 from ringsim.variables import Outcome, Status
 
 

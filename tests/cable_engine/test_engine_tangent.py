@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from driven import Bench, Motion, truss
-from ringsim.engine.assembly import turn_rates
+from ringsim.exudyn.assembly import turn_rates
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import exudyn as exu
 import pytest
 
 from driven import truss, write_all
-from ringsim.engine.build import build
-from ringsim.engine.integrate import solver_settings
+from ringsim.exudyn.build import build
+from ringsim.exudyn.integrate import solver_settings
 
 
 def residuals(*, whole: bool, step: float) -> list[float]:

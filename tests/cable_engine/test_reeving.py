@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from ringsim.cable.records import Cable, Cables, FixedSheave, Winch
 from ringsim.cable.winding import ConstantWinding
-from ringsim.engine.assembly import Assembly
-from ringsim.engine.cable_path import CablePath
-from ringsim.engine.cables import CableDrive
+from ringsim.exudyn.assembly import Assembly
+from ringsim.exudyn.cable_path import CablePath
+from ringsim.exudyn.cables import CableDrive
 from ringsim.layout.bodies import Pose
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from driven import outcome, truss, write_all
-from ringsim.engine.build import build
-from ringsim.engine.cables import CableDrive
+from ringsim.exudyn.build import build
+from ringsim.exudyn.cables import CableDrive
 from ringsim.variables import Outcome, Status
 
 Array = NDArray[np.float64]

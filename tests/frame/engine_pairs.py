@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.integrate import solve as by_exudyn
+from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.scene import Scene
 from ringsim.variables import Outcome

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from momenta import Array, momenta
-from ringsim.engine.integrate import solve as by_exudyn
+from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import Integration
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.frame.model import FrameModel

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ringsim.engine.integrate import solve as by_exudyn
+from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.scene import load_scene
 from ringsim.stepping.instant import Passing, lost_between

@@ -9,8 +9,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from ringsim.frame.integrate import solve
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import load_scene
-from ringsim.theory.statics import OneCoordinate, opening_time
 
 AGREEMENT = 2e-5
 """What the steps leave: at 1e-6 of tolerance 7e-7 to 6e-6 for free rings, and at 5e-7 about 1e-5

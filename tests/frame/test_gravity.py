@@ -10,15 +10,15 @@ import pytest
 from rigid_motion import RigidRing
 from scipy.interpolate import CubicSpline
 
-from ringsim.engine.build import build
-from ringsim.engine.integrate import Integration as ByExudyn
-from ringsim.engine.integrate import solve as by_exudyn
+from ringsim.exudyn.build import build
+from ringsim.exudyn.integrate import Integration as ByExudyn
+from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import Integration as ByFrames
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.frame.model import FrameModel
 from ringsim.layout.layout import layout_of
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene, load_scene
-from ringsim.theory.statics import OneCoordinate, opening_time
 from test_base_reaction import Course, about_base, impulses, ring
 
 ASLANT = [0.3, 0.2, -1.0]

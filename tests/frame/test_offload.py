@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from numeric_tangent import Probe, error
-from ringsim.engine.integrate import solve as by_exudyn
+from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.layout.layout import layout_of
 from ringsim.parts.ground import Offload
+from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene
-from ringsim.theory.statics import OneCoordinate
 from test_base_reaction import ring
 
 DOWN = {"gravity.vector": [0.0, 0.0, -9.81]}

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from ringsim.engine.build import build
-from ringsim.engine.integrate import Integration as Exudyn
+from ringsim.exudyn.build import build
+from ringsim.exudyn.integrate import Integration as Exudyn
 from ringsim.frame.integrate import Integration as Frames
 from ringsim.frame.model import FrameModel
 from ringsim.outputs.corners import PeakAcceleration, Position

@@ -14,10 +14,10 @@ import ringsim
 from ringsim.layout.layout import internal_mobility, layout_of
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.refusal import InputError
+from ringsim.rigid.assembling import assembled
+from ringsim.rigid.margin import DriveMargin
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene, scene_from_toml
-from ringsim.theory.assembling import assembled
-from ringsim.theory.margin import DriveMargin
-from ringsim.theory.statics import OneCoordinate, opening_time
 from ringsim.variables import Fate, Status
 
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from ringsim.cable.records import BarHalfBracket
-from ringsim.engine.build import build
+from ringsim.exudyn.build import build
 from ringsim.layout.bodies import InSpace, Lump, OnBody, Pose
 from ringsim.layout.draft import Draft
 from ringsim.layout.layout import Layout, layout_at_opening, layout_of
+from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene, builtin_scenes, load_scene
 from ringsim.structures.family import Structure
-from ringsim.theory.statics import OneCoordinate
 
 STEP = 1e-6
 CLOSE = 1e-9

@@ -17,11 +17,11 @@ from ringsim.layout.draft import natural_lengths
 from ringsim.layout.layout import layout_of
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.refusal import InputError
+from ringsim.rigid.margin import DriveMargin
+from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene, load_scene
 from ringsim.shapes import shape_of
 from ringsim.simulation import simulate
-from ringsim.theory.margin import DriveMargin
-from ringsim.theory.statics import OneCoordinate
 
 STIFFNESS, STRAIN = 2000.0, 0.01
 NET = {"kind": "boundary", "axial_stiffness": STIFFNESS, "strain": STRAIN}

@@ -12,8 +12,8 @@ from motor_rings import MOTOR, PLAIN, STALL, ring
 from ringsim.layout.layout import layout_of
 from ringsim.parts.margin import EcssMechanisms, MarginStandard, NasaMechanisms
 from ringsim.refusal import InputError
+from ringsim.rigid.margin import PULLEYS, DriveMargin, PlaneMargin
 from ringsim.scene import Scene, load_scene
-from ringsim.theory.margin import PULLEYS, DriveMargin, PlaneMargin
 
 ANGLES = np.radians([62.0, 90.0, 130.0, 170.0, 179.0])
 STEP = 1e-4

@@ -15,10 +15,10 @@ from ringsim.layout.layout import layout_of
 from ringsim.parts.joints import HingeSpring, LinearSpring, TableSpring, TapeSpring
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.refusal import InputError
+from ringsim.rigid.margin import DriveMargin
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
-from ringsim.theory.margin import DriveMargin
-from ringsim.theory.statics import OneCoordinate, opening_time
 from ringsim.variables import Status
 
 LINEAR = {"kind": "linear", "stiffness": 0.004, "preload": 0.01}

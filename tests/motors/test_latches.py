@@ -20,10 +20,10 @@ from ringsim.outputs.joints import FastestLatch, Latching
 from ringsim.parts.joints import Latch
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.refusal import InputError
+from ringsim.rigid.margin import DriveMargin
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
-from ringsim.theory.margin import DriveMargin
-from ringsim.theory.statics import OneCoordinate, opening_time
 from ringsim.variables import Fate
 
 LATCH = {"peak_torque": 0.3, "reach": 8.0}

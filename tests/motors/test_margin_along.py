@@ -15,11 +15,11 @@ from motor_rings import PLAIN, ring
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.parts.margin import EcssMechanisms
+from ringsim.rigid import margin
+from ringsim.rigid.margin import DriveMargin, Passed, least_along, passed, with_margin
 from ringsim.scene import Scene
 from ringsim.simulation import simulate
 from ringsim.stored_state import read_state
-from ringsim.theory import margin
-from ringsim.theory.margin import DriveMargin, Passed, least_along, passed, with_margin
 from ringsim.variables import PLANES, Outcome, Status
 
 ECSS = {"kind": "ecss-e-st-33-01c"}

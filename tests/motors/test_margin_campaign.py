@@ -18,7 +18,7 @@ from ringsim.plots.campaign import figures
 from ringsim.refusal import InputError
 from ringsim.report import tables
 from ringsim.report.page import page
-from ringsim.theory.margin import MOST, DriveMargin, with_margin
+from ringsim.rigid.margin import MOST, DriveMargin, with_margin
 from ringsim.variables import PLANES, Fate, Outcome, Status
 
 REQUIRED = {

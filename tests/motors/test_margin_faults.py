@@ -17,8 +17,8 @@ from ringsim.cli import cli
 from ringsim.layout.layout import layout_of
 from ringsim.parts.faults import Fault
 from ringsim.parts.margin import EcssMechanisms
+from ringsim.rigid.margin import CABLES, DriveMargin, PlaneMargin
 from ringsim.scene import Scene
-from ringsim.theory.margin import CABLES, DriveMargin, PlaneMargin
 
 ECSS = EcssMechanisms()
 SPRING = {"kind": "linear", "stiffness": 0.004, "preload": 0.01}
@@ -177,7 +177,7 @@ def test_check_says_what_it_counts(tmp_path: Path) -> None:
 def test_a_kind_of_fault_that_the_margin_does_not_know_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from ringsim.theory import drive as condition
+    from ringsim.rigid import drive as condition
 
     monkeypatch.setattr(condition, "changes_drive", lambda fault: False)
     spring = sprung(faults=[{"kind": "failed-spring", "section": 1, "time": 0.0}]).faults[0]

@@ -11,8 +11,8 @@ import pytest
 from motor_rings import PLAIN, ring
 from ringsim.layout.layout import layout_of
 from ringsim.parts.margin import EcssMechanisms, MarginStandard, NasaMechanisms
+from ringsim.rigid.margin import DriveMargin
 from ringsim.scene import Scene
-from ringsim.theory.margin import DriveMargin
 
 DRY = {"coulomb": 0.05}
 

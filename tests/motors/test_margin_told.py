@@ -14,9 +14,9 @@ from ringsim.cli import cli
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.plots import run
 from ringsim.plots.rods_and_cables import drive
+from ringsim.rigid.margin import DriveMargin
 from ringsim.scene import Scene
 from ringsim.simulation import simulate
-from ringsim.theory.margin import DriveMargin
 
 
 @pytest.fixture(scope="module")

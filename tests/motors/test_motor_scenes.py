@@ -9,11 +9,11 @@ from scipy.optimize import brentq
 
 from motor_rings import MOTOR, PLAIN, STALL, TRAVEL, ring
 from ringsim.outputs.family import holds
+from ringsim.rigid.margin import PULLEYS
+from ringsim.rigid.mechanism import Mechanism
+from ringsim.rigid.resistances import Opening, resistances
 from ringsim.scene import scene_from_toml
 from ringsim.simulation import simulate
-from ringsim.theory.margin import PULLEYS
-from ringsim.theory.mechanism import Mechanism
-from ringsim.theory.resistances import Opening, resistances
 from ringsim.variables import Fate
 
 STIFFNESS, NEUTRAL = 300.0, 0.4

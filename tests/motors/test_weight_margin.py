@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from ringsim.layout.layout import layout_of
+from ringsim.rigid.mechanism import Mechanism
+from ringsim.rigid.resistances import Opening, WeightResistance, resistances
 from ringsim.scene import load_scene
-from ringsim.theory.mechanism import Mechanism
-from ringsim.theory.resistances import Opening, WeightResistance, resistances
 
 VECTOR = np.array([0.3, -0.5, -9.0])
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ringsim import simulation
-from ringsim.engine import integrate
 from ringsim.execution.work import solve
+from ringsim.exudyn import integrate
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.result import Result

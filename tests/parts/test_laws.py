@@ -13,7 +13,7 @@ from scipy.integrate import quad, solve_ivp
 
 from law_cases import records
 from ringsim.choice import kinds_of
-from ringsim.engine.assembly import SYMBOLIC, TORSION, Assembly
+from ringsim.exudyn.assembly import SYMBOLIC, TORSION, Assembly
 from ringsim.parts.faults import StuckVJoint
 from ringsim.parts.joints import JointFriction, Latch, SpringDamperStop, Stop
 from ringsim.parts.net import SpringNet, pull

@@ -11,8 +11,8 @@ import pytest
 from rigid_motion import RigidRing
 
 from ringsim.choice import kinds_of
-from ringsim.engine.build import build
-from ringsim.engine.integrate import Integration
+from ringsim.exudyn.build import build
+from ringsim.exudyn.integrate import Integration
 from ringsim.parts.joints import JointFriction
 from ringsim.parts.persection import PerSection
 from ringsim.refusal import InputError

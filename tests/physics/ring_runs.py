@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from ringsim.engine.build import build
-from ringsim.engine.integrate import Integration
+from ringsim.exudyn.build import build
+from ringsim.exudyn.integrate import Integration
 from ringsim.outputs.recorder import Recorder
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene, load_scene
 from ringsim.stepping.locks import lock_times
-from ringsim.theory.statics import OneCoordinate, opening_time
 
 Array = NDArray[np.float64]
 

@@ -8,12 +8,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ring_runs import Array, ring, run
-from ringsim.engine.assembly import axes_of, turn_rates
-from ringsim.engine.build import Built, build
-from ringsim.engine.integrate import Integration
-from ringsim.engine.integrate import solve as by_exudyn
-from ringsim.engine.meters import EnergyMeter
-from ringsim.engine.model import Openings, State
+from ringsim.exudyn.assembly import axes_of, turn_rates
+from ringsim.exudyn.build import Built, build
+from ringsim.exudyn.integrate import Integration
+from ringsim.exudyn.integrate import solve as by_exudyn
+from ringsim.exudyn.meters import EnergyMeter
+from ringsim.exudyn.model import Openings, State
 from ringsim.frame.integrate import Integration as Frames
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.frame.model import FrameModel

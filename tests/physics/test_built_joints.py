@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from ring_runs import ring
-from ringsim.engine.build import build
+from ringsim.exudyn.build import build
 from ringsim.layout.bodies import OnBody, OnRod
 from ringsim.parts.faults import StuckVJoint
 from ringsim.parts.joints import Joints, SpringDamperStop

@@ -7,8 +7,8 @@ import weakref
 
 import pytest
 
-from ringsim.engine.build import build
-from ringsim.engine.integrate import Integration
+from ringsim.exudyn.build import build
+from ringsim.exudyn.integrate import Integration
 from ringsim.scene import load_scene
 
 

@@ -9,9 +9,9 @@ import exudyn.itemInterface as item
 import numpy as np
 import pytest
 
-from ringsim.engine.assembly import DryJoints
-from ringsim.engine.build import build
-from ringsim.engine.integrate import Integration
+from ringsim.exudyn.assembly import DryJoints
+from ringsim.exudyn.build import build
+from ringsim.exudyn.integrate import Integration
 from ringsim.frame.integrate import solve as by_frames
 from ringsim.scene import Scene, load_scene
 from ringsim.variables import Fate

@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 
 from ring_runs import Array, ideal_time, ring, run
 from ringsim.parts.joints import ViscousCoulombFriction
+from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene
-from ringsim.theory.statics import OneCoordinate
 
 LAWS: dict[str, dict[str, Any]] = {
     "vjoint-viscous": {"vjoint": {"viscous": 5e-4}},

@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import quad
 
 from ring_runs import ideal_time, ring
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene, load_scene
-from ringsim.theory.statics import OneCoordinate, opening_time
 
 BARE = {"boom": "none", "rods__density": 1e-3}
 """Nothing but corners and V-joints: the rods weigh 1e-6 of them."""

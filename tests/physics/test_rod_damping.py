@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from ring_runs import Array, ring, run
-from ringsim.engine.assembly import Assembly
-from ringsim.engine.rods import GeometricallyExact
+from ringsim.exudyn.assembly import Assembly
+from ringsim.exudyn.rods import GeometricallyExact
 from ringsim.layout.bodies import Pose
 
 LENGTH, MASS, INERTIA, RELAXATION = 0.3, 1.0, 1e-2, 1e-3

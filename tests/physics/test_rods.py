@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ring_runs import ring
-from ringsim.engine.assembly import Assembly
-from ringsim.engine.rods import GeometricallyExact, add_rod
+from ringsim.exudyn.assembly import Assembly
+from ringsim.exudyn.rods import GeometricallyExact, add_rod
 from ringsim.layout.bodies import Pose, Rod
 from ringsim.parts.rods import GeometricallyExactRods, Tube
 from ringsim.simulation import run

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ring_runs import Array, ring, run
-from ringsim.engine.build import build
+from ringsim.exudyn.build import build
 from ringsim.scene import Scene
 
 ROUND = {"boom": "none", "solver__end_time": 1.5}

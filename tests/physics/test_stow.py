@@ -17,10 +17,10 @@ from scipy.optimize import brentq
 
 from ringsim.dataset import save
 from ringsim.refusal import InputError
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import simulate
 from ringsim.stored_state import read_state
-from ringsim.theory.statics import OneCoordinate, opening_time
 from ringsim.variables import Fate
 
 STOW = load_scene("ring18-stow")
@@ -194,7 +194,7 @@ def test_what_knows_constant_loads_alone_says_so() -> None:
 
 def test_the_scales_of_a_folding_ring_are_of_its_whole_way() -> None:
     from ringsim.layout.layout import layout_of
-    from ringsim.theory.statics import scales_of
+    from ringsim.rigid.statics import scales_of
 
     scene = STOW.with_values({"stop.stowed_angle": 47.578})
     layout = layout_of(scene)

@@ -22,8 +22,8 @@ from scipy.interpolate import CubicSpline
 
 from main_line import README, ROOT, commands, run
 from ringsim.plots.run import asynchrony, opening_angles
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import load_scene
-from ringsim.theory.statics import OneCoordinate, opening_time
 
 FIGURES = {"opening_angles", "asynchrony", "section_map", "ring", "energy"}
 

@@ -9,10 +9,10 @@ from scipy.stats import binom, norm
 from ringsim.analysis.intervals import share_interval
 from ringsim.analysis.tails import DISAGREE, _unled, agreement, replicated_interval
 from ringsim.cable.friction import BearingFriction
+from ringsim.rigid.drive import Drive
+from ringsim.rigid.mechanism import Mechanism
 from ringsim.sampling.subset_levels import Answer, Repetition, _simulation
 from ringsim.scene import load_scene
-from ringsim.theory.drive import Drive
-from ringsim.theory.mechanism import Mechanism
 
 AXES = 18
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ringsim.engine.build import build
+from ringsim.exudyn.build import build
+from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene, load_scene
-from ringsim.theory.statics import OneCoordinate
 
 RING = load_scene("ring18")
 HEAVY = {"boom.length": 3.0, "boom.density": 18000.0}

@@ -7,8 +7,8 @@ import re
 import pytest
 
 from ringsim.analysis.stability import word_of
-from ringsim.engine.build import build
-from ringsim.engine.integrate import Integration
+from ringsim.exudyn.build import build
+from ringsim.exudyn.integrate import Integration
 from ringsim.scene import Scene, load_scene
 from ringsim.simulation import run, run_frame
 from ringsim.variables import Fate, Status

@@ -12,7 +12,7 @@ from ringsim.analysis.brief import restart_lines
 from ringsim.campaign import accuracy
 from ringsim.cli import cli
 from ringsim.dataset import to_dataset
-from ringsim.engine import integrate
+from ringsim.exudyn import integrate
 from ringsim.parts.solver import Solver
 from ringsim.scene import load_scene
 from ringsim.variables import COUNTS, Outcome, Status

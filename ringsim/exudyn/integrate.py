@@ -12,9 +12,9 @@ import numpy as np
 
 from ringsim.cable.chain import ChainState
 from ringsim.cable.ropes import Flags
-from ringsim.engine.assembly import STIFFENING, Predictor
-from ringsim.engine.build import Built, build
-from ringsim.engine.meters import (
+from ringsim.exudyn.assembly import STIFFENING, Predictor
+from ringsim.exudyn.build import Built, build
+from ringsim.exudyn.meters import (
     AccelerationMeter,
     BaseMeter,
     BendingMeter,
@@ -23,18 +23,18 @@ from ringsim.engine.meters import (
     ShapeMeter,
     StressMeter,
 )
-from ringsim.engine.model import Openings, State, joint_groups
+from ringsim.exudyn.model import Openings, State, joint_groups
 from ringsim.layout.layout import Layout
 from ringsim.outputs.family import Reading
 from ringsim.outputs.recorder import Recorder
 from ringsim.parts.faults import AT_ONCE
+from ringsim.rigid.statics import residual_tolerance, rope_reach, scales_of
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
 from ringsim.stepping.control import RunControl
 from ringsim.stepping.events import Events
 from ringsim.stepping.instant import Instant, Strained
 from ringsim.stepping.locks import Latches, locks_of
-from ringsim.theory.statics import residual_tolerance, rope_reach, scales_of
 from ringsim.variables import Cause, Outcome, Reason
 
 # When exudyn's modified Newton renews its Jacobian within a step, and when it gives up.

@@ -14,8 +14,8 @@ from ringsim.cable.winches import why_unlimited
 from ringsim.layout.bodies import Array
 from ringsim.parts.faults import AT_ONCE, FailedLatch, FailedSpring, Fault, StuckVJoint
 from ringsim.refusal import InputError
+from ringsim.rigid.mechanism import Configuration, Mechanism
 from ringsim.scene import Scene
-from ringsim.theory.mechanism import Configuration, Mechanism
 
 # What faults and switched winches leave of a drive on a ring of rigid rods, over the time.
 

@@ -8,16 +8,16 @@ import exudyn as exu
 import numpy as np
 
 from ringsim.cable.chain import ChainState, work_between
-from ringsim.engine.assembly import Array, axes_of, cross, spin
-from ringsim.engine.build import Built
-from ringsim.engine.cable_path import Direction
-from ringsim.engine.model import Multibody, State
-from ringsim.engine.rods import Ancf, beam_section
+from ringsim.exudyn.assembly import Array, axes_of, cross, spin
+from ringsim.exudyn.build import Built
+from ringsim.exudyn.cable_path import Direction
+from ringsim.exudyn.model import Multibody, State
+from ringsim.exudyn.rods import Ancf, beam_section
 from ringsim.layout.bodies import InSpace, OnBody
 from ringsim.layout.points import points_of
 from ringsim.outputs.family import Carried, Put
+from ringsim.rigid.statics import body_reaction, first_reaction
 from ringsim.stepping.instant import Energies, Instant, Passing, lost_between
-from ringsim.theory.statics import body_reaction, first_reaction
 
 # Force and moment in the middle of beam elements, by their formulation.
 #

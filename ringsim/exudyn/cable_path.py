@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ringsim.cable.records import BlockSheave, FixedSheave, Sheave
-from ringsim.engine.assembly import Array, Indices, axes_of, cross, gyration, skew, spin
+from ringsim.exudyn.assembly import Array, Indices, axes_of, cross, gyration, skew, spin
 
 # V pulleys on blocks between nodes with slope vectors, the coordinates of paper 000's rods.
 #
@@ -17,7 +17,7 @@ from ringsim.engine.assembly import Array, Indices, axes_of, cross, gyration, sk
 #
 #     p = r - sense h b / \|b\|,   b = c_L + c_R,   c = y / \|y\| + t (y x z) / \|y x z\|,
 #
-# t = -sense for the left half and +sense for the right: the point of ``ringsim.engine.cable_path``
+# t = -sense for the left half and +sense for the right: the point of ``ringsim.exudyn.cable_path``
 # as a function of the coordinates alone.  A force F on the pulley acts on them as (dp/dq)^T F, the
 # exact virtual work; as only directions count, it does none on the stretch of a cross-section.
 # With u = v / \|v\| and any constant vector g,
@@ -130,7 +130,7 @@ class PlacedBlocks:
 # exact and resists nothing.  Source: paper 000, fig. 3.
 #
 # Nodes have Euler parameters; with rods of kind "ancf" those of the bar halves have slope vectors
-# instead, and blocks act on them as ``ringsim.engine.cable_path`` says.
+# instead, and blocks act on them as ``ringsim.exudyn.cable_path`` says.
 
 
 WIDTH = 7

@@ -136,7 +136,7 @@ def _turned(phi: Of) -> Of:
 #     sum_e (u . K_u u + psi . K_psi psi) / 2,   with joints closed and the mean opening angle held,
 #
 # or every opening angle, where sections are held at their own; u and psi are strains against the
-# natural lengths (``ringsim.theory.assembling``).  Loads, net and springs do not act yet.
+# natural lengths (``ringsim.rigid.assembling``).  Loads, net and springs do not act yet.
 # Stationary points are found by Gauss and Newton's method with Lagrange's multipliers for joints
 # and angles. How a free structure lies in space, and what else its joints leave free, stays as near
 # to the drawing as a weak spring on every frame in each iteration keeps it.

@@ -15,11 +15,11 @@ from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.margin import MarginStandard
 from ringsim.parts.net import BoundaryNet
 from ringsim.refusal import InputError
+from ringsim.rigid.drive import Drive, is_unknown
+from ringsim.rigid.mechanism import Mechanism, SectionLoads
+from ringsim.rigid.resistances import Opening, resistances
 from ringsim.scene import Scene
 from ringsim.scene.substituted import substituted
-from ringsim.theory.drive import Drive, is_unknown
-from ringsim.theory.mechanism import Mechanism, SectionLoads
-from ringsim.theory.resistances import Opening, resistances
 from ringsim.variables import Outcome
 
 # The static margin of a drive on the ideal ring, at every opening angle.

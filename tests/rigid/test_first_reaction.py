@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ringsim.layout.layout import layout_of
+from ringsim.rigid.statics import OneCoordinate, first_acceleration, first_reaction
 from ringsim.scene import load_scene
-from ringsim.theory.statics import OneCoordinate, first_acceleration, first_reaction
 
 RING = load_scene("ring18").with_values(
     {

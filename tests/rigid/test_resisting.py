@@ -7,8 +7,8 @@ import pytest
 
 from ringsim.layout.draft import FreeHub
 from ringsim.parts.persection import at_section
-from ringsim.theory.mechanism import Mechanism
-from ringsim.theory.resistances import JointFrictionResistance, Opening
+from ringsim.rigid.mechanism import Mechanism
+from ringsim.rigid.resistances import JointFrictionResistance, Opening
 from small_rings import pulled
 
 

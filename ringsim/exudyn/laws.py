@@ -9,8 +9,8 @@ import exudyn.itemInterface as item
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsim.engine.assembly import SYMBOLIC, TORSION, Array, axes_of
-from ringsim.engine.model import BuiltJoint, JointGroup, Multibody, State
+from ringsim.exudyn.assembly import SYMBOLIC, TORSION, Array, axes_of
+from ringsim.exudyn.model import BuiltJoint, JointGroup, Multibody, State
 from ringsim.layout.bodies import turned_about_z
 from ringsim.layout.draft import natural_lengths
 from ringsim.layout.layout import Contact, EdgeNet, HubNet, Hung
@@ -50,7 +50,7 @@ class Hanging:
         self._where = np.array([assembly.coordinates_of(node)[:3] for node in nodes])
 
     def reaction(self, state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
-        """See ``ringsim.engine.laws.Reacting``."""
+        """See ``ringsim.exudyn.laws.Reacting``."""
         moved = (state.position - state.begun)[self._where]
         rates = state.velocity[self._where]
         found = self._hung.law.hold(self._hung.up, self._hung.lifts, moved, rates)
@@ -398,7 +398,7 @@ class EdgeCables:
         self._first, self._second = np.array(places).transpose(1, 0, 2)
 
     def reaction(self, state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
-        """See ``ringsim.engine.laws.Reacting``."""
+        """See ``ringsim.exudyn.laws.Reacting``."""
         reaction = pull(self._stretched(state), self._rates)
         return reaction, np.zeros(len(self._rates))
 

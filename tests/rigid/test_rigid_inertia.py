@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from fold_rates import fold_rate
 
+from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene
 from ringsim.structures.pantograph_ring import PantographRing
-from ringsim.theory.statics import OneCoordinate
 from small_rings import pulled
 
 PIECES = 200

@@ -11,9 +11,9 @@ from ringsim.layout.bodies import Array
 from ringsim.parts.joints import JointFriction
 from ringsim.parts.margin import Category
 from ringsim.parts.persection import at_section
+from ringsim.rigid.mechanism import Configuration, Mechanism, Points, SectionLoads, SpringEnergy
+from ringsim.rigid.statics import Carried
 from ringsim.scene import Scene
-from ringsim.theory.mechanism import Configuration, Mechanism, Points, SectionLoads, SpringEnergy
-from ringsim.theory.statics import Carried
 
 # The family of resistances to the opening of a ring of rigid rods.
 

@@ -10,8 +10,8 @@ from ringsim.cable.chain import Chain, ChainState, RopeTangent, decay_tangent, r
 from ringsim.cable.records import Cables
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.winches import Winches
-from ringsim.engine.assembly import Array, Assembly, Indices
-from ringsim.engine.cable_path import CablePath, Placed
+from ringsim.exudyn.assembly import Array, Assembly, Indices
+from ringsim.exudyn.cable_path import CablePath, Placed
 from ringsim.stepping.locks import Turning
 
 # The Jacobian of the cables' forces after the coordinates of the nodes that carry them.
@@ -168,7 +168,7 @@ def _pairs(rows: Indices, columns: Indices) -> tuple[Indices, Indices]:
 # Cables in the multibody model: their forces inside every Newton iteration.
 #
 # One exudyn object spans all nodes that the paths depend on.  Its force is the chain's, its
-# Jacobian that of ringsim.engine.cables.
+# Jacobian that of ringsim.exudyn.cables.
 
 
 class CableDrive:

@@ -8,9 +8,9 @@ from click.testing import CliRunner
 from ringsim.calibration import opening_angle_for
 from ringsim.cli import cli
 from ringsim.refusal import InputError
+from ringsim.rigid.statics import OneCoordinate, opening_time
 from ringsim.scene import Scene
 from ringsim.simulation import run
-from ringsim.theory.statics import OneCoordinate, opening_time
 from small_rings import pulled, six
 
 WANTED = 7.0

@@ -8,7 +8,7 @@ import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
 
-from ringsim.engine.assembly import Array, Assembly, axes_of, spin
+from ringsim.exudyn.assembly import Array, Assembly, axes_of, spin
 from ringsim.layout import bodies as parts
 from ringsim.layout.bodies import Pose
 from ringsim.parts.rods import AncfRods, GeometricallyExactRods, Rods
@@ -45,7 +45,7 @@ class GeometricallyExact:
 
         exudyn's element takes no damping and says nothing of it.  Its strains are constant, so
         damping C eps_dot is a damper C / L between its ends' frames moved to its middle, where
-        they coincide (``ringsim.engine.assembly``).
+        they coincide (``ringsim.exudyn.assembly``).
         """
         damping = np.array(section.dampingMatrix) / length
         if damping.any():

@@ -10,10 +10,10 @@ from ringsim.cable.chain import ChainState
 from ringsim.cable.faults import CableFault
 from ringsim.cable.records import BlockSheave, FixedSheave, Sheave
 from ringsim.choice import kind_of
-from ringsim.engine.assembly import Array
-from ringsim.engine.cable_path import CablePath
-from ringsim.engine.cables import CableDrive
-from ringsim.engine.laws import (
+from ringsim.exudyn.assembly import Array
+from ringsim.exudyn.cable_path import CablePath
+from ringsim.exudyn.cables import CableDrive
+from ringsim.exudyn.laws import (
     EdgeCables,
     Reacting,
     Springs,
@@ -23,8 +23,8 @@ from ringsim.engine.laws import (
     opening_joints,
     torsion,
 )
-from ringsim.engine.model import Multibody, State
-from ringsim.engine.rods import Ancf
+from ringsim.exudyn.model import Multibody, State
+from ringsim.exudyn.rods import Ancf
 from ringsim.layout.bodies import OnBody
 from ringsim.layout.layout import BoomBeam
 from ringsim.layout.points import BOOM_TIP

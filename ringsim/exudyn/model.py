@@ -8,14 +8,14 @@ import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
 
-from ringsim.engine.assembly import Array, Assembly, Indices, axes_of, spin
-from ringsim.engine.rods import FORMULATIONS, BuiltRod, GeometricallyExact, NodeFrames, add_rod
+from ringsim.exudyn.assembly import Array, Assembly, Indices, axes_of, spin
+from ringsim.exudyn.rods import FORMULATIONS, BuiltRod, GeometricallyExact, NodeFrames, add_rod
 from ringsim.layout import bodies as parts
 from ringsim.layout.bodies import ChordOpening, InSpace, Mount, OnBody, OnRod, Pose
 from ringsim.layout.layout import layout_of
+from ringsim.rigid.assembling import assembled
+from ringsim.rigid.statics import Acceleration, OneCoordinate, first_acceleration
 from ringsim.scene import Scene
-from ringsim.theory.assembling import assembled
-from ringsim.theory.statics import Acceleration, OneCoordinate, first_acceleration
 
 # A layout assembled in exudyn: bodies, rods, joints and loads.
 

@@ -11,9 +11,9 @@ from ringsim.layout.bodies import Array, JointOpening, Lump, OnBody, OnRod, cros
 from ringsim.layout.layout import Layout
 from ringsim.parts.ground import Offload
 from ringsim.parts.persection import spread
+from ringsim.rigid.mechanism import Configuration, Mechanism, SpringEnergy, body_of
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Scales
-from ringsim.theory.mechanism import Configuration, Mechanism, SpringEnergy, body_of
 
 # Any structure with rigid rods as one coordinate q: inertia, work, and its release from rest.
 #

@@ -1,1 +1,0 @@
-"""Closed forms and quadratures: references independent of the multibody engine."""
