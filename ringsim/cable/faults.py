@@ -1,12 +1,11 @@
 """Faults of cables: what is cut or jammed, where and when."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from ringsim.cable.chain import ChainState
 from ringsim.cable.ropes import Array, Ropes
-from ringsim.parts.faults import Fault
+from ringsim.parts.faults import Fault, Struck
 
 # The family of cable faults.
 
@@ -17,11 +16,21 @@ class CableFault(Fault):
     cable: Annotated[int, Field(ge=1)] = 1
     """Which cable of the scene, "upper" or "lower", or its number from 1: the upper one first."""
 
-    def strike(self, ropes: Ropes, state: ChainState) -> Ropes:
-        """The ropes after the fault, from those before it and the chain at that instant; ValueError
-        as of ``change``.
-        """
-        return self.change(ropes, state.stored, state.wound)
+    def strike(self, now: Struck) -> None:
+        """See ``Fault``."""
+        now.ropes = self.change(now.ropes, now.stored, now.wound)
+
+    def clear(self, now: Struck) -> None:
+        """See ``Fault``."""
+        now.ropes = self.whole(now.ropes)
+
+    def check(self, scene: Any) -> None:
+        """See ``Fault``."""
+        if scene.cables is None:
+            raise ValueError(
+                "is a fault of a cable, but the scene has none: add [cables.upper], or leave the "
+                "fault out"
+            )
 
     def change(self, ropes: Ropes, stored: Array, wound: Array) -> Ropes:
         """The ropes after the fault, with the natural length in each span, m, shape (spans,), and
@@ -31,7 +40,7 @@ class CableFault(Fault):
         """
         raise NotImplementedError
 
-    def clear(self, ropes: Ropes) -> Ropes:
+    def whole(self, ropes: Ropes) -> Ropes:
         """The ropes after the fault is cleared; ValueError if it cannot be."""
         raise NotImplementedError
 
@@ -53,7 +62,7 @@ class CutCable(CableFault):
         """Let go of the rope that holds the span."""
         return ropes.cut(self.cable - 1, self.span - 1)
 
-    def clear(self, ropes: Ropes) -> Ropes:
+    def whole(self, ropes: Ropes) -> Ropes:
         """Never."""
         raise ValueError(
             f"faults: the rope of cable {self.cable} that parted at {self.time:g} s cannot be made "
@@ -75,7 +84,7 @@ class JammedPulley(CableFault):
         """Split the rope at the pulley; each part keeps the rope that its spans hold."""
         return ropes.jam(self.cable - 1, self.pulley - 1, stored, wound)
 
-    def clear(self, ropes: Ropes) -> Ropes:
+    def whole(self, ropes: Ropes) -> Ropes:
         """Let the rope slip again: both parts become one."""
         return ropes.unjam(self.cable - 1, self.pulley - 1)
 
@@ -105,7 +114,7 @@ class OffSheave(CableFault):
             ropes = ropes.cut(self.cable - 1, span)
         return ropes
 
-    def clear(self, ropes: Ropes) -> Ropes:
+    def whole(self, ropes: Ropes) -> Ropes:
         """Let a wedged rope slip again; nobody puts a free one back."""
         if self.rope == "wedged":
             return ropes.unjam(self.cable - 1, self.pulley - 1)

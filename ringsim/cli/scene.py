@@ -10,7 +10,6 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from ringsim.cable.faults import CableFault
 from ringsim.choice import kind_of, kinds_of
 from ringsim.cli.options import PATH, SETTINGS
 from ringsim.files import require_place, write_text
@@ -21,7 +20,7 @@ from ringsim.overrides import place_of
 from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.margin import MarginStandard
 from ringsim.refusal import InputError, known_or_nearest, show
-from ringsim.rigid.drive import changes_drive, told, turns_ever
+from ringsim.rigid.drive import turns_ever
 from ringsim.rigid.margin import MOST, DriveMargin, Margin, PlaneMargin
 from ringsim.scene import Scene, builtin_scenes, load_scene, scene_from_toml
 from ringsim.scene.substituted import strained, substituted
@@ -272,8 +271,9 @@ def _formula(drive: DriveMargin) -> str:
 def _exceptions(scene: Scene, drive: DriveMargin) -> Iterator[str]:
     """What faults do to the margin, and winches that are not on all the time."""
     for number, fault in enumerate(scene.faults, 1):
-        later = "strikes later, not counted here; a run counts it from then on"
-        words = later if fault.time > AT_ONCE and changes_drive(fault) else told(fault)
+        words = drive.conditions.told(fault)
+        if fault.time > AT_ONCE and words == "counted":
+            words = "strikes later, not counted here; a run counts it from then on"
         yield f"faults[{number}], {kind_of(fault)} at {fault.time:g} s: {words}"
     names = [] if scene.cables is None else [number for number, _ in scene.cables.present()]
     for (cable, end), winch in drive.conditions.winches.items():
@@ -292,7 +292,7 @@ def _by_plane(scene: Scene, standard: MarginStandard) -> Iterator[str]:
     cables = scene.cables
     if cables is None or None in (cables.upper, cables.lower):
         return
-    struck = any(isinstance(one, CableFault) and one.time <= AT_ONCE for one in scene.faults)
+    struck = any(hasattr(one, "cable") and one.time <= AT_ONCE for one in scene.faults)
     if cables.upper == cables.lower and not struck:
         yield "each plane has half of the drive"
         return

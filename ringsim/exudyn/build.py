@@ -1,36 +1,21 @@
-"""From a scene to a model that is ready to be integrated: boom, connectors, cables, faults."""
+"""From a scene to a model that is ready to be integrated: boom, connectors, cables."""
 
-import math
 from typing import Any, NamedTuple
 
 import exudyn.itemInterface as item
 import numpy as np
 
-from ringsim.cable.chain import ChainState
-from ringsim.cable.faults import CableFault
 from ringsim.cable.records import BlockSheave, FixedSheave, Sheave
 from ringsim.choice import kind_of
-from ringsim.exudyn.assembly import Array
 from ringsim.exudyn.cable_path import CablePath
 from ringsim.exudyn.cables import CableDrive
-from ringsim.exudyn.laws import (
-    EdgeCables,
-    Reacting,
-    Springs,
-    Stops,
-    Weight,
-    connect,
-    opening_joints,
-    torsion,
-)
-from ringsim.exudyn.model import Multibody, State
+from ringsim.exudyn.laws import AngleForces, EdgeCables, Reacting, Weight, connect
+from ringsim.exudyn.model import Multibody
 from ringsim.exudyn.rods import Ancf
 from ringsim.layout.bodies import OnBody
 from ringsim.layout.layout import BoomBeam
 from ringsim.layout.points import BOOM_TIP
 from ringsim.parts.boom import FlexibleBoom
-from ringsim.parts.faults import AT_ONCE, FailedSpring, StuckVJoint
-from ringsim.parts.joints import Reaction
 from ringsim.scene import Scene
 
 # A flexible boom: a chain of elements, clamped at its top, with a body that slides along it.
@@ -126,71 +111,6 @@ class Boom:
         )
 
 
-# The faults that strike a multibody model between two steps.
-
-
-class StuckJoint:
-    """A V-joint that a fault will hold: a torsion spring that lies inactive until then."""
-
-    def __init__(self, model: Multibody, fault: StuckVJoint) -> None:
-        self._law, self._system = fault, model.assembly.system
-        self._place = model.scene.structure.planes.index(fault.plane), fault.section - 1
-        planes = opening_joints(model, 'faults of kind "stuck-vjoint"', "faults")
-        joint, self._sense = planes[self._place[0]][self._place[1]]
-        linear = {"stiffness": fault.stiffness, "damping": fault.damping, "activeConnector": False}
-        self._object, self._angle = torsion(model, joint.markers, **linear), math.nan
-
-    def strike(self, angles: Array) -> None:
-        """Hold the joint at the opening angle that it has now."""
-        self._angle = float(angles[self._place])
-        offset = self._sense * (math.pi - self._angle)
-        self._system.SetObjectParameter(self._object, "offset", offset)
-        self._system.SetObjectParameter(self._object, "activeConnector", True)
-
-    def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
-        """See ``Reacting``."""
-        rate = rates[self._place]
-        if math.isnan(self._angle):  # the fault has not struck
-            return Reaction(0.0, 0.0, 0.0), rate
-        return self._law.torque(float(angles[self._place]) - self._angle, rate), rate
-
-
-class Faults:
-    """The faults of a scene, in the order of their times, each struck between two steps.
-
-    ``joints`` are the V-joints that will stick.
-    """
-
-    def __init__(self, model: Multibody, drive: CableDrive | None, springs: Springs | None) -> None:
-        self._drive, self._springs = drive, springs
-        self._planes = model.scene.structure.planes
-        self._waiting = [
-            (fault, StuckJoint(model, fault) if isinstance(fault, StuckVJoint) else None)
-            for fault in sorted(model.scene.faults, key=lambda fault: fault.time)
-        ]
-        self.joints = [joint for _, joint in self._waiting if joint is not None]
-
-    @property
-    def next_time(self) -> float:
-        """Time of the next fault, s; infinite if there is none left."""
-        return self._waiting[0][0].time if self._waiting else math.inf
-
-    def strike(self, time: float, angles: Array, state: ChainState | None) -> bool:
-        """Strike all faults that are due, at opening angles (rad) of shape (planes, sections) and
-        a state of the cables; returns whether there was one.
-        """
-        due = [one for one in self._waiting if one[0].time <= time + AT_ONCE]
-        del self._waiting[: len(due)]
-        for fault, joint in due:
-            if joint is not None:
-                joint.strike(angles)
-            elif isinstance(fault, FailedSpring) and self._springs is not None:
-                self._springs.fail((self._planes.index(fault.plane), fault.section - 1))
-            elif isinstance(fault, CableFault) and self._drive is not None and state is not None:
-                self._drive.ropes = fault.strike(self._drive.ropes, state)
-        return bool(due)
-
-
 # From a scene to a model that is ready to be integrated.
 
 
@@ -199,9 +119,8 @@ class Built(NamedTuple):
 
     model: Multibody
     connectors: list[Reacting]
-    stops: Stops | None
+    angles: AngleForces
     cables: CableDrive | None
-    faults: Faults
     weight: Weight | None
     edge: EdgeCables | None
     boom: Boom | None
@@ -215,7 +134,7 @@ def build(scene: Scene) -> Built:
     InputError
         If the structure has no joint for a friction law, the stop or a fault.
     """
-    model, stops, springs, cables = Multibody(scene), None, None, None
+    model, cables = Multibody(scene), None
     gravity = model.layout.gravity
     weight = None if gravity is None else Weight(model, gravity)
     beam = model.layout.boom
@@ -224,22 +143,14 @@ def build(scene: Scene) -> Built:
     edge = None if model.layout.edge is None else EdgeCables(model, model.layout.edge)
     if edge is not None:
         connectors.append(edge.reaction)
-    if scene.stop is not None:
-        stops = Stops(model, scene.stop)
-        connectors.append(stops.reaction)
-    if scene.hinge_spring is not None:
-        springs = Springs(model, "hinge_spring", scene.hinge_spring)
-        connectors.append(springs.reaction)
-    if scene.latch is not None and scene.latch.pushes:
-        connectors.append(Springs(model, "latch", scene.latch).reaction)
+    angles = AngleForces(model)
+    connectors += [angles.reaction(number) for number in range(len(angles.switches.laws))]
     if scene.cables is not None:
         paths = [[_on_nodes(model, sheave) for sheave in path] for path in model.layout.paths]
         path = CablePath(paths, slopes=isinstance(model.formulation, Ancf))
         cables = CableDrive(model.assembly, scene.cables, path, len(scene.faults))
-    faults = Faults(model, cables, springs)
-    connectors += [joint.reaction for joint in faults.joints]
     model.assembly.finish()
-    return Built(model, connectors, stops, cables, faults, weight, edge, boom)
+    return Built(model, connectors, angles, cables, weight, edge, boom)
 
 
 def _on_nodes(model: Multibody, sheave: Sheave) -> Sheave:

@@ -27,7 +27,7 @@ from ringsim.exudyn.model import Openings, State, joint_groups
 from ringsim.layout.layout import Layout
 from ringsim.outputs.family import Reading
 from ringsim.outputs.recorder import Recorder
-from ringsim.parts.faults import AT_ONCE
+from ringsim.parts.faults import AT_ONCE, Faults, Struck
 from ringsim.rigid.statics import residual_tolerance, rope_reach, scales_of
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
@@ -191,7 +191,8 @@ class Integration:
         angles = self._openings.read(self._state)[0]
         self._latches = Latches(scene)
         self._locks = locks_of(scene, angles, self._latches)
-        self._events, self._turn = Events(scene), scene.loads_turn_at
+        self._faults, self._events = Faults(scene.faults), Events(scene)
+        self._turn = scene.loads_turn_at
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
@@ -320,8 +321,8 @@ class Integration:
 
     def _lock(self, locked: Flags, time: float) -> None:
         """Latch the V-joints that have locked, and let winches know whose plane has."""
-        if self._built.stops is not None:
-            self._built.stops.latch(self._latches.caught)
+        self._latches.hold(self._built.angles.switches)
+        self._built.angles.follow()
         cables = self._built.cables
         if cables is not None and self._chain is not None:
             for number, (plane, _) in enumerate(cables.present):
@@ -333,8 +334,7 @@ class Integration:
 
         ``self._chain`` holds the cables at the state that was measured last, which is this one.
         """
-        struck = self._built.faults.strike(now.time, now.angles, self._chain)
-        if struck | self._turn_loads(now.time) or self._events.at(now.time):
+        if self._strike(now) | self._turn_loads(now.time) or self._events.at(now.time):
             self._energy.go_on_from(now.energies.work, self._state)
             self._begin(now)
             after = self._measure(now.time)
@@ -360,6 +360,21 @@ class Integration:
         )
         return now
 
+    def _strike(self, now: Instant) -> bool:
+        """Strike all faults that are due; returns whether there was one."""
+        due, built, chain = self._faults.due(now.time), self._built, self._chain
+        if not due:
+            return False
+        hit = Struck(self._scene.structure.planes, built.angles.switches, np.pi - now.angles)
+        if built.cables is not None and chain is not None:
+            hit.ropes, hit.stored, hit.wound = built.cables.ropes, chain.stored, chain.wound
+        for fault in due:
+            fault.strike(hit)
+        built.angles.follow()
+        if built.cables is not None:
+            built.cables.ropes = hit.ropes
+        return True
+
     def _turn_loads(self, time: float) -> bool:
         """Turn the loads round if it is time (s); returns whether it was."""
         due = self._turn <= time + AT_ONCE
@@ -376,7 +391,7 @@ class Integration:
             self._chain = cables.current(state.position, state.velocity, time)
         energies = self._energy.read(time, state, angles, rates, self._chain)
         gap = max(float(group.gaps(state).max()) for group in self._gaps)
-        tensions, stretch, driven = None, 0.0, math.isfinite(self._built.faults.next_time)
+        tensions, stretch, driven = None, 0.0, math.isfinite(self._faults.next_time)
         if cables is not None and self._chain is not None:
             tensions = self._chain.tensions
             stretch = float(np.max(self._chain.strains, where=self._chain.ropes.alive, initial=0.0))

@@ -7,7 +7,6 @@ from typing import Any
 
 import exudyn.itemInterface as item
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsim.exudyn.assembly import SYMBOLIC, TORSION, Array, axes_of
 from ringsim.exudyn.model import BuiltJoint, JointGroup, Multibody, State
@@ -15,10 +14,9 @@ from ringsim.layout.bodies import turned_about_z
 from ringsim.layout.draft import natural_lengths
 from ringsim.layout.layout import Contact, EdgeNet, HubNet, Hung
 from ringsim.layout.points import HUB
-from ringsim.parts.joints import HingeSpring, JointFriction, Latch, Reaction, Stop
+from ringsim.parts.laws import AngleLaw, Reaction, Rub, Switches
 from ringsim.parts.net import SpringNet, pull
 from ringsim.parts.persection import at_section
-from ringsim.refusal import InputError
 
 # Lines that carry corners, and their trolleys, as objects on the corners' nodes.
 
@@ -161,88 +159,60 @@ def connect(model: Multibody, weight: Weight | None = None) -> list[Reacting]:
     if layout.hung is not None and weight is not None:
         weight.add_lines(layout.hung)
         found.append(Hanging(model, layout.hung).reaction)
-    return found + [_friction(model, *one) for one in model.scene.joints.present().items()]
+    return found + [_friction(model, rub) for rub in layout.rubs]
 
 
-class Stops:
-    """A stop on every V-joint, with its latch.
+class AngleForces:
+    """All laws on V-joints, as torsion springs with exudyn's expressions of them.
 
     exudyn measures the angle from the half-open joint, a quarter turn away, so that neither end of
-    the range lies near the jump of the measured angle at 180 deg.
+    the range lies near the jump of the measured angle at 180 deg.  A law's ``setting`` is the
+    connector's offset, for which a torque of an expression has no other use.
     """
 
-    def __init__(self, model: Multibody, stop: Stop) -> None:
-        self._law, self._system = stop, model.assembly.system
-        planes = opening_joints(model, "stop", 'stop = "none"')
-        self._objects = [[self._add(model, *one) for one in plane] for plane in planes]
-        self._latched = np.zeros((len(planes), len(planes[0])), dtype=bool)
-
-    def _add(self, model: Multibody, joint: BuiltJoint, sense: float) -> Any:
-        def torque(angle: Any, rate: Any, offset: Any) -> Any:
-            folded = sense * angle + 0.5 * math.pi
-            return sense * self._law.torque(folded, sense * rate, offset > 0.5, SYMBOLIC).total
-
-        quarter = turned_about_z(sense * 0.5 * math.pi)
-        markers = model.assembly.node_marker(joint.nodes[0], quarter), joint.markers[1]
-        law = model.assembly.symbolic_law(TORSION, ("stop", sense), torque)
-        return torsion(model, markers, **law)
-
-    def latch(self, deployed: NDArray[np.bool_]) -> None:
-        """Hold these V-joints, (planes, sections), from both sides from now on, if it latches."""
-        if self._law.latch:
-            for plane, section in np.argwhere(deployed & ~self._latched):
-                # A stop has no use for the connector's offset; its law reads it as a switch.
-                self._system.SetObjectParameter(self._objects[plane][section], "offset", 1.0)
-            self._latched |= deployed
-
-    def reaction(self, _: State | None, angles: Array, rates: Array) -> tuple[Reaction, Array]:
-        """See ``Reacting``."""
-        return self._law.torque(np.pi - angles, -rates, self._latched), -rates
-
-
-class Springs:
-    """A spring, or the ramp of a latch, in every V-joint; the angle is measured as in ``Stops``."""
-
-    def __init__(self, model: Multibody, part: str, spring: HingeSpring | Latch) -> None:
-        self._system = model.assembly.system
-        planes = opening_joints(model, part, f'{part} = "none"')
+    def __init__(self, model: Multibody) -> None:
+        self.switches, self._system = Switches(model.layout.angle_laws), model.assembly.system
+        openings = model.openings()
         self._objects = [
-            [self._add(model, *one, spring.at(k)) for k, one in enumerate(plane)]
-            for plane in planes
+            [self._add(model, law, k, *openings[p][n]) for k, (p, n) in enumerate(law.places)]
+            for law in self.switches.laws
         ]
-        self._law = spring.at(np.arange(len(planes[0])))
-        self._alive = np.ones((len(planes), len(planes[0])))
+        self._given = [self._now(number) for number in range(len(self._objects))]
 
-    def _add(
-        self, model: Multibody, joint: BuiltJoint, sense: float, law: HingeSpring | Latch
-    ) -> Any:
-        def torque(angle: Any, rate: Any, _: Any) -> Any:
-            return sense * law.torque(sense * angle + 0.5 * math.pi, SYMBOLIC).elastic
+    def _add(self, model: Multibody, law: AngleLaw, k: int, joint: BuiltJoint, sense: float) -> Any:
+        own = law.record.at(law.places[k][1])
+
+        def torque(angle: Any, rate: Any, setting: Any) -> Any:
+            folded = sense * angle + 0.5 * math.pi
+            return sense * own.reaction(folded, sense * rate, setting, SYMBOLIC).total
 
         quarter = turned_about_z(sense * 0.5 * math.pi)
         markers = model.assembly.node_marker(joint.nodes[0], quarter), joint.markers[1]
-        return torsion(model, markers, **model.assembly.symbolic_law(TORSION, (law, sense), torque))
+        expression = model.assembly.symbolic_law(TORSION, (own, sense), torque)
+        active, offset = bool(law.on[k]), float(law.setting[k])
+        return torsion(model, markers, activeConnector=active, offset=offset, **expression)
 
-    def fail(self, place: tuple[int, int]) -> None:
-        """Break the spring of a V-joint, (plane, section)."""
-        self._alive[place] = 0.0
-        self._system.SetObjectParameter(self._objects[place[0]][place[1]], "activeConnector", False)
+    def follow(self) -> None:
+        """Tell exudyn what faults and latches have changed; due after each change."""
+        for number, objects in enumerate(self._objects):
+            given, now = self._given[number], self._now(number)
+            for k in np.flatnonzero((given != now).any(axis=0)):
+                self._system.SetObjectParameter(objects[k], "activeConnector", bool(now[0, k]))
+                self._system.SetObjectParameter(objects[k], "offset", float(now[1, k]))
+            self._given[number] = now
 
-    def reaction(self, state: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
-        """See ``Reacting``."""
-        reaction = self._law.torque(np.pi - angles)
-        return Reaction(*(self._alive * part for part in reaction)), -rates
+    def reaction(self, number: int) -> Reacting:
+        """That of a law."""
 
+        def reacting(_: State, angles: Array, rates: Array) -> tuple[Reaction, Array]:
+            law = self.switches.laws[number]
+            resisted = -rates[tuple(np.array(law.places).T)]
+            return self.switches.reaction(number, np.pi - angles, -rates), resisted
 
-def opening_joints(model: Multibody, part: str, out: str) -> list[list[tuple[BuiltJoint, float]]]:
-    """The V-joints with their senses, by plane; InputError, which names ``part``, without any."""
-    planes = model.openings()
-    if not all(planes):
-        raise InputError(
-            f"{part}: this structure has no joints that open, which would be held: leave it out "
-            f"({out})"
-        )
-    return planes
+        return reacting
+
+    def _now(self, number: int) -> Array:
+        return np.array([self.switches.on[number], self.switches.setting[number]])
 
 
 def torsion(model: Multibody, markers: Sequence[Any], **settings: Any) -> Any:
@@ -252,31 +222,19 @@ def torsion(model: Multibody, markers: Sequence[Any], **settings: Any) -> Any:
     )
 
 
-def _friction(model: Multibody, family: str, law: JointFriction) -> Reacting:
+def _friction(model: Multibody, rub: Rub) -> Reacting:
     """Friction of the joints of a family."""
-    joints = [joint for joint in model.joints if joint.part.family == family]
-    if not joints:
-        known = ", ".join(sorted({joint.part.family for joint in model.joints} - {""}))
-        raise InputError(
-            f"joints.{family}: this structure has no joint of that family (it has: "
-            f'{known or "none"}): leave it out (joints.{family} = "none")'
-        )
-
+    joints = [model.joints[number] for number in rub.joints]
     dry = []
-    for joint in joints:
-        damping = at_section(law, joint.part.section).linear_damping()
+    for k, joint in enumerate(joints):
+        damping = at_section(rub.law, int(rub.sections[k])).linear_damping()
         if damping is None:
-            dry.append(joint)
+            dry.append(k)
         elif damping > 0.0:
             torsion(model, joint.markers, damping=damping)
-
-    def each(some: list[BuiltJoint]) -> JointFriction:
-        return at_section(law, np.array([joint.part.section for joint in some]))
-
     if dry:
-        model.assembly.dry_joints.add(each(dry), [joint.markers for joint in dry])
-    group = JointGroup(model, joints)
-    own = each(joints)
+        model.assembly.dry_joints.add(rub.of(dry), [joints[k].markers for k in dry])
+    group, own = JointGroup(model, joints), rub.of(slice(None))
 
     def reaction(state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
         rate = group.rate(state)

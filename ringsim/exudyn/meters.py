@@ -260,7 +260,7 @@ class BaseMeter:
 
     def __init__(self, built: Built) -> None:
         model, layout = built.model, built.model.layout
-        self._system, self._layout, self._stops = model.assembly.system, layout, built.stops
+        self._system, self._layout, self._angles = model.assembly.system, layout, built.angles
         self._first = first_reaction(layout, model.moving)
         self._node = None if layout.base is None else model.bodies[layout.base][1]
         clamps = [j.holder for j in model.joints if isinstance(j.part.first, InSpace)]
@@ -268,8 +268,7 @@ class BaseMeter:
 
     def read(self, now: Instant) -> Carried:
         """At the current state."""
-        stops = self._stops
-        torques = None if stops is None else stops.reaction(None, now.angles, now.rates)[0].total
+        torques = self._angles.switches.torques("stop", np.pi - now.angles, -now.rates)
         return Carried(self._reaction(), self._turn(), torques)
 
     def _reaction(self) -> Array | None:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.cable.chain import Chain, ChainState
-from ringsim.cable.faults import CableFault
 from ringsim.cable.records import BlockSheave, Cables, Sheave
 from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.winches import Winches
@@ -382,10 +381,11 @@ class FrameCables:
         self._wind(wound, speed)
         return self._tightened(places, rates)
 
-    def strike(self, fault: CableFault, state: ChainState) -> None:
-        """Let a fault change the ropes."""
-        self.ropes = fault.strike(self.ropes, state)
-        self._retable()
+    def take(self, ropes: Ropes) -> None:
+        """Go on with ropes that a fault may have changed."""
+        if ropes is not self.ropes:
+            self.ropes = ropes
+            self._retable()
 
     def begin(self, time: float, state: ChainState, slopes: Array) -> None:
         """Begin a step at a time (s) in a state of the chain; ``slopes`` are the derivatives of the

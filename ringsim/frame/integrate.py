@@ -1,7 +1,7 @@
 """Time integration of a scene in joint coordinates; ``ringsim.stepping`` decides on the steps."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +17,8 @@ from ringsim.frame.readings import EnergyMeter, Readings
 from ringsim.frame.state import State
 from ringsim.layout.bodies import Array
 from ringsim.outputs.recorder import Recorder, States, StoredState, cleared, struck_by
-from ringsim.parts.faults import AT_ONCE, FailedSpring, Fault, StuckVJoint
+from ringsim.parts.faults import AT_ONCE, Fault, Faults, Struck
+from ringsim.parts.laws import Place, Switches
 from ringsim.refusal import InputError
 from ringsim.rigid.statics import scales_of
 from ringsim.scene import Scene
@@ -113,7 +114,7 @@ class Integration(Remembering):
         self._moves: list[tuple[float, Array]] = []
         self._easy = False
         self._steps: list[tuple[float, Array]] = []
-        self._faults, self._events = sorted(scene.faults, key=lambda one: one.time), Events(scene)
+        self._faults, self._events = Faults(scene.faults), Events(scene)
         self._turn = scene.loads_turn_at
         self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
         self._readings = Readings(model)
@@ -262,7 +263,8 @@ class Integration(Remembering):
         if self._locks is None:
             return
         locked = self._latches.locked(self._locks.deployed)
-        model.laws.latch(self._latches.caught)
+        self._latches.hold(model.laws.switches)
+        model.laws.follow()
         if model.cables is not None and chain is not None:
             for number, (plane, _) in enumerate(model.cables.present):
                 if locked[plane].all():
@@ -300,20 +302,18 @@ class Integration(Remembering):
 
     def _strike(self, now: Instant) -> bool:
         """Strike all faults that are due; returns whether there was one."""
-        due = [fault for fault in self._faults if fault.time <= now.time + AT_ONCE]
-        del self._faults[: len(due)]
+        due, model, chain = self._faults.due(now.time), self._model, self._now.chain
+        if not due:
+            return False
+        hit = Struck(self._scene.structure.planes, model.laws.switches, np.pi - now.angles)
+        if model.cables is not None and chain is not None:
+            hit.ropes, hit.stored, hit.wound = model.cables.ropes, chain.stored, chain.wound
         for fault in due:
-            if isinstance(fault, StuckVJoint):
-                place = self._scene.structure.planes.index(fault.plane), fault.section - 1
-                self._model.laws.stick(fault, place, float(now.angles[place]))
-            elif isinstance(fault, FailedSpring):
-                self._model.laws.fail(
-                    (self._scene.structure.planes.index(fault.plane), fault.section - 1)
-                )
-            elif isinstance(fault, CableFault) and self._model.cables is not None:
-                assert self._now.chain is not None
-                self._model.cables.strike(fault, self._now.chain)
-        return bool(due)
+            fault.strike(hit)
+        model.laws.follow()
+        if model.cables is not None:
+            model.cables.take(hit.ropes)
+        return True
 
     def _measure(self, time: float, state: State) -> Instant:
         """A state, with its cables, and what has passed since the one that was kept last."""
@@ -325,7 +325,7 @@ class Integration(Remembering):
     def _told(self, time: float, state: State) -> Instant:
         """A state whose chain is known."""
         model, chain = self._model, state.chain
-        tensions, stretch, driven = None, 0.0, bool(self._faults)
+        tensions, stretch, driven = None, 0.0, math.isfinite(self._faults.next_time)
         if model.cables is not None and chain is not None:
             tensions = chain.tensions
             stretch = float(np.max(chain.strains, where=chain.ropes.alive, initial=0.0))
@@ -379,8 +379,14 @@ class Storing(Integration):
         if self._states is not None and self._states.due(self._control):
             self._states.keep(self._control, self.history, self.memory())
 
-    def _place(self, fault: StuckVJoint | FailedSpring) -> tuple[int, int]:
-        return self._scene.structure.planes.index(fault.plane), fault.section - 1
+    def _settings(self) -> dict[tuple[Any, ...], float]:
+        """Those of laws that faults have switched on."""
+        switches = self._model.laws.switches
+        return {
+            key: float(switches.setting[number][switches.laws[number].places.index(place)])
+            for number, place, key in _of_faults(switches)
+            if switches.on[number].any()
+        }
 
     def memory(self) -> Memory:
         """See ``Remembering``: all that the next step depends on, but step control."""
@@ -390,7 +396,7 @@ class Storing(Integration):
             "latches": self._latches.memory(),
             "energy": self._energy.memory(),
             "reaction": getattr(model, "reaction", None),
-            "stuck": [opening for *_, opening in model.laws.stuck],
+            "settings": [[*key, value] for key, value in self._settings().items()],
         }
         if cables is not None and now.chain is not None:
             ropes = cables.ropes
@@ -441,20 +447,22 @@ class Storing(Integration):
         """Let all faults have struck that had, but those that are gone."""
         model = self._model
         # Those of the start have struck this model already, where it stood then.
-        model.laws = JointLaws(self._scene, model.skeleton, model.openings)
-        openings = list(start.memory["stuck"])
-        for fault in struck_by(start.scene.faults, start.time):
-            opening = openings.pop(0) if isinstance(fault, StuckVJoint) else math.nan
-            if fault in gone:
-                continue
-            if isinstance(fault, StuckVJoint):
-                model.laws.stick(fault, self._place(fault), opening)
-            elif isinstance(fault, FailedSpring):
-                model.laws.fail(self._place(fault))
-        left = len(struck_by(self._scene.faults, start.time))
-        self._faults = sorted(self._scene.faults, key=lambda fault: fault.time)[left:]
+        model.laws = JointLaws(model.skeleton, model.openings)
+        switches, planes = model.laws.switches, self._scene.structure.planes
+        unknown = np.full(self._control.now.angles.shape, math.nan)
+        own = Struck(planes, switches, unknown)
+        for fault in struck_by(self._scene.faults, start.time):
+            if not isinstance(fault, CableFault):
+                fault.strike(own)
+        # Settings are those of the state: at which angle a joint has stuck.
+        held = {tuple(key): value for *key, value in start.memory["settings"]}
+        for number, place, key in _of_faults(switches):
+            if key in held:
+                switches.set(number, place, on=1.0, setting=held[key])
+        self._faults.due(start.time)
         if self._locks is not None:
-            model.laws.latch(self._latches.caught)
+            self._latches.hold(switches)
+        model.laws.follow()
 
     def _chain_of(self, start: StoredState, gone: list[Fault]) -> ChainState:
         """The cables."""
@@ -462,14 +470,27 @@ class Storing(Integration):
         assert cables is not None
         assert scene.cables is not None
         ropes = Ropes(cables.ropes.points_per_cable, *memory["ropes"])
+        own = Struck(
+            scene.structure.planes,
+            self._model.laws.switches,
+            np.pi - self._control.now.angles,
+            ropes,
+        )
         for fault in gone:
-            if isinstance(fault, CableFault):
-                try:
-                    ropes = fault.clear(ropes)
-                except ValueError as error:
-                    raise InputError(str(error)) from error
+            try:
+                fault.clear(own)
+            except ValueError as error:
+                raise InputError(str(error)) from error
         wound, rate = memory["wound"]
         before = [cable for _, cable in scene.cables.present()]
         cables.winches.go_on(memory["winches"], before, start.time, wound, rate)
         place, moving = self._now.place.lines, self._now.rate.lines
-        return cables.go_on(ropes, place, moving, wound, rate)
+        return cables.go_on(own.ropes, place, moving, wound, rate)
+
+
+def _of_faults(switches: Switches) -> Iterator[tuple[int, Place, tuple[Any, ...]]]:
+    """Numbers of the laws that faults bring, with their V-joints and what tells them apart."""
+    for number, law in enumerate(switches.laws):
+        if isinstance(law.record, Fault):
+            for place in law.places:
+                yield number, place, (law.group, *place, law.record.time)

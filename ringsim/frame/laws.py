@@ -5,16 +5,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
-from numpy.typing import NDArray
 
 from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh, Skeleton
 from ringsim.frame.vectors import compiled
 from ringsim.layout.bodies import Array, JointOpening
-from ringsim.parts.faults import StuckVJoint
-from ringsim.parts.joints import JointFriction, Reaction
+from ringsim.parts.joints import JointFriction
+from ringsim.parts.laws import AngleLaw, Reaction, Rub, Switches
 from ringsim.parts.persection import at_section
 from ringsim.refusal import InputError
-from ringsim.scene import Scene
 from ringsim.stepping.locks import Turning
 
 # Laws of ringsim.parts and ringsim.cable as lists of operations, which compiled code plays back.
@@ -241,12 +239,12 @@ def _play_function(kind: int, x: Array, y: Array, out: Array) -> None:
 
 _NUDGE = 1e-7
 """Change of angle (rad) and rate (rad/s) by which the slopes of laws are measured."""
-_TURNED, _RATE, _ON, _ELASTIC, _DAMPING, _STORED = range(6)
-"""Rows of the laws' tape: coordinate, its rate and whether the law acts; parts of its Reaction."""
+_TURNED, _RATE, _ON, _SETTING, _ELASTIC, _DAMPING, _STORED = range(7)
+"""Rows of the laws' tape: coordinate and rate, whether the law acts, its setting; its Reaction."""
 
 
 class Acting(NamedTuple):
-    """Laws on coordinates x = sense * angle + offset, all shape (n,), and the angles' numbers.
+    """Laws on coordinates x = sense * angle, all shape (n,), and the angles' numbers.
 
     The first ``soft`` of them have slopes of their own; behind them is dry friction (``Turning``).
     """
@@ -254,7 +252,6 @@ class Acting(NamedTuple):
     tape: Tape
     own: Indices
     sense: Array
-    offset: Array
     soft: int
 
 
@@ -264,7 +261,7 @@ def _feel(acting: Acting, angles: Array, rates: Array, more: float, faster: floa
     rows = acting.tape.rows
     for n in range(len(acting.own)):
         k, sense = acting.own[n], acting.sense[n]
-        rows[_TURNED, n] = sense * angles[k] + acting.offset[n] + more
+        rows[_TURNED, n] = sense * angles[k] + more
         rows[_RATE, n] = sense * rates[k] + faster
     play(acting.tape)
 
@@ -346,119 +343,58 @@ class Openings(NamedTuple):
 
 
 class JointLaws:
-    """All torques of a scene's joints.
+    """All torques of a layout's joints.
 
-    ``damping`` is the torque over the rate of each angle where friction is linear, N m s/rad,
-    ``acting`` are all other laws, and ``stuck`` the faults that hold V-joints, (plane, section), at
-    opening angles, rad.
+    ``switches`` say which laws act, with which settings; ``damping`` is the torque over the rate of
+    each angle where friction is linear, N m s/rad, and ``acting`` are all other laws.
     """
 
-    def __init__(self, scene: Scene, skeleton: Skeleton, openings: Openings) -> None:
-        self._openings, self._stop = openings, scene.stop
+    def __init__(self, skeleton: Skeleton, openings: Openings) -> None:
+        layout, own, sense = skeleton.layout, *openings
+        self.switches = Switches(layout.angle_laws)
         self.damping = np.zeros(len(skeleton.angles))
+        self._openings = openings
         self._friction: list[tuple[JointFriction, Indices, Array, Turning]] = []
-        for family, law in scene.joints.present().items():
-            self._rub(family, law, skeleton)
-        spring, sections = scene.hinge_spring, openings.angle.shape[1]
-        self._spring = None if spring is None else spring.at(np.arange(sections))
-        self._sprung = np.ones(openings.angle.shape, dtype=bool)
-        latch = scene.latch
-        self._pawl = latch.at(np.arange(sections)) if latch is not None and latch.pushes else None
-        self.latched = np.zeros(openings.angle.shape, dtype=bool)
-        self.stuck: list[tuple[StuckVJoint, tuple[int, int], float]] = []
-        self._tape()
-
-    def _rub(self, family: str, law: JointFriction, skeleton: Skeleton) -> None:
-        joints = skeleton.layout.joints
-        own = [n for n, one in enumerate(skeleton.angles) if joints[one.joint].family == family]
-        if not own:
-            known = ", ".join(sorted({joint.family for joint in joints} - {""}))
-            raise InputError(
-                f"joints.{family}: this structure has no joint of that family (it has: "
-                f'{known or "none"}): leave it out (joints.{family} = "none")'
-            )
-        rest = []
-        for n in own:
-            linear = at_section(law, joints[skeleton.angles[n].joint].section).linear_damping()
-            if linear is None:
-                rest.append(n)
-            else:
-                self.damping[n] += linear
-        if rest:
-            sections = np.array([joints[skeleton.angles[n].joint].section for n in rest])
-            senses = np.array([skeleton.angles[n].sense for n in rest])
-            self._friction.append((at_section(law, sections), np.array(rest), senses, Turning()))
-
-    def _tape(self) -> None:
-        """Note all laws, each on joints of its own, anew."""
-        own, sense = self._openings
-        stop, spring, pawl = self._stop, self._spring, self._pawl
-        laws: list[tuple[Law, object, Indices, Array, float]] = []
-        if stop is not None:
-            laws.append((stop.torque, stop, own, sense, 0.0))
-        if spring is not None:
-
-            def drive(x: Any, _: Any, on: Any) -> Reaction:
-                return Reaction(*(on * part for part in spring.torque(x)))
-
-            laws.append((drive, spring, own, sense, 0.0))
-        if pawl is not None:
-            laws.append((lambda x, _rate, _on: pawl.torque(x), pawl, own, sense, 0.0))
-        for fault, place, opening in self.stuck:
-            where, against = np.array([own[place]]), np.array([-sense[place]])
-            hold = fault.torque
-            laws.append(
-                (
-                    lambda x, rate, _, hold=hold: hold(x, rate),
-                    fault,
-                    where,
-                    against,
-                    np.pi - opening,
-                )
-            )
-        soft = sum(each.size for _, _, each, *_ in laws)
+        for rub in layout.rubs:
+            self._rub(rub, skeleton)
+        laws: list[tuple[Law, object, Indices, Array]] = []
+        for law in layout.angle_laws:
+            at = tuple(np.array(law.places).T)
+            laws.append((_switched(law), law.record, own[at], sense[at]))
+        soft = sum(each.size for _, _, each, _ in laws)
         for friction, where, senses, _ in self._friction:
-            rub = friction.torque
-            laws.append(
-                (lambda _x, rate, _, rub=rub: (0.0, rub(rate), 0.0), friction, where, senses, 0.0)
-            )
+            laws.append((_rubbing(friction), friction, where, senses))
         self.acting = Acting(
-            taped([(law, each.shape, record) for law, record, each, *_ in laws], 3, 3),
-            np.concatenate([np.zeros(0, np.int64), *(each.ravel() for _, _, each, *_ in laws)]),
-            np.concatenate([np.zeros(0), *(sense.ravel() for *_, sense, _ in laws)]),
-            np.concatenate([np.zeros(0), *(np.full(w.size, off) for _, _, w, _, off in laws)]),
+            taped([(law, each.shape, record) for law, record, each, _ in laws], 4, 3),
+            np.concatenate([np.zeros(0, np.int64), *(each for _, _, each, _ in laws)]),
+            np.concatenate([np.zeros(0), *(senses for *_, senses in laws)]),
             soft,
         )
-        self._switch()
+        self.follow()
 
-    def _switch(self) -> None:
-        """Tell stops which joints are latched, and springs which are whole."""
-        on, first = self.acting.tape.rows[_ON], 0
-        for law, states in ((self._stop, self.latched), (self._spring, self._sprung)):
-            if law is not None:
-                on[first : first + states.size] = states.ravel()
-                first += states.size
+    def _rub(self, rub: Rub, skeleton: Skeleton) -> None:
+        rest = []
+        for k, joint in enumerate(rub.joints):
+            linear = at_section(rub.law, int(rub.sections[k])).linear_damping()
+            if linear is None:
+                rest.append(k)
+            else:
+                self.damping[skeleton.angle_of[joint]] += linear
+        if rest:
+            own = np.array([skeleton.angle_of[rub.joints[k]] for k in rest])
+            senses = np.array([skeleton.angles[n].sense for n in own])
+            self._friction.append((rub.of(rest), own, senses, Turning()))
 
-    def latch(self, deployed: NDArray[np.bool_]) -> None:
-        """Hold these V-joints from both sides from now on, if the stop latches."""
-        if self._stop is not None and self._stop.latch:
-            self.latched |= deployed
-            self._switch()
+    def follow(self) -> None:
+        """Take over what faults and latches have changed; due after each change."""
+        rows, last = self.acting.tape.rows, self.acting.soft
+        rows[_ON, :last] = np.concatenate([np.zeros(0), *self.switches.on])
+        rows[_SETTING, :last] = np.concatenate([np.zeros(0), *self.switches.setting])
 
     def begin(self) -> None:
         """Begin a step."""
         for *_, turning in self._friction:
             turning.forget()
-
-    def stick(self, fault: StuckVJoint, place: tuple[int, int], opening: float) -> None:
-        """Hold a V-joint, (plane, section), at an opening angle (rad)."""
-        self.stuck.append((fault, place, opening))
-        self._tape()
-
-    def fail(self, place: tuple[int, int]) -> None:
-        """Break the spring of a V-joint, (plane, section)."""
-        self._sprung[place] = False
-        self._switch()
 
     def note(self, rates: Array) -> None:
         """Remember an iterate for slopes of dry friction: rates of the angles, rad/s."""
@@ -477,8 +413,19 @@ class JointLaws:
 
     def stop_torques(self, angles: Array, rates: Array) -> Array | None:
         """Torques of the stop, (planes, sections), N m; None without."""
-        if self._stop is None:
-            return None
         own, sense = self._openings
-        folded, rate = sense * angles[own], sense * rates[own]
-        return np.asarray(self._stop.torque(folded, rate, self.latched).total)
+        return self.switches.torques("stop", sense * angles[own], sense * rates[own])
+
+
+def _switched(law: AngleLaw) -> Law:
+    """What a tape is made of: a law on its places, as far as they are switched on."""
+    own = law.own
+
+    def reacting(folded: Any, rate: Any, on: Any, setting: Any) -> Reaction:
+        return own.reaction(folded, rate, setting).times(on)
+
+    return reacting
+
+
+def _rubbing(friction: JointFriction) -> Law:
+    return lambda _folded, rate, _on, _setting: (0.0, friction.torque(rate), 0.0)

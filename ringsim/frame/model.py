@@ -70,7 +70,7 @@ class FrameModel:
         self.mesh, parts = mesh_of(skeleton, scene.rods, boom, touching)
         mesh = self.mesh
         self.openings = Openings.of(skeleton)
-        self.laws = JointLaws(scene, skeleton, self.openings)
+        self.laws = JointLaws(skeleton, self.openings)
         self.with_hub, self._strung = self.layout.net is not None, False
         self.web = Web.of(self.layout.net)
         edge = self.layout.edge

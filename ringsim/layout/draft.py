@@ -41,10 +41,11 @@ from ringsim.layout.layout import (
     layout_at_opening,
 )
 from ringsim.parts.boom import RigidBoom
-from ringsim.parts.joints import Reaction
+from ringsim.parts.laws import AngleLaw, Reaction, Rub
 from ringsim.parts.net import BoundaryNet, SpringNet
 from ringsim.parts.persection import at_section, spread
 from ringsim.parts.rods import Tube
+from ringsim.refusal import InputError
 
 # What holds a structure: its boom and, at the boom's upper end, the ground or a spacecraft.
 
@@ -275,8 +276,8 @@ class Track(NamedTuple):
 class Draft:
     """Collects parts; ``finish`` adds what the scene names and gives the layout.
 
-    Of the scene it reads ``rods``, ``boom``, ``spacecraft``, ``net``, ``loads``, ``gravity``,
-    ``offload`` and ``cables``.
+    Of the scene it reads ``rods``, ``joints``, ``stop``, ``hinge_spring``, ``latch``, ``faults``,
+    ``boom``, ``spacecraft``, ``net``, ``loads``, ``gravity``, ``offload`` and ``cables``.
     """
 
     scene: Any
@@ -399,7 +400,38 @@ class Draft:
             gravity=gravity,
             hung=None if gravity is None else hang(self, gravity, base_of(self)),
             edge=along_edges(self),
+            angle_laws=self._angle_laws(openings),
+            rubs=tuple(self._rub(*one) for one in self.scene.joints.present().items()),
         )
+
+    def _angle_laws(self, openings: Sequence[Sequence[Opening]]) -> tuple[AngleLaw, ...]:
+        """Of stops, springs, latches and faults; InputError without V-joints that they act on."""
+        scene, found = self.scene, list[AngleLaw]()
+        parts = {name: getattr(scene, name) for name in ("stop", "hinge_spring", "latch")}
+        parts |= {f"faults[{k}]": fault for k, fault in enumerate(scene.faults, 1)}
+        for name, part in parts.items():
+            if part is None:
+                continue
+            laws = part.laws(scene.structure.planes, scene.structure.sections)
+            if laws and not all(isinstance(one, JointOpening) for row in openings for one in row):
+                raise InputError(
+                    f"{name}: this structure has no joints that open, which would be held: leave "
+                    f'it out ({name} = "none")'
+                )
+            found += laws
+        return tuple(found)
+
+    def _rub(self, family: str, law: Any) -> Rub:
+        """Friction of the joints of a family."""
+        own = [number for number, joint in enumerate(self.joints) if joint.family == family]
+        if not own:
+            known = ", ".join(sorted({joint.family for joint in self.joints} - {""}))
+            raise InputError(
+                f"joints.{family}: this structure has no joint of that family (it has: "
+                f'{known or "none"}): leave it out (joints.{family} = "none")'
+            )
+        sections = np.array([self.joints[number].section for number in own])
+        return Rub(family, law, tuple(own), sections)
 
     def _mount(self, part: Part | None, at: Any, axes: Array, what: str) -> Mount:
         place, size = real_of(at), 1.0

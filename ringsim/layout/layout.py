@@ -28,6 +28,7 @@ from ringsim.layout.bodies import (
     skew,
 )
 from ringsim.parts.ground import Offload
+from ringsim.parts.laws import AngleLaw, Rub
 from ringsim.parts.net import BoundaryNet, SpringNet
 
 # A structure at one value of its coordinate: the one description that every room reads.
@@ -41,7 +42,7 @@ class Spring(NamedTuple):
     """A linear spring with a damper between the origins of two bodies.
 
     ``law`` has ``stiffness``, ``damping``, ``free_length``, and ``tension(length, rate)`` as a
-    ``ringsim.parts.joints.Reaction``.
+    ``ringsim.parts.laws.Reaction``.
     """
 
     first: int
@@ -141,7 +142,8 @@ class Layout:
     and vector, N; ``base`` the body that is held, or that a boom's upper end is fixed to;
     ``gravity`` the weight of a kilogram, m/s^2; ``hung`` the lines of a ground test;
     ``held`` how much further open V-joints are held before a run, shape (planes, sections), rad;
-    ``edge`` the cables along the edge of a net.
+    ``edge`` the cables along the edge of a net; ``angle_laws`` what acts on V-joints, and ``rubs``
+    what brakes joints by their rates alone.
     """
 
     bodies: tuple[Body, ...]
@@ -160,6 +162,8 @@ class Layout:
     hung: Hung | None = None
     held: Array | None = None
     edge: EdgeNet | None = None
+    angle_laws: tuple[AngleLaw, ...] = ()
+    rubs: tuple[Rub, ...] = ()
 
     def pose(self, mount: Mount) -> Pose:
         """The frame of a mount, with its own axes."""

@@ -224,7 +224,7 @@ def spanned(values: Iterable[str], known: Mapping[str, NDArray[Any]]) -> dict[st
 # States stored on the way of a run, and going on from one.
 
 
-FORMAT = 4
+FORMAT = 5
 """Of what is stored; a state of another format is refused."""
 
 

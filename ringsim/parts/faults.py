@@ -1,10 +1,13 @@
-"""Faults of joints: what breaks or sticks, where and when."""
+"""Faults: what breaks or sticks, where and when, and what it changes."""
 
+import math
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field
 
-from ringsim.parts.joints import Reaction, two_sided
+from ringsim.parts.laws import AngleLaw, AngleRecord, Array, Place, Reaction, Switches, two_sided
 from ringsim.units import Model, SecondOrZero, TorsionDamping, TorsionRate
 
 # The family of faults: things that break at a given time and place.
@@ -15,55 +18,154 @@ AT_ONCE = 1e-8
 round-off of places (in steps of 1e-10 s they blew rings up that sound steps open)."""
 
 
+@dataclass
+class Struck:
+    """What faults can change, between two steps of a run or on the way of a margin.
+
+    ``folded`` are the angles by which V-joints are folded, shape (planes, sections), rad, NaN where
+    nobody knows; ``ropes`` the cables' (``ringsim.cable.ropes``) with the natural length ``stored``
+    in each span, m, and the rope ``wound`` at both ends of each cable, m; None without cables.
+    """
+
+    planes: tuple[str, ...]
+    switches: Switches
+    folded: Array
+    ropes: Any = None
+    stored: Any = None
+    wound: Any = None
+
+
 class Fault(Model):
-    """Anything that breaks."""
+    """Anything that breaks; a kind says in ``strike`` what it changes, and engines do the rest."""
 
     time: SecondOrZero
     """When it happens, in s of the simulation."""
+
+    def laws(self, planes: tuple[str, ...], sections: int) -> list[AngleLaw]:
+        """Laws on V-joints that it will switch on."""
+        return []
+
+    def strike(self, now: Struck) -> None:
+        """Change what it breaks; ValueError if that does not exist."""
+        raise NotImplementedError
+
+    def clear(self, now: Struck) -> None:
+        """Take a strike back from what goes on from a stored state; ValueError if nobody can.
+
+        Laws begin as the scene has them, so that only faults of ropes have something to do.
+        """
+
+    def unlatches(self, planes: tuple[str, ...]) -> Place | None:
+        """The V-joint whose latch no longer catches, if it is such a fault."""
+        return None
+
+    def check(self, scene: Any) -> None:
+        """Raise a ValueError, told behind the fault's name, where a scene has nothing to break."""
+
+
+class JointFault(Fault):
+    """A fault of one V-joint."""
+
+    plane: str = "upper"
+    """Plane of the V-joint, one of those of the structure."""
+    section: Annotated[int, Field(ge=1)]
+    """Counted from 1 at the boom."""
+
+    def place(self, planes: tuple[str, ...]) -> Place:
+        """Of the V-joint."""
+        return planes.index(self.plane), self.section - 1
 
 
 # A latch that does not catch.
 
 
-class FailedLatch(Fault):
+class FailedLatch(JointFault):
     """The latch of a V-joint does not catch from that time on; one that has caught holds on."""
 
     kind: Literal["failed-latch"] = "failed-latch"
-    plane: str = "upper"
-    """Plane of the V-joint, one of those of the structure."""
-    section: Annotated[int, Field(ge=1)]
-    """Counted from 1 at the boom."""
+
+    def strike(self, now: Struck) -> None:
+        """Nothing but that: its pawl is lifted all the same."""
+
+    def unlatches(self, planes: tuple[str, ...]) -> Place | None:
+        """See ``Fault``."""
+        return self.place(planes)
+
+    def check(self, scene: Any) -> None:
+        """See ``Fault``."""
+        if scene.stop is None or not scene.stop.latch:
+            raise ValueError(
+                "is a fault of a latch, but the stops have none: set stop.latch = true, or leave "
+                "the fault out"
+            )
 
 
 # A spring that breaks.
 
 
-class FailedSpring(Fault):
+class FailedSpring(JointFault):
     """The spring of a V-joint gives no torque any more; what it had stored is lost."""
 
     kind: Literal["failed-spring"] = "failed-spring"
-    plane: str = "upper"
-    """Plane of the V-joint, one of those of the structure."""
-    section: Annotated[int, Field(ge=1)]
-    """Counted from 1 at the boom."""
+
+    def strike(self, now: Struck) -> None:
+        """See ``Fault``."""
+        for law in now.switches.of_group("springs"):
+            now.switches.set(law, self.place(now.planes), on=0.0)
+
+    def check(self, scene: Any) -> None:
+        """See ``Fault``."""
+        if scene.hinge_spring is None:
+            raise ValueError(
+                "is a fault of a spring, but the scene has none: add [hinge_spring], or leave the "
+                "fault out"
+            )
 
 
 # A V-joint that seizes.
 
 
-class StuckVJoint(Fault):
+class StuckVJoint(JointFault, AngleRecord):
     """A stiff spring holds the joint at the angle that it has at that time."""
 
     kind: Literal["stuck-vjoint"] = "stuck-vjoint"
-    plane: str = "upper"
-    """Plane of the V-joint, one of those of the structure."""
-    section: Annotated[int, Field(ge=1)]
-    """Counted from 1 at the boom."""
     stiffness: TorsionRate = 1000.0
     """Of the spring that holds the joint."""
     damping: TorsionDamping = 1.0
     """Of the damper beside it."""
 
-    def torque(self, turned: Any, rate: Any) -> Reaction:
-        """Against the angle (rad) by which the joint has turned since, and its rate (rad/s)."""
-        return two_sided(turned, rate, self.stiffness, self.damping)
+    def laws(self, planes: tuple[str, ...], sections: int) -> list[AngleLaw]:
+        """The spring, which holds nothing yet."""
+        places = (self.place(planes),)
+        return [AngleLaw("stuck", self, places, np.zeros(1), np.zeros(1), holds=True)]
+
+    def strike(self, now: Struck) -> None:
+        """See ``Fault``."""
+        place = self.place(now.planes)
+        for law in now.switches.of_record(self):
+            now.switches.set(law, place, on=1.0, setting=float(now.folded[place]))
+
+    def reaction(self, folded: Any, rate: Any, setting: Any, xp: Any = np) -> Reaction:
+        """See ``AngleRecord``; ``setting`` is the angle at which the joint is held."""
+        return two_sided(folded - setting, rate, self.stiffness, self.damping)
+
+
+# Striking them in the order of their times.
+
+
+class Faults:
+    """Those of a scene that wait for their time."""
+
+    def __init__(self, faults: tuple[Fault, ...]) -> None:
+        self.waiting = sorted(faults, key=lambda fault: fault.time)
+
+    @property
+    def next_time(self) -> float:
+        """Time of the next fault, s; infinite if there is none left."""
+        return self.waiting[0].time if self.waiting else math.inf
+
+    def due(self, time: float) -> list[Fault]:
+        """Those whose time (s) has come, which wait no longer."""
+        found = [fault for fault in self.waiting if fault.time <= time + AT_ONCE]
+        del self.waiting[: len(found)]
+        return found

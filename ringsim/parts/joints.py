@@ -2,14 +2,15 @@
 
 import math
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ringsim.choice import OneOf
-from ringsim.parts.persection import PerSection, at_section
+from ringsim.parts.laws import AngleLaw, AngleRecord, Reaction, one_sided, two_sided
+from ringsim.parts.persection import PerSection
 from ringsim.units import (
     AngularRate,
     DegreeOrZero,
@@ -75,49 +76,6 @@ class Joints(Model):
         return {family: law for family, law in self if law is not None}
 
 
-# Springs with dampers, of which nets, stops and contacts are made; each law is written once.
-#
-# A law takes the functions that it needs (``minimum``, ``maximum``, ``where``, ``tanh``, ``exp``,
-# ``sqrt``, ``abs``, ``sign``) from ``xp``: numpy, or an engine's namespace of the same names for
-# its own expressions.  Forces resist the growth of the law's coordinate.
-
-
-class Reaction(NamedTuple):
-    """What resists a coordinate; numbers, arrays or an engine's expressions."""
-
-    elastic: Any
-    """Derivative of ``stored`` after the coordinate, N (N m for an angle)."""
-    damping: Any
-    """The rest; times the rate it is the power lost, never negative, N (N m)."""
-    stored: Any
-    """Elastic energy, J."""
-
-    @property
-    def total(self) -> Any:
-        """Elastic and damping part together."""
-        return self.elastic + self.damping
-
-
-def two_sided(stretch: Any, rate: Any, stiffness: Any, damping: Any) -> Reaction:
-    """A linear spring and damper, for a stretch in m (rad) and its rate."""
-    elastic = stiffness * stretch
-    return Reaction(elastic, damping * rate, 0.5 * elastic * stretch)
-
-
-def one_sided(
-    stretch: Any, rate: Any, stiffness: Any, damping: Any, onset: float, xp: Any = np
-) -> Reaction:
-    """A spring that acts while its stretch is positive, with a damper that never turns it round.
-
-    k s + d s' min(s / onset, 1), but not below 0: a damper in full force from the first touch
-    would let the force jump, and Newton would find no solution in the step that meets it.
-    """
-    taut = xp.maximum(stretch, 0.0)
-    elastic = stiffness * taut
-    damper = xp.maximum(damping * rate * xp.minimum(taut / onset, 1.0), -elastic)
-    return Reaction(elastic, damper, 0.5 * elastic * taut)
-
-
 # What the latches of the V-joints ask for before they hold.
 
 
@@ -125,7 +83,7 @@ _Reach = Annotated[float, Field(gt=0.0, le=60.0), Unit("deg")]
 _LeastRate = Annotated[float, Field(ge=0.0, le=1e3), Unit("rad/s")]
 
 
-class Latch(Model):
+class Latch(AngleRecord):
     """A pawl on every V-joint that a ramp lifts in the last degrees, and that falls in at 180 deg.
 
     At the folded angle x the ramp resists opening with 4 peak_torque u (1 - u), u = x / reach, and
@@ -142,19 +100,14 @@ class Latch(Model):
     min_rate: PerSection[_LeastRate] = 0.0
     """Opening rate at 180 deg below which a latch does not catch."""
 
-    def at(self, where: int | NDArray[np.int64]) -> Self:
-        """The latch of a section, or of several, counted from 0."""
-        return at_section(self, where)
+    def laws(self, planes: tuple[str, ...], sections: int) -> list[AngleLaw]:
+        """Its ramps, where any resists."""
+        if not np.any(np.asarray(self.peak_torque) > 0.0):
+            return []
+        return [AngleLaw.everywhere("latches", self, (len(planes), sections), "latch")]
 
-    @property
-    def pushes(self) -> bool:
-        """Whether a ramp resists anywhere."""
-        return bool(np.any(np.asarray(self.peak_torque) > 0.0))
-
-    def torque(self, folded: Any, xp: Any = np) -> Reaction:
-        """What resists folding, N m, and the energy stored, J, at an angle in rad; ``xp``: see
-        ``ringsim.parts.joints``.
-        """
+    def reaction(self, folded: Any, rate: Any, setting: Any, xp: Any = np) -> Reaction:
+        """See ``AngleRecord``."""
         reach: float = math.radians(self.reach)
         u = xp.minimum(xp.maximum(folded / reach, 0.0), 1.0)
         largest: Any = self.peak_torque
@@ -167,20 +120,24 @@ class Latch(Model):
 # The family of springs in the V-joints.
 
 
-class HingeSpring(Model):
+class HingeSpring(AngleRecord):
     """A spring in every V-joint; its torque follows from the joint's angle alone.
 
     The angle is that by which the joint is folded, pi - opening angle; a positive torque opens it.
     Fields of a kind may be ``PerSection``; ``torque`` is called on what ``at`` gives.
     """
 
-    def at(self, where: int | NDArray[np.int64]) -> Self:
-        """The spring of a section, or of several, counted from 0."""
-        return at_section(self, where)
+    def laws(self, planes: tuple[str, ...], sections: int) -> list[AngleLaw]:
+        """One in every V-joint."""
+        return [AngleLaw.everywhere("springs", self, (len(planes), sections), "spring")]
+
+    def reaction(self, folded: Any, rate: Any, setting: Any, xp: Any = np) -> Reaction:
+        """See ``AngleRecord``."""
+        return self.torque(folded, xp)
 
     def torque(self, folded: Any, xp: Any = np) -> Reaction:
         """What resists folding, N m, and the energy stored, J, at an angle in rad; ``xp``: see
-        ``ringsim.parts.joints``.
+        ``ringsim.parts.laws``.
         """
         raise NotImplementedError
 
@@ -277,7 +234,7 @@ class TapeSpring(HingeSpring):
 # The family of stops.
 
 
-class Stop(Model):
+class Stop(AngleRecord):
     """One-sided stops of every V-joint: at 180 deg and at the stowed end.
 
     A kind says how they push.  The angle is that by which a joint is folded, pi - opening angle.
@@ -292,6 +249,10 @@ class Stop(Model):
     stowed_angle: DegreeOrZero = 0.0
     """Opening angle of the stowed stop."""
 
+    def laws(self, planes: tuple[str, ...], sections: int) -> list[AngleLaw]:
+        """One on every V-joint; its setting is 1 once the joint is latched."""
+        return [AngleLaw.everywhere("stop", self, (len(planes), sections))]
+
     @property
     def most_folded(self) -> float:
         """Folded angle at which the stowed stop is met, rad."""
@@ -301,8 +262,9 @@ class Stop(Model):
         """Reaction to a depth (rad) and its rate (rad/s), none where the depth is negative."""
         raise NotImplementedError
 
-    def torque(self, folded: Any, rate: Any, latched: Any, xp: Any = np) -> Reaction:
-        """Reaction of both ends, or of the latch where it holds; ``xp``: see ``springs``."""
+    def reaction(self, folded: Any, rate: Any, setting: Any, xp: Any = np) -> Reaction:
+        """Of both ends, or of the latch where it holds; see ``AngleRecord``."""
+        latched = setting > 0.5
         high = self.push(folded - self.most_folded, rate, xp)
         low = self.push(-folded, -rate, xp)
         held = two_sided(folded, rate, self.stiffness, self.damping)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ringsim.parts.joints import Reaction, one_sided, two_sided
+from ringsim.parts.laws import Reaction, one_sided, two_sided
 from ringsim.parts.persection import PerSection, spread
 from ringsim.units import AxialStiffness, DampingRate, Kilogram, Metre, Model, SpringRate, Unit
 

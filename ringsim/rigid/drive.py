@@ -2,17 +2,17 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from ringsim.cable.faults import CableFault
 from ringsim.cable.friction import PulleyFriction
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.winches import why_unlimited
 from ringsim.layout.bodies import Array
-from ringsim.parts.faults import AT_ONCE, FailedLatch, FailedSpring, Fault, StuckVJoint
+from ringsim.parts.faults import AT_ONCE, Fault, Struck
+from ringsim.parts.laws import AngleLaw, Switches
 from ringsim.refusal import InputError
 from ringsim.rigid.mechanism import Configuration, Mechanism
 from ringsim.scene import Scene
@@ -28,13 +28,11 @@ class Condition(NamedTuple):
     """A drive at one instant.
 
     ``reach`` has, of the winches that are on, 1 for the spans that their rope runs to and else 0,
-    shape (spans,); ``sprung`` is 1 where the spring of a V-joint is whole, shape (planes,
-    sections); a V-joint that is ``stuck`` holds all of rigid rods.
+    shape (spans,); ``switches`` say which laws on V-joints act.
     """
 
     reach: dict[Place, Array]
-    sprung: Array
-    stuck: bool
+    switches: Switches
 
 
 class Conditions:
@@ -44,8 +42,8 @@ class Conditions:
     opens.  A span that parts takes the tension of its rope, up to the next jam.
     """
 
-    def __init__(self, scene: Scene, points: tuple[int, ...]) -> None:
-        self._structure, self._points = scene.structure, points
+    def __init__(self, scene: Scene, points: tuple[int, ...], laws: Sequence[AngleLaw]) -> None:
+        self._structure, self._points, self._laws = scene.structure, points, laws
         self._faults = sorted(scene.faults, key=lambda fault: fault.time)
         cables = [] if scene.cables is None else [cable for _, cable in scene.cables.present()]
         self.winches: dict[Place, Winch] = {
@@ -82,44 +80,39 @@ class Conditions:
         return self._known[struck, on]
 
     def _after(self, faults: list[Fault], on: tuple[Place, ...]) -> Condition:
-        sprung = np.ones((len(self._structure.planes), self._structure.sections))
-        ropes = _whole(self._points)
-        for fault in faults:
-            if isinstance(fault, FailedSpring):
-                sprung[self._structure.planes.index(fault.plane), fault.section - 1] = 0.0
-            elif isinstance(fault, CableFault):
-                none = np.zeros(ropes.spans), np.zeros((len(self._points), 2))
-                ropes = fault.change(ropes, *none)
+        ropes = self._struck(faults, switches := Switches(self._laws))
         reach = {}
         for number, end in on:
             rope = ropes.of_end[number, end]
             own = slice(*ropes.cable_starts[number : number + 2])
             reach[number, end] = 1.0 * (ropes.alive[rope] & (ropes.of_span[own] == rope))
-        return Condition(reach, sprung, any(isinstance(fault, StuckVJoint) for fault in faults))
+        return Condition(reach, switches)
+
+    def _struck(self, faults: Sequence[Fault], switches: Switches) -> Ropes:
+        """The ropes after faults, which change the switches, too."""
+        shape = len(self._structure.planes), self._structure.sections
+        now = Struck(self._structure.planes, switches, np.full(shape, np.nan), _whole(self._points))
+        for fault in faults:
+            now.stored, now.wound = np.zeros(now.ropes.spans), np.zeros((len(self._points), 2))
+            fault.strike(now)
+        return cast(Ropes, now.ropes)
+
+    def told(self, fault: Fault) -> str:
+        """What a fault does to the margin of a ring that is whole."""
+        ropes = self._struck([fault], switches := Switches(self._laws))
+        if switches.hold:
+            return "with rigid rods it holds the whole ring: margin -1"
+        sound, whole = Switches(self._laws), _whole(self._points)
+        same = all(map(np.array_equal, switches.on, sound.on)) and all(
+            np.array_equal(getattr(ropes, name), getattr(whole, name))
+            for name in ("starts", "alive")
+        )
+        return "changes nothing" if same else "counted"
 
 
 def turns_ever(winch: Winch) -> bool:
     """Whether a winch is ever switched on."""
     return winch.start_time != winch.stop_time
-
-
-def changes_drive(fault: Fault) -> bool:
-    """Whether a fault takes anything from the drive of a ring, as far as the margin knows."""
-    return isinstance(fault, (CableFault, FailedSpring, StuckVJoint))
-
-
-def is_unknown(fault: Fault) -> bool:
-    """Whether the margin of a drive does not know what a fault does."""
-    return not changes_drive(fault) and not isinstance(fault, FailedLatch)
-
-
-def told(fault: Fault) -> str:
-    """What the margin of a drive makes of a fault."""
-    if isinstance(fault, StuckVJoint):
-        return "with rigid rods it holds the whole ring: margin -1"
-    if isinstance(fault, FailedLatch):
-        return "changes nothing: its pawl is lifted all the same"
-    return "counted" if changes_drive(fault) else "NOT counted: the margin does not know it"
 
 
 def _whole(points: tuple[int, ...]) -> Ropes:
@@ -161,7 +154,7 @@ class Drive:
         self._cables = [] if scene.cables is None else scene.cables.present()
         self._paths = [points.path(number) for number in range(len(self._cables))]
         self._laws: dict[float, list[PulleyFriction]] = {}
-        self.conditions = Conditions(scene, tuple(map(len, self._paths)))
+        self.conditions = Conditions(scene, tuple(map(len, self._paths)), points.layout.angle_laws)
         reason = why_unlimited(scene.cables, scene.structure.planes)
         if reason:
             raise InputError(reason)

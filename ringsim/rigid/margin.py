@@ -15,7 +15,7 @@ from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.margin import MarginStandard
 from ringsim.parts.net import BoundaryNet
 from ringsim.refusal import InputError
-from ringsim.rigid.drive import Drive, is_unknown
+from ringsim.rigid.drive import Drive
 from ringsim.rigid.mechanism import Mechanism, SectionLoads
 from ringsim.rigid.resistances import Opening, resistances
 from ringsim.scene import Scene
@@ -107,7 +107,7 @@ class DriveMargin:
         """
         standard, now = self.standard, self.mechanism.at(0.5 * (math.pi - angle))
         over, state = self._drive.reeved(now), self.conditions.at(time)
-        opening = Opening(angle, self._drive.speed(over, state), 0.0, now, state.sprung)
+        opening = Opening(angle, self._drive.speed(over, state), 0.0, now, state.switches)
         ideal, usual = (self._drive.pulls(state, over, factor) for factor in (0.0, 1.0))
         factored = self._drive.pulls(state, over, standard.friction, losses=standard.friction)
         loads = float(self._loads.at(now).clip(min=0.0).sum())  # what resists is a resistance
@@ -126,7 +126,7 @@ class DriveMargin:
             else:
                 required += factor * max(force, 0.0)
         required = standard.motorisation * required + accelerated
-        margin = _margin(drive, math.inf if state.stuck else required)
+        margin = _margin(drive, math.inf if state.switches.hold else required)
         pulls = np.stack([ideal, factored])
         return Margin(angle, driving, resisting, margin, required, pulls)
 
@@ -287,11 +287,8 @@ def with_margin(
             "least_drive_margin_time": np.asarray(least.time),
             "least_drive_margin_angle": np.asarray(math.degrees(least.angle)),
         }
-    unknown = [number for number, one in enumerate(scene.faults, 1) if is_unknown(one)]
-    missing = "".join(f"; the margin of the drive does not know faults[{k}]" for k in unknown)
     return replace(
         outcome,
-        reason=outcome.reason + missing,
         values=outcome.values | values,
         coordinates=outcome.coordinates | {"resistance": np.array(kinds, dtype=str)},
     )
@@ -335,7 +332,7 @@ class PlaneMargin(DriveMargin):
         ideal, factored = whole.pulls[:, self._plane] - whole.pulls[:, 1 - self._plane]
         half = {source: 0.5 * force for source, force in whole.driving.items()}
         half[CABLES] += 0.5 * float(ideal)
-        held = self.conditions.at(time).stuck
+        held = self.conditions.at(time).switches.hold
         if held or whole.required == 0.0 or not math.isfinite(whole.margin):
             return whole._replace(driving=half)
         margin = whole.margin + float(factored) / whole.required

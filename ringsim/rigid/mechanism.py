@@ -9,6 +9,7 @@ import numpy as np
 from ringsim.layout.bodies import Array, Mount, OnBody, skew
 from ringsim.layout.draft import FreeHub, NetForce, natural_lengths
 from ringsim.layout.layout import EdgeNet, Layout, layout_of
+from ringsim.parts.laws import Switches
 from ringsim.parts.net import SpringNet, pull
 from ringsim.scene import Scene
 
@@ -173,11 +174,13 @@ def _axial(w: Array) -> Array:
 class Mechanism:
     """Coordinate, masses and forces of a scene's structure; arguments are those of ``Points``.
 
-    ``fixed`` is whether a body is held: the first upper assembly by the base of a boom.
+    ``fixed`` is whether a body is held: the first upper assembly by the base of a boom;
+    ``switches`` are those of the laws on its V-joints, all whole.
     """
 
     def __init__(self, scene: Scene, at: float | None = None, layout: Layout | None = None) -> None:
         self.points = points = Points(scene, at, layout)
+        self.switches = Switches(points.layout.angle_laws)
         masses = points.layout.point_masses()[0]
         places = points.fit(lambda layout: layout.point_masses()[2:])
         count, flat = places.shape[-1], places.reshape(len(masses), -1)
@@ -294,42 +297,25 @@ class SectionLoads:
         return np.asarray(np.bincount(self._sections, power), dtype=float)
 
 
-# Springs and latches of all V-joints of a ring of rigid rods, whose joints open alike.
+# Laws on all V-joints of a ring of rigid rods, whose joints open alike.
 
 
-class SpringEnergy:
-    """Springs and latches of a scene; ``alive`` are springs that have not failed, shape (planes,
-    sections).
+class Torques(NamedTuple):
+    """Sum of torques that resist folding, N m, and energy, J."""
+
+    torque: float
+    stored: float
+
+
+def torques_at(switches: Switches, folded: float, group: str | None = None) -> Torques:
+    """Of the laws that a drive meets on its way, or those of a group, at rest and at the angle
+    (rad) by which every V-joint is folded.
     """
-
-    def __init__(self, scene: Scene) -> None:
-        sections = scene.structure.sections
-        self._planes = scene.structure.planes
-        self.alive = np.ones((len(self._planes), sections))
-        spring = scene.hinge_spring
-        self._law = None if spring is None else spring.at(np.arange(sections))
-        latch = scene.latch
-        self._pawl = None if latch is None else latch.at(np.arange(sections))
-
-    def at(self, folded: float) -> tuple[float, float]:
-        """Sum of all torques that open (N m) and energy (J) at the folded angle (rad) of all."""
-        torque, stored = self.springs(folded)
-        if self._pawl is None:
-            return torque, stored
-        more, lifted = self.pawls(folded)
-        return torque + more, stored + lifted
-
-    def pawls(self, folded: float) -> tuple[float, float]:
-        """Those of the latches alone."""
-        if self._pawl is None:
-            return 0.0, 0.0
-        reaction = self._pawl.torque(np.full(self.alive.shape, folded))
-        return float(np.sum(reaction.elastic)), float(np.sum(reaction.stored))
-
-    def springs(self, folded: float) -> tuple[float, float]:
-        """Those of the springs alone."""
-        if self._law is None:
-            return 0.0, 0.0
-        reaction = self._law.torque(np.full(self.alive.shape, folded))
-        torque = float(np.sum(self.alive * reaction.elastic))
-        return torque, float(np.sum(self.alive * reaction.stored))
+    torque = stored = 0.0
+    for number, law in enumerate(switches.laws):
+        if law.category is not None and group in (None, law.group):
+            angles = np.full(len(law.places), folded)
+            still = law.own.reaction(angles, np.zeros(len(angles)), switches.setting[number])
+            torque += float(np.sum(switches.on[number] * still.elastic))
+            stored += float(np.sum(switches.on[number] * still.stored))
+    return Torques(torque, stored)

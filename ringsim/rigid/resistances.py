@@ -2,16 +2,15 @@
 
 import math
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ringsim.choice import load_package
 from ringsim.layout.bodies import Array
-from ringsim.parts.joints import JointFriction
+from ringsim.parts.laws import Rub, Switches
 from ringsim.parts.margin import Category
-from ringsim.parts.persection import at_section
-from ringsim.rigid.mechanism import Configuration, Mechanism, Points, SectionLoads, SpringEnergy
+from ringsim.rigid.mechanism import Configuration, Mechanism, Points, SectionLoads, torques_at
 from ringsim.rigid.statics import Carried
 from ringsim.scene import Scene
 
@@ -22,14 +21,14 @@ class Opening(NamedTuple):
     """The ring at an opening angle (rad) while it opens at a rate (rad/s) and an acceleration.
 
     ``now`` is the mechanism at its coordinate q = (pi - angle) / 2;
-    ``sprung`` is 1 where the spring of a V-joint is whole, one for all or shape (planes, sections).
+    ``switches`` say which laws on V-joints act.
     """
 
     angle: float
     rate: float
     acceleration: float
     now: Configuration
-    sprung: Array | float = 1.0
+    switches: Switches
 
 
 class Resistance:
@@ -38,9 +37,9 @@ class Resistance:
     All joints open alike; forces are generalised: power over the rate of the opening angle, N m.
     """
 
-    kind: ClassVar[str]
+    kind: str
     """Its name in results."""
-    category: ClassVar[Category]
+    category: Category
     """The factor of a standard that it takes."""
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
@@ -50,6 +49,11 @@ class Resistance:
     def carried(self) -> Carried:
         """The corners on lines of a scene that has an offload."""
         return Carried(self.scene, self.mechanism)
+
+    @classmethod
+    def of(cls, scene: Scene, mechanism: Mechanism) -> "list[Resistance]":
+        """All of this kind that a scene may have."""
+        return [cls(scene, mechanism)]
 
     @property
     def present(self) -> bool:
@@ -64,7 +68,7 @@ class Resistance:
 def resistances(scene: Scene, mechanism: Mechanism) -> list[Resistance]:
     """All that a scene has, by name."""
     load_package(__name__.rpartition(".")[0])
-    found = [kind(scene, mechanism) for kind in Resistance.__subclasses__()]
+    found = [one for kind in Resistance.__subclasses__() for one in kind.of(scene, mechanism)]
     return sorted((one for one in found if one.present), key=lambda one: one.kind)
 
 
@@ -112,8 +116,8 @@ class JointFrictionResistance(Resistance):
 
     def __init__(self, scene: Scene, mechanism: Mechanism) -> None:
         super().__init__(scene, mechanism)
-        laws = scene.joints.present()
-        self._joints = [_joints(mechanism.points, *item) for item in laws.items()]
+        points = mechanism.points
+        self._joints = [(rub.of(slice(None)), _turning(points, rub)) for rub in points.layout.rubs]
 
     @property
     def present(self) -> bool:
@@ -130,12 +134,12 @@ class JointFrictionResistance(Resistance):
         return found
 
 
-def _joints(points: Points, family: str, law: JointFriction) -> tuple[JointFriction, Array]:
-    """The law at the joints of a family; and how fast these turn, as a product of s and s' with
-    constants, shape (joints, functions, functions): z . (x x x') of their second parts less that of
-    their first, with z the joint's axis and x a direction of the part square to it.
+def _turning(points: Points, rub: Rub) -> Array:
+    """How fast joints turn, as a product of s and s' with constants, shape (joints, functions,
+    functions): z . (x x x') of their second parts less that of their first, with z the joint's axis
+    and x a direction of the part square to it.
     """
-    joints = [joint for joint in points.layout.joints if joint.family == family]
+    joints = [points.layout.joints[number] for number in rub.joints]
     axes = np.array([points.layout.pose(joint.first).axes[:, 2] for joint in joints])
     sides = [joint.first for joint in joints], [joint.second for joint in joints]
     alongs = map(points.directions, sides)
@@ -143,28 +147,7 @@ def _joints(points: Points, family: str, law: JointFriction) -> tuple[JointFrict
         np.einsum("jaf,jag->jfg", np.cross(axes[:, :, None], along, axis=1), along)
         for along in alongs
     )
-    sections = np.array([joint.section for joint in joints])
-    return at_section(law, sections), second - first
-
-
-# Ramps of the latches.
-
-
-class LatchResistance(Resistance):
-    """Torque that lifts the pawls of all V-joints."""
-
-    kind = "latches"
-    category = "latch"
-
-    @property
-    def present(self) -> bool:
-        """See ``Resistance``."""
-        return self.scene.latch is not None and self.scene.latch.pushes
-
-    def force(self, opening: Opening) -> float:
-        """See ``Resistance``."""
-        # A difference, not a negative: no resistance is 0, not -0.
-        return 0.0 - SpringEnergy(self.scene).pawls(math.pi - opening.angle)[0]
+    return np.asarray(second - first)
 
 
 # Stiffness of the lines of a ground test.
@@ -232,26 +215,28 @@ class NetResistance(Resistance):
         return 0.5 * self.mechanism.net(opening.now).force
 
 
-# Springs in the V-joints.
+# Laws on the V-joints: springs, which drive where they open the joints, and ramps of latches.
 
 
-class SpringResistance(Resistance):
-    """Torque of those that are whole, which drives where it opens the joints."""
+class LawResistance(Resistance):
+    """Torque of the laws of a group."""
 
-    kind = "springs"
-    category = "spring"
+    def __init__(self, scene: Scene, mechanism: Mechanism, group: str, category: Category) -> None:
+        super().__init__(scene, mechanism)
+        self.kind, self.category = group, category
 
-    @property
-    def present(self) -> bool:
-        """See ``Resistance``."""
-        return self.scene.hinge_spring is not None
+    @classmethod
+    def of(cls, scene: Scene, mechanism: Mechanism) -> list[Resistance]:
+        """See ``Resistance``: those that a drive meets on its way."""
+        laws = mechanism.points.layout.angle_laws
+        groups = {law.group: law.category for law in laws if law.category is not None}
+        return [cls(scene, mechanism, *each) for each in groups.items()]
 
     def force(self, opening: Opening) -> float:
         """See ``Resistance``."""
-        springs = SpringEnergy(self.scene)
-        springs.alive = springs.alive * opening.sprung
-        # One radian of every joint's angle for one of the opening angle.
-        return -springs.springs(math.pi - opening.angle)[0]
+        # A difference, not a negative: no resistance is 0, not -0.
+        folded = math.pi - opening.angle
+        return 0.0 - torques_at(opening.switches, folded, self.kind).torque
 
 
 # Friction of the trolleys of a ground test.

@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.layout.bodies import Array, JointOpening, Lump, OnBody, OnRod, cross
-from ringsim.layout.layout import Layout
+from ringsim.layout.layout import Layout, layout_of
 from ringsim.parts.ground import Offload
+from ringsim.parts.laws import Switches
 from ringsim.parts.persection import spread
-from ringsim.rigid.mechanism import Configuration, Mechanism, SpringEnergy, body_of
+from ringsim.rigid.mechanism import Configuration, Mechanism, body_of, torques_at
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Scales
 
@@ -49,7 +50,7 @@ class OneCoordinate:
 
     def __init__(self, scene: Scene, start: Layout | None = None) -> None:
         """Everywhere; or, with the layout at the start, there alone and sooner."""
-        self._springs = SpringEnergy(scene)
+        self._switches = Switches((start or layout_of(scene)).angle_laws)
         if start is not None:
             begin = Mechanism(scene, scene.structure.coordinate, start)
             self._mechanism: Callable[[float], Mechanism] = lambda _: begin
@@ -69,7 +70,7 @@ class OneCoordinate:
         mechanism, now = self._at(q)
         done = np.tensordot(*mechanism.points.forces, 2) @ now.values
         done += mechanism.weight_work(now)
-        stored = mechanism.net(now).energy + self._springs.at(2.0 * q)[1]
+        stored = mechanism.net(now).energy + torques_at(self._switches, 2.0 * q).stored
         return float(done) - stored
 
     def work_rate(self, q: float) -> float:
@@ -78,7 +79,7 @@ class OneCoordinate:
         done = np.tensordot(*mechanism.points.forces, 2) @ now.slopes
         done += mechanism.rates(now) @ mechanism.weight(now)
         pulled = done + mechanism.net(now).force
-        return float(pulled - 2.0 * self._springs.at(2.0 * q)[0])
+        return float(pulled - 2.0 * torques_at(self._switches, 2.0 * q).torque)
 
     def _at(self, q: float) -> tuple[Mechanism, Configuration]:
         mechanism = self._mechanism(q)

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Self, get_origin
 import tomli_w
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
+import ringsim.cable.faults  # noqa: F401  (kinds of faults)
 from ringsim.cable.records import CABLES, Cable, Cables, numbered, path_of, spans_of
 from ringsim.choice import OneOf
 from ringsim.files import parse_toml, read_text

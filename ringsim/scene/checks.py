@@ -2,11 +2,9 @@
 
 from typing import TYPE_CHECKING
 
-from ringsim.cable.faults import CableFault
 from ringsim.cable.winches import why_unlimited
 from ringsim.choice import kind_of
 from ringsim.layout.layout import Layout, layout_of
-from ringsim.parts.faults import FailedLatch, FailedSpring
 from ringsim.parts.rods import LengthError
 from ringsim.scene.substituted import strained
 
@@ -114,24 +112,13 @@ def _check_faults(scene: "Scene") -> None:
     """Refuse (ValueError) faults of what is not there."""
     cables = [] if scene.cables is None else scene.cables.present()
     for number, fault in enumerate(scene.faults, 1):
+        try:
+            fault.check(scene)
+        except ValueError as error:
+            raise ValueError(f"faults[{number}] {error}") from None
         places = {"section": scene.structure.sections, "cable": len(cables)}
-        if isinstance(fault, FailedSpring) and scene.hinge_spring is None:
-            raise ValueError(
-                f"faults[{number}] is a fault of a spring, but the scene has none: add "
-                "[hinge_spring], or leave the fault out"
-            )
-        if isinstance(fault, FailedLatch) and (scene.stop is None or not scene.stop.latch):
-            raise ValueError(
-                f"faults[{number}] is a fault of a latch, but the stops have none: set stop.latch "
-                "= true, or leave the fault out"
-            )
-        if isinstance(fault, CableFault):
-            if not cables:
-                raise ValueError(
-                    f"faults[{number}] is a fault of a cable, but the scene has none: add "
-                    "[cables.upper], or leave the fault out"
-                )
-            pulleys = scene.pulleys_of(cables[min(fault.cable, len(cables)) - 1][1])
+        if (cable := getattr(fault, "cable", None)) is not None:
+            pulleys = scene.pulleys_of(cables[min(cable, len(cables)) - 1][1])
             places |= {"pulley": pulleys, "span": pulleys + 1}
         planes = scene.structure.planes
         if (plane := getattr(fault, "plane", planes[0])) not in planes:

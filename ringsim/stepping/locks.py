@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsim.hermite import first_zero
-from ringsim.parts.faults import FailedLatch
+from ringsim.parts.laws import Switches
 from ringsim.parts.persection import spread
 from ringsim.stepping.instant import Array, Instant, Remembering
 from ringsim.variables import PLANES, Fate
@@ -244,9 +244,9 @@ class Latches(Remembering):
         least = spread(0.0 if scene.latch is None else scene.latch.min_rate, shape[1])
         self._least = np.broadcast_to(np.where(least > 0.0, least, -math.inf), shape)
         self._fails = np.full(shape, math.inf)
-        for fault in (one for one in scene.faults if isinstance(one, FailedLatch)):
-            place = scene.structure.planes.index(fault.plane), fault.section - 1
-            self._fails[place] = min(self._fails[place], fault.time)
+        for fault in scene.faults:
+            if (place := fault.unlatches(scene.structure.planes)) is not None:
+                self._fails[place] = min(self._fails[place], fault.time)
         self._past: list[Instant] = []
         self._sure = not (np.isfinite(self._least).any() or np.isfinite(self._fails).any())
 
@@ -257,6 +257,12 @@ class Latches(Remembering):
     def locked(self, deployed: Flags) -> Flags:
         """V-joints that have locked: that their latches hold; without latches the deployed ones."""
         return self.caught if self._present else deployed
+
+    def hold(self, switches: Switches) -> None:
+        """Let stops hold the V-joints that have caught, from both sides from now on."""
+        if self._present:
+            for law in switches.of_group("stop"):
+                np.copyto(switches.setting[law], 1.0, where=self.caught.ravel())
 
     def note(self, before: Instant, now: Instant) -> None:
         """Go on by a step."""

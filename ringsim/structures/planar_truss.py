@@ -12,7 +12,7 @@ from ringsim.choice import kind_of
 from ringsim.layout.bodies import Lump, axes_along
 from ringsim.layout.draft import Draft, Track
 from ringsim.layout.layout import Contact, Layout, Spring
-from ringsim.parts.joints import Reaction, one_sided, two_sided
+from ringsim.parts.laws import Reaction, one_sided, two_sided
 from ringsim.parts.rods import Tube
 from ringsim.structures.family import Structure
 from ringsim.units import DampingRate, Metre, Model, SpringRate

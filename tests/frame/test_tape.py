@@ -39,7 +39,7 @@ ROUND_OFF = 1e-15
 def laws() -> dict[str, Any]:
     angle = {"deep": 0.01, "wide": 3.0}
     found: dict[str, Any] = {
-        f"stop-{name}": (lambda x, v, on, k=k: STOP.torque(k * x, v, on))
+        f"stop-{name}": (lambda x, v, on, k=k: STOP.reaction(k * x, v, on))
         for name, k in angle.items()
     }
     for spring in (
@@ -50,8 +50,8 @@ def laws() -> dict[str, Any]:
         net = SpringNet(stiffness=0.3, damping=0.02, two_sided=sided)
         found[f"net-{sided}"] = lambda x, v, _, n=net: n.tension(x, v)
     fault = StuckVJoint(section=1, time=0.0)
-    found["stuck"] = lambda x, v, _: fault.torque(x, v)
-    found["latch"] = lambda x, *_: RAMP.torque(x)
+    found["stuck"] = lambda x, v, _: fault.reaction(x, v, 0.0)
+    found["latch"] = lambda x, *_: RAMP.reaction(x, 0.0, 0.0)
     found["dry"] = lambda _x, v, _: (0.0, RUBBING.torque(v), 0.0)
     return found
 
@@ -69,7 +69,7 @@ def test_a_tape_does_what_its_law_does(name: str) -> None:
     tape = taped([(law, SHAPE, None)], 3, 3)
     for _ in range(3):  # a tape keeps nothing of what it was played with before
         x, v = random.normal(size=(2, *SHAPE))
-        on = random.random(SHAPE) > 0.5
+        on = 1.0 * (random.random(SHAPE) > 0.5)
         expected = [np.broadcast_to(each, SHAPE) for each in law(x, v, on)]
         assert max(np.abs(each).max() for each in expected) > 1e-6
         for found, each in zip(played(tape, [x, v, on], 3), expected, strict=True):

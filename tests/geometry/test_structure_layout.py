@@ -155,7 +155,9 @@ class Parting(Structure):
     [(Stretching(), "rod of section 1 changes its length"), (Parting(), "a hinge stands")],
 )
 def test_a_structure_that_cannot_be_is_refused(structure: Structure, wanted: str) -> None:
-    plain = load_scene("ring18").with_values({"boom": "none", "net": "none", "loads": "none"})
+    plain = load_scene("ring18").with_values(
+        {"boom": "none", "net": "none", "loads": "none", "stop": "none"}
+    )
     scene: Scene = plain.model_copy(update={"structure": structure})
     with pytest.raises(ValueError, match=wanted):
         layout_of(scene, 0.5)
@@ -176,7 +178,9 @@ class Bare(Structure):
 
 
 def with_bare(parts: dict[str, Any], *, swapped: bool = False) -> Layout:
-    scene = load_scene("ring18").with_values({"boom": "none", "net": "none", "loads": "none"})
+    scene = load_scene("ring18").with_values(
+        {"boom": "none", "net": "none", "loads": "none", "stop": "none"}
+    )
     update = {"structure": Bare(swapped=swapped), **parts}
     return layout_of(scene.model_copy(update=update), 0.5)
 

@@ -43,13 +43,17 @@ def latched(**values: object) -> Scene:
 
 def test_the_energy_of_the_ramp_is_the_integral_of_its_torque() -> None:
     law = Latch(**LATCH)
-    work, _ = quad(lambda x: law.torque(x).elastic, REACH, 0.0)
+    work, _ = quad(lambda x: law.reaction(x, 0.0, 0.0).elastic, REACH, 0.0)
     assert work == pytest.approx(2.0 / 3.0 * 0.3 * REACH, rel=1e-12)
     for begin, end in ((0.3, 0.1), (0.3, 0.05), (0.1, -0.01)):
-        work, _ = quad(lambda x: law.torque(x).elastic, begin, end, points=[0.0, REACH])
-        assert law.torque(end).stored - law.torque(begin).stored == pytest.approx(work, rel=1e-9)
-    assert law.torque(0.5 * REACH).elastic == pytest.approx(-0.3, rel=1e-12)
-    np.testing.assert_array_equal(law.torque(np.array([-0.1, 0.0, REACH, 1.0])).elastic, 0.0)
+        work, _ = quad(lambda x: law.reaction(x, 0.0, 0.0).elastic, begin, end, points=[0.0, REACH])
+        assert law.reaction(end, 0.0, 0.0).stored - law.reaction(
+            begin, 0.0, 0.0
+        ).stored == pytest.approx(work, rel=1e-9)
+    assert law.reaction(0.5 * REACH, 0.0, 0.0).elastic == pytest.approx(-0.3, rel=1e-12)
+    np.testing.assert_array_equal(
+        law.reaction(np.array([-0.1, 0.0, REACH, 1.0]), 0.0, 0.0).elastic, 0.0
+    )
 
 
 def test_resistance_is_that_of_all_ramps() -> None:

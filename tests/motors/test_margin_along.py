@@ -15,7 +15,6 @@ from motor_rings import PLAIN, ring
 from ringsim.cli import cli
 from ringsim.dataset import save
 from ringsim.parts.margin import EcssMechanisms
-from ringsim.rigid import margin
 from ringsim.rigid.margin import DriveMargin, Passed, least_along, passed, with_margin
 from ringsim.scene import Scene
 from ringsim.simulation import simulate
@@ -148,14 +147,6 @@ def test_a_run_that_went_on_keeps_the_margin_of_its_file(tmp_path: Path) -> None
     np.testing.assert_allclose(dry, 6 * coulomb, rtol=1e-9)
     start = DriveMargin(scene, PLAIN).at(math.radians(60.0))
     assert float(first.drive_margin[0]) == pytest.approx(start.margin, rel=1e-6)
-
-
-def test_a_run_tells_of_faults_that_its_margin_does_not_know(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(margin, "is_unknown", lambda fault: fault.kind == "cut-cable")
-    found = with_margin(opened(0.1), netted(faults=[CUT | {"time": 0.5}]))
-    assert found.reason == "made; the margin of the drive does not know faults[1]"
 
 
 def test_the_least_of_a_campaign_follows_from_angles_alone() -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -15,10 +16,11 @@ from click.testing import CliRunner
 from motor_rings import PLAIN, STALL, ring
 from ringsim.cli import cli
 from ringsim.layout.layout import layout_of
-from ringsim.parts.faults import Fault
+from ringsim.parts.faults import JointFault, Struck
 from ringsim.parts.margin import EcssMechanisms
 from ringsim.rigid.margin import CABLES, DriveMargin, PlaneMargin
 from ringsim.scene import Scene
+from ringsim.simulation import simulate
 
 ECSS = EcssMechanisms()
 SPRING = {"kind": "linear", "stiffness": 0.004, "preload": 0.01}
@@ -174,16 +176,33 @@ def test_check_says_what_it_counts(tmp_path: Path) -> None:
     )
 
 
-def test_a_kind_of_fault_that_the_margin_does_not_know_is_told(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    from ringsim.rigid import drive as condition
+class FailedSection(JointFault):
+    """A kind that this test brings: the springs of a section fail in all planes."""
 
-    monkeypatch.setattr(condition, "changes_drive", lambda fault: False)
-    spring = sprung(faults=[{"kind": "failed-spring", "section": 1, "time": 0.0}]).faults[0]
-    assert isinstance(spring, Fault)
-    assert condition.is_unknown(spring)
-    assert condition.told(spring) == "NOT counted: the margin does not know it"
+    kind: Literal["failed-section"] = "failed-section"
+
+    def strike(self, now: Struck) -> None:
+        for law in now.switches.of_group("springs"):
+            for plane in range(len(now.planes)):
+                now.switches.set(law, (plane, self.section - 1), on=0.0)
+
+
+def test_a_fault_of_ones_own_counts_everywhere_unasked() -> None:
+    own = [{"kind": "failed-section", "section": 2, "time": 0.05}]
+    both = [
+        {"kind": "failed-spring", "plane": plane, "section": 2, "time": 0.05}
+        for plane in ("upper", "lower")
+    ]
+    short = {"solver.end_time": 0.3, "record.interval": 0.1}
+    scenes = [sprung(faults=faults).with_values(short) for faults in (own, both)]
+    for time in (0.0, 0.1):
+        assert margins(scenes[0], time) == margins(scenes[1], time)
+    assert margins(scenes[0], 0.1) != margins(scenes[0], 0.0)
+    for fidelity in ("frame", "full"):
+        one, other = (simulate(scene, fidelity) for scene in scenes)
+        # Room for one fault or two: exudyn's sums are rounded in another order.
+        np.testing.assert_allclose(one.opening_angle, other.opening_angle, rtol=1e-10)
+        assert float(one.energy_error) < 1e-3
 
 
 def test_at_a_commanded_speed_only_winches_with_a_rope_count() -> None:

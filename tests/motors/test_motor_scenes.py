@@ -91,7 +91,9 @@ def test_along_a_run_work_is_drive_less_resistance(opening: xr.Dataset) -> None:
     kinds, resisting = resistances(scene, mechanism), []
     for row in zip(angle, rate, bend, strict=True):
         now = mechanism.at(0.5 * (np.pi - row[0]))
-        resisting.append(sum(one.force(Opening(*map(float, row), now)) for one in kinds))
+        resisting.append(
+            sum(one.force(Opening(*map(float, row), now, mechanism.switches)) for one in kinds)
+        )
     tension = found.motor_torque.isel(plane=0, winch=0) / MOTOR["stall_torque"]
     lost = found.drive_resistance.sel(resistance=PULLEYS)
     driving = tension * (found.drive_available - lost)

@@ -24,7 +24,9 @@ def test_weight_resists_with_its_virtual_work(degrees: float) -> None:
     )
     mechanism, angle = Mechanism(scene), math.radians(degrees)
     now = mechanism.at(0.5 * (math.pi - angle))
-    found = WeightResistance(scene, mechanism).force(Opening(angle, 0.0, 0.0, now))
+    found = WeightResistance(scene, mechanism).force(
+        Opening(angle, 0.0, 0.0, now, mechanism.switches)
+    )
 
     def work(at: float) -> float:
         """Of the weights, J, in the axes of the body that is held, where it is."""
@@ -78,7 +80,8 @@ def test_trolleys_and_lines_resist_with_their_virtual_work(base: str, degrees: f
 
     now = mechanism.at(0.5 * (math.pi - angle))
     found = {
-        one.kind: one.force(Opening(angle, 0.0, 2.0, now)) for one in resistances(scene, mechanism)
+        one.kind: one.force(Opening(angle, 0.0, 2.0, now, mechanism.switches))
+        for one in resistances(scene, mechanism)
     }
     assert found["trolleys"] == pytest.approx(0.01 * float(pulls @ ways[lines]), rel=1e-6)
     by_lines = 3.0 * float((risen * climbs).ravel()[lines].sum())
@@ -86,5 +89,5 @@ def test_trolleys_and_lines_resist_with_their_virtual_work(base: str, degrees: f
     assert abs(by_lines) > 1e-3
     bare = scene.with_values({"offload.trolley_mass": 0.0})
     (inertia,) = (one for one in resistances(bare, mechanism) if one.kind == "inertia")
-    more = found["inertia"] - inertia.force(Opening(angle, 0.0, 2.0, now))
+    more = found["inertia"] - inertia.force(Opening(angle, 0.0, 2.0, now, mechanism.switches))
     assert more == pytest.approx(2.0 * 0.05 * float(ways[lines] @ ways[lines]), rel=1e-6)

@@ -35,9 +35,8 @@ def any_kind(family: type[Model]) -> st.SearchStrategy[Any]:
 
 def stop_law(stop: Stop, latched: bool) -> Any:
     def law(place: Any, rate: Any, xp: Any = np) -> Any:
-        # In the engine the latch is a condition on a symbol.
-        holds = latched if xp is np else 0.0 * place + float(latched) > 0.5
-        return stop.torque(place, rate, holds, xp)
+        # In the engine the setting is a symbol.
+        return stop.reaction(place, rate, 0.0 * place + float(latched), xp)
 
     law.corners = (0.0, stop.most_folded)  # type: ignore[attr-defined]
     return law
@@ -45,10 +44,14 @@ def stop_law(stop: Stop, latched: bool) -> Any:
 
 def ramp_law(latch: Latch) -> Any:
     def law(place: Any, rate: Any, xp: Any = np) -> Any:
-        return latch.torque(place, xp)
+        return latch.reaction(place, 0.0, 0.0, xp)
 
     law.corners = (0.0, math.radians(latch.reach))  # type: ignore[attr-defined]
     return law
+
+
+def stuck_law(fault: StuckVJoint) -> Any:
+    return lambda place, rate, xp=np: fault.reaction(place, rate, 0.1, xp)
 
 
 def without_xp(law: Any) -> Any:
@@ -63,7 +66,7 @@ LAWS = {
     "ramp": records(Latch).map(ramp_law),
     "rest": records(Rest).map(lambda rest: rest.push),
     "strut": records(DeployingSpring).map(lambda spring: without_xp(spring.tension)),
-    "stuck": st.just(without_xp(StuckVJoint(time=0.0, section=1).torque)),
+    "stuck": st.just(stuck_law(StuckVJoint(time=0.0, section=1))),
 }
 """Reaction of every part as a function of coordinate, rate and xp."""
 
@@ -138,7 +141,7 @@ def test_friction_is_smooth_below_its_characteristic_rate(law):
 
 @given(STOP, PLACE, RATE)
 def test_a_stop_only_pushes_into_the_range(stop, folded, rate):
-    torque = float(stop.torque(folded, rate, False).total)
+    torque = float(stop.reaction(folded, rate, False).total)
     if folded < 0.0:
         assert torque <= 0.0  # opened too far: folds
     elif folded > stop.most_folded:
@@ -189,7 +192,7 @@ def thrown(stop, inertia, rate, end, *, latched):
     """Times, depths and rates of a joint that meets its open stop at a rate."""
 
     def change(time, state):
-        return [state[1], -float(stop.torque(state[0], state[1], latched).total) / inertia]
+        return [state[1], -float(stop.reaction(state[0], state[1], latched).total) / inertia]
 
     # Folded angles fall as the joint opens.
     found = solve_ivp(
@@ -203,5 +206,5 @@ def test_static_depth_on_a_stop_is_the_torque_over_its_stiffness():
     stop = SpringDamperStop(stiffness=150.0, stowed_angle=30.0)
     torque = 0.3
     folded = math.pi - math.radians(30.0) + torque / 150.0
-    assert float(stop.torque(folded, 0.0, False).total) == pytest.approx(torque, rel=1e-12)
-    assert float(stop.torque(-torque / 150.0, 0.0, False).total) == pytest.approx(-torque)
+    assert float(stop.reaction(folded, 0.0, False).total) == pytest.approx(torque, rel=1e-12)
+    assert float(stop.reaction(-torque / 150.0, 0.0, False).total) == pytest.approx(-torque)

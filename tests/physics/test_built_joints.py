@@ -54,7 +54,10 @@ def test_a_hinge_turns_about_the_axis_of_its_body(kind: str) -> None:
             {"stop": SpringDamperStop()},
             "joints that open, which would be held: leave it out (stop =",
         ),
-        ({"faults": (StuckVJoint(time=0.1, section=1),)}, 'faults of kind "stuck-vjoint": this'),
+        (
+            {"faults": (StuckVJoint(time=0.1, section=1),)},
+            "faults[1]: this structure has no joints that open",
+        ),
     ],
 )
 def test_parts_that_a_structure_has_no_joint_for_are_refused(

@@ -37,7 +37,7 @@ def test_joint_friction_takes_the_power_of_all_its_joints(family):
         for speed in speeds
     )
     mechanism = Mechanism(scene)
-    opening = Opening(math.pi - 2.0 * phi, -2.0 * rate, 0.0, mechanism.at(phi))
+    opening = Opening(math.pi - 2.0 * phi, -2.0 * rate, 0.0, mechanism.at(phi), mechanism.switches)
     found = JointFrictionResistance(scene, mechanism).force(opening)
     assert found * opening.rate == pytest.approx(exact, rel=1e-12)
 
