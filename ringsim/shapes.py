@@ -9,10 +9,8 @@ import numpy as np
 import xarray as xr
 
 from ringsim.layout.bodies import Array
-from ringsim.layout.draft import natural_lengths
 from ringsim.layout.layout import Layout, layout_at_opening, layout_of
 from ringsim.layout.points import Points, points_of
-from ringsim.parts.net import BoundaryNet, SpringNet
 from ringsim.scene import Scene
 
 COMPUTED = "positions as computed"
@@ -76,12 +74,11 @@ class Shape:
         return self.points.drawn(places, self._taut_beyond)
 
     @cached_property
-    def _taut_beyond(self) -> float | Array:
-        """Length beyond which a string of the net pulls, m, of all or of each."""
-        net = self.scene.net
-        if isinstance(net, BoundaryNet) and (edge := layout_of(self.scene).edge) is not None:
-            return natural_lengths(self.scene, edge)[edge.present]
-        return net.neutral_length if isinstance(net, SpringNet) and not net.two_sided else 0.0
+    def _taut_beyond(self) -> Array:
+        """Length beyond which each string of the net pulls, m."""
+        laws = [law for law in layout_of(self.scene).pair_laws if law.group == "net"]
+        each = [law.natural * (law.own.linear() is None) for law in laws]  # which also pushes
+        return np.concatenate([np.zeros(0), *each])
 
     def lags(self, run: xr.Dataset) -> ByLine:
         """Deviation (degree) from the mean opening angle of the joint that a line ends at, NaN for

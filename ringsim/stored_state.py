@@ -29,7 +29,7 @@ def layout_fingerprint(scene: Scene) -> str:
          for rod in layout.rods],
         [(joint.kind, joint.first, joint.second, joint.error) for joint in layout.joints],
         layout.openings, layout.paths, layout.base,
-        None if layout.net is None else layout.net.bodies,
+        [law.bodies for law in layout.pair_laws],
         None if layout.hung is None else layout.hung.bodies,
         None if (boom := layout.boom) is None else (boom.top, boom.low, boom.lump.centre),
         scene.rods.elements, layout.gravity is None,

@@ -9,7 +9,7 @@ from ringsim.cable.records import BlockSheave, FixedSheave, Sheave
 from ringsim.choice import kind_of
 from ringsim.exudyn.cable_path import CablePath
 from ringsim.exudyn.cables import CableDrive
-from ringsim.exudyn.laws import AngleForces, EdgeCables, Reacting, Weight, connect
+from ringsim.exudyn.laws import AngleForces, Reacting, Weight, connect
 from ringsim.exudyn.model import Multibody
 from ringsim.exudyn.rods import Ancf
 from ringsim.layout.bodies import OnBody
@@ -122,7 +122,6 @@ class Built(NamedTuple):
     angles: AngleForces
     cables: CableDrive | None
     weight: Weight | None
-    edge: EdgeCables | None
     boom: Boom | None
 
 
@@ -140,9 +139,6 @@ def build(scene: Scene) -> Built:
     beam = model.layout.boom
     boom = None if beam is None else Boom(model, beam, weight)
     connectors = connect(model, weight)
-    edge = None if model.layout.edge is None else EdgeCables(model, model.layout.edge)
-    if edge is not None:
-        connectors.append(edge.reaction)
     angles = AngleForces(model)
     connectors += [angles.reaction(number) for number in range(len(angles.switches.laws))]
     if scene.cables is not None:
@@ -150,7 +146,7 @@ def build(scene: Scene) -> Built:
         path = CablePath(paths, slopes=isinstance(model.formulation, Ancf))
         cables = CableDrive(model.assembly, scene.cables, path, len(scene.faults))
     model.assembly.finish()
-    return Built(model, connectors, angles, cables, weight, edge, boom)
+    return Built(model, connectors, angles, cables, weight, boom)
 
 
 def _on_nodes(model: Multibody, sheave: Sheave) -> Sheave:

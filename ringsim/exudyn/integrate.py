@@ -19,6 +19,7 @@ from ringsim.exudyn.meters import (
     BaseMeter,
     BendingMeter,
     EnergyMeter,
+    NetMeter,
     PositionMeter,
     ShapeMeter,
     StressMeter,
@@ -182,6 +183,7 @@ class Integration:
         self._position = PositionMeter(model) if scene.record.positions else None
         shaped = scene.record.shape or strained(scene)
         self._shape = ShapeMeter(model) if shaped else None
+        self._net = NetMeter.of(model)
         coordinates = {"rod": np.array(list(model.layout.halves()))}
         for meter in (self._position, self._shock, self._shape):
             coordinates |= {} if meter is None else meter.coordinates
@@ -343,7 +345,7 @@ class Integration:
             energies = after.energies._replace(lost=lost, driven=now.energies.driven)
             now = replace(after, energies=energies)
         self._energy.keep()
-        cables, edge = self._built.cables, self._built.edge
+        cables = self._built.cables
         self.history.note(
             Reading(
                 **vars(now),
@@ -355,7 +357,7 @@ class Integration:
                 carried=None if self._base is None else self._base.read(now),
                 accelerations=None if self._shock is None else self._shock.read(),
                 put=None if self._shape is None else self._shape.read(self._state),
-                edge=None if edge is None else edge.tensions(self._state),
+                net=None if self._net is None else self._net.read(self._state),
             )
         )
         return now

@@ -8,14 +8,13 @@ from typing import Any
 import exudyn.itemInterface as item
 import numpy as np
 
-from ringsim.exudyn.assembly import SYMBOLIC, TORSION, Array, axes_of
+from ringsim.exudyn.assembly import SYMBOLIC, TORSION, Array, Assembly, axes_of
 from ringsim.exudyn.model import BuiltJoint, JointGroup, Multibody, State
 from ringsim.layout.bodies import turned_about_z
-from ringsim.layout.draft import natural_lengths
-from ringsim.layout.layout import Contact, EdgeNet, HubNet, Hung
+from ringsim.layout.layout import Contact, Hung
 from ringsim.layout.points import HUB
-from ringsim.parts.laws import AngleLaw, Reaction, Rub, Switches
-from ringsim.parts.net import SpringNet, pull
+from ringsim.parts.laws import HUB as FREE
+from ringsim.parts.laws import AngleLaw, PairLaw, Reaction, Rub, Switches
 from ringsim.parts.persection import at_section
 
 # Lines that carry corners, and their trolleys, as objects on the corners' nodes.
@@ -148,14 +147,11 @@ the state, the opening angles and their rates, shape (planes, sections), rad and
 
 def connect(model: Multibody, weight: Weight | None = None) -> list[Reacting]:
     """Springs, contacts, net and friction of a model; before ``Assembly.finish``."""
-    layout, found = model.layout, []
-    for spring in layout.springs:
-        law, ends = spring.law, [model.bodies[k][1] for k in (spring.first, spring.second)]
-        linear = {"stiffness": law.stiffness, "damping": law.damping}
-        found.append(_strings(model, [ends], law.tension, law.free_length, [linear]))
+    layout = model.layout
+    if layout.hub is not None:
+        _add_hub(model, weight)
+    found: list[Reacting] = [PairForces(model, law).reaction for law in layout.pair_laws]
     found += [_contact(model, contact) for contact in layout.contacts]
-    if layout.net is not None:
-        found.append(_net(model, layout.net, weight))
     if layout.hung is not None and weight is not None:
         weight.add_lines(layout.hung)
         found.append(Hanging(model, layout.hung).reaction)
@@ -243,66 +239,65 @@ def _friction(model: Multibody, rub: Rub) -> Reacting:
     return reaction
 
 
-def _net(model: Multibody, held: HubNet, weight: Weight | None) -> Reacting:
-    """The net's strings and their hub.
+def _add_hub(model: Multibody, weight: Weight | None) -> None:
+    """The hub of a net, a point with mass.
 
-    The hub starts where its strings balance: from anywhere else it would swing for the whole run,
-    next to weightless as it is, with the energy of its first stretch.
+    It starts where its strings balance: from anywhere else it would swing for the whole run, next
+    to weightless as it is, with the energy of its first stretch.
     """
-    assembly, net = model.assembly, held.law
-    nodes = [model.bodies[number][1] for number in held.bodies]
-    hub = assembly.add_node(
-        item.NodePoint(referenceCoordinates=list(held.hub)),
+    assembly, hub = model.assembly, model.layout.hub
+    assert hub is not None
+    ends = [body for law in model.layout.pair_laws if law.hung for body in law.bodies[:, 1]]
+    nodes = [model.bodies[body][1] for body in ends]
+    node = assembly.add_node(
+        item.NodePoint(referenceCoordinates=list(hub.place)),
         np.mean([assembly.starts[int(node)][:3] for node in nodes], axis=0),
     )
-    model.loose[HUB] = hub
-    mass = item.ObjectMassPoint(nodeNumber=hub, mass=net.hub_mass)
+    model.loose[HUB] = node
+    mass = item.ObjectMassPoint(nodeNumber=node, mass=hub.mass)
     assembly.bodies.append(assembly.system.AddObject(mass))
     if weight is not None:
-        weight.add_point(hub, net.hub_mass)
+        weight.add_point(node, hub.mass)
 
-    def settings(law: SpringNet) -> dict[str, Any]:
-        if law.two_sided:
-            return {"stiffness": law.stiffness, "damping": law.damping}
+
+class PairForces:
+    """A law between bodies, as exudyn's springs with dampers between their nodes."""
+
+    def __init__(self, model: Multibody, law: PairLaw) -> None:
+        self._law, assembly = law, model.assembly
+        nodes = [[_node(model, body) for body in pair] for pair in law.bodies.tolist()]
+        for k, pair in enumerate(nodes):
+            ends = [assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=n)) for n in pair]
+            natural = float(law.natural[k])
+            settings = self._settings(assembly, int(law.sections[k]), natural)
+            assembly.system.AddObject(
+                item.ObjectConnectorSpringDamper(
+                    markerNumbers=ends, referenceLength=natural, **settings
+                )
+            )
+        places = [[assembly.coordinates_of(node)[:3] for node in pair] for pair in nodes]
+        self._first, self._second = np.array(places).transpose(1, 0, 2)
+
+    def _settings(self, assembly: Assembly, section: int, natural: float) -> dict[str, Any]:
+        own = self._law.record.at(section)
+        if (linear := own.linear()) is not None:
+            return dict(zip(("stiffness", "damping"), linear, strict=True))
         return assembly.symbolic_law(
             "ObjectConnectorSpringDamper",
-            law,
-            lambda stretch, rate, _: law.tension(stretch, rate, SYMBOLIC).total,
+            (own, natural),
+            lambda stretch, rate, _: own.reaction(stretch, rate, natural, SYMBOLIC).total,
         )
 
-    own = [settings(at_section(net, k)) for k in range(len(nodes))]
-    each, free = at_section(net, np.arange(len(nodes))), net.neutral_length
-    pairs = [(hub, node) for node in nodes]
-    return _strings(model, pairs, lambda s, rate: each.tension(s - free, rate), free, own)
-
-
-def _strings(
-    model: Multibody,
-    pairs: Sequence[Sequence[Any]],
-    law: Callable[[Array, Array], Reaction],
-    free_length: float,
-    settings: Sequence[dict[str, Any]],
-) -> Reacting:
-    """Springs with dampers along the lines between pairs of nodes, with exudyn's settings of each.
-
-    ``law`` is the reaction to the lengths (m) and their rates (m/s).
-    """
-    system = model.assembly.system
-    for pair, own in zip(pairs, settings, strict=True):
-        ends = [system.AddMarker(item.MarkerNodePosition(nodeNumber=node)) for node in pair]
-        system.AddObject(
-            item.ObjectConnectorSpringDamper(markerNumbers=ends, referenceLength=free_length, **own)
-        )
-    places = [[model.assembly.coordinates_of(node)[:3] for node in pair] for pair in pairs]
-    near, far = np.array(places).transpose(1, 0, 2)
-
-    def reaction(state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
-        arms, moving = (x[far] - x[near] for x in (state.position, state.velocity))
+    def reaction(self, state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
+        """See ``Reacting``."""
+        arms, moving = (x[self._second] - x[self._first] for x in (state.position, state.velocity))
         lengths = np.linalg.norm(arms, axis=1)
         rates = np.sum(arms * moving, axis=1) / lengths
-        return law(lengths, rates), rates
+        return self._law.reaction(lengths, rates), rates
 
-    return reaction
+
+def _node(model: Multibody, body: int) -> Any:
+    return model.loose[HUB] if body == FREE else model.bodies[body][1]
 
 
 def _contact(model: Multibody, contact: Contact) -> Reacting:
@@ -330,46 +325,3 @@ def _contact(model: Multibody, contact: Contact) -> Reacting:
         return law.push(contact.room - state.position[where], closer), closer
 
     return reaction
-
-
-# Cables along a net's edge, as exudyn's springs between the corners' nodes.
-
-
-class EdgeCables:
-    """Cables between the nodes of bodies."""
-
-    def __init__(self, model: Multibody, edge: EdgeNet) -> None:
-        self._present, natural = edge.present, natural_lengths(model.scene, edge)
-        self._natural = natural[self._present]
-        self._rates = edge.law.rates(natural)[self._present]
-        assembly = model.assembly
-        nodes = [[model.bodies[k][1] for k in pair] for pair in edge.pairs.tolist()]
-        for pair, free, rate in zip(
-            nodes, self._natural.tolist(), self._rates.tolist(), strict=True
-        ):
-            ends = [assembly.system.AddMarker(item.MarkerNodePosition(nodeNumber=k)) for k in pair]
-            law = assembly.symbolic_law("ObjectConnectorSpringDamper", ("edge", rate), _law(rate))
-            assembly.system.AddObject(
-                item.ObjectConnectorSpringDamper(markerNumbers=ends, referenceLength=free, **law)
-            )
-        places = [[assembly.coordinates_of(node)[:3] for node in pair] for pair in nodes]
-        self._first, self._second = np.array(places).transpose(1, 0, 2)
-
-    def reaction(self, state: State, _angles: Array, _rates: Array) -> tuple[Reaction, Array]:
-        """See ``ringsim.exudyn.laws.Reacting``."""
-        reaction = pull(self._stretched(state), self._rates)
-        return reaction, np.zeros(len(self._rates))
-
-    def tensions(self, state: State) -> Array:
-        """Of the cables, N, shape (planes, sections); NaN in planes without."""
-        found = np.full(self._present.shape, np.nan)
-        found[self._present] = pull(self._stretched(state), self._rates).elastic
-        return found
-
-    def _stretched(self, state: State) -> Array:
-        arms = state.position[self._second] - state.position[self._first]
-        return np.asarray(np.linalg.norm(arms, axis=1) - self._natural)
-
-
-def _law(rate: float) -> Any:
-    return lambda stretch, _rate, _offset: pull(stretch, rate, SYMBOLIC).elastic

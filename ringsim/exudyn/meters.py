@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Self
 
 import exudyn as exu
 import numpy as np
@@ -16,6 +16,7 @@ from ringsim.exudyn.rods import Ancf, beam_section
 from ringsim.layout.bodies import InSpace, OnBody
 from ringsim.layout.points import points_of
 from ringsim.outputs.family import Carried, Put
+from ringsim.parts.laws import PairLaw
 from ringsim.rigid.statics import body_reaction, first_reaction
 from ringsim.stepping.instant import Energies, Instant, Passing, lost_between
 
@@ -382,3 +383,28 @@ class AccelerationMeter:
         found = self._data.GetODE2Coordinates_tt(self._next)
         self._next = exu.ConfigurationType.Current
         return np.asarray(np.asarray(found, dtype=float)[self._where])
+
+
+# Tension of a net's cables in exudyn.
+
+
+class NetMeter:
+    """Reads the nodes of all bodies for a law that tells of each of its pairs."""
+
+    def __init__(self, model: Multibody, law: PairLaw) -> None:
+        openings = model.layout.openings
+        self._law, self._shape = law, (len(openings), len(openings[0]))
+        self._where = np.array(
+            [model.assembly.coordinates_of(node)[:3] for _, node in model.bodies]
+        )
+
+    @classmethod
+    def of(cls, model: Multibody) -> Self | None:
+        """None without such a law."""
+        told = [law for law in model.layout.pair_laws if law.places]
+        return cls(model, told[0]) if told else None
+
+    def read(self, state: State) -> Array:
+        """Shape (planes, sections), N; NaN in planes without."""
+        both = state.position[self._where], state.velocity[self._where]
+        return self._law.tensions(*both, self._shape)

@@ -11,7 +11,7 @@ from ringsim.frame.elimination import Border, Factored, Fronts
 from ringsim.frame.kernels import Pose, Strains, add_forces, move
 from ringsim.frame.laws import JointLaws, Openings
 from ringsim.frame.mesh import CURE, NOT_HERE, Skeleton, mesh_of
-from ringsim.frame.springs import STIFFNESS, BeamSlide, EdgeCables, RigidSlide, Slide, Web
+from ringsim.frame.springs import STIFFNESS, BeamSlide, RigidSlide, Slide, Web
 from ringsim.frame.state import (
     Coefficients,
     Followed,
@@ -71,10 +71,8 @@ class FrameModel:
         mesh = self.mesh
         self.openings = Openings.of(skeleton)
         self.laws = JointLaws(skeleton, self.openings)
-        self.with_hub, self._strung = self.layout.net is not None, False
-        self.web = Web.of(self.layout.net)
-        edge = self.layout.edge
-        self.edge = None if edge is None else EdgeCables(scene, edge, mesh)
+        self.with_hub, self._strung = self.layout.hub is not None, False
+        self.web = Web.of(self.layout, mesh)
         self.coefficients = Coefficients.of(scene.solver.spectral_radius)
         angle = np.array([one.start for one in skeleton.angles])
         self.openings.unwrapped(angle)
@@ -119,7 +117,7 @@ class FrameModel:
         np.add.at(self._masses, mesh.point, mesh.mass.sum(axis=1)[:, None])
         self._heaviest = float(mesh.point_mass.max() + mesh.mass[:, 0].max())
         lines = 0 if self.cables is None else self.cables.points
-        ends = [] if self.layout.net is None else list(self.layout.net.bodies)
+        ends = self.web.ends
         hung = self.layout.hung
         lines_on = [] if hung is None else list(hung.bodies)
         sizes = (
@@ -127,12 +125,12 @@ class FrameModel:
             3 * lines,
             len(angle),
             3 * len(ends),
-            3 * bool(ends),
+            3 * self.with_hub,
             3 * len(lines_on),
         )
         self._held = Held(
             cuts=np.cumsum([0, *sizes]),
-            ends=np.array(ends, dtype=np.int64),
+            ends=ends,
             hung=np.array(lines_on, dtype=np.int64),
             top=np.array([slide.top for slide in slides], dtype=np.int64),
             low=np.array([slide.low for slide in slides], dtype=np.int64),
@@ -143,7 +141,7 @@ class FrameModel:
             gravity=self.gravity,
         )
         self._held_loads = np.zeros((len(mesh.length), 5, 3, 3))
-        self._string_spots = mesh.home[self._held.ends][:, None] + np.arange(3)
+        self._string_spots = mesh.home[ends][:, None] + np.arange(3)
         self._lines = no_lines() if self.cables is None else self.cables.lines
         self._arms = Arms.empty(lines)
         self.start = self._started(pose)
@@ -203,8 +201,6 @@ class FrameModel:
         self.laws.note(now.rate.angles)
         for slide in self._beam_slides:
             slide.hold(now.pose, inner)
-        if self.edge is not None:
-            self.edge.push(now.pose.place, inner)
         if self.hanging is not None:
             self.hanging.push(now, inner)
         if self.cables is not None:
@@ -233,8 +229,6 @@ class FrameModel:
             fronts[front, spot, spot] += by_rate * slopes
         for slide in self._beam_slides:
             slide.add_tangent(now.pose, fronts)
-        if self.edge is not None:
-            self.edge.add_tangent(now.pose.place, fronts)
         if self.hanging is not None:
             self.hanging.add_tangent(now, by_rate, by_place, fronts)
         if cables is not None:
@@ -258,7 +252,7 @@ class FrameModel:
             self.first[k + 3 : k + 6] = moving.turning(turn)
         angular = moving.coordinate * np.array(skeleton.angle_rates)
         self.first[self.mesh.angle_home] = angular
-        hub = np.zeros(3) if self.layout.net is None else np.array(self.layout.net.hub)
+        hub = np.zeros(3) if self.layout.hub is None else np.array(self.layout.hub.place)
         self._hub = hub.copy()
         state = State(
             pose, hub, np.zeros((len(self.mesh.length), 6)),

@@ -1,16 +1,19 @@
 """What outputs read of a state, as far as the scene records it."""
 
+from typing import Self
+
 import numpy as np
 
 from ringsim.cable.chain import ChainState, work_between
 from ringsim.frame.kernels import Strains, StressMeter, energies_of
 from ringsim.frame.mesh import Mesh
 from ringsim.frame.model import FrameModel
-from ringsim.frame.springs import passing_strings
+from ringsim.frame.springs import passing_pairs
 from ringsim.frame.state import State
 from ringsim.layout.bodies import Array, OnBody, OnRod
 from ringsim.layout.points import BOOM_TIP, HUB, Where, points_of
 from ringsim.outputs.family import Carried, Put, Reading
+from ringsim.parts.laws import PairLaw
 from ringsim.refusal import InputError
 from ringsim.rigid.statics import first_reaction
 from ringsim.scene.substituted import strained
@@ -161,6 +164,29 @@ class ShapeMeter:
         return Put(state.pose.place[self._corners], energy)
 
 
+# Tension of a net's cables in joint coordinates.
+
+
+class NetMeter:
+    """Reads the ends of a law that tells of each of its pairs."""
+
+    def __init__(self, model: FrameModel, law: PairLaw) -> None:
+        self._model, self._law = model, law
+        self._shape = model.openings.angle.shape
+
+    @classmethod
+    def of(cls, model: FrameModel) -> Self | None:
+        """None without such a law."""
+        told = [law for law in model.layout.pair_laws if law.places]
+        return cls(model, told[0]) if told else None
+
+    def read(self, state: State) -> Array:
+        """Shape (planes, sections), N; NaN in planes without."""
+        velocities = np.zeros((len(self._model.layout.bodies), 3))
+        velocities[self._model.web.ends] = state.rate.ends
+        return self._law.tensions(state.pose.place, velocities, self._shape)
+
+
 # What outputs read of a state, as far as the scene records it.
 
 
@@ -175,13 +201,14 @@ class Readings:
         self._base = BaseMeter(model) if record.reactions else None
         self._shock = AccelerationMeter(model) if record.accelerations else None
         self._shape = ShapeMeter(model) if shaped else None
+        self._net = NetMeter.of(model)
         self.coordinates = {"rod": np.array(list(model.layout.halves()))}
         for meter in (self._position, self._shock, self._shape):
             self.coordinates |= {} if meter is None else meter.coordinates
 
     def read(self, now: Instant, state: State, strains: Strains) -> Reading:
         """An instant with what there is to tell of its state."""
-        cables, edge = self._model.cables, self._model.edge
+        cables = self._model.cables
         return Reading(
             **vars(now),
             chain=state.chain,
@@ -191,7 +218,7 @@ class Readings:
             carried=None if self._base is None else self._base.read(state),
             accelerations=None if self._shock is None else self._shock.read(state),
             put=None if self._shape is None else self._shape.read(state),
-            edge=None if edge is None else edge.tensions(state.pose.place),
+            net=None if self._net is None else self._net.read(state),
         )
 
 
@@ -224,16 +251,15 @@ class EnergyMeter(Remembering):
         kinetic, elastic = energies_of(mesh, state.rate.points, state.strains)
         elastic += torques.stored + sum(slide.stored(pose) for slide in model.slides)
         forces, places, rates = [torques.lost], [pose.angle], [state.rate.angles]
-        if model.with_hub:
-            stored, resisting, lengths, along = passing_strings(model.web, *state.net)
-            moving = state.rate.hub[0]
-            kinetic += 0.5 * model.web.hub_mass * float(moving @ moving)
+        if len(model.web.second):
+            stored, resisting, lengths, along = passing_pairs(model.web, *state.net)
             elastic += stored
             forces.append(resisting)
             places.append(lengths)
             rates.append(along)
-        if model.edge is not None:
-            elastic += model.edge.stored(pose.place)
+        if model.with_hub:
+            moving = state.rate.hub[0]
+            kinetic += 0.5 * model.web.hub_mass * float(moving @ moving)
         if model.hanging is not None:
             hold = model.hanging.hold(state)
             kinetic += model.hanging.kinetic(state)

@@ -1,4 +1,4 @@
-"""The net's strings to a hub and along the edge, and the body that slides on the boom."""
+"""Laws between bodies and to the hub of a net, and the body that slides on the boom."""
 
 import math
 from collections.abc import Sequence
@@ -7,72 +7,103 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.frame.kernels import Pose
-from ringsim.frame.laws import Tape, play, taped
-from ringsim.frame.mesh import Indices, Mesh
+from ringsim.frame.laws import Law, Tape, play, taped
+from ringsim.frame.mesh import CURE, NOT_HERE, Indices, Mesh
 from ringsim.frame.vectors import compiled, cross, dot, minus, times, vector
 from ringsim.layout.bodies import Array, skew
-from ringsim.layout.draft import natural_lengths
-from ringsim.layout.layout import EdgeNet, HubNet
-from ringsim.parts.net import pull
-from ringsim.parts.persection import at_section
-from ringsim.scene import Scene
+from ringsim.layout.layout import Layout
+from ringsim.parts.laws import HUB as FREE
+from ringsim.parts.laws import PairLaw
+from ringsim.refusal import InputError
 
-# The net's strings from corners to a hub, a point with three unknowns of its own.
+# Laws between bodies, and from bodies to the hub of a net, a point with three unknowns of its own.
 
 
 _NUDGE = 1e-7
 """Change of stretch (m) and its rate (m/s) by which the slopes of the law are measured."""
 _STRETCH, _RATE, _ELASTIC, _DAMPING, _STORED = range(5)
-"""Rows of the law's tape."""
+"""Rows of the laws' tape."""
 
 
 class Web(NamedTuple):
-    """Strings from a hub: their law, the bodies at their ends, length without force (m), whether
-    they only pull, and the mass of the hub (kg).
+    """All pairs of a layout, shape (pairs,): their laws; numbers of their ends among ``ends``,
+    which are bodies, -1 for the hub; natural lengths (m); the front that has both bodies, or that
+    of the second one, and their places in it, shape (pairs, 3); the mass of the hub (kg).
     """
 
     tape: Tape
-    bodies: Indices
-    free: float
-    one_sided: bool
+    first: Indices
+    second: Indices
+    natural: Array
+    ends: Indices
+    spots: Indices
     hub_mass: float
 
     @classmethod
-    def of(cls, held: HubNet | None) -> "Web":
-        """Those of a net; none without."""
-        if held is None:
-            return cls(taped([], 2, 3), np.zeros(0, dtype=np.int64), 0.0, True, 0.0)
-        law, bodies = held.law, np.array(held.bodies, dtype=np.int64)
-        tension = at_section(law, np.arange(len(bodies))).tension
-        tape = taped([(tension, bodies.shape, law)], 2, 3)
-        return cls(tape, bodies, law.neutral_length, not law.two_sided, law.hub_mass)
+    def of(cls, layout: Layout, mesh: Mesh) -> "Web":
+        """Those of a layout; InputError where no front has both bodies of a pair."""
+        laws = layout.pair_laws
+        bodies = np.concatenate([np.zeros((0, 2), np.int64), *(law.bodies for law in laws)])
+        ends = list(dict.fromkeys(bodies[bodies != FREE].tolist()))
+        number = {body: k for k, body in enumerate(ends)} | {FREE: -1}
+        first, second = (
+            np.array([number[k] for k in side], np.int64) for side in bodies.T.tolist()
+        )
+        return cls(
+            taped([(_between(law), law.natural.shape, law.record) for law in laws], 2, 3),
+            first, second, np.concatenate([np.zeros(0), *(law.natural for law in laws)]),
+            np.array(ends, np.int64),
+            np.array([_spots(mesh, *pair) for pair in bodies.tolist()], np.int64).reshape(-1, 3),
+            0.0 if layout.hub is None else layout.hub.mass,
+        )  # fmt: skip
+
+
+def _between(law: PairLaw) -> Law:
+    own, natural = law.own, law.natural
+    return lambda stretch, rate: own.reaction(stretch, rate, natural)
+
+
+def _spots(mesh: Mesh, first: int, second: int) -> tuple[int, int, int]:
+    if first == FREE:
+        front, place = mesh.frame_local[second].tolist()
+        return front, -1, place
+    # The front of both bodies that is eliminated first.
+    ends = mesh.home[first], mesh.home[second]
+    front = int(min(mesh.frame_local[first, 0], mesh.frame_local[second, 0]))
+    own = mesh.spots[front].tolist()
+    if not all(int(end) in own for end in ends):
+        raise InputError(f"{NOT_HERE} a net between corners that are no neighbours: {CURE}")
+    return front, own.index(int(ends[0])), own.index(int(ends[1]))
 
 
 @compiled
 def stretched(
-    ends: Array, rates: Array, hub: Array, hub_rate: Array
-) -> tuple[Array, Array, Array, float]:
-    """Lengths (m), their rates (m/s) and directions of strings from the hub, at places and rates of
-    shape (n, 3) and (3,); the greatest length.
+    web: Web, ends: Array, rates: Array, hub: Array, hub_rate: Array
+) -> tuple[Array, Array, Array]:
+    """Lengths (m), their rates (m/s) and directions of all pairs, from the first end to the second,
+    at places and rates of the ends, shape (n, 3), and of the hub, (3,).
     """
-    n, most = len(ends), 0.0
+    n = len(web.first)
     lengths, along, units = np.empty(n), np.empty(n), np.empty((n, 3))
     for k in range(n):
-        arm = minus(vector(ends[k]), vector(hub))
+        one, other = web.first[k], web.second[k]
+        start = vector(ends[one]) if one >= 0 else vector(hub)
+        moving = vector(rates[one]) if one >= 0 else vector(hub_rate)
+        arm = minus(vector(ends[other]), start)
         length = math.sqrt(dot(arm, arm))
         unit = times(1.0 / length, arm)
-        lengths[k], along[k] = length, dot(unit, minus(vector(rates[k]), vector(hub_rate)))
+        lengths[k], along[k] = length, dot(unit, minus(vector(rates[other]), moving))
         units[k, 0], units[k, 1], units[k, 2] = unit
-        most = max(most, length)
-    return lengths, along, units, most
+    return lengths, along, units
 
 
 @compiled
 def _feel(web: Web, lengths: Array, along: Array, more: float, faster: float) -> None:
-    """Play the law at lengths and rates, all so much larger."""
+    """Play the laws at lengths and rates, all so much larger."""
     rows = web.tape.rows
     for k in range(len(lengths)):
-        rows[_STRETCH, k], rows[_RATE, k] = lengths[k] - web.free + more, along[k] + faster
+        rows[_STRETCH, k] = lengths[k] - web.natural[k] + more
+        rows[_RATE, k] = along[k] + faster
     play(web.tape)
 
 
@@ -82,35 +113,38 @@ def _force(web: Web, k: int) -> float:
 
 
 @compiled
-def pull_strings(
+def pull_pairs(
     web: Web, mesh: Mesh, ends: Array, rates: Array, hub: Array, hub_rate: Array, g: Array
 ) -> bool:
-    """Add what resists at the bodies and, in the last three unknowns, at the hub; False while all
-    strings are slack.
+    """Add what resists at the bodies and, in the last three unknowns, at the hub; returns whether a
+    string pulls at the hub.
     """
-    lengths, along, units, most = stretched(ends, rates, hub, hub_rate)
-    if web.one_sided and most <= web.free:
-        return False
+    lengths, along, units = stretched(web, ends, rates, hub, hub_rate)
     _feel(web, lengths, along, 0.0, 0.0)
-    at = len(g) - 3
-    for n in range(len(web.bodies)):
-        home, pull = mesh.home[web.bodies[n]], _force(web, n)
+    strung = False
+    for n in range(len(web.first)):
+        pull, one = _force(web, n), web.first[n]
+        if pull == 0.0:
+            continue
+        strung |= one < 0
+        start = mesh.home[web.ends[one]] if one >= 0 else len(g) - 3
+        end = mesh.home[web.ends[web.second[n]]]
         for i in range(3):
-            g[home + i] += pull * units[n, i]
-            g[at + i] -= pull * units[n, i]
-    return True
+            g[end + i] += pull * units[n, i]
+            g[start + i] -= pull * units[n, i]
+    return strung
 
 
 @compiled
-def add_strings(
+def add_pairs(
     web: Web, mesh: Mesh, ends: Array, rates: Array, hub: Array, hub_rate: Array, by_rate: float,
-    fronts: Array, columns: Array, rows: Array, corner: Array,
+    strung: bool, fronts: Array, columns: Array, rows: Array, corner: Array,
 ) -> None:  # fmt: skip
-    """Add derivatives of the strings' pulls to the fronts, and those after the hub's place to the
-    first three columns, rows and corner of the border; ``by_rate`` is the derivative of rates after
-    places, 1/s.
+    """Add derivatives of the pulls to the fronts and, if the hub is ``strung``, those after its
+    place to the first three columns, rows and corner of the border; ``by_rate`` is the derivative
+    of rates after places, 1/s.
     """
-    lengths, along, units, _ = stretched(ends, rates, hub, hub_rate)
+    lengths, along, units = stretched(web, ends, rates, hub, hub_rate)
     slope, block = np.zeros(len(lengths)), np.zeros((3, 3))
     for side in (1.0, -1.0):
         for what in range(2):
@@ -120,130 +154,39 @@ def add_strings(
                 slope[n] += share * _force(web, n)
     _feel(web, lengths, along, 0.0, 0.0)
     for n in range(len(slope)):
-        body = web.bodies[n]
-        number, first = mesh.frame_local[body, 0], mesh.frame_local[body, 1]
+        free = web.first[n] < 0
+        if free and not strung:
+            continue
+        front, first, second = web.spots[n]
         across = _force(web, n) / lengths[n]
         for i in range(3):
             for j in range(3):
                 block[i, j] = (slope[n] - across) * units[n, i] * units[n, j]
             block[i, i] += across
+        home = mesh.home[web.ends[web.second[n]]]
         for i in range(3):
             for j in range(3):
-                fronts[number, first + i, first + j] += block[i, j]
-                columns[mesh.home[body] + i, j] -= block[i, j]
-                rows[mesh.home[body] + i, j] -= block[i, j]
-                corner[i, j] += block[i, j]
+                fronts[front, second + i, second + j] += block[i, j]
+                if free:
+                    columns[home + i, j] -= block[i, j]
+                    rows[home + i, j] -= block[i, j]
+                    corner[i, j] += block[i, j]
+                else:
+                    fronts[front, first + i, first + j] += block[i, j]
+                    fronts[front, first + i, second + j] -= block[i, j]
+                    fronts[front, second + i, first + j] -= block[i, j]
 
 
-def passing_strings(
+def passing_pairs(
     web: Web, ends: Array, rates: Array, hub: Array, hub_rate: Array
 ) -> tuple[float, Array, Array, Array]:
-    """Energy stored (J), dissipating forces of the strings (N), their lengths (m) and rates of
-    these (m/s).
+    """Energy stored (J), dissipating forces of the pairs (N), their lengths (m) and rates of these
+    (m/s).
     """
-    lengths, along, _, _ = stretched(ends, rates, hub, hub_rate)
+    lengths, along, _ = stretched(web, ends, rates, hub, hub_rate)
     _feel(web, lengths, along, 0.0, 0.0)
     rows = web.tape.rows
     return float(rows[_STORED].sum()), rows[_DAMPING].copy(), lengths, along
-
-
-# Cables along a net's edge: springs between bodies of neighbouring blocks.
-
-
-@compiled
-def lengths_of(places: Array, pairs: Indices, lengths: Array) -> None:
-    """Write distances of pairs of frames (m)."""
-    for n in range(len(pairs)):
-        arm = minus(vector(places[pairs[n, 1]]), vector(places[pairs[n, 0]]))
-        lengths[n] = np.sqrt(dot(arm, arm))
-
-
-@compiled
-def add_pulls(places: Array, pairs: Indices, pulls: Array, home: Indices, g: Array) -> None:
-    """Add pulls (N) between pairs of frames to a residual."""
-    for n in range(len(pairs)):
-        first, second = pairs[n]
-        arm = minus(vector(places[second]), vector(places[first]))
-        force = times(pulls[n] / np.sqrt(dot(arm, arm)), arm)
-        for i in range(3):
-            g[home[second] + i] += force[i]
-            g[home[first] + i] -= force[i]
-
-
-@compiled
-def add_slopes(
-    places: Array, pairs: Indices, pulls: Array, rates: Array, spots: Indices, fronts: Array
-) -> None:
-    """Add derivatives of the pulls (N, and N/m along the cable) to fronts; ``spots`` are the front
-    and the places of both ends in it.
-    """
-    for n in range(len(pairs)):
-        if pulls[n] <= 0.0:
-            continue
-        arm = minus(vector(places[pairs[n, 1]]), vector(places[pairs[n, 0]]))
-        length = np.sqrt(dot(arm, arm))
-        unit = times(1.0 / length, arm)
-        front, first, second = spots[n]
-        for i in range(3):
-            for j in range(3):
-                own = unit[i] * unit[j]
-                slope = rates[n] * own - pulls[n] / length * own
-                if i == j:
-                    slope += pulls[n] / length
-                fronts[front, first + i, first + j] += slope
-                fronts[front, second + i, second + j] += slope
-                fronts[front, first + i, second + j] -= slope
-                fronts[front, second + i, first + j] -= slope
-
-
-class EdgeCables:
-    """Cables between the origins of bodies; ``places`` are those of all frames, (f, 3), m."""
-
-    def __init__(self, scene: Scene, edge: EdgeNet, mesh: Mesh) -> None:
-        self._present, self._home = edge.present, mesh.home
-        self._pairs = np.ascontiguousarray(edge.pairs)
-        natural = natural_lengths(scene, edge)
-        self._natural = natural[self._present]
-        self._rates = edge.law.rates(natural)[self._present]
-        self._spots = np.array([_spots(mesh, *pair) for pair in self._pairs.tolist()])
-        self._lengths = np.empty(len(self._pairs))
-
-    def push(self, places: Array, g: Array) -> None:
-        """Add to the residual."""
-        pulls = self._pulls(places)
-        if pulls.any():
-            add_pulls(places, self._pairs, pulls, self._home, g)
-
-    def add_tangent(self, places: Array, fronts: Array) -> None:
-        """Add to the fronts."""
-        pulls = self._pulls(places)
-        if pulls.any():
-            add_slopes(places, self._pairs, pulls, self._rates, self._spots, fronts)
-
-    def stored(self, places: Array) -> float:
-        """Elastic energy, J."""
-        return float(np.sum(pull(self._stretched(places), self._rates).stored))
-
-    def tensions(self, places: Array) -> Array:
-        """Of the cables, N, shape (planes, sections); NaN in planes without."""
-        found = np.full(self._present.shape, np.nan)
-        found[self._present] = self._pulls(places)
-        return found
-
-    def _pulls(self, places: Array) -> Array:
-        return np.asarray(pull(self._stretched(places), self._rates).elastic)
-
-    def _stretched(self, places: Array) -> Array:
-        lengths_of(places, self._pairs, self._lengths)
-        return self._lengths - self._natural
-
-
-def _spots(mesh: Mesh, first: int, second: int) -> tuple[int, int, int]:
-    """The front that both bodies are in, the one that is eliminated first, and their places."""
-    ends = mesh.home[first], mesh.home[second]
-    front = int(min(mesh.frame_local[first, 0], mesh.frame_local[second, 0]))
-    own = mesh.spots[front].tolist()
-    return front, own.index(int(ends[0])), own.index(int(ends[1]))
 
 
 # Bodies that slide along a boom: a stiff spring across it.

@@ -10,7 +10,7 @@ from ringsim.frame.cables import Arms, Lines, place_lines
 from ringsim.frame.kernels import Pose, Strains, add_forces, begin_tangent, place_points
 from ringsim.frame.laws import Acting, add_joint_slopes, push_joints
 from ringsim.frame.mesh import Indices, Mesh
-from ringsim.frame.springs import Web, add_strings, aside, pull_strings
+from ringsim.frame.springs import Web, add_pairs, aside, pull_pairs
 from ringsim.frame.vectors import compiled
 from ringsim.layout.bodies import Array
 from ringsim.layout.layout import Hung
@@ -126,7 +126,7 @@ def put_in_place(
     for n in range(len(held.ends)):
         k = cuts[ENDS] + 3 * n
         place[k : k + 3] = pose.place[held.ends[n]]
-    if len(held.ends) > 0:
+    if cuts[HUNG] > cuts[HUB]:
         place[cuts[HUB] : cuts[HUNG]] = hub
     for n in range(len(held.hung)):
         k = cuts[HUNG] + 3 * n
@@ -160,12 +160,13 @@ def balance(
             for i in range(6):
                 g[mesh.home[top] + i] += force * rows[k, i]
                 g[mesh.home[low] + i] += force * rows[k, 6 + i]
-    if len(web.bodies) == 0:
+    if len(web.first) == 0:
         return False
-    for i in range(3):
-        g[len(g) - 3 + i] += web.hub_mass * (now.acceleration[cuts[HUB] + i] - held.gravity[i])
+    if cuts[HUNG] > cuts[HUB]:
+        for i in range(3):
+            g[len(g) - 3 + i] += web.hub_mass * (now.acceleration[cuts[HUB] + i] - held.gravity[i])
     ends, end_rates, at, hub_rate = _strings(held, now)
-    return bool(pull_strings(web, mesh, ends, end_rates, at, hub_rate, g))
+    return bool(pull_pairs(web, mesh, ends, end_rates, at, hub_rate, g))
 
 
 @compiled
@@ -208,10 +209,12 @@ def differentiate(
     if strung:
         for i in range(3):
             corner[i, i] = web.hub_mass * by_place
+    if len(web.first) > 0:
         ends, end_rates, at, hub_rate = _strings(held, now)
-        add_strings(
-            web, mesh, ends, end_rates, at, hub_rate, by_rate, fronts, columns, rows, corner
-        )
+        add_pairs(
+            web, mesh, ends, end_rates, at, hub_rate, by_rate, strung, fronts, columns, rows,
+            corner,
+        )  # fmt: skip
 
 
 @compiled
@@ -234,6 +237,9 @@ def add_slides(mesh: Mesh, held: Held, pose: Pose, fronts: Array) -> None:
 
 
 # The state of a model: where everything stands and how it moves.
+
+
+_NO_HUB = np.zeros(3)
 
 
 class Groups(NamedTuple):
@@ -281,7 +287,10 @@ class State:
     @property
     def net(self) -> tuple[Array, Array, Array, Array]:
         """Places and rates of the strings' ends, (n, 3), and of the hub, (3,)."""
-        return self.place.ends, self.rate.ends, self.place.hub[0], self.rate.hub[0]
+        hub = (
+            (_NO_HUB, _NO_HUB) if not len(self.place.hub) else (self.place.hub[0], self.rate.hub[0])
+        )
+        return self.place.ends, self.rate.ends, *hub
 
     def memory(self) -> Memory:
         """All but the cables, see ``ringsim.stepping.instant``."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ringsim.cable.records import BarHalfBracket, BlockSheave, Cable, FixedSheave, Sheave
 from ringsim.layout.bodies import (
@@ -33,17 +34,14 @@ from ringsim.layout.layout import (
     SPACECRAFT,
     BoomBeam,
     Contact,
-    EdgeNet,
-    HubNet,
+    Hub,
     Hung,
     Layout,
-    Spring,
     layout_at_opening,
 )
 from ringsim.parts.boom import RigidBoom
-from ringsim.parts.laws import AngleLaw, Reaction, Rub
-from ringsim.parts.net import BoundaryNet, SpringNet
-from ringsim.parts.persection import at_section, spread
+from ringsim.parts.laws import AngleLaw, Corners, PairLaw, Reaction, Rub
+from ringsim.parts.persection import spread
 from ringsim.parts.rods import Tube
 from ringsim.refusal import InputError
 
@@ -102,42 +100,6 @@ def _add_lump(draft: "Draft", number: int, lump: Lump) -> None:
     draft.bodies[number] = replace(body, lumps=(*body.lumps, lump))
 
 
-# Cables along the edge of a net: which corners they join, and how long they are.
-
-
-def along_edges(draft: "Draft") -> EdgeNet | None:
-    """The cables of a scene's net, if it has such."""
-    law = draft.scene.net
-    if not isinstance(law, BoundaryNet):
-        return None
-    planes = {"upper": (0,), "lower": (1,), "both": (0, 1)}[law.planes]
-    draft.require_corners("net", planes[-1] + 1)
-    sections, count = draft.scene.structure.sections, len(draft.corners[0])
-    bodies = np.full((len(draft.scene.structure.planes), sections, 2), -1)
-    for plane in planes:
-        row = np.array([ref.number for ref in draft.corners[plane]])
-        ahead = np.arange(1, sections + 1) % count
-        bodies[plane] = np.stack([row[:sections], row[ahead]], axis=-1)
-    return EdgeNet(law, bodies)
-
-
-def natural_lengths(scene: Any, edge: EdgeNet) -> Array:
-    """Of the cables, from the layout with all V-joints at 180 deg, m, shape (planes, sections);
-    NaN in planes without.
-    """
-    plain = scene.model_copy(update={"net": None})
-    deployed = distances(layout_at_opening(plain, math.pi), edge)
-    return edge.law.natural(deployed)
-
-
-def distances(layout: Layout, edge: EdgeNet) -> Array:
-    """Of the corners that cables join, in a layout, m, shape (planes, sections)."""
-    places = np.array([body.pose.place for body in layout.bodies])
-    found = np.full(edge.present.shape, np.nan)
-    found[edge.present] = np.linalg.norm(np.diff(places[edge.pairs], axis=1)[:, 0], axis=1)
-    return found
-
-
 # The lines that carry a structure in a ground test, and what each carries.
 
 
@@ -169,18 +131,20 @@ def hang(draft: "Draft", gravity: np.ndarray, base: int | None) -> Hung | None:
     return Hung(law, tuple(carried[n][0] for n in keep), lifts[keep], -gravity / size)
 
 
-# The net of an ideal ring: springs from the upper corners to a massless hub.
+# The hub of a net, where its strings balance.
 #
-# The hub lies where the springs' pulls balance, sum k_i s_i u_i = 0 (s_i the stretch, u_i the
-# direction from the hub): the least of a convex energy while they only pull, found by Newton's
-# method with A_i = k_i (u_i u_i^T + (s_i / L_i) (1 - u_i u_i^T)), the pulls' derivatives after its
-# place.  The springs' work is then that of the corners alone.
+# The hub lies where the strings' pulls balance, sum T_i u_i = 0 (T_i the tension, u_i the direction
+# from the hub): the least of a convex energy while they only pull, found by Newton's method with
+# A_i = dT_i/dl u_i u_i^T + (T_i / l_i) (1 - u_i u_i^T), the pulls' derivatives after its place.
+# The strings' work is then that of the corners alone.
 
 
 _MOST = 60
 """Newton steps to the hub, each a tenth of the net's size long at most."""
 _BALANCED = 1e-14
 """Pull on the hub over the largest string's, or its movement over the net's size, taken as zero."""
+_NUDGE = 1e-7
+"""Change of a string's length by which its stiffness is measured, over the net's size."""
 
 
 class NetForce(NamedTuple):
@@ -191,49 +155,57 @@ class NetForce(NamedTuple):
 
 
 class FreeHub:
-    """Springs from so many corners to a free hub; ``corners`` have the shape (corners, 3), m."""
+    """Strings of a law from a free hub; ``ends`` have the shape (strings, 3), m."""
 
-    def __init__(self, net: SpringNet, corners: int) -> None:
-        self._net = at_section(net, np.arange(corners))
-        self._stiffness = spread(net.stiffness, corners)
+    def __init__(self, law: PairLaw) -> None:
+        self._law = law
 
-    def hub(self, corners: Array) -> Array:
+    def place(self, ends: Array) -> Array:
         """Where it lies, shape (3,), m: midway while all is slack."""
-        return self._balance(corners)[0]
+        return self._balance(ends)[0]
 
-    def force(self, corners: Array, slopes: Array) -> NetForce:
-        """On a coordinate after which ``slopes`` are the corners' derivatives, shape (corners, 3),
-        m/rad.
-        """
-        _, _, units, still = self._balance(corners)
+    def force(self, ends: Array, slopes: Array) -> NetForce:
+        """On a coordinate after which ``slopes`` are the ends' derivatives, (strings, 3), m/rad."""
+        _, units, still = self._balance(ends)
         longer = np.sum(units * slopes, axis=1)
         # A difference, not a negative: a slack net pulls with 0, not -0.
         return NetForce(0.0 - float(still.elastic @ longer), float(np.sum(still.stored)))
 
-    def _balance(self, corners: Array) -> tuple[Array, Array, Array, Reaction]:
-        """The hub, and the strings' lengths, directions and reaction at rest there."""
-        hub, size, moved = corners.mean(axis=0), float(np.ptp(corners)), np.inf
+    def _balance(self, ends: Array) -> tuple[Array, Array, Reaction]:
+        """The hub, and the strings' directions and reaction at rest there."""
+        hub, size, moved = ends.mean(axis=0), float(np.ptp(ends)), np.inf
         for _ in range(_MOST):
-            arms = corners - hub
+            arms = ends - hub
             lengths = np.maximum(np.linalg.norm(arms, axis=1), 1e-300)
             units = arms / lengths[:, None]
-            still = self._net.tension(lengths - self._net.neutral_length, 0.0)
+            still = self._still(lengths)
             pull = still.elastic @ units
             balanced = np.abs(pull).max() <= _BALANCED * np.abs(still.elastic).max()
             if balanced or moved < _BALANCED * size:
                 break
-            matrix = self._rates(lengths, units, still).sum(axis=0)
+            ahead, behind = (self._still(lengths + by * _NUDGE * size).elastic for by in (1, -1))
+            stiffness = (ahead - behind) / (2.0 * _NUDGE * size)
+            along = units[:, :, None] * units[:, None, :]
+            across = (still.elastic / lengths)[:, None, None] * (np.eye(3) - along)
+            matrix = (stiffness[:, None, None] * along + across).sum(axis=0)
             step = np.linalg.lstsq(matrix, pull, rcond=1e-9)[0]
             moved = float(np.abs(step).max())
             hub = hub + (step if moved <= 0.1 * size else step * (0.1 * size / moved))
-        return hub, lengths, units, still
+        return hub, units, still
 
-    def _rates(self, lengths: Array, units: Array, still: Reaction) -> Array:
-        """The matrices A_i, shape (corners, 3, 3), N/m."""
-        acting = self._stiffness * ((still.elastic > 0.0) | self._net.two_sided)
-        along = units[:, :, None] * units[:, None, :]
-        across = (still.elastic / lengths)[:, None, None]
-        return np.asarray(acting[:, None, None] * along + across * (np.eye(3) - along))
+    def _still(self, lengths: Array) -> Reaction:
+        return self._law.reaction(lengths, np.zeros(len(lengths)))
+
+
+def balanced(layout: Layout) -> Layout:
+    """A layout with its hub where the strings of the net balance."""
+    hung = [law for law in layout.pair_laws if law.hung]
+    if not hung or layout.hub is None:
+        return layout
+    if len(hung) > 1:
+        raise ValueError("net: give all strings to the hub in one law")
+    ends = np.array([layout.bodies[body].pose.place for body in hung[0].bodies[:, 1]])
+    return replace(layout, hub=layout.hub._replace(place=FreeHub(hung[0]).place(ends)))
 
 
 # A layout under construction: what a structure calls to say what it consists of.
@@ -286,7 +258,7 @@ class Draft:
     joints: list[Joint] = field(default_factory=list)
     openings: dict[int, list[Opening]] = field(default_factory=lambda: defaultdict(list))
     corners: list[list[BodyRef]] = field(default_factory=list)
-    springs: list[Spring] = field(default_factory=list)
+    pairs: list[PairLaw] = field(default_factory=list)
     contacts: list[Contact] = field(default_factory=list)
     tracks: dict[int, Track] = field(default_factory=dict)
 
@@ -384,25 +356,27 @@ class Draft:
         gravity = None if weight is None else np.array(weight.vector)
         boom = add_boom(self)  # adds lumps and joints
         openings = tuple(tuple(self.openings[plane]) for plane in sorted(self.openings))
-        return Layout(
+        layout = Layout(
             bodies=tuple(self.bodies),
             rods=tuple(self.rods),
             joints=tuple(self.joints),
             openings=openings,
             corners=tuple(tuple(ref.number for ref in plane) for plane in self.corners),
             paths=self._paths(),
-            springs=tuple(self.springs),
             contacts=tuple(self.contacts),
-            net=self._net(),
+            hub=None,
             boom=boom,
             forces=self._forces(openings),
             base=base_of(self),
             gravity=gravity,
             hung=None if gravity is None else hang(self, gravity, base_of(self)),
-            edge=along_edges(self),
             angle_laws=self._angle_laws(openings),
+            pair_laws=(*self.pairs, *self._net()),
             rubs=tuple(self._rub(*one) for one in self.scene.joints.present().items()),
         )
+        if not any(law.hung for law in layout.pair_laws):
+            return layout
+        return balanced(replace(layout, hub=Hub(np.zeros(3), self.scene.net.point_mass)))
 
     def _angle_laws(self, openings: Sequence[Sequence[Opening]]) -> tuple[AngleLaw, ...]:
         """Of stops, springs, latches and faults; InputError without V-joints that they act on."""
@@ -464,14 +438,19 @@ class Draft:
                 f'leave it out ({part} = "none")'
             )
 
-    def _net(self) -> HubNet | None:
+    def _net(self) -> list[PairLaw]:
         net = self.scene.net
-        if not isinstance(net, SpringNet):
-            return None
-        self.require_corners("net", 1)
-        held = tuple(ref.number for ref in self.corners[0])
-        hub = FreeHub(net, len(held)).hub(np.array([self.bodies[k].pose.place for k in held]))
-        return HubNet(net, hub, held)
+        if net is None:
+            return []
+
+        def distances(pairs: NDArray[np.int64]) -> Array:
+            plain = self.scene.model_copy(update={"net": None})
+            deployed = layout_at_opening(plain, math.pi)
+            places = np.array([body.pose.place for body in deployed.bodies])
+            return np.asarray(np.linalg.norm(np.diff(places[pairs], axis=1)[:, 0], axis=1))
+
+        rows = tuple(tuple(ref.number for ref in plane) for plane in self.corners)
+        return list(net.laws(Corners(rows, self.scene.structure.sections, distances)))
 
     def _forces(self, openings: Sequence[Sequence[Opening]]) -> tuple[tuple[int, Array], ...]:
         force = 0.0 if self.scene.loads is None else self.scene.loads.force

@@ -28,26 +28,15 @@ from ringsim.layout.bodies import (
     skew,
 )
 from ringsim.parts.ground import Offload
-from ringsim.parts.laws import AngleLaw, Rub
-from ringsim.parts.net import BoundaryNet, SpringNet
+from ringsim.parts.laws import AngleLaw, PairLaw, Rub
 
 # A structure at one value of its coordinate: the one description that every room reads.
 
 
 SPACECRAFT = "spacecraft"
 """Group of the lump that is one."""
-
-
-class Spring(NamedTuple):
-    """A linear spring with a damper between the origins of two bodies.
-
-    ``law`` has ``stiffness``, ``damping``, ``free_length``, and ``tension(length, rate)`` as a
-    ``ringsim.parts.laws.Reaction``.
-    """
-
-    first: int
-    second: int
-    law: Any
+OWN = "structure"
+"""Group of laws that a structure brings itself, against which it rests before a run."""
 
 
 class Contact(NamedTuple):
@@ -62,31 +51,11 @@ class Contact(NamedTuple):
     law: Any
 
 
-class HubNet(NamedTuple):
-    """Springs from the origins of bodies to a free ``hub``, where they balance, shape (3,), m."""
+class Hub(NamedTuple):
+    """The free point of a net: where its strings balance, shape (3,), m, and its mass, kg."""
 
-    law: SpringNet
-    hub: Array
-    bodies: tuple[int, ...]
-
-
-class EdgeNet(NamedTuple):
-    """Cables between the origins of bodies, numbers of them by plane and section, -1 in planes
-    without: shape (planes, sections, 2).
-    """
-
-    law: BoundaryNet
-    bodies: NDArray[np.int64]
-
-    @property
-    def pairs(self) -> NDArray[np.int64]:
-        """Those that there are, shape (n, 2)."""
-        return self.bodies[self.present]
-
-    @property
-    def present(self) -> NDArray[np.bool_]:
-        """Whether there is a cable, shape (planes, sections)."""
-        return self.bodies[..., 0] >= 0
+    place: Array
+    mass: float
 
 
 class Hung(NamedTuple):
@@ -142,8 +111,8 @@ class Layout:
     and vector, N; ``base`` the body that is held, or that a boom's upper end is fixed to;
     ``gravity`` the weight of a kilogram, m/s^2; ``hung`` the lines of a ground test;
     ``held`` how much further open V-joints are held before a run, shape (planes, sections), rad;
-    ``edge`` the cables along the edge of a net; ``angle_laws`` what acts on V-joints, and ``rubs``
-    what brakes joints by their rates alone.
+    ``angle_laws`` what acts on V-joints, ``pair_laws`` what acts between bodies, and ``rubs`` what
+    brakes joints by their rates alone.
     """
 
     bodies: tuple[Body, ...]
@@ -152,17 +121,16 @@ class Layout:
     openings: tuple[tuple[Opening, ...], ...]
     corners: tuple[tuple[int, ...], ...]
     paths: tuple[tuple[Sheave, ...], ...]
-    springs: tuple[Spring, ...]
     contacts: tuple[Contact, ...]
-    net: HubNet | None
+    hub: Hub | None
     boom: BoomBeam | None
     forces: tuple[tuple[int, Array], ...]
     base: int | None = None
     gravity: Array | None = None
     hung: Hung | None = None
     held: Array | None = None
-    edge: EdgeNet | None = None
     angle_laws: tuple[AngleLaw, ...] = ()
+    pair_laws: tuple[PairLaw, ...] = ()
     rubs: tuple[Rub, ...] = ()
 
     def pose(self, mount: Mount) -> Pose:
@@ -176,8 +144,8 @@ class Layout:
         parts += [(group, mass) for rod in self.rods for _, mass, group in rod.masses]
         if self.boom is not None:
             parts.append(("boom", self.boom.lump.mass))
-        if self.net is not None:
-            parts.append(("hub", self.net.law.hub_mass))
+        if self.hub is not None:
+            parts.append(("hub", self.hub.mass))
         found: dict[str, float] = {}
         for group, mass in parts:
             found[group] = found.get(group, 0.0) + mass

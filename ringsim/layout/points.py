@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ringsim.layout.bodies import Array, InSpace, Joint, JointOpening, Mount, OnBody, OnRod
 from ringsim.layout.layout import Layout
+from ringsim.parts.laws import HUB as FREE
 
 HUB, BOOM_TIP = "hub", "boom tip"
 """Points that stand on no body and no rod: the net's hub, the free end of a flexible boom."""
@@ -165,12 +166,13 @@ def _lines(layout: Layout) -> Iterator[tuple[str, Where, Where]]:
                 yield "boom", OnBody(number), OnBody(number, 2.0 * lump.centre)
     if layout.boom is not None:
         yield "boom", layout.boom.top, BOOM_TIP
-    if layout.net is not None:
-        for number in layout.net.bodies:
-            yield "net", OnBody(number), HUB
-    if layout.edge is not None:
-        for first, second in layout.edge.pairs.tolist():
-            yield "net", OnBody(first), OnBody(second)
+    for law in layout.pair_laws:
+        if law.group == "net":
+            for first, second in law.bodies.tolist():
+                yield (
+                    ("net", OnBody(second), HUB) if first == FREE
+                    else ("net", OnBody(first), OnBody(second))
+                )  # fmt: skip
 
 
 def _group(layout: Layout, body: int) -> str:
@@ -214,8 +216,8 @@ def _distinct(names: Sequence[str]) -> Iterator[str]:
 
 def _place(layout: Layout, where: Where) -> Array:
     if where == HUB:
-        assert layout.net is not None
-        return layout.net.hub
+        assert layout.hub is not None
+        return layout.hub.place
     if where == BOOM_TIP:
         assert layout.boom is not None
         return layout.pose(layout.boom.top).at(2.0 * layout.boom.lump.centre)[0]

@@ -97,7 +97,7 @@ class NetTension(Output):
 
     def read(self, now: Reading) -> Array | None:
         """Shape (planes, sections), N."""
-        return now.edge
+        return now.net
 
     def reduce(self, run: Run, series: Series) -> Values:
         """Interpolated, and the largest reading."""

@@ -14,7 +14,6 @@ from ringsim.cable.records import Cable
 from ringsim.cable.winding import MotorWinding
 from ringsim.choice import kind_of
 from ringsim.hermite import cubic, monotone_slopes
-from ringsim.parts.net import BoundaryNet
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
 from ringsim.stepping.instant import Array, Instant
@@ -73,7 +72,7 @@ class Reading(Instant):
 
     put: Put | None = None
     """Where corners are and what the rods store; None unless recorded."""
-    edge: Array | None = None
+    net: Array | None = None
     """Tension of the cables along a net's edge, shape (planes, sections), N; None without."""
 
     def by_plane(self, of_cables: NDArray[Any]) -> Array:
@@ -425,7 +424,7 @@ def holds(scene: Scene) -> set[str]:
         "prestress": bool(strained(scene)),
         "base": scene.boom is not None or scene.structure.supported,
         "latches": scene.stop is not None and scene.stop.latch and scene.structure.locks,
-        "boundary net": isinstance(scene.net, BoundaryNet),
+        "boundary net": scene.net is not None and scene.net.tells,
         "held base": scene.held or scene.spacecraft is not None,
     }
     return {name for name, present in held.items() if present}

@@ -4,8 +4,9 @@ An engine knows how to measure a place's coordinate and what its virtual work do
 the coordinate is here.  So a spring, a net, a latch or a fault is one record that names its places.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -165,6 +166,107 @@ class Switches:
         for law in self.of_group(group):
             return np.asarray(self.reaction(law, folded, rates).total.reshape(folded.shape))
         return None
+
+
+# Laws on distances between the origins of two bodies.
+
+
+HUB = -1
+"""Stands for a body: the free point of a net, where its strings balance."""
+
+
+class PairRecord(Model):
+    """Anything that pulls two bodies together, or pushes them apart.
+
+    Fields of a kind may be ``PerSection``; its methods are called on what ``at`` gives.
+    """
+
+    def at(self, where: int | NDArray[np.int64]) -> Self:
+        """That of a section (or corner), or of several, counted from 0."""
+        return at_section(self, where)
+
+    def reaction(self, stretch: Any, rate: Any, natural: Any, xp: Any = np) -> Reaction:
+        """What resists a distance longer than ``natural`` (m) by ``stretch`` (m), at its rate
+        (m/s), N; and the energy stored, J.
+        """
+        raise NotImplementedError
+
+    def linear(self) -> tuple[float, float] | None:
+        """Stiffness (N/m) and damping (N s/m) of what is a linear spring and damper; else None."""
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class PairLaw:
+    """A record between bodies; arrays have the shape (pairs,).
+
+    ``bodies`` are their numbers, or ``HUB`` first, shape (pairs, 2); ``sections`` pick the values
+    of the record; ``lengths`` gives the natural lengths, m, when they are asked for.  ``places``
+    are the plane and section that results tell the tension of each pair at; empty: they do not.
+    ``category`` is that of the standard for margins; None for what the drive does not meet.
+    """
+
+    group: str
+    record: PairRecord
+    bodies: NDArray[np.int64]
+    sections: NDArray[np.int64]
+    lengths: Callable[[], Array]
+    category: Category | None = None
+    places: tuple[Place, ...] = ()
+
+    @cached_property
+    def natural(self) -> Array:
+        """Natural lengths, m."""
+        return self.lengths()
+
+    @cached_property
+    def own(self) -> PairRecord:
+        """The record with the values of all its pairs."""
+        return self.record.at(self.sections)
+
+    @property
+    def hung(self) -> bool:
+        """Whether its pairs are strings from the hub."""
+        return bool((self.bodies == HUB).any())
+
+    def reaction(self, lengths: Array, rates: Array) -> Reaction:
+        """At lengths (m) and rates (m/s) of all pairs."""
+        return self.own.reaction(lengths - self.natural, rates, self.natural)
+
+    def moved(self, places: Array, velocities: Array) -> tuple[Array, Array]:
+        """Lengths (m) and rates (m/s) at places and velocities of all bodies, the hub's last,
+        shape (bodies, 3).
+        """
+        arms, moving = (x[self.bodies[:, 1]] - x[self.bodies[:, 0]] for x in (places, velocities))
+        lengths = np.linalg.norm(arms, axis=1)
+        return lengths, np.sum(arms * moving, axis=1) / lengths
+
+    def tensions(self, places: Array, velocities: Array, shape: tuple[int, int]) -> Array:
+        """N, in a table of planes and sections, NaN where there is no pair; see ``moved``."""
+        found = np.full(shape, np.nan)
+        total = self.reaction(*self.moved(places, velocities)).total
+        found[tuple(np.array(self.places).T)] = total
+        return found
+
+
+class Corners(NamedTuple):
+    """What a net may be fastened to: bodies of the corners by plane, and the number of sections.
+
+    ``distances`` gives those of pairs of bodies, (n, 2), in the deployed structure, (n,), m.
+    """
+
+    rows: tuple[tuple[int, ...], ...]
+    sections: int
+    distances: Callable[[NDArray[np.int64]], Array]
+
+    def row(self, plane: int) -> NDArray[np.int64]:
+        """Bodies of a plane; ValueError where the structure has no corners there."""
+        if plane >= len(self.rows):
+            raise ValueError(
+                f"net: this structure has no corners to hold one in {plane + 1} of its planes: "
+                'leave it out (net = "none")'
+            )
+        return np.array(self.rows[plane], dtype=np.int64)
 
 
 # Friction, which depends on the rate alone.

@@ -1,20 +1,40 @@
 """Nets: strings between corners of a ring, or from corners to a hub."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from ringsim.parts.laws import Reaction, one_sided, two_sided
+from ringsim.parts.laws import (
+    HUB,
+    Array,
+    Corners,
+    PairLaw,
+    PairRecord,
+    Reaction,
+    one_sided,
+    two_sided,
+)
 from ringsim.parts.persection import PerSection, spread
-from ringsim.units import AxialStiffness, DampingRate, Kilogram, Metre, Model, SpringRate, Unit
+from ringsim.units import AxialStiffness, DampingRate, Kilogram, Metre, SpringRate, Unit
 
 # The family of nets.
 
 
-class Net(Model):
+class Net(PairRecord):
     """What the corners stretch as the ring opens."""
+
+    steep: ClassVar[bool] = False
+    """Whether it resists most in the last degrees."""
+
+    def laws(self, corners: Corners) -> list[PairLaw]:
+        """Its strings, between corners or from corners to a hub."""
+        raise NotImplementedError
+
+    @property
+    def tells(self) -> bool:
+        """Whether results tell the tension in each section."""
+        return False
 
     @property
     def point_mass(self) -> float:
@@ -30,7 +50,6 @@ class Net(Model):
 # The net, reduced to the cables along its edge.
 
 
-Array = NDArray[np.float64]
 _Strain = Annotated[float, Field(ge=-0.5, le=0.1), Unit("1")]
 
 
@@ -53,19 +72,33 @@ class BoundaryNet(Net):
     planes: Literal["upper", "lower", "both"] = "both"
     """Planes whose corners hold cables."""
 
-    def natural(self, deployed: Array) -> Array:
-        """Natural lengths, m, from distances in the deployed ring, shape (..., sections)."""
-        return np.asarray(deployed / (1.0 + spread(self.strain, deployed.shape[-1])))
+    steep: ClassVar[bool] = True
 
-    def rates(self, natural: Array) -> Array:
-        """Force over stretch of cables with natural lengths (m), N/m, shape (..., sections)."""
-        return np.asarray(spread(self.axial_stiffness, natural.shape[-1]) / natural)
+    @property
+    def tells(self) -> bool:
+        """See ``Net``."""
+        return True
 
+    def laws(self, corners: Corners) -> list[PairLaw]:
+        """See ``Net``; natural lengths follow from the deployed ring."""
+        chosen = {"upper": (0,), "lower": (1,), "both": (0, 1)}[self.planes]
+        every = np.arange(corners.sections)
+        rows = [corners.row(plane) for plane in chosen]
+        pairs = [np.stack([row[every], row[(every + 1) % len(row)]], axis=1) for row in rows]
+        bodies, sections = np.concatenate(pairs), np.tile(every, len(rows))
 
-def pull(stretch: Any, rate: Any, xp: Any = np) -> Reaction:
-    """Of a cable longer than natural by ``stretch`` (m), at its force over stretch (N/m)."""
-    taut = xp.maximum(stretch, 0.0)
-    return Reaction(rate * taut, 0.0 * taut, 0.5 * rate * taut * taut)
+        def lengths() -> Array:
+            strains = spread(self.strain, corners.sections)[sections]
+            return np.asarray(corners.distances(bodies) / (1.0 + strains))
+
+        places = tuple((plane, int(k)) for plane in chosen for k in every)
+        return [PairLaw("net", self, bodies, sections, lengths, "spring", places)]
+
+    def reaction(self, stretch: Any, rate: Any, natural: Any, xp: Any = np) -> Reaction:
+        """See ``PairRecord``."""
+        taut = xp.maximum(stretch, 0.0)
+        pulling: Any = self.axial_stiffness / natural
+        return Reaction(pulling * taut, 0.0 * taut, 0.5 * pulling * taut * taut)
 
 
 # The net, reduced to springs.
@@ -105,10 +138,19 @@ class SpringNet(Net):
         """See ``Net``."""
         return self.damping == 0.0
 
-    def tension(self, stretch: Any, rate: Any, xp: Any = np) -> Reaction:
-        """Of strings longer than neutral by ``stretch`` (m), at its rate (m/s).
+    def laws(self, corners: Corners) -> list[PairLaw]:
+        """See ``Net``."""
+        ends = corners.row(0)
+        bodies = np.stack([np.full(len(ends), HUB), ends], axis=1)
+        natural = np.full(len(ends), self.neutral_length)
+        return [PairLaw("net", self, bodies, np.arange(len(ends)), lambda: natural, "spring")]
 
-        The stiffness is that of all corners, or of those that ``at_section`` has picked.
-        """
+    def linear(self) -> tuple[float, float] | None:
+        """See ``PairRecord``."""
+        stiffness: Any = self.stiffness
+        return (stiffness, self.damping) if self.two_sided else None
+
+    def reaction(self, stretch: Any, rate: Any, natural: Any, xp: Any = np) -> Reaction:
+        """See ``PairRecord``."""
         law = stretch, rate, self.stiffness, self.damping
         return two_sided(*law) if self.two_sided else one_sided(*law, ONSET, xp)

@@ -22,7 +22,7 @@ from ringsim.layout.bodies import (
     Pose,
     stiffness_of,
 )
-from ringsim.layout.draft import FreeHub
+from ringsim.layout.draft import balanced
 from ringsim.layout.layout import Layout, layout_at_opening
 from ringsim.outputs.corners import deviations
 from ringsim.parts.rods import Rods
@@ -362,11 +362,7 @@ class Frames:
             )
             for first, rod in zip(self._first, layout.rods, strict=False)
         )
-        net = layout.net
-        if net is not None:
-            corners = np.array([bodies[number].pose.place for number in net.bodies])
-            net = net._replace(hub=FreeHub(net.law, len(corners)).hub(corners))
-        return replace(layout, bodies=bodies, rods=rods, net=net)
+        return balanced(replace(layout, bodies=bodies, rods=rods))
 
 
 # The structure as it is put together before a run.

@@ -13,7 +13,6 @@ from ringsim.choice import kind_of
 from ringsim.layout.bodies import Array
 from ringsim.parts.faults import AT_ONCE
 from ringsim.parts.margin import MarginStandard
-from ringsim.parts.net import BoundaryNet
 from ringsim.refusal import InputError
 from ringsim.rigid.drive import Drive
 from ringsim.rigid.mechanism import Mechanism, SectionLoads
@@ -85,7 +84,7 @@ class DriveMargin:
         self.conditions = self._drive.conditions
         self._loads = SectionLoads(self.mechanism)
         self._resistances = resistances(scene, self.mechanism)
-        self._ends_steeply = scene.latch is not None or isinstance(scene.net, BoundaryNet)
+        self._ends_steeply = scene.latch is not None or (scene.net is not None and scene.net.steep)
         self.kinds = [PULLEYS, *(one.kind for one in self._resistances)]
         self.start = math.pi - 2.0 * scene.structure.coordinate
         """Opening angle at which the scene begins, rad."""

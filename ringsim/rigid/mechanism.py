@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.layout.bodies import Array, Mount, OnBody, skew
-from ringsim.layout.draft import FreeHub, NetForce, natural_lengths
-from ringsim.layout.layout import EdgeNet, Layout, layout_of
-from ringsim.parts.laws import Switches
-from ringsim.parts.net import SpringNet, pull
+from ringsim.layout.draft import FreeHub, NetForce
+from ringsim.layout.layout import Layout, layout_of
+from ringsim.parts.laws import PairLaw, Switches
 from ringsim.scene import Scene
 
 # Every point of a structure with rigid rods as a linear function of a few numbers.
@@ -105,27 +104,30 @@ def _stacked(pairs: Iterable[Sequence[Array]]) -> Pairs:
     return found[:, 0], found[:, 1]
 
 
-# Cables along a net's edge on a ring of rigid rods: generalised force - sum T dl/dq.
+# Laws between bodies on a ring of rigid rods: generalised force - sum T dl/dq.
 
 
-class IdealEdge:
-    """Cables between corners; arguments are those of ``ringsim.layout.draft.FreeHub``, the
-    corners both ends of all cables: shape (2 * cables, 3).
-    """
+class RigidPairs:
+    """The pairs of a law; a net's hub lies where its strings balance."""
 
-    def __init__(self, scene: Scene, edge: EdgeNet) -> None:
-        natural = natural_lengths(scene, edge)
-        self._natural = natural[edge.present]
-        self._rates = edge.law.rates(natural)[edge.present]
+    def __init__(self, points: Points, law: PairLaw) -> None:
+        self._law, self._hub = law, FreeHub(law) if law.hung else None
+        self.group = law.group
+        first, second = law.bodies.T
+        self._second = points.places([OnBody(int(body)) for body in second])
+        if self._hub is None:
+            self._first = points.places([OnBody(int(body)) for body in first])
 
-    def force(self, corners: Array, slopes: Array) -> NetForce:
-        """On a coordinate after which ``slopes`` are the corners' derivatives, m/rad."""
-        ends, moving = corners.reshape(-1, 2, 3), slopes.reshape(-1, 2, 3)
-        arms = ends[:, 1] - ends[:, 0]
+    def force(self, now: "Configuration") -> NetForce:
+        """At rest, on the coordinate."""
+        ends, moving = now.places(self._second), now.velocities(self._second)
+        if self._hub is not None:
+            return self._hub.force(ends, moving)
+        arms, growing = ends - now.places(self._first), moving - now.velocities(self._first)
         lengths = np.linalg.norm(arms, axis=1)
-        longer = np.sum(arms * (moving[:, 1] - moving[:, 0]), axis=1) / lengths
-        reaction = pull(lengths - self._natural, self._rates)
-        return NetForce(0.0 - float(reaction.elastic @ longer), float(np.sum(reaction.stored)))
+        longer = np.sum(arms * growing, axis=1) / lengths
+        still = self._law.reaction(lengths, np.zeros(len(lengths)))
+        return NetForce(0.0 - float(still.elastic @ longer), float(np.sum(still.stored)))
 
 
 # A structure with rigid rods at one coordinate, and how its points move there.
@@ -187,14 +189,8 @@ class Mechanism:
         self._mass, self._first = float(masses.sum()), np.tensordot(masses, places, 1)
         second = ((flat.T * masses) @ flat).reshape(3, count, 3, count)
         self._second = second.transpose(1, 3, 0, 2)
-        corners, edge = points.layout.corners, points.layout.edge
-        self._net: FreeHub | IdealEdge | None = None
-        if isinstance(scene.net, SpringNet):
-            self._ends = points.places([OnBody(body) for body in corners[0]])
-            self._net = FreeHub(scene.net, len(self._ends))
-        elif edge is not None:
-            self._net = IdealEdge(scene, edge)
-            self._ends = points.places([OnBody(int(body)) for body in edge.pairs.ravel()])
+        laws = [law for law in points.layout.pair_laws if law.category is not None]
+        self._pairs = [RigidPairs(points, law) for law in laws]
         held = [body_of(support.second) for support in points.layout.supports]
         self.fixed = bool(held)
         self._held = points.frame(held[0]) if held else np.zeros(0)
@@ -224,11 +220,10 @@ class Mechanism:
         matrix[6, 6] = np.trace(np.tensordot(slopes, np.tensordot(slopes, self._second, 1), 1))
         return Configuration(q, values, slopes, matrix)
 
-    def net(self, now: Configuration) -> NetForce:
-        """What the net does at rest."""
-        if self._net is None:
-            return NetForce(0.0, 0.0)
-        return self._net.force(now.places(self._ends), now.velocities(self._ends))
+    def pairs(self, now: Configuration, group: str | None = None) -> NetForce:
+        """What laws between bodies do at rest, all or those of a group."""
+        found = [pair.force(now) for pair in self._pairs if group in (None, pair.group)]
+        return NetForce(sum(one.force for one in found), sum(one.energy for one in found))
 
     def weight(self, now: Configuration) -> Array:
         """Generalised force of gravity and of what lines carry on (V, W, q), N and N m."""

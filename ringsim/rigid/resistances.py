@@ -195,24 +195,27 @@ class LoadResistance(Resistance):
         return float((-self._loads.at(opening.now)).clip(min=0.0).sum())
 
 
-# The net's pull.
+# Laws between bodies: the pull of a net.
 
 
-class NetResistance(Resistance):
-    """Tension of the net's strings or cables; dampers are left out."""
+class PairResistance(Resistance):
+    """Tension of the pairs of a group; dampers are left out."""
 
-    kind = "net"
-    category = "spring"
+    def __init__(self, scene: Scene, mechanism: Mechanism, group: str, category: Category) -> None:
+        super().__init__(scene, mechanism)
+        self.kind, self.category = group, category
 
-    @property
-    def present(self) -> bool:
+    @classmethod
+    def of(cls, scene: Scene, mechanism: Mechanism) -> list[Resistance]:
         """See ``Resistance``."""
-        return self.scene.net is not None
+        laws = mechanism.points.layout.pair_laws
+        groups = {law.group: law.category for law in laws if law.category is not None}
+        return [cls(scene, mechanism, *each) for each in groups.items()]
 
     def force(self, opening: Opening) -> float:
         """See ``Resistance``."""
         # The angle opens by two for one that the coordinate falls.
-        return 0.5 * self.mechanism.net(opening.now).force
+        return 0.5 * self.mechanism.pairs(opening.now, self.kind).force
 
 
 # Laws on the V-joints: springs, which drive where they open the joints, and ramps of latches.

@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsim.layout.bodies import Array, JointOpening, Lump, OnBody, OnRod, cross
-from ringsim.layout.layout import Layout, layout_of
+from ringsim.layout.layout import OWN, Layout, layout_of
 from ringsim.parts.ground import Offload
 from ringsim.parts.laws import Switches
-from ringsim.parts.persection import spread
 from ringsim.rigid.mechanism import Configuration, Mechanism, body_of, torques_at
 from ringsim.scene import Scene
 from ringsim.stepping.instant import Scales
@@ -70,7 +69,7 @@ class OneCoordinate:
         mechanism, now = self._at(q)
         done = np.tensordot(*mechanism.points.forces, 2) @ now.values
         done += mechanism.weight_work(now)
-        stored = mechanism.net(now).energy + torques_at(self._switches, 2.0 * q).stored
+        stored = mechanism.pairs(now).energy + torques_at(self._switches, 2.0 * q).stored
         return float(done) - stored
 
     def work_rate(self, q: float) -> float:
@@ -78,7 +77,7 @@ class OneCoordinate:
         mechanism, now = self._at(q)
         done = np.tensordot(*mechanism.points.forces, 2) @ now.slopes
         done += mechanism.rates(now) @ mechanism.weight(now)
-        pulled = done + mechanism.net(now).force
+        pulled = done + mechanism.pairs(now).force
         return float(pulled - 2.0 * torques_at(self._switches, 2.0 * q).torque)
 
     def _at(self, q: float) -> tuple[Mechanism, Configuration]:
@@ -148,7 +147,7 @@ def first_acceleration(layout: Layout, ideal: OneCoordinate, q: float) -> Accele
 
     One with springs of its own starts without: it rests against them on its cables.
     """
-    if layout.springs:
+    if any(law.group == OWN for law in layout.pair_laws):
         return Acceleration(0.0, np.zeros(3), np.zeros(3))
     motion = ideal.motion(q)
     return Acceleration(ideal.work_rate(q) / motion.inertia, motion.velocity, motion.rotation)
@@ -259,9 +258,10 @@ def residual_tolerance(scene: Scene, layout: Layout, reached: float) -> float:
     1 m.
     """
     drive = float(np.linalg.norm([force for _, force in layout.forces])) + scene.structure.push
-    if layout.net is not None:
-        net, springs = layout.net.law, len(layout.net.bodies)
-        drive += float(np.linalg.norm(spread(net.stiffness, springs))) * net.neutral_length
+    for law in layout.pair_laws:
+        if law.hung:  # as far again as without force
+            still = law.reaction(2.0 * law.natural, np.zeros(len(law.natural)))
+            drive += float(np.linalg.norm(still.elastic))
     if drive == 0.0 and layout.gravity is not None:
         drive = sum(layout.masses().values()) * float(np.linalg.norm(layout.gravity))
     stiffest = max(rod.young_modulus * rod.tube.area / rod.lengths.min() for rod in layout.rods)

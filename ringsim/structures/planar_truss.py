@@ -11,8 +11,8 @@ from pydantic import model_validator
 from ringsim.choice import kind_of
 from ringsim.layout.bodies import Lump, axes_along
 from ringsim.layout.draft import Draft, Track
-from ringsim.layout.layout import Contact, Layout, Spring
-from ringsim.parts.laws import Reaction, one_sided, two_sided
+from ringsim.layout.layout import OWN, Contact, Layout
+from ringsim.parts.laws import PairLaw, PairRecord, Reaction, one_sided, two_sided
 from ringsim.parts.rods import Tube
 from ringsim.structures.family import Structure
 from ringsim.units import DampingRate, Metre, Model, SpringRate
@@ -98,7 +98,7 @@ REST_ONSET = 1e-5
 that the cable holds where the rest is met."""
 
 
-class DeployingSpring(Model):
+class DeployingSpring(PairRecord):
     """Compression spring inside the telescopic strut, with its damping."""
 
     stiffness: SpringRate = 2030.0
@@ -108,9 +108,13 @@ class DeployingSpring(Model):
     damping: DampingRate = 5.0
     """Force over the rate of the strut's length."""
 
-    def tension(self, length: Any, rate: Any = 0.0) -> Reaction:
-        """Of a strut of some length (m), at its rate (m/s); the spring pushes: negative."""
-        return two_sided(length - self.free_length, rate, self.stiffness, self.damping)
+    def linear(self) -> tuple[float, float] | None:
+        """See ``PairRecord``."""
+        return self.stiffness, self.damping
+
+    def reaction(self, stretch: Any, rate: Any, natural: Any, xp: Any = np) -> Reaction:
+        """See ``PairRecord``; the spring pushes: negative."""
+        return two_sided(stretch, rate, self.stiffness, self.damping)
 
 
 class Rest(Model):
@@ -329,7 +333,8 @@ class PlanarTruss(Structure):
         draft.joint("revolute", "", 0, (axis, outer), points.foot, np.eye(3))
         draft.joint("revolute", "", 0, (upper, inner), points.head)
         draft.slide(outer, inner, along)
-        draft.springs.append(Spring(outer.number, inner.number, self.spring))
+        pair, free = np.array([[outer.number, inner.number]]), np.array([self.spring.free_length])
+        draft.pairs.append(PairLaw(OWN, self.spring, pair, np.zeros(1, int), lambda: free))
         draft.contacts.append(Contact(bar.number, 0, self.rest_distance, self.rest))
         draft.chord_opening(0, bar, points.upper)
         cable = [draft.on(axis, points.lower), draft.on(bar, points.upper_end)]

@@ -48,7 +48,7 @@ def laws() -> dict[str, Any]:
         found[f"spring-{spring.kind}"] = lambda x, *_, s=spring: s.torque(3.0 * x)
     for sided in (False, True):
         net = SpringNet(stiffness=0.3, damping=0.02, two_sided=sided)
-        found[f"net-{sided}"] = lambda x, v, _, n=net: n.tension(x, v)
+        found[f"net-{sided}"] = lambda x, v, _, n=net: n.reaction(x, v, 1.0)
     fault = StuckVJoint(section=1, time=0.0)
     found["stuck"] = lambda x, v, _: fault.reaction(x, v, 0.0)
     found["latch"] = lambda x, *_: RAMP.reaction(x, 0.0, 0.0)

@@ -22,6 +22,8 @@ def records(kind: type[Model]) -> st.SearchStrategy[Any]:
 def _values(schema: dict[str, Any]) -> st.SearchStrategy[Any]:
     if "oneOf" in schema:
         schema = schema["oneOf"][0]
+    if "enum" in schema:
+        return st.sampled_from(schema["enum"])
     if schema["type"] == "boolean":
         return st.booleans()
     low = schema.get("minimum", schema.get("exclusiveMinimum", -LARGEST))

@@ -16,7 +16,8 @@ from ringsim.choice import kinds_of
 from ringsim.exudyn.assembly import SYMBOLIC, TORSION, Assembly
 from ringsim.parts.faults import StuckVJoint
 from ringsim.parts.joints import JointFriction, Latch, SpringDamperStop, Stop
-from ringsim.parts.net import SpringNet, pull
+from ringsim.parts.laws import PairRecord
+from ringsim.parts.net import BoundaryNet, SpringNet
 from ringsim.parts.persection import at_section
 from ringsim.structures.planar_truss import DeployingSpring, Rest
 from ringsim.units import Model
@@ -54,18 +55,18 @@ def stuck_law(fault: StuckVJoint) -> Any:
     return lambda place, rate, xp=np: fault.reaction(place, rate, 0.1, xp)
 
 
-def without_xp(law: Any) -> Any:
-    return lambda place, rate, xp=np: law(place, rate)
+def pair_law(record: PairRecord) -> Any:
+    return lambda stretch, rate, xp=np: record.reaction(stretch, rate, 1.3, xp)
 
 
 LAWS = {
     "stop": st.builds(stop_law, STOP, st.just(False)),
     "latch": st.builds(stop_law, STOP, st.just(True)),
-    "net": records(SpringNet).map(lambda net: net.tension),
-    "edge": st.floats(1.0, 1e5).map(lambda k: lambda x, rate, xp=np: pull(x, k, xp)),
+    "net": records(SpringNet).map(pair_law),
+    "edge": records(BoundaryNet).map(pair_law),
     "ramp": records(Latch).map(ramp_law),
     "rest": records(Rest).map(lambda rest: rest.push),
-    "strut": records(DeployingSpring).map(lambda spring: without_xp(spring.tension)),
+    "strut": records(DeployingSpring).map(pair_law),
     "stuck": st.just(stuck_law(StuckVJoint(time=0.0, section=1))),
 }
 """Reaction of every part as a function of coordinate, rate and xp."""
@@ -153,7 +154,7 @@ def test_a_stop_only_pushes_into_the_range(stop, folded, rate):
 @given(records(Rest), records(SpringNet), PLACE, RATE)
 def test_rest_and_one_sided_strings_never_turn_round(rest, net, stretch, rate):
     assert float(rest.push(stretch, rate).total) >= 0.0
-    tension = float(net.tension(stretch, rate).total)
+    tension = float(net.reaction(stretch, rate, 1.0).total)
     assert net.two_sided or tension >= 0.0
     if net.two_sided:
         assert tension == pytest.approx(net.stiffness * stretch + net.damping * rate, rel=1e-12)
@@ -163,8 +164,10 @@ def test_values_of_each_section_reach_the_law():
     net = SpringNet(stiffness=(1.0, 2.0, 4.0))
     assert type(at_section(net, 2).stiffness) is float
     stretch = np.array([0.1, 0.2, 0.3])
-    each = [at_section(net, k).tension(stretch[k], 0.0).total for k in range(3)]
-    np.testing.assert_array_equal(at_section(net, np.arange(3)).tension(stretch, 0.0).total, each)
+    each = [at_section(net, k).reaction(stretch[k], 0.0, 1.0).total for k in range(3)]
+    np.testing.assert_array_equal(
+        at_section(net, np.arange(3)).reaction(stretch, 0.0, 1.0).total, each
+    )
     assert each == [0.1, 0.4, 1.2]
 
 

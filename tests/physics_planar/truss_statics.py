@@ -70,7 +70,7 @@ def spring_force(truss: PlanarTruss, cable: ArrayLike) -> Array:
     """Push of the deploying spring at cable lengths (m) with rigid beams, N."""
     geometry = truss.geometry()
     strut = geometry.strut(geometry.angle(cable))
-    return np.asarray(-truss.spring.tension(strut).elastic)
+    return np.asarray(-truss.spring.reaction(strut - truss.spring.free_length, 0.0, None).elastic)
 
 
 def tension(truss: PlanarTruss, cable: ArrayLike) -> Array:
@@ -101,7 +101,7 @@ def statics(scene: Scene, cable: ArrayLike) -> TrussStatics:
     for _ in range(_REPETITIONS):
         along, across = head - foot * np.cos(angle), bend + foot * np.sin(angle)
         strut = np.hypot(along, across)
-        push = -truss.spring.tension(strut).elastic
+        push = -truss.spring.reaction(strut - truss.spring.free_length, 0.0, None).elastic
         lever = (head * across - bend * along) / strut
         hold = push * lever / (beam * cable_across)
         pull = push * along / strut - hold * cable_along

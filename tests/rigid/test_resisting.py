@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ringsim.layout.draft import FreeHub
+from ringsim.layout.layout import layout_of
 from ringsim.parts.persection import at_section
 from ringsim.rigid.mechanism import Mechanism
 from ringsim.rigid.resistances import JointFrictionResistance, Opening
@@ -46,9 +47,9 @@ def test_joint_friction_takes_the_power_of_all_its_joints(family):
 def test_hub_of_an_odd_net_lies_where_its_strings_balance(stiffness):
     net = {"stiffness": stiffness, "neutral_length": 0.2}
     scene = pulled(sections=5, structure__aspect_ratio=0.8, net=net)
-    geometry, hub_net = scene.structure.geometry(), FreeHub(scene.net, 5)
+    geometry, hub_net = scene.structure.geometry(), FreeHub(layout_of(scene).pair_laws[0])
     corners = geometry.fold(0.9).corners[0]
-    hub = hub_net.hub(corners)
+    hub = hub_net.place(corners)
     arms = corners - hub
     lengths = np.linalg.norm(arms, axis=1)
     pulls = np.broadcast_to(stiffness, 5) * np.maximum(lengths - 0.2, 0.0)
@@ -62,6 +63,6 @@ def test_hub_of_an_odd_net_lies_where_its_strings_balance(stiffness):
         energy.append(hub_net.force(corners, np.zeros((5, 3))).energy)
     mechanism = Mechanism(scene)
     # Central differences: second order of the step.
-    assert mechanism.net(mechanism.at(0.9)).force == pytest.approx(
+    assert mechanism.pairs(mechanism.at(0.9)).force == pytest.approx(
         -(energy[1] - energy[0]) / (2.0 * step), rel=1e-8
     )
