@@ -200,8 +200,9 @@ def _with_remark(outcome: Outcome, scene: Scene) -> Outcome:
         pulleys = scene.pulleys_of(cable)
         slip = cable.slip_speed_over(pulleys)
         speed = friction.usual_winding(times[before], values["wound_length"][plane, before])
-        right_angle = np.full(pulleys, 0.5 * np.pi)
-        decay = -cable.friction.log_decay(right_angle, cable.pulley_radius).min(initial=0.0)
+        right_angle, tension = np.full(pulleys, 0.5 * np.pi), float(values["peak_tension"])
+        seen = friction.Pulleys(right_angle, np.zeros(pulleys), np.full(pulleys, tension))
+        decay = -cable.friction.decay(seen, cable.pulley_radius).min(initial=0.0)
         excess = friction.excess(slip, speed, pulleys, float(decay))
         if speed > 0.0 and excess > friction.TOLERATED:
             most = friction.slip_speed(speed, pulleys)

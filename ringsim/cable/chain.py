@@ -1,13 +1,14 @@
 """The tension chain of all cables: tensions, their state from step to step, their tangent."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from ringsim.cable import ropes as slack
+from ringsim.cable.friction import LEAST_TENSION, Pulleys
 from ringsim.cable.records import Cable
 from ringsim.cable.ropes import Array, Flags, Ropes
 from ringsim.cable.winding import WinchReading
@@ -31,8 +32,8 @@ class ChainState:
     """Angle between the two pulls on each pulley (rad), shape (pulleys,)."""
     log_decays: Array
     """Logarithm of the full decay at each pulley, shape (pulleys,)."""
-    friction_slopes: Callable[[], Array]
-    """Computes the derivative of ``log_decays`` after the angles; forces do not need it."""
+    friction: "Friction"
+    """The laws of ``log_decays``, and their derivatives, which forces do not need."""
     speeds: Array
     """Rope over each pulley (m/s, towards the winch positive), shape (pulleys,)."""
     exponents: Array
@@ -65,6 +66,25 @@ class ChainState:
     def exponent_slopes(self) -> Array:
         """Derivative of the exponents after the speeds, s/m, shape (pulleys,)."""
         return np.asarray((1.0 - self.exponents**2) / self.slip_speeds)
+
+    @property
+    def pulley_tensions(self) -> Array:
+        """Mean of both sides of each pulley, N, shape (pulleys,), as friction laws see it."""
+        return pulley_tensions(self.ropes, self.tensions)
+
+    @cached_property
+    def pulleys(self) -> Pulleys:
+        """What friction laws see."""
+        return Pulleys(self.angles, np.abs(self.speeds), self.pulley_tensions)
+
+    def law_slopes(self, slopes: Array) -> Array:
+        """Derivatives of the exponents times the decays after the speeds over the decays, s/m: the
+        ``slopes`` of the exponents with those of laws that depend on speed.
+        """
+        if not self.friction.moves:
+            return slopes
+        own = np.abs(self.exponents) * self.friction.by_speed(self.pulleys)
+        return np.asarray(slopes + own / np.minimum(self.log_decays, -1e-300))
 
     @property
     def is_slack(self) -> Flags:
@@ -157,13 +177,18 @@ class ChainState:
         inner = ropes.inner(rope)
         part = self.lengths[ropes.starts[rope] : ropes.ends[rope]] / self.paths[rope]
         slip, decays = self.slip_speeds[inner], self.log_decays[inner]
+        moves, seen, friction = self.friction.moves, self.pulleys, self.friction
         share = (1.0 - np.cumsum(part)[:-1] - float(end)) / slip
         slid = self.speeds[inner] / slip - present * share
         alive, logs = float(ropes.alive[rope]), np.zeros(len(part))
 
         def ratio(speed: float) -> float:
             # A root finder asks some ten thousand times a run: few calls of numpy, in place.
-            np.cumsum(decays * np.tanh(slid + speed * share), out=logs[1:])
+            turning, own = slid + speed * share, decays
+            if moves:
+                seen.speed[inner] = np.abs(turning) * slip
+                own = friction.decays(seen)[inner]
+            np.cumsum(own * np.tanh(turning), out=logs[1:])
             weights = np.exp(logs - np.maximum.reduce(logs))
             return alive * float(weights[-1 if end else 0]) / float(weights @ part)
 
@@ -196,6 +221,55 @@ def work_between(before: ChainState, after: ChainState) -> tuple[float, float]:
     return driven, float(np.sum(friction) + np.sum(viscous))
 
 
+# What friction laws of all cables say, and the tensions that those of tension depend on.
+
+
+class Friction:
+    """The laws of the cables on their pulleys, by ``slices`` of all pulleys."""
+
+    def __init__(self, cables: Sequence[Cable], slices: Sequence[slice]) -> None:
+        self._own = [(c.friction, c.pulley_radius, n) for c, n in zip(cables, slices, strict=True)]
+        self.moves = any(law.moves for law, *_ in self._own)
+        self.loads = any(law.loads for law, *_ in self._own)
+
+    def decays(self, pulleys: Pulleys) -> Array:
+        """ln(eta) of all pulleys, shape (pulleys,)."""
+        return self._each("decay", pulleys)
+
+    def by_angle(self, pulleys: Pulleys) -> Array:
+        """Derivatives after the angles, 1/rad."""
+        return self._each("by_angle", pulleys)
+
+    def by_speed(self, pulleys: Pulleys) -> Array:
+        """Derivatives after the speeds, s/m."""
+        return self._each("by_speed", pulleys)
+
+    def _each(self, name: str, pulleys: Pulleys) -> Array:
+        return np.concatenate(
+            [
+                getattr(law, name)(Pulleys(*(each[n] for each in pulleys)), radius)
+                for law, radius, n in self._own
+            ]
+        )
+
+
+MOST_SOLVED = 60
+"""Most repetitions for tensions on which friction depends."""
+SOLVED = 1e-13
+"""Change of an exponent's logarithm at which they are found: round-off leaves 1e-15."""
+UNSOLVED = (
+    "no tensions go with the friction of the pulleys, which depends on them too strongly: weaken "
+    "its dependence on tension, or raise the tension of the ropes"
+)
+"""Why a chain has no answer."""
+
+
+def pulley_tensions(ropes: Ropes, tensions: Array) -> Array:
+    """Mean of both sides of each pulley, N, shape (pulleys,); see ``Pulleys``."""
+    behind = ropes.behind
+    return np.maximum(0.5 * (tensions[behind - 1] + tensions[behind]), LEAST_TENSION)
+
+
 # The tension chain of all cables, from positions and velocities of their pulleys.
 #
 # Spans i = 0 .. n-1 run from the winch to the far end, pulley j = 1 .. n-1 stands between spans
@@ -216,6 +290,11 @@ def work_between(before: ChainState, after: ChainState) -> tuple[float, float]:
 # lengths and shifted indices are misprints); for c = 1 it is exactly EA (S - M) / M.  Sums are
 # taken with c relative to its largest value, so that long chains with high friction neither
 # overflow nor divide by zero.
+#
+# A law of friction may depend on the speed s_j, known before, and on the mean of T_j-1 and T_j.
+# The latter is solved for by repetition from q itself: each time the laws see the tensions found
+# last.  It converges as long as the sum of |dln eta_j / dln T| is below 1 or so; elsewhere a state
+# has no answer, as one whose winch has wound up all its rope.
 #
 # Speed of the rope over the pulleys.  Span i holds the natural length m_i.  Rope enters it over
 # pulley i+1 and leaves it over pulley i, so dm_i/dt = s_i+1 - s_i with s_0 = winding at the winch
@@ -281,6 +360,7 @@ class Chain:
             [[c.axial_stiffness, c.damping_time, c.slack_width] for c in cables]
         ).T
         """EA (N), Kelvin-Voigt time (s) and slack width (N) of each cable, shape (3, cables)."""
+        self.friction = Friction(cables, self.pulleys)
 
     def start(self, points: Array) -> Ropes:
         """One rope per cable, as long as its path at the start plus its initial slack.
@@ -325,7 +405,6 @@ class Chain:
             for sides in (before + behind, behind - before)
         )
         angles = 2.0 * np.arctan2(sine, cosine)
-        log_decays = self.log_decays(angles)
 
         rope = ropes.of_pulley
         last, inner = ropes.ends[rope] - 1, ropes.behind - 1
@@ -338,18 +417,31 @@ class Chain:
         speeds = (inflow[rope] + winding[rope] * beyond - share_rate) * ropes.slips
         exponents = np.tanh(speeds / self.slip_speed)
 
-        steps = np.zeros(ropes.spans)
-        steps[ropes.behind] = exponents * log_decays * ropes.slips
-        logs = np.cumsum(steps)
-        # Relative to the largest decay of the rope: bad pulleys neither overflow nor vanish.
-        weights = np.exp(logs - np.maximum.reduceat(logs, ropes.starts)[ropes.of_span])
-        shares = weights / (ropes.along(weights * lengths) / paths)[ropes.of_span]
-
         material = stiffness, damping_time, slack_width = self.material[:, ropes.cable]
         strains = paths / natural - 1.0
         strain_rates = (path_rates + paths / natural * winding) / natural
         forces = stiffness * (strains + damping_time * strain_rates)
         tension = ropes.alive * slack.tension(forces, slack_width)
+
+        def shared(log_decays: Array) -> Array:
+            """Tension of each span over its rope's mean."""
+            steps = np.zeros(ropes.spans)
+            steps[ropes.behind] = exponents * log_decays * ropes.slips
+            logs = np.cumsum(steps)
+            # Relative to the largest decay of the rope: bad pulleys neither overflow nor vanish.
+            weights = np.exp(logs - np.maximum.reduceat(logs, ropes.starts)[ropes.of_span])
+            return np.asarray(weights / (ropes.along(weights * lengths) / paths)[ropes.of_span])
+
+        even, log_decays = tension[ropes.of_span], np.zeros(len(angles))
+        shares = np.ones(ropes.spans)
+        for _ in range(MOST_SOLVED):
+            seen = Pulleys(angles, np.abs(speeds), pulley_tensions(ropes, shares * even))
+            previous, log_decays = log_decays, self.friction.decays(seen)
+            shares = shared(log_decays)
+            if not self.friction.loads or np.abs(log_decays - previous).max(initial=0.0) < SOLVED:
+                break
+        else:
+            raise ValueError(UNSOLVED)
         return ChainState(
             ropes=ropes,
             material=material,
@@ -358,12 +450,12 @@ class Chain:
             directions=directions,
             angles=angles,
             log_decays=log_decays,
-            friction_slopes=partial(self.log_slopes, angles),
+            friction=self.friction,
             speeds=speeds,
             exponents=exponents,
             slip_speeds=self.slip_speed,
             shares=shares,
-            tensions=shares * tension[ropes.of_span],
+            tensions=shares * even,
             paths=paths,
             path_rates=path_rates,
             natural=natural,
@@ -375,16 +467,6 @@ class Chain:
             wound=wound,
             wound_rate=wound_rate,
         )
-
-    def log_decays(self, angles: Array) -> Array:
-        """Logarithms of the full decay at angles (rad) of all pulleys, shape (pulleys,)."""
-        own = zip(self.cables, self.pulleys, strict=True)
-        return np.concatenate([c.friction.log_decay(angles[n], c.pulley_radius) for c, n in own])
-
-    def log_slopes(self, angles: Array) -> Array:
-        """Their derivatives after the angles, 1/rad."""
-        own = zip(self.cables, self.pulleys, strict=True)
-        return np.concatenate([c.friction.log_slope(angles[n], c.pulley_radius) for c, n in own])
 
 
 # Derivatives of the cable's forces after positions and velocities of its points.
@@ -404,6 +486,10 @@ class Chain:
 #
 # L_i, dL_i/dt, a_j and s_j depend on neighbouring points alone, so everything is written on the
 # differences of points: no product of full matrices is formed.
+#
+# ln eta_j / ds_j of a law of speed comes beside (1 - p_j^2) / s_slip.  That laws of tension change
+# with what is sought is left out: Newton's method takes up to twice the iterations where a rope is
+# nearly slack, so that such a law changes fast (tests/cable_engine/own_laws/stribeck.py).
 #
 # Where the rope runs straight over a pulley the angle has a kink (the wrap angle cannot be
 # negative); its derivative is taken as zero there, the mean of both sides.
@@ -487,7 +573,7 @@ def decay_factors(
 
     # Each pulley's p ln(eta) after the differences, shape (pulleys, spans, 3).
     exponent = state.exponents[inner]
-    sensitivity = state.log_decays[inner] * slopes[inner]
+    sensitivity = state.log_decays[inner] * state.law_slopes(slopes)[inner]
     steadily = float(state.wound_rates[rope]) + ratio * path_rate
     by_length = (sensitivity * (steadily / path))[:, None] * beyond_less_part
     by_length += (sensitivity * (ratio / path) * (part_rate - part * path_rate))[:, None]
@@ -495,7 +581,7 @@ def decay_factors(
     by_place = by_length[:, :, None] * unit
     by_place += by_rate[:, :, None] * tangent.swing
     before, behind = _angle_gradients(unit, length)
-    turned = (exponent * state.friction_slopes()[inner])[:, None]
+    turned = (exponent * state.friction.by_angle(state.pulleys)[inner])[:, None]
     pulley = np.arange(count - 1)
     by_place[pulley, pulley] += turned * before
     by_place[pulley, pulley + 1] += turned * behind

@@ -1,7 +1,7 @@
 """Pulley friction: how much of a rope's tension each pulley leaves to the next span."""
 
 import math
-from typing import Literal, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -69,14 +69,40 @@ def usual_winding(times: Array, wound: Array) -> float:
 # The family of friction laws: the loss of tension over a pulley.
 
 
+class Pulleys(NamedTuple):
+    """What friction laws see of pulleys, shape (pulleys,) each.
+
+    ``angle`` between the two pulls (rad: pi where the rope runs straight through, 0 where it turns
+    back on itself); ``speed`` of the rope over it, at least 0 m/s; ``tension``, the mean of both
+    sides, at least ``LEAST_TENSION``, N.
+    """
+
+    angle: Any
+    speed: Any
+    tension: Any
+
+
+LEAST_TENSION = 1e-6
+"""Newton; a law that divides by the tension of a rope that hangs slack has no answer."""
+_NUDGE = 1e-6
+"""Change of angle (rad), or share of the speed, by which slopes are measured of laws that do not
+tell them: central differences are off by its square."""
+_SLOWEST = 1e-9
+"""Change of speed at least, m/s."""
+
+
 class PulleyFriction(Model):
     """Ratio eta of the tension behind a pulley to the tension before it, seen from the winch.
 
-    It holds while rope runs to the winch and depends on the angle a between the two pulls
-    alone: a = pi where the rope runs straight through, a = 0 where it turns back on itself.  A
-    kind defines ln(eta), at most 0, and its derivative; the logarithm keeps long products of
-    weak pulleys exact.
+    It holds while rope runs to the winch.  A kind defines ln(eta), at most 0: by ``log_decay`` and
+    its derivative ``log_slope`` if it depends on the angle alone, else by ``decay``, and says so
+    with ``moves`` and ``loads``.  The logarithm keeps long products of weak pulleys exact.
     """
+
+    moves: ClassVar[bool] = False
+    """Whether it depends on the speed of the rope."""
+    loads: ClassVar[bool] = False
+    """Whether it depends on its tension: then the tensions of a rope are solved for."""
 
     @property
     def coefficients(self) -> Array:
@@ -94,12 +120,40 @@ class PulleyFriction(Model):
         own = self.coefficients * factor
         return self.model_copy(update={"coefficient": tuple(own) if own.ndim else float(own)})
 
-    def bound_decay(self, angle: Array, radius: float) -> Array:
+    def bound_decay(self, pulleys: Pulleys, radius: float) -> Array:
         """ln(eta) of a law that was factored: minus infinity where it has no solution any more."""
         if self.refusal(radius) is not None:
             with np.errstate(all="ignore"):
-                return np.nan_to_num(self.log_decay(angle, radius), nan=-np.inf, neginf=-np.inf)
-        return self.log_decay(angle, radius)
+                found = np.asarray(self.decay(pulleys, radius))
+                return np.asarray(np.nan_to_num(found, nan=-np.inf, neginf=-np.inf))
+        return np.asarray(self.decay(pulleys, radius))
+
+    def decay(self, pulleys: Pulleys, radius: float) -> Any:
+        """ln(eta) of pulleys of ``radius`` (m)."""
+        return self.log_decay(pulleys.angle, radius)
+
+    def by_angle(self, pulleys: Pulleys, radius: float) -> Any:
+        """Derivative of ``decay`` after the angle, 1/rad."""
+        if not (self.moves or self.loads):
+            return self.log_slope(pulleys.angle, radius)
+        ahead, behind = (
+            self.decay(pulleys._replace(angle=pulleys.angle + by), radius)
+            for by in (_NUDGE, -_NUDGE)
+        )
+        return (ahead - behind) / (2.0 * _NUDGE)
+
+    def by_speed(self, pulleys: Pulleys, radius: float) -> Any:
+        """Derivative of ``decay`` after the speed, s/m."""
+        if not self.moves:
+            return 0.0 * pulleys.speed
+        by = np.maximum(_NUDGE * pulleys.speed, _SLOWEST)
+        # One-sided next to rest, where there is no smaller speed.
+        slower = np.maximum(pulleys.speed - by, 0.0)
+        ahead, behind = (
+            self.decay(pulleys._replace(speed=speed), radius)
+            for speed in (pulleys.speed + by, slower)
+        )
+        return (ahead - behind) / (pulleys.speed + by - slower)
 
     def log_decay(self, angle: Array, radius: float) -> Array:
         """ln(eta) for the angles (rad, shape (pulleys,)) on pulleys of ``radius`` (m)."""

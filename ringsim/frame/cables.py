@@ -3,11 +3,12 @@
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ringsim.cable.chain import Chain, ChainState
+from ringsim.cable.friction import PulleyFriction, Pulleys
 from ringsim.cable.records import BlockSheave, Cables, Sheave
 from ringsim.cable.ropes import SHORTEST, Ropes
 from ringsim.cable.winches import Winches
@@ -16,7 +17,12 @@ from ringsim.frame.kernels import Pose, push
 from ringsim.frame.laws import Tape, play, taped
 from ringsim.frame.mesh import Indices, Mesh, Parts, Skeleton
 from ringsim.frame.ropes import (
+    BY_ANGLE,
+    BY_SPEED,
+    DECAY,
+    PASSING,
     Drums,
+    Laws,
     RopeTable,
     Spans,
     border,
@@ -25,6 +31,7 @@ from ringsim.frame.ropes import (
     measure,
     of_ropes,
     pull_tight,
+    show,
 )
 from ringsim.frame.vectors import (
     compiled,
@@ -241,37 +248,33 @@ def add_line_tangent(lines: Lines, arms: Arms, spans: Spans, fronts: Array) -> N
 @compiled
 def pull_cables(
     lines: Lines, mesh: Mesh, arms: Arms, table: RopeTable, behind: Indices, drums: Drums,
-    decays: Tape, places: Array, rates: Array, spans: Spans, g: Array,
+    laws: Laws, places: Array, rates: Array, spans: Spans, g: Array,
 ) -> float:  # fmt: skip
     """Tighten the spans at places and rates of the points, and add what resists their pull to the
     residual, shape (unknowns,); returns the least length of a span, m.
     """
-    least = pull_tight(table, behind, drums, decays, places, rates, spans)
+    least = pull_tight(table, behind, drums, laws, places, rates, spans)
     pull_spans(lines, mesh, arms, spans, g)
     return least
 
 
 @compiled
 def add_cables(
-    lines: Lines, mesh: Mesh, arms: Arms, table: RopeTable, drums: Drums, decays: Tape,
-    log_slopes: Tape, slopes: Array, spans: Spans, rates: Array, left: Array, rate_by_place: float,
-    factors: Array, fronts: Array, columns: Array, rows: Array, first: int,
+    lines: Lines, mesh: Mesh, arms: Arms, table: RopeTable, drums: Drums, laws: Laws, slopes: Array,
+    spans: Spans, rates: Array, left: Array, rate_by_place: float, factors: Array, fronts: Array,
+    columns: Array, rows: Array, first: int,
 ) -> None:  # fmt: skip
     """Add how spans turn to the fronts, and how tensions change to the border's columns and rows,
     from the ``first`` on.
 
-    ``decays`` and ``log_slopes`` are the laws of the pulleys' friction, played last for the spans,
-    and to be played; ``slopes`` those of its exponents after the ropes' speeds (s/m), ``rates`` of
-    the points (m/s), ``left`` the share of a change of path that stretches each rope,
-    ``rate_by_place`` the derivative of rates after places (1/s), ``factors`` zeros, shape
-    (2, k, points, 3).
+    ``laws`` are those of the pulleys' friction, played last for the spans; ``slopes`` those of its
+    exponents after the ropes' speeds (s/m), ``rates`` of the points (m/s), ``left`` the share of a
+    change of path that stretches each rope, ``rate_by_place`` the derivative of rates after places
+    (1/s), ``factors`` zeros, shape (2, k, points, 3).
     """
-    for j in range(len(spans.angle)):
-        log_slopes.rows[0, j] = spans.angle[j]
-    play(log_slopes)
     border(
-        table, drums, decays.rows[1], log_slopes.rows[1], slopes, spans, rates, left, rate_by_place,
-        factors,
+        table, drums, laws.decays.rows[DECAY], laws.slopes.rows[BY_ANGLE], slopes, spans, rates,
+        left, rate_by_place, factors,
     )  # fmt: skip
     add_line_tangent(lines, arms, spans, fronts)
     pull_lines(lines, mesh, arms, factors[0], columns, first)
@@ -316,17 +319,21 @@ class FrameCables:
         self._turned_at, self._turned = math.nan, _Turned(*np.zeros((2, len(own), 2)))
         self._drums = Drums(*np.zeros((3, 0)))
         self._turning = Turning()
-        self._decays, self._log_slopes = self._taped("log_decay"), self._taped("log_slope")
+        friction = self._chain.friction
+        self._laws = Laws(
+            self._taped(1, "decay"), self._taped(2, "by_angle", "by_speed"), friction.moves,
+            friction.loads,
+        )  # fmt: skip
         self._left, self._slopes = np.ones(0), np.ones(0)
         self._retable()
 
-    def _taped(self, name: str) -> Tape:
-        """A law of the pulleys' friction, over the angles of all cables."""
+    def _taped(self, results: int, *names: str) -> Tape:
+        """What the laws of the pulleys' friction say of all pulleys."""
         laws = []
         for cable, own in zip(self._chain.cables, self._chain.pulleys, strict=True):
-            law = partial(getattr(cable.friction, name), radius=cable.pulley_radius)
+            law = partial(_told, cable.friction, cable.pulley_radius, names)
             laws.append((law, (own.stop - own.start,), cable.friction))
-        return taped(laws, 1, 1)
+        return taped(laws, 3, results)
 
     def state(self, time: float, places: Array, rates: Array) -> ChainState:
         """The chain at places and rates of all points; ValueError if it has no answer."""
@@ -336,9 +343,7 @@ class FrameCables:
     def _tightened(self, places: Array, rates: Array) -> ChainState:
         """The chain with its winches as they have turned."""
         ropes, spans, turned = self.ropes, self._spans, self._turned
-        least = pull_tight(
-            self._table, ropes.behind, self._drums, self._decays, places, rates, spans
-        )
+        least = pull_tight(self._table, ropes.behind, self._drums, self._laws, places, rates, spans)
         self._require(least, places, rates)
         paths, path_rates, strains, strain_rates, forces, means = of_ropes(
             self._table, self._drums, spans
@@ -351,8 +356,8 @@ class FrameCables:
             rates=spans.rate.copy(),
             directions=spans.unit.copy(),
             angles=angles,
-            log_decays=self._decays.rows[1].copy(),
-            friction_slopes=partial(self._chain.log_slopes, angles),
+            log_decays=self._laws.decays.rows[DECAY].copy(),
+            friction=self._chain.friction,
             speeds=spans.speed.copy(),
             exponents=spans.exponent.copy(),
             slip_speeds=self._chain.slip_speed,
@@ -402,14 +407,14 @@ class FrameCables:
         self._turn(time, places, rates)
         least = pull_cables(
             self.lines, self._mesh, arms, self._table, self.ropes.behind, self._drums,
-            self._decays, places, rates, self._spans, g,
+            self._laws, places, rates, self._spans, g,
         )  # fmt: skip
         self._require(least, places, rates)
         self._turning.note(self.ropes, self._spans.speed)
 
     def _require(self, least: float, places: Array, rates: Array) -> None:
         """ValueError if a span is shorter than can be, or more rope is wound than there is."""
-        if not (least > SHORTEST and self._enough):
+        if not (least > SHORTEST and self._enough):  # NaN without an answer
             self._chain.state(self.ropes, places, rates, *self._turned)  # says what is wrong
 
     def _turn(self, time: float, places: Array, rates: Array) -> None:
@@ -444,6 +449,13 @@ class FrameCables:
         turning = self._turning
         found = turning.slopes(self.ropes, spans.speed, own, lambda s: np.tanh(s / slip))
         self._slopes = felt_slopes(found, own, slip)
+        show(self.ropes.behind, spans, self._laws.slopes)
+        play(self._laws.slopes)
+        if self._laws.moves:
+            by_speed = self._laws.slopes.rows[BY_SPEED]
+            decays = np.minimum(self._laws.decays.rows[DECAY], -1e-300)
+            more = np.abs(spans.exponent) * by_speed / decays
+            self._slopes = self._slopes + np.where(np.abs(more) * slip > PASSING, more, 0.0)
         return factors_needed(self._table, self._slopes)
 
     def add_tangent(
@@ -459,8 +471,8 @@ class FrameCables:
         border; ``rate_by_place`` is the derivative of the points' rates after places, 1/s.
         """
         add_cables(
-            self.lines, self._mesh, arms, self._table, self._drums, self._decays, self._log_slopes,
-            self._slopes, self._spans, rates, self._left, rate_by_place,
+            self.lines, self._mesh, arms, self._table, self._drums, self._laws, self._slopes,
+            self._spans, rates, self._left, rate_by_place,
             np.zeros((2, count, self.points, 3)), fronts, border.columns, border.rows,
             border.first,
         )  # fmt: skip
@@ -470,3 +482,9 @@ class FrameCables:
         self._table = RopeTable.of(self.ropes, chain.material, chain.slip_speed, self.lines.span)
         self._spans = Spans.empty(self.ropes)
         self._turned_at = math.nan
+
+
+def _told(
+    law: PulleyFriction, radius: float, names: Sequence[str], angle: Any, speed: Any, tension: Any
+) -> tuple[Any, ...]:
+    return tuple(getattr(law, name)(Pulleys(angle, speed, tension), radius) for name in names)

@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ringsim.cable.chain import MOST_SOLVED, SOLVED
+from ringsim.cable.friction import LEAST_TENSION
 from ringsim.cable.ropes import Ropes
 from ringsim.frame.laws import Tape, play
 from ringsim.frame.mesh import Indices
@@ -79,6 +81,21 @@ class Spans(NamedTuple):
                    np.zeros(pulleys), np.zeros(pulleys))  # fmt: skip
 
 
+class Laws(NamedTuple):
+    """What friction laws say of pulleys: ln(eta), and its derivatives after angle and speed; and
+    whether any depends on the speed of the rope, or on its tension.
+    """
+
+    decays: Tape
+    slopes: Tape
+    moves: bool
+    loads: bool
+
+
+DECAY, BY_ANGLE, BY_SPEED = 3, 3, 4
+"""Rows of the results of ``decays`` and of ``slopes``, behind what laws see."""
+
+
 @compiled
 def measure(table: RopeTable, behind: Indices, places: Array, rates: Array, spans: Spans) -> float:
     """Lengths, rates, directions and angles of places and rates of the points, (points, 3);
@@ -111,28 +128,38 @@ def path_of(spans: Spans, first: int, last: int) -> tuple[float, float]:
 
 
 @compiled
-def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> None:
-    """Tensions of all spans."""
+def slide(table: RopeTable, drums: Drums, spans: Spans) -> None:
+    """Speeds of the ropes over the pulleys, and exponents of their friction."""
     for rope in range(len(table.starts)):
         first, last = table.starts[rope], table.ends[rope]
         path, path_rate = path_of(spans, first, last)
         natural, winding = drums.natural[rope], drums.winding[rope]
-        beyond = path
-        rate_beyond = path_rate
-        log = most = 0.0
+        beyond, rate_beyond = path, path_rate
         for i in range(first, last):
             j = table.pulley[i]
             if i > first:
                 part = beyond / path
                 moved = (rate_beyond - part * path_rate) * natural / path
                 speed = drums.inflow[rope] + winding * part - moved
-                p = math.tanh(speed / table.slip_speed[j])
-                spans.speed[j], spans.exponent[j] = speed, p
-                log += p * log_decays[j]
-                most = max(most, log)
-            spans.share[i] = log
+                spans.speed[j], spans.exponent[j] = speed, math.tanh(speed / table.slip_speed[j])
             beyond -= spans.length[i]
             rate_beyond -= spans.rate[i]
+
+
+@compiled
+def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> None:
+    """Tensions of all spans, whose speeds are known."""
+    for rope in range(len(table.starts)):
+        first, last = table.starts[rope], table.ends[rope]
+        path, path_rate = path_of(spans, first, last)
+        natural, winding = drums.natural[rope], drums.winding[rope]
+        log = most = 0.0
+        for i in range(first, last):
+            if i > first:
+                j = table.pulley[i]
+                log += spans.exponent[j] * log_decays[j]
+                most = max(most, log)
+            spans.share[i] = log
         mean = 0.0
         for i in range(first, last):
             spans.share[i] = math.exp(spans.share[i] - most)
@@ -145,16 +172,42 @@ def tighten(table: RopeTable, drums: Drums, log_decays: Array, spans: Spans) -> 
 
 @compiled
 def pull_tight(
-    table: RopeTable, behind: Indices, drums: Drums, decays: Tape, places: Array, rates: Array,
+    table: RopeTable, behind: Indices, drums: Drums, laws: Laws, places: Array, rates: Array,
     spans: Spans,
 ) -> float:  # fmt: skip
-    """Spans, with their tensions, at places and rates of the points; returns the least length."""
-    least = measure(table, behind, places, rates, spans)
+    """Spans, with their tensions, at places and rates of the points; returns the least length, NaN
+    if no tensions go with the friction (``ringsim.cable.chain``).
+    """
+    least, rows = measure(table, behind, places, rates, spans), laws.decays.rows
+    slide(table, drums, spans)
+    show(behind, spans, laws.decays)
+    if not laws.loads:
+        play(laws.decays)
+        tighten(table, drums, rows[DECAY], spans)
+        return least
+    rows[DECAY] = 0.0
+    tighten(table, drums, rows[DECAY], spans)
+    before = np.zeros(len(behind))
+    for _ in range(MOST_SOLVED):
+        show(behind, spans, laws.decays)
+        play(laws.decays)
+        tighten(table, drums, rows[DECAY], spans)
+        change = 0.0
+        for j in range(len(behind)):
+            change = max(change, abs(rows[DECAY, j] - before[j]))
+            before[j] = rows[DECAY, j]
+        if change < SOLVED:
+            return least
+    return math.nan
+
+
+@compiled
+def show(behind: Indices, spans: Spans, tape: Tape) -> None:
+    """Let laws see the pulleys (``ringsim.cable.friction.Pulleys``)."""
     for j in range(len(behind)):
-        decays.rows[0, j] = spans.angle[j]
-    play(decays)
-    tighten(table, drums, decays.rows[1], spans)
-    return least
+        both = 0.5 * (spans.tension[behind[j] - 1] + spans.tension[behind[j]])
+        tape.rows[0, j], tape.rows[1, j] = spans.angle[j], abs(spans.speed[j])
+        tape.rows[2, j] = max(both, LEAST_TENSION)
 
 
 @compiled
@@ -213,7 +266,7 @@ def felt_slopes(slopes: Array, own: Array, slip_speed: Array) -> Array:
 @compiled
 def _turns(table: RopeTable, slopes: Array, span: int) -> bool:
     """Whether the friction of the pulley before a span changes with speed."""
-    return bool(table.pulley[span] >= 0 and slopes[table.pulley[span]] > 0.0)
+    return bool(table.pulley[span] >= 0 and slopes[table.pulley[span]] != 0.0)
 
 
 @compiled

@@ -6,7 +6,8 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from ringsim.cable.friction import PulleyFriction
+from ringsim.cable.chain import MOST_SOLVED, SOLVED, UNSOLVED
+from ringsim.cable.friction import LEAST_TENSION, PulleyFriction, Pulleys
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.winches import why_unlimited
@@ -205,26 +206,44 @@ class Drive:
         return min(rates, default=0.0)
 
     def pulls(
-        self, state: Condition, over: Sequence[Reeved], friction: float = 1.0, losses: float = 1.0
-    ) -> Array:
+        self, state: Condition, over: Sequence[Reeved], rate: float, friction: float = 1.0,
+        losses: float = 1.0,
+    ) -> Array:  # fmt: skip
         """What each cable drives, N m, shape (cables,), with so many times the friction of the
-        pulleys and the losses of gears and drums; ``over`` is how they are ``reeved``.
+        pulleys and the losses of gears and drums; ``over`` is how they are ``reeved``, ``rate``
+        that of the opening angle, rad/s.
         """
         if friction not in self._laws:  # the same few factors at every angle
             self._laws[friction] = [cable.friction.factored(friction) for cable in self.cables]
         found = np.zeros(len(self._paths))
         each = zip(self.cables, self._laws[friction], over, strict=True)
         for number, (cable, law, reeved) in enumerate(each):
-            steps = law.bound_decay(reeved.angles, cable.pulley_radius)
             tensions = np.zeros(len(reeved.shortening))
             for end, (winch, way) in enumerate(zip(cable.winches, _ways(cable), strict=True)):
                 if (reach := state.reach.get((number, end))) is None:
                     continue
                 pull = winch.winding.available_tension(at_speed=self._at_speed, losses=losses)
-                shares = np.exp(np.append(0.0, np.cumsum(steps[::way])))[::way]
+                shares = _decayed(law, cable.pulley_radius, reeved, rate, pull, way)
                 tensions = np.maximum(tensions, pull * shares * reach)
             found[number] = tensions @ reeved.shortening
         return found
+
+
+def _decayed(
+    law: PulleyFriction, radius: float, reeved: Reeved, rate: float, pull: float, way: int
+) -> Array:
+    """Tension of the spans over the ``pull`` (N) of a winch from which they run this ``way``."""
+    beyond = reeved.shortening[::way][::-1].cumsum()[::-1][1:][::way]
+    shares, last = np.ones(len(reeved.shortening)), np.zeros(0)
+    for _ in range(MOST_SOLVED):
+        both = 0.5 * pull * (shares[:-1] + shares[1:])
+        seen = Pulleys(reeved.angles, np.abs(rate * beyond), np.maximum(both, LEAST_TENSION))
+        steps = law.bound_decay(seen, radius)
+        shares = np.exp(np.append(0.0, np.cumsum(steps[::way])))[::way]
+        if not law.loads or (len(last) and np.abs(steps - last).max(initial=0.0) < SOLVED):
+            return np.asarray(shares)
+        last = steps
+    raise InputError(UNSOLVED)
 
 
 def _ways(cable: Cable) -> tuple[int, ...]:

@@ -106,9 +106,10 @@ class DriveMargin:
         """
         standard, now = self.standard, self.mechanism.at(0.5 * (math.pi - angle))
         over, state = self._drive.reeved(now), self.conditions.at(time)
-        opening = Opening(angle, self._drive.speed(over, state), 0.0, now, state.switches)
-        ideal, usual = (self._drive.pulls(state, over, factor) for factor in (0.0, 1.0))
-        factored = self._drive.pulls(state, over, standard.friction, losses=standard.friction)
+        rate, factor = self._drive.speed(over, state), standard.friction
+        opening = Opening(angle, rate, 0.0, now, state.switches)
+        ideal, usual = (self._drive.pulls(state, over, rate, times) for times in (0.0, 1.0))
+        factored = self._drive.pulls(state, over, rate, factor, losses=factor)
         loads = float(self._loads.at(now).clip(min=0.0).sum())  # what resists is a resistance
         driving = {CABLES: float(ideal.sum()), LOADS: loads}
         drive, required, accelerated = float(factored.sum()) + loads, 0.0, 0.0

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from stribeck import StribeckFriction
 
-from cable_cases import LAWS, decays, random_case, still
+from cable_cases import LAWS, RADIUS, decays, random_case, still
 from point_tangents import tangents
+
+OF_SPEED = StribeckFriction(coefficient=0.3 * RADIUS, kinetic=0.3, speed=1e-3)
 
 # Rope wound beyond the path: about 0.2 of the mean path taut; then within the smoothing; slack.
 STRETCHES = {"taut": 0.01, "almost taut": 2e-5, "almost slack": -2e-5, "slack": -1e-3}
@@ -36,7 +39,7 @@ def differences(function, values, step):
     return np.stack(columns, axis=-1)
 
 
-@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+@pytest.mark.parametrize("law", [*LAWS.values(), OF_SPEED], ids=[*LAWS, "stribeck"])
 @pytest.mark.parametrize("stretch", STRETCHES.values(), ids=STRETCHES)
 def test_tangents_are_the_derivatives_of_the_forces(law, stretch):
     # Slow enough that the exponents of friction lie between -1 and 1.

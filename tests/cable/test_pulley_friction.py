@@ -21,7 +21,8 @@ ANGLES = np.linspace(0.0, np.pi, 181)
 
 
 def test_the_laws_tested_here_are_all_laws_there_are():
-    assert set(LAWS) == set(kinds_of(PulleyFriction))
+    shipped = {k for k, law in kinds_of(PulleyFriction).items() if "ringsim" in law.__module__}
+    assert set(LAWS) == shipped
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
