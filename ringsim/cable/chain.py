@@ -8,7 +8,14 @@ from itertools import pairwise
 import numpy as np
 
 from ringsim.cable import ropes as slack
-from ringsim.cable.friction import LEAST_TENSION, Pulleys
+from ringsim.cable.friction import (
+    LEAST_TENSION,
+    MOST_SOLVED,
+    SOLVED,
+    UNSOLVED,
+    Friction,
+    Pulleys,
+)
 from ringsim.cable.records import Cable
 from ringsim.cable.ropes import Array, Flags, Ropes
 from ringsim.cable.winding import WinchReading
@@ -32,7 +39,7 @@ class ChainState:
     """Angle between the two pulls on each pulley (rad), shape (pulleys,)."""
     log_decays: Array
     """Logarithm of the full decay at each pulley, shape (pulleys,)."""
-    friction: "Friction"
+    friction: Friction
     """The laws of ``log_decays``, and their derivatives, which forces do not need."""
     speeds: Array
     """Rope over each pulley (m/s, towards the winch positive), shape (pulleys,)."""
@@ -221,49 +228,6 @@ def work_between(before: ChainState, after: ChainState) -> tuple[float, float]:
     return driven, float(np.sum(friction) + np.sum(viscous))
 
 
-# What friction laws of all cables say, and the tensions that those of tension depend on.
-
-
-class Friction:
-    """The laws of the cables on their pulleys, by ``slices`` of all pulleys."""
-
-    def __init__(self, cables: Sequence[Cable], slices: Sequence[slice]) -> None:
-        self._own = [(c.friction, c.pulley_radius, n) for c, n in zip(cables, slices, strict=True)]
-        self.moves = any(law.moves for law, *_ in self._own)
-        self.loads = any(law.loads for law, *_ in self._own)
-
-    def decays(self, pulleys: Pulleys) -> Array:
-        """ln(eta) of all pulleys, shape (pulleys,)."""
-        return self._each("decay", pulleys)
-
-    def by_angle(self, pulleys: Pulleys) -> Array:
-        """Derivatives after the angles, 1/rad."""
-        return self._each("by_angle", pulleys)
-
-    def by_speed(self, pulleys: Pulleys) -> Array:
-        """Derivatives after the speeds, s/m."""
-        return self._each("by_speed", pulleys)
-
-    def _each(self, name: str, pulleys: Pulleys) -> Array:
-        return np.concatenate(
-            [
-                getattr(law, name)(Pulleys(*(each[n] for each in pulleys)), radius)
-                for law, radius, n in self._own
-            ]
-        )
-
-
-MOST_SOLVED = 60
-"""Most repetitions for tensions on which friction depends."""
-SOLVED = 1e-13
-"""Change of an exponent's logarithm at which they are found: round-off leaves 1e-15."""
-UNSOLVED = (
-    "no tensions go with the friction of the pulleys, which depends on them too strongly: weaken "
-    "its dependence on tension, or raise the tension of the ropes"
-)
-"""Why a chain has no answer."""
-
-
 def pulley_tensions(ropes: Ropes, tensions: Array) -> Array:
     """Mean of both sides of each pulley, N, shape (pulleys,); see ``Pulleys``."""
     behind = ropes.behind
@@ -360,7 +324,9 @@ class Chain:
             [[c.axial_stiffness, c.damping_time, c.slack_width] for c in cables]
         ).T
         """EA (N), Kelvin-Voigt time (s) and slack width (N) of each cable, shape (3, cables)."""
-        self.friction = Friction(cables, self.pulleys)
+        self.friction = Friction(
+            [(c.friction, c.pulley_radius, n) for c, n in zip(cables, self.pulleys, strict=True)]
+        )
 
     def start(self, points: Array) -> Ropes:
         """One rope per cable, as long as its path at the start plus its initial slack.

@@ -1,6 +1,7 @@
 """Pulley friction: how much of a rope's tension each pulley leaves to the next span."""
 
 import math
+from collections.abc import Sequence
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
@@ -162,6 +163,49 @@ class PulleyFriction(Model):
     def log_slope(self, angle: Array, radius: float) -> Array:
         """Derivative of ln(eta) after the angle, in 1/rad; same shapes."""
         raise NotImplementedError
+
+
+# What friction laws of all cables say, and the tensions that those of tension depend on.
+
+
+class Friction:
+    """Laws with the radius (m) of their pulleys and which of all pulleys these are."""
+
+    def __init__(self, own: Sequence[tuple[PulleyFriction, float, slice]]) -> None:
+        self._own = tuple(own)
+        self.moves = any(law.moves for law, *_ in self._own)
+        self.loads = any(law.loads for law, *_ in self._own)
+
+    def decays(self, pulleys: Pulleys) -> Array:
+        """ln(eta) of all pulleys, shape (pulleys,)."""
+        return self._each("decay", pulleys)
+
+    def by_angle(self, pulleys: Pulleys) -> Array:
+        """Derivatives after the angles, 1/rad."""
+        return self._each("by_angle", pulleys)
+
+    def by_speed(self, pulleys: Pulleys) -> Array:
+        """Derivatives after the speeds, s/m."""
+        return self._each("by_speed", pulleys)
+
+    def _each(self, name: str, pulleys: Pulleys) -> Array:
+        return np.concatenate(
+            [
+                getattr(law, name)(Pulleys(*(each[n] for each in pulleys)), radius)
+                for law, radius, n in self._own
+            ]
+        )
+
+
+MOST_SOLVED = 60
+"""Most repetitions for tensions on which friction depends."""
+SOLVED = 1e-13
+"""Change of an exponent's logarithm at which they are found: round-off leaves 1e-15."""
+UNSOLVED = (
+    "no tensions go with the friction of the pulleys, which depends on them too strongly: weaken "
+    "its dependence on tension, or raise the tension of the ropes"
+)
+"""Why a chain has no answer."""
 
 
 # Friction in the pulley's bearing, in the closed form of paper 000.

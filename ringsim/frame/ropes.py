@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsim.cable.chain import MOST_SOLVED, SOLVED
-from ringsim.cable.friction import LEAST_TENSION
+from ringsim.cable.friction import LEAST_TENSION, MOST_SOLVED, SOLVED
 from ringsim.cable.ropes import Ropes
 from ringsim.frame.laws import Tape, play
 from ringsim.frame.mesh import Indices

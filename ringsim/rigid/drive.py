@@ -6,8 +6,14 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from ringsim.cable.chain import MOST_SOLVED, SOLVED, UNSOLVED
-from ringsim.cable.friction import LEAST_TENSION, PulleyFriction, Pulleys
+from ringsim.cable.friction import (
+    LEAST_TENSION,
+    MOST_SOLVED,
+    SOLVED,
+    UNSOLVED,
+    PulleyFriction,
+    Pulleys,
+)
 from ringsim.cable.records import Cable, Winch
 from ringsim.cable.ropes import Ropes
 from ringsim.cable.winches import why_unlimited
