@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 import pytest
+from loops import for_each
 from pydantic import TypeAdapter, ValidationError
 
 from cable_cases import LAWS, random_case, still
@@ -124,7 +125,7 @@ def test_a_rope_that_was_wedged_before_is_free_on_both_sides() -> None:
     assert wedged.clear(jammed).starts.tolist() == case.ropes.starts.tolist()
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("fault", "text"),
     [
         (JammedPulley(cable=3, pulley=1, time=0.0), r"there is no cable 3 \(there are 1 to 2\)"),

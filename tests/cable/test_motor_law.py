@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 from pydantic import ValidationError
 
 from cable_cases import still
@@ -155,7 +156,7 @@ def test_a_rope_that_is_pulled_off_turns_an_open_gear_and_breaks_its_head_on_a_l
     assert speed == 0.0
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("fields", "text"),
     [
         ({"speed": 600.0}, "speed = 600.0 rad/s must be below voltage .* no torque at its speed"),

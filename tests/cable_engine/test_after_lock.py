@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loops import for_each
 
 from driven import truss
 from ringsim.cable.winding import StallWinding
@@ -127,7 +128,7 @@ def test_the_stress_has_a_limit_too() -> None:
     assert "more than limits.rod_stress = 1000 Pa" in found.reason
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "words"),
     [
         ({"limits.rod_stress": 1e8}, "limits.rod_stress = 1e+08 Pa needs the stress of the rods"),

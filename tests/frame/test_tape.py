@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loops import for_each
 
 from ringsim.cable.friction import (
     BearingFriction,
@@ -129,7 +130,7 @@ def branching(x: Any) -> Any:
     return 2.0 * x if x > 0.0 else -5.0 * x
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("law", "cause"),
     [
         (lambda x: np.floor(x), "floor"),

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import exudyn as exu
 import numpy as np
 import pytest
+from loops import for_each
 
 from ringsim.cable.records import BarHalfBracket
 from ringsim.exudyn.build import build
@@ -181,7 +182,7 @@ def with_bare(parts: dict[str, Any], *, swapped: bool = False) -> Layout:
     return layout_of(scene.model_copy(update=update), 0.5)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("part", "wanted"),
     [
         ("boom", r'boom: this structure has no corners .* 2 of its planes.*\(boom = "none"\)'),

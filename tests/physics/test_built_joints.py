@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 import pytest
+from loops import for_each
 
 from ring_runs import ring
 from ringsim.exudyn.build import build
@@ -43,7 +44,7 @@ def test_a_hinge_turns_about_the_axis_of_its_body(kind: str) -> None:
     assert (OnRod, OnBody) in orders  # without these nothing would have to be turned round
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "text"),
     [
         (

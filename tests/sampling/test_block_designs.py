@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loops import for_each
 from pydantic import TypeAdapter
 from SALib.sample import sobol as salib_sobol
 
@@ -107,8 +108,8 @@ def test_stretches_of_places_are_groups(kind):
     assert [*whole] == ["force", "friction", "modulus"]
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(
+@for_each("kind", KINDS)
+@for_each(
     ("wrong", "words"),
     [
         ({"groups": {"a": ("frictoin",)}}, "did you mean friction"),

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from loops import for_each
 from pydantic import TypeAdapter
 
 from ringsim.refusal import InputError
@@ -126,7 +127,7 @@ def test_a_shared_value_is_one_axis_of_correlations_and_grids() -> None:
     assert drawn(inputs, design={"kind": "grid", "levels": {"friction": 4}}).samples == 4 * 3
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("inputs", "words"),
     [
         ({"friction": FRICTION, UPPER: FRICTION | {"shared": []}}, "upper.*is drawn twice"),

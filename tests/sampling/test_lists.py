@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loops import for_each
 from pydantic import TypeAdapter
 
 from ringsim.refusal import InputError
@@ -64,7 +65,7 @@ def test_lists_from_another_campaign_keep_their_arrays(tmp_path: Path) -> None:
         draw(ring, {}, (), Listed(file="design.nc"), seed=1, folder=tmp_path)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "words"),
     [
         (
