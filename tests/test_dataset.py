@@ -18,6 +18,8 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_table, scene_from_toml
 from ringsim.variables import Cause, Fidelity, Outcome, Status
 
+pytestmark = pytest.mark.quick
+
 TIMES = np.array([0.0, 0.1, 0.25])
 
 

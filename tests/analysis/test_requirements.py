@@ -9,6 +9,8 @@ from ringsim.analysis.verdicts import parse_requirements, read_requirements
 from ringsim.campaign.specification import load_campaign
 from ringsim.refusal import InputError
 
+pytestmark = pytest.mark.quick
+
 SHOWN = {"probability": 0.99, "confidence": 0.9}
 
 

@@ -15,6 +15,8 @@ from ringsim.analysis.verdicts import Verdict, to_json
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status
 
+pytestmark = pytest.mark.quick
+
 MOST_TEN = {"asynchrony_max": {"max": 10.0, "probability": 0.99, "confidence": 0.9}}
 
 

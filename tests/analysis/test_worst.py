@@ -18,6 +18,8 @@ from ringsim.analysis.verdicts import read_requirements
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 
+pytestmark = pytest.mark.quick
+
 BOUND = {"probability": 0.9, "confidence": 0.9}
 
 

@@ -13,6 +13,8 @@ from cable_cases import LAWS, random_case, still
 from ringsim.cable.faults import CableFault, CutCable, JammedPulley, OffSheave
 from ringsim.choice import OneOf
 
+pytestmark = pytest.mark.quick
+
 PATH = [[0, 0, 0], [1, 0, 0], [1.5, 0.6, 0], [2, 0, 0.4], [3, 0, 0], [3, 1, 0]]
 
 

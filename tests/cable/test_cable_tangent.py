@@ -8,6 +8,8 @@ import pytest
 from cable_cases import LAWS, decays, random_case, still
 from point_tangents import tangents
 
+pytestmark = pytest.mark.quick
+
 # Rope wound beyond the path: about 0.2 of the mean path taut; then within the smoothing; slack.
 STRETCHES = {"taut": 0.01, "almost taut": 2e-5, "almost slack": -2e-5, "slack": -1e-3}
 MATERIAL = {"axial_stiffness": 1e4, "slack_width": 0.5, "damping_time": 0.003}

@@ -14,6 +14,8 @@ from ringsim.cable.records import Winch
 from ringsim.cable.winches import Winches
 from ringsim.cable.winding import MotorWinding, StallWinding
 
+pytestmark = pytest.mark.quick
+
 FIELDS = {
     "no_load_speed": 600.0, "stall_torque": 0.002, "gear_ratio": 100.0, "efficiency": 0.6,
     "drum_radius": 0.02,

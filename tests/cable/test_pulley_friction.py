@@ -18,6 +18,8 @@ from ringsim.cable.friction import (
 )
 from ringsim.choice import kinds_of
 
+pytestmark = pytest.mark.quick
+
 ANGLES = np.linspace(0.0, np.pi, 181)
 
 

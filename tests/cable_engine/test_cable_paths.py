@@ -10,6 +10,8 @@ from ringsim.overrides import parse_assignment
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 
+pytestmark = pytest.mark.quick
+
 TRUSS = truss()
 
 

@@ -10,6 +10,8 @@ from driven import Bench, truss
 from ringsim.refusal import InputError
 from ringsim.simulation import run_frame
 
+pytestmark = pytest.mark.quick
+
 ROUND_OFF = 1e-12
 """Sums and exponentials of some ten spans in doubles, relative; points are 1 m from the origin."""
 

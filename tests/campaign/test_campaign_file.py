@@ -44,6 +44,7 @@ def test_paths_may_be_quoted_or_nested(tmp_path):
     assert list(campaign.specification.inputs) == ["rods.young_modulus", "loads.force"]
 
 
+@pytest.mark.quick
 def test_scene_file_is_looked_up_beside_the_campaign_file(tmp_path):
     scene = loaded(tmp_path).scene
     (tmp_path / "mine.toml").write_text(scene.to_toml())
@@ -57,6 +58,7 @@ def test_shipped_campaigns_can_be_drawn(file):
     assert campaign.draw().samples >= 1
 
 
+@pytest.mark.quick
 def test_example_in_the_guide_can_be_drawn(tmp_path):
     guide = ROOT / "docs" / "guide"
     page = (guide / "campaigns.md").read_text(encoding="utf-8")
@@ -68,6 +70,7 @@ def test_example_in_the_guide_can_be_drawn(tmp_path):
     assert len(campaign.specification.requirements) == 2
 
 
+@pytest.mark.quick
 @for_each(
     ("old", "new", "words"),
     [
@@ -195,6 +198,7 @@ def test_replay_gives_the_stored_result_and_saves_it(bench):
     assert "absent: there is no such folder" in bench.run("replay", "absent", 0, code=2)
 
 
+@pytest.mark.quick
 def test_long_runs_come_first(tmp_path):
     text = GOOD + 'rods.elements = { kind = "discrete", values = [1, 2, 4] }\n'
     campaign = loaded(tmp_path, text.replace("samples = 4", "samples = 30"))

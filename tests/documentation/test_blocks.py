@@ -28,6 +28,7 @@ SCRIPTS = [
 ]
 
 
+@pytest.mark.quick
 @for_each("call", CALLS)
 def test_commands_and_their_options_exist(call: list[str]) -> None:
     verb, *arguments = call
@@ -37,6 +38,7 @@ def test_commands_and_their_options_exist(call: list[str]) -> None:
     command.make_context(verb, arguments).close()
 
 
+@pytest.mark.quick
 @for_each("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_links_lead_to_files(page: Path) -> None:
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)

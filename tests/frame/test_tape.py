@@ -27,6 +27,8 @@ from ringsim.parts.joints import (
 from ringsim.parts.net import SpringNet
 from ringsim.refusal import InputError
 
+pytestmark = pytest.mark.quick
+
 SHAPE = (2, 5)
 STOP = SpringDamperStop(stiffness=50.0, damping=0.3, stowed_angle=10.0)
 TABLE = TableSpring(angles=(30.0, 90.0, 150.0), torques=(0.2, -0.1, 0.4))

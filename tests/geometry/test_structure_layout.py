@@ -18,6 +18,8 @@ from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene, builtin_scenes, load_scene
 from ringsim.structures.family import Structure
 
+pytestmark = pytest.mark.quick
+
 STEP = 1e-6
 CLOSE = 1e-9
 """Central differences of places of the order of 1 m: STEP^2 and round-off over STEP."""

@@ -4,10 +4,13 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
 from loops import for_each
 
 from ringsim.cli import VERBS, command_of
 from ringsim.outputs import VARIABLES
+
+pytestmark = pytest.mark.quick
 
 ROOT = Path(__file__).parents[2]
 SOURCES = sorted((ROOT / "ringsim").rglob("*.py"))

@@ -3,6 +3,8 @@
 import pytest
 from loops import for_each
 
+pytestmark = pytest.mark.quick
+
 
 def test_every_case_that_fails_is_named() -> None:
     seen = []

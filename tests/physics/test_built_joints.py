@@ -16,6 +16,8 @@ from ringsim.parts.joints import Joints, SpringDamperStop
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize("kind", ["geometrically-exact", "ancf"])
 def test_a_hinge_turns_about_the_axis_of_its_body(kind: str) -> None:

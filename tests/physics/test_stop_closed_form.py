@@ -141,7 +141,7 @@ def left_after_a_bounce(damping: float) -> float:
     return float(found.y[1, -1] / SPEED) ** 2
 
 
-@pytest.mark.parametrize("damping", [0.0, *DAMPINGS])
+@pytest.mark.parametrize("damping", [pytest.param(0.0, marks=pytest.mark.quick), *DAMPINGS])
 def test_a_bounce_leaves_the_energy_that_the_damper_does_not_take(damping: float) -> None:
     run = stopped(damping, latch=False, settling=0.032)
     locked = float(run["deployment_time"])

@@ -10,6 +10,8 @@ from matplotlib.figure import Figure
 
 from ringsim.plots import style
 
+pytestmark = pytest.mark.quick
+
 
 def quantity(values, units: str) -> xr.DataArray:
     attributes = {"units": units, "long_name": "some quantity"}

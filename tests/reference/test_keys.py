@@ -15,6 +15,8 @@ from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
 from ringsim.units import Model
 
+pytestmark = pytest.mark.quick
+
 EVERY = [
     pytest.param(root, model, key, id=f"{root}-{model.__name__}.{key.name}")
     for root in ROOTS for model in places(root) for key in keys_of(model)

@@ -16,6 +16,8 @@ from ringsim.cli import cli
 from ringsim.reference.schema import schema_of
 from ringsim.scene import builtin_scenes, load_scene
 
+pytestmark = pytest.mark.quick
+
 ROOT = Path(__file__).parents[2]
 CAMPAIGNS = sorted((ROOT / "campaigns").glob("*.toml"))
 SCENE = tomllib.loads(builtin_scenes()["ring18-cable"])

@@ -16,6 +16,8 @@ from ringsim.sampling.columns import Correlation
 from ringsim.sampling.designs.blocks import Morris, Saltelli
 from ringsim.sampling.table import AnyDistribution
 
+pytestmark = pytest.mark.quick
+
 UNIFORM = {"kind": "uniform", "low": 0.0, "high": 1.0}
 EACH = UNIFORM | {"each_section": True}
 PULLEYS = [f"friction[{k}]" for k in range(1, 9)]

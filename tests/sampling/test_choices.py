@@ -16,6 +16,8 @@ from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import read_design, write_design
 
+pytestmark = pytest.mark.quick
+
 TRUSS = load_scene("truss2")
 IDENTITY = {"identity": "x", "scene": "", "solver": ""}
 STUCK = {"kind": "stuck-vjoint", "section": 2, "time": 0.2}

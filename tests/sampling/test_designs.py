@@ -16,6 +16,8 @@ from ringsim.sampling.designs.family import Design
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import load_scene
 
+pytestmark = pytest.mark.quick
+
 DESIGN = TypeAdapter(AnyDesign)
 INPUTS = TypeAdapter(dict[str, AnyDistribution])
 

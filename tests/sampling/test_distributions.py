@@ -14,6 +14,8 @@ from ringsim.choice import kinds_of
 from ringsim.sampling.distributions import Distribution
 from ringsim.sampling.table import AnyDistribution
 
+pytestmark = pytest.mark.quick
+
 READ = TypeAdapter(AnyDistribution)
 
 EXAMPLES = {

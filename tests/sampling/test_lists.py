@@ -16,6 +16,8 @@ from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import load_scene
 from ringsim.storage.netcdf import read_design, write_design
 
+pytestmark = pytest.mark.quick
+
 TRUSS = load_scene("truss2")
 PATH = "cables.upper.friction.coefficient"
 

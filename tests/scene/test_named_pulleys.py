@@ -15,6 +15,8 @@ from ringsim.overrides import field_at
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene, scene_from_toml
 
+pytestmark = pytest.mark.quick
+
 TRUSS = load_scene("truss2")
 COEFFICIENT = "cables.upper.friction.coefficient"
 NAMES = ("section 1 first hinge", "section 1 V", "section 1 second hinge",

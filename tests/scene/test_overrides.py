@@ -9,6 +9,8 @@ from ringsim.overrides import parse_assignment
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
 
+pytestmark = pytest.mark.quick
+
 RING18 = load_scene("ring18")
 BARE = Scene(name="bare")
 

@@ -10,6 +10,8 @@ from loops import for_each
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 
+pytestmark = pytest.mark.quick
+
 SCENE = load_scene("planar-truss")
 BAD: list[tuple[dict[str, Any], tuple[str, ...]]] = [
     ({"structure.strut_head": 0.7}, ("strut_head = 0.7 m", "beam_length = 0.627 m")),

@@ -37,6 +37,7 @@ def test_there_are_more_than_a_hundred_bad_scenes() -> None:
     assert len(BAD_SCENES) > 100
 
 
+@pytest.mark.quick
 @for_each("key", BAD_SCENES)
 def test_bad_scene_gets_one_line_with_file_field_and_cure(key: str, tmp_path: Path) -> None:
     bad = BAD_SCENES[key]
@@ -88,6 +89,7 @@ def test_impossible_file_names_are_refused(name: str) -> None:
     the_line(check(name))
 
 
+@pytest.mark.quick
 @for_each(
     ("assignment", "named"),
     [
