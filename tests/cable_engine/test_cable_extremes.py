@@ -49,7 +49,7 @@ QUICK = [
     {"speed": 0.5},
 ]
 LATE = {"start": 2.0}
-LONG = [*((case, "full") for case in QUICK[:2]), (LATE, "full"), (LATE, "frame")]
+LONG = [*((case, "full") for case in QUICK[:2]), (LATE, "full")]
 
 
 @pytest.mark.parametrize(
