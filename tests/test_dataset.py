@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from loops import for_each
 from ring_rods import RODS
 
 from ringsim.build import sources
@@ -16,6 +17,8 @@ from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_table, scene_from_toml
 from ringsim.variables import Cause, Fidelity, Outcome, Status
+
+pytestmark = pytest.mark.quick
 
 TIMES = np.array([0.0, 0.1, 0.25])
 
@@ -108,7 +111,7 @@ def test_time_stays_a_number_of_seconds(tmp_path):
     np.testing.assert_array_equal(read.time.values, TIMES)
 
 
-@pytest.mark.parametrize("status", list(Status))
+@for_each("status", list(Status))
 def test_status_is_a_flag_with_a_reason(status, tmp_path):
     dataset = to_dataset(Outcome(status, "because", cause=Cause.NEWTON), scene_of())
     read = reopened(dataset, tmp_path / "run.nc")
@@ -184,7 +187,7 @@ def test_saving_again_forgets_the_encoding_of_an_older_file(tmp_path):
     np.testing.assert_array_equal(read.asynchrony.values, dataset.asynchrony.values)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "message"),
     [
         ({"oppening_angle": np.zeros(3)}, "oppening_angle"),

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 from click.testing import CliRunner, Result
+from loops import for_each
 
 from ringsim import simulation
 from ringsim.analysis.study import evidence_for, read_evidence
@@ -23,7 +24,7 @@ def ringsim(*words: str) -> Result:
     return CliRunner().invoke(cli, list(words))
 
 
-@pytest.mark.parametrize("name", builtin_scenes())
+@for_each("name", builtin_scenes())
 def test_every_builtin_scene_has_its_evidence(name: str) -> None:
     evidence = evidence_for(load_scene(name))
     of = {"ring18-ground": "ring18-cable", "ring18-motor": "ring18-cable", "ring18-stow": "ring18"}
@@ -64,7 +65,7 @@ def test_the_full_engine_runs_where_the_cheaper_one_cannot_or_may_not(
         assert dataset.attrs["fidelity"] == "full"
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("words", "told"),
     [
         (["--accuracy", "1e-7"], "the best setting measured with ring18 is good for"),

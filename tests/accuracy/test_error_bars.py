@@ -295,7 +295,9 @@ def test_cases_run_as_a_campaign_with_bars_and_steps_as_inputs(tmp_path, capfd) 
         for step, tolerance in ((0.2, 1e-3), (0.1, 3e-5))
     ]
     scene = ring(**SOON, **{"solver.end_time": 4.0})
-    file = run_cases(tmp_path, "steps", scene, cases, workers=1, title="two steps")
+    file = run_cases(
+        tmp_path, "steps", scene, cases, workers=1, title="two steps", fidelity="frame"
+    )
     with xr.open_dataset(file) as found:
         assert (found.status == 0).all()
         np.testing.assert_array_equal(found.solver_step, [0.2, 0.1])

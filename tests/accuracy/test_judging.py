@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import tomli_w
 import xarray as xr
+from loops import for_each
 
 from ringsim.analysis.accuracy import NEEDED, Truth, in_words, judge, tables
 from ringsim.analysis.ladder import PATHS, Rung, by_frames, ladder, references
@@ -207,7 +208,7 @@ def test_evidence_survives_its_file_and_picks_the_cheapest(study: xr.Dataset, tm
         evidence.require_like(load_scene("ring18-cable"))
 
 
-@pytest.mark.parametrize("name", builtin_scenes())
+@for_each("name", builtin_scenes())
 def test_every_rung_of_every_scene_is_a_scene(name: str) -> None:
     scene = load_scene(name)
     rungs = ladder(scene)

@@ -9,6 +9,7 @@ the integrator, the elements or the step control change, make the reports again
 from __future__ import annotations
 
 import pytest
+from loops import for_each
 
 from ringsim.analysis.study import evidence_for
 from ringsim.parts.solver import NO_DEVIATIONS
@@ -54,8 +55,8 @@ SCALARS = {
 }
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("name", ["ring18", "ring18-cable", "truss2"])
+@for_each("engine", ENGINES)
+@for_each("name", ["ring18", "ring18-cable", "truss2"])
 def test_every_setting_is_on_a_frontier(name: str, engine: str) -> None:
     """Each beats every cheaper one of its engine in some output, and covers all outputs."""
     evidence = evidence_for(load_scene(name))

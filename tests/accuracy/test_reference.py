@@ -8,6 +8,8 @@ import xarray as xr
 
 from ringsim.analysis.engines import limit, order, reference
 
+pytestmark = pytest.mark.quick
+
 
 def levels(*values: object) -> xr.DataArray:
     array = np.array(values, dtype=float)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from loops import for_each
 
 from ringsim.analysis.accuracy import NEEDED, tables
 from ringsim.analysis.engines import limit
@@ -155,7 +156,7 @@ def test_two_levels_are_not_extrapolated():
     assert limit(xr.DataArray([1.0, 0.75], dims="rung")) == (0.75, 0.25)
 
 
-@pytest.mark.parametrize("name", builtin_scenes())
+@for_each("name", builtin_scenes())
 def test_nothing_is_left_out_of_a_builtin_scene(name):
     assert left_out(load_scene(name)) == []
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
+
 from ringsim.tables import markdown_table
+
+pytestmark = pytest.mark.quick
 
 
 def test_cells_stand_as_they_are_given() -> None:

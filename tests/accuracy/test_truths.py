@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
+
 from ringsim.campaign.accuracy import _quadrature
 from ringsim.scene import load_scene
+
+pytestmark = pytest.mark.quick
 
 
 def test_the_quadrature_is_no_truth_of_a_damped_net() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from loops import for_each
 from preloaded import ringsim
 
 from made import campaign
@@ -86,7 +87,7 @@ def test_a_requirement_of_the_command_line_replaces_the_file_s(study):
     assert " met " in line
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("make", "words"),
     [
         (lambda folder: None, "no such file or folder"),

@@ -11,6 +11,8 @@ from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
 from ringsim.sampling.designs.independent import RandomDesign, Sobol
 
+pytestmark = pytest.mark.quick
+
 
 def linear(x):
     """Rises with x1 and falls with x2, of which x3 says nothing."""

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import xarray as xr
 from made_campaign import made_campaign
 
 from ringsim.analysis.brief import latch_lines, peak_lines
 from ringsim.variables import Fate
+
+pytestmark = pytest.mark.quick
 
 
 def campaign(outcomes: list[Fate], latched: list[int]) -> xr.Dataset:

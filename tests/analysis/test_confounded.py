@@ -22,7 +22,7 @@ def every(count):
     return ~np.eye(count, dtype=bool)
 
 
-@pytest.mark.parametrize("samples", [30, 200])
+@pytest.mark.parametrize("samples", [30, pytest.param(200, marks=pytest.mark.slow)])
 def test_independent_inputs_make_pairs_in_one_campaign_of_twenty_at_most(samples):
     random = np.random.default_rng(4)
     found = [bool(pairs(random.random((samples, 12)), every(12))) for _ in range(300)]

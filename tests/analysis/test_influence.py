@@ -74,7 +74,7 @@ def test_intervals_of_areas_cover_normal_groups():
     assert 0.92 <= covered(ends, true) <= 0.98
 
 
-@pytest.mark.parametrize("kind", ["sobol", "latin-hypercube"])
+@pytest.mark.parametrize("kind", ["sobol", pytest.param("latin-hypercube", marks=pytest.mark.slow)])
 def test_intervals_from_replicates_cover(kind):
     """Truth from 400,000 independent samples, whose own error is a hundredth of the intervals."""
 

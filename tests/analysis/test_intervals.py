@@ -86,7 +86,7 @@ def test_many_independent_samples_are_covered_by_the_normal_limit(truth):
         assert 0.92 <= share_covered(intervals.of_independent(values, each), truth[each]) <= 0.98
 
 
-@pytest.mark.parametrize("kind", ["sobol", "latin-hypercube"])
+@pytest.mark.parametrize("kind", [pytest.param("sobol", marks=pytest.mark.slow), "latin-hypercube"])
 def test_replicates_of_designs_are_covered(kind, truth):
     samples, replicates = 256, 8
     all_points = [points(kind, samples, replicates, seed) for seed in range(CAMPAIGNS)]

@@ -37,9 +37,12 @@ def ever(probability, wanted, side):
     return said
 
 
+LONG = [(0.9, 0.95), (0.7, 0.8)]
+
+
 @pytest.mark.parametrize(
     ("probability", "confidence"),
-    [(0.99, 0.9), (0.9, 0.95), pytest.param(0.7, 0.8, marks=pytest.mark.slow)],
+    [(0.99, 0.9), *(pytest.param(*each, marks=pytest.mark.slow) for each in LONG)],
 )
 def test_all_looks_together_err_no_more_than_one_may(probability, confidence):
     wanted = Requirement(max=1.0, probability=probability, confidence=confidence)

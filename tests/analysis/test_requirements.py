@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import pytest
+from loops import for_each
 
 from ringsim.analysis.verdicts import parse_requirements, read_requirements
 from ringsim.campaign.specification import load_campaign
 from ringsim.refusal import InputError
+
+pytestmark = pytest.mark.quick
 
 SHOWN = {"probability": 0.99, "confidence": 0.9}
 
@@ -20,7 +23,7 @@ def test_both_ways_of_writing_read_alike():
     assert parse_requirements(texts) == read_requirements(table, "file")
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("table", "words"),
     [
         ({"asynchrony_mx": {"max": 1.0, **SHOWN}}, r"did you mean asynchrony_max\?"),
@@ -53,7 +56,7 @@ def test_wrong_requirements_are_told_with_the_cure(table, words):
         read_requirements(table, "study.toml")
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("texts", "words"),
     [
         (["asynchrony_max"], "must read NAME: KEY VALUE"),

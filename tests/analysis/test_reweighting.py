@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from loops import for_each
 from scipy.stats import norm, truncnorm
 
 from made import UNIT, campaign, drawn_campaign, points
@@ -258,7 +259,7 @@ def test_words_and_lists_of_places_have_weights():
     assert pairs["friction"].places == 2
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("reweighted", "words"),
     [
         ({"x3": NARROW}, "is no drawn input of this campaign"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from loops import for_each
 
 from made import campaign, points, response
 from ringsim.analysis.intervals import samples_needed, share_bounds
@@ -13,6 +14,8 @@ from ringsim.analysis.study_text import told
 from ringsim.analysis.verdicts import Verdict, to_json
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status
+
+pytestmark = pytest.mark.quick
 
 MOST_TEN = {"asynchrony_max": {"max": 10.0, "probability": 0.99, "confidence": 0.9}}
 
@@ -239,7 +242,7 @@ def test_a_campaign_of_which_every_run_failed_is_told():
     assert "12 of 12" in text_of(found)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("made", "wanted", "words"),
     [
         (xr.Dataset({"status": 0}), None, "only a campaign can be analysed"),

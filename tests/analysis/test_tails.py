@@ -12,6 +12,8 @@ from ringsim.plots.campaign.tornado import explained
 from ringsim.report.tables import rare_event
 from ringsim.sampling.designs.levels import SubsetSimulation
 
+pytestmark = pytest.mark.quick
+
 FACTORS = dict.fromkeys(("x1", "x2"))
 
 

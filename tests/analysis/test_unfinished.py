@@ -14,6 +14,8 @@ from ringsim.sampling.designs.blocks import Morris, Saltelli
 from ringsim.sampling.designs.independent import RandomDesign, Sobol
 from ringsim.variables import Fate
 
+pytestmark = pytest.mark.quick
+
 NOT_RUN = -1
 
 

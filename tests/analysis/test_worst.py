@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from loops import for_each
 from made_campaign import made_campaign, with_motors
 
 from made import campaign
@@ -16,6 +17,8 @@ from ringsim.analysis.study import analyse
 from ringsim.analysis.verdicts import read_requirements
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
+
+pytestmark = pytest.mark.quick
 
 BOUND = {"probability": 0.9, "confidence": 0.9}
 
@@ -89,7 +92,7 @@ SENSES = {
 }
 
 
-@pytest.mark.parametrize("name", SENSES)
+@for_each("name", SENSES)
 def test_a_limit_is_led_to_the_number_that_it_limits(name: str) -> None:
     """Never to the other end: it may keep to a limit that nearly all values break."""
     for key, wanted, other in zip(("max", "min"), SENSES[name], SENSES[name][::-1], strict=True):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loops import for_each
 
 from ringsim.layout.layout import layout_at_opening, layout_of
 from ringsim.parts.rods import LengthError
@@ -114,7 +115,7 @@ def test_both_engines_start_and_move_alike() -> None:
     assert np.abs(apart).max() < 1e-4
 
 
-@pytest.mark.parametrize(("name", "values", "words"), [
+@for_each(("name", "values", "words"), [
     ("ring18", {"structure.hinge_error": {"upper_left": 0.02}}, "upper_left"),
     ("ring18", {"structure.hinge_error": {"upper_left": [1e-5, 2e-5]}}, "18"),
     ("ring18", {"structure.hinge_error": {"upper_left": 1e-5}, "rods.kind": "ancf"},

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loops import for_each
 
 from ringsim.exudyn.integrate import solve as by_exudyn
 from ringsim.frame.integrate import solve as by_frames
@@ -304,7 +305,7 @@ def test_a_scene_without_errors_is_as_it_was() -> None:
         assert str(one[name].tolist()) == str(two[name].tolist()), name
 
 
-@pytest.mark.parametrize(("scene", "values", "words"), [
+@for_each(("scene", "values", "words"), [
     ("ring18", {"rods.length_error": {"bar_upper_left": 0.1}}, "bar_upper_left = 0.1"),
     ("ring18", {"rods.length_error": {"bar_upper_left": [1e-4, 0.0]}}, "has 2 values"),
     ("ring18", {"rods.length_error": {}, "rods.kind": "ancf"}, "rods.length_error needs rods.kind"),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loops import for_each
 
 from ringsim.refusal import InputError
 from ringsim.rigid.assembling import deployed
@@ -104,7 +105,7 @@ def test_a_warm_ring_is_a_larger_one() -> None:
     assert np.abs(found.deviations.ravel() - expected).max() < 2e-3 * expected.max()
 
 
-@pytest.mark.parametrize(("heat", "words"), [
+@for_each(("heat", "words"), [
     ({"bar": {"value": 500.0, "stiffness": {"temperatures": [1.0, 300.0], "factors": [1.0, 2.0]}}},
      r"temperature\.bar\.value = 500 K must lie within 1 \.\. 300 K.*bar\.stiffness\.temp"),
     ({"bar": {"stiffness": {"temperatures": [300.0, 100.0], "factors": [1.0, 2.0]}}},

@@ -10,6 +10,8 @@ from cable_cases import cable
 from ringsim.cable.records import AnyBracket, BarHalfBracket, BisectorBracket, Bracket
 from ringsim.choice import kinds_of
 
+pytestmark = pytest.mark.quick
+
 BAR, REACH = 0.2889, 0.105
 OPENING = np.radians([20.0, 47.0, 90.0, 133.0, 180.0])
 PHI = 0.5 * (np.pi - OPENING)

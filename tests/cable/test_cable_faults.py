@@ -6,11 +6,14 @@ from typing import Annotated
 
 import numpy as np
 import pytest
+from loops import for_each
 from pydantic import TypeAdapter, ValidationError
 
 from cable_cases import LAWS, random_case, still
 from ringsim.cable.faults import CableFault, CutCable, JammedPulley, OffSheave
 from ringsim.choice import OneOf
+
+pytestmark = pytest.mark.quick
 
 
 def held(state):
@@ -130,7 +133,7 @@ def test_a_rope_that_was_wedged_before_is_free_on_both_sides() -> None:
     assert wedged.whole(jammed).starts.tolist() == case.ropes.starts.tolist()
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("fault", "text"),
     [
         (JammedPulley(cable=3, pulley=1, time=0.0), r"there is no cable 3 \(there are 1 to 2\)"),

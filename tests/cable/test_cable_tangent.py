@@ -9,6 +9,8 @@ from stribeck import StribeckFriction
 from cable_cases import LAWS, RADIUS, decays, random_case, still
 from point_tangents import tangents
 
+pytestmark = pytest.mark.quick
+
 OF_SPEED = StribeckFriction(coefficient=0.3 * RADIUS, kinetic=0.3, speed=1e-3)
 
 # Rope wound beyond the path: about 0.2 of the mean path taut; then within the smoothing; slack.

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 from pydantic import ValidationError
 
 from cable_cases import still
 from ringsim.cable.records import Winch
 from ringsim.cable.winches import Winches
 from ringsim.cable.winding import MotorWinding, StallWinding
+
+pytestmark = pytest.mark.quick
 
 FIELDS = {
     "no_load_speed": 600.0, "stall_torque": 0.002, "gear_ratio": 100.0, "efficiency": 0.6,
@@ -155,7 +158,7 @@ def test_a_rope_that_is_pulled_off_turns_an_open_gear_and_breaks_its_head_on_a_l
     assert speed == 0.0
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("fields", "text"),
     [
         ({"speed": 600.0}, "speed = 600.0 rad/s must be below voltage .* no torque at its speed"),

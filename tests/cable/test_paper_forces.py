@@ -7,6 +7,8 @@ import pytest
 
 from cable_cases import LAWS, still
 
+pytestmark = pytest.mark.quick
+
 HALF, OFFSET, SHORT = 0.2889, 0.105, 0.013
 ROUND_OFF = 1e-12
 

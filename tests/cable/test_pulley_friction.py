@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 from pydantic import ValidationError
 
 from cable_cases import LAWS, RADIUS, cable, eta
@@ -16,6 +17,8 @@ from ringsim.cable.friction import (
     PulleyFriction,
 )
 from ringsim.choice import kinds_of
+
+pytestmark = pytest.mark.quick
 
 ANGLES = np.linspace(0.0, np.pi, 181)
 
@@ -90,8 +93,8 @@ def test_bearing_friction_is_capstan_friction_for_small_wraps():
     assert bearing[0] == pytest.approx(capstan[0], rel=wrap**2)
 
 
-@pytest.mark.parametrize("law", [BearingFriction, ExactBearingFriction])
-@pytest.mark.parametrize("coefficient", [0.01, 0.02, (0.001, 0.01)])
+@for_each("law", [BearingFriction, ExactBearingFriction])
+@for_each("coefficient", [0.01, 0.02, (0.001, 0.01)])
 def test_a_bearing_that_holds_any_tension_is_refused(law, coefficient):
     with pytest.raises(ValidationError, match=r"must be below pulley_radius = 0\.01 m"):
         cable(friction=law(coefficient=coefficient))

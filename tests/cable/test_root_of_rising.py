@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from ringsim.cable.winches import root_of_rising
 
+pytestmark = pytest.mark.quick
+
 SPEEDS = st.floats(0.0, 0.1)
 GAINS = st.floats(1.0, 1e6)
 

@@ -14,6 +14,8 @@ from ringsim.cable.records import AnyWinding, Winch
 from ringsim.cable.winding import ConstantWinding, PrescribedWinding, Winding
 from ringsim.choice import kinds_of
 
+pytestmark = pytest.mark.quick
+
 HALF, BLOCK, SHORT, DISTANCE = 0.29, 0.105, 0.013, 0.3
 FULL = 0.05
 """Slip speed over winding speed per span at which every moving pulley has all its friction."""

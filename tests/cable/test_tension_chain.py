@@ -12,6 +12,8 @@ from ringsim.cable import ropes
 from ringsim.cable.chain import Chain
 from ringsim.cable.friction import BearingFriction
 
+pytestmark = pytest.mark.quick
+
 # Tension is so far above the smoothing width that softplus equals its argument to 1e-16.
 TAUT = {"axial_stiffness": 1e4, "slack_width": 0.01}
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 from pydantic import ValidationError
 from scipy.integrate import quad, solve_ivp
 
@@ -81,7 +82,7 @@ def test_a_table_is_a_monotone_cubic():
     assert (straight.wound(0.5), straight.wound_rate(0.5)) == pytest.approx((0.1, 0.2))
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("table", "text"),
     [
         ({"times": (0.0, 1.0), "lengths": (0.0, 0.1, 0.2)}, "give one length for each time"),

@@ -13,7 +13,7 @@ from ringsim.exudyn.assembly import turn_rates
 from ringsim.exudyn.build import Built, build
 from ringsim.exudyn.cables import CableDrive
 from ringsim.scene import Scene, load_scene
-from ringsim.simulation import run
+from ringsim.simulation import run, run_frame
 from ringsim.variables import Outcome
 
 Array = NDArray[np.float64]
@@ -33,10 +33,11 @@ def truss(sections: int = 2, **values: Any) -> Scene:
     return load_scene("truss2").with_values(chosen)
 
 
-def outcome(scene: Scene) -> Outcome:
+def outcome(scene: Scene, engine: str = "full") -> Outcome:
     """Run a scene; the checks that hold of every run are made here."""
-    found = run(scene)
-    assert found.values["constraint_error"] < 1e-9
+    found = {"full": run, "frame": run_frame}[engine](scene)
+    # Frames have no joints that could gape but for a stiff spring at each: see docs/frame.md.
+    assert found.values["constraint_error"] < {"full": 1e-9, "frame": 1e-8}[engine]
     return found
 
 

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loops import for_each
 
-from driven import truss
+from driven import outcome, truss
 from ringsim.cable.winding import StallWinding
 from ringsim.outputs.family import Reading
 from ringsim.outputs.recorder import Recorder
@@ -32,8 +33,8 @@ def uneven_scene(after_lock: str, **values: Any) -> Scene:
 
 
 @functools.cache
-def uneven(after_lock: str, **values: Any) -> Outcome:
-    return run(uneven_scene(after_lock, **values))
+def uneven(after_lock: str, engine: str, **values: Any) -> Outcome:
+    return outcome(uneven_scene(after_lock, **values), engine)
 
 
 def after_upper_lock(found: Outcome) -> tuple[np.ndarray, slice]:
@@ -46,8 +47,8 @@ def after_upper_lock(found: Outcome) -> tuple[np.ndarray, slice]:
 
 
 @pytest.mark.parametrize("after_lock", ["stop", "hold", "pull"])
-def test_winches_do_after_the_lock_what_they_are_told(after_lock: str) -> None:
-    found = uneven(after_lock)
+def test_winches_do_after_the_lock_what_they_are_told(after_lock: str, engine: str) -> None:
+    found = uneven(after_lock, engine)
     assert found.status == Status.OK, found.reason
     assert found.fate is Fate.DEPLOYED
     times, after = after_upper_lock(found)
@@ -101,8 +102,8 @@ def test_a_winch_that_holds_follows_the_line_of_its_motor(monkeypatch: pytest.Mo
     assert np.abs(speed[times[lock + 1 :] > times[lock] + 0.2]).max() < 0.005
 
 
-def test_a_winch_that_pulls_on_a_locked_plane_loads_its_rope_and_joints() -> None:
-    stopped, pulling = uneven("stop"), uneven("pull")
+def test_a_winch_that_pulls_on_a_locked_plane_loads_its_rope_and_joints(engine: str) -> None:
+    stopped, pulling = uneven("stop", engine), uneven("pull", engine)
     peaks = [float(one.values["peak_tension"]) for one in (stopped, pulling)]
     assert peaks[1] > 2.0 * peaks[0]
     assert "past its stop" not in stopped.reason
@@ -122,12 +123,14 @@ def test_limits_that_a_run_passes_are_told_with_value_and_time() -> None:
 
 
 def test_the_stress_has_a_limit_too() -> None:
-    found = uneven("stop", record__stress=True, limits__rod_stress=1e3, solver__end_time=0.3)
+    found = uneven(
+        "stop", "full", record__stress=True, limits__rod_stress=1e3, solver__end_time=0.3
+    )
     assert found.fate is Fate.OVERLOADED
     assert "more than limits.rod_stress = 1000 Pa" in found.reason
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "words"),
     [
         ({"limits.rod_stress": 1e8}, "limits.rod_stress = 1e+08 Pa needs the stress of the rods"),

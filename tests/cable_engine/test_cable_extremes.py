@@ -28,7 +28,7 @@ def sound(found: Outcome) -> None:
         assert np.isfinite(values["deployment_time"])
 
 
-def wound_in(speed: float, start: float, **values: Any) -> Outcome:
+def wound_in(speed: float, start: float, engine: str = "full", **values: Any) -> Outcome:
     """A truss whose winch takes up the rope of a whole deployment at a speed (m/s)."""
     length = 0.36
     return outcome(
@@ -38,7 +38,8 @@ def wound_in(speed: float, start: float, **values: Any) -> Outcome:
             solver__end_time=1.5 * length / speed,
             record__interval=0.01 * length / speed,
             **values,
-        )
+        ),
+        engine,
     )
 
 
@@ -48,15 +49,20 @@ QUICK = [
     {"speed": 0.5},
 ]
 LATE = {"start": 2.0}
+LONG = [*((case, "full") for case in QUICK[:2]), (LATE, "full")]
 
 
 @pytest.mark.parametrize(
-    "case",
-    [*QUICK, pytest.param(LATE, marks=pytest.mark.slow)],
-    ids=lambda case: "-".join(map(str, case.items())),
+    ("case", "engine"),
+    [
+        *((case, "frame") for case in QUICK[:2]),
+        (QUICK[2], "full"),
+        *(pytest.param(*each, marks=pytest.mark.slow) for each in LONG),
+    ],
+    ids=lambda case: case if isinstance(case, str) else "-".join(map(str, case.items())),
 )
-def test_values_at_their_ends(case: dict[str, Any]) -> None:
-    values = {"speed": 0.05, "start": 20.0} | case
+def test_values_at_their_ends(case: dict[str, Any], engine: str) -> None:
+    values: dict[str, Any] = {"speed": 0.05, "start": 20.0, "engine": engine} | case
     found = wound_in(**values)
     sound(found)
     assert found.status == Status.OK

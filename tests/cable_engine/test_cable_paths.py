@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from loops import for_each
 
 from driven import truss
 from ringsim.overrides import parse_assignment
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
+
+pytestmark = pytest.mark.quick
 
 TRUSS = truss()
 
@@ -87,7 +90,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("assignment", REFUSED)
+@for_each("assignment", REFUSED)
 def test_places_that_do_not_exist_are_refused(assignment: str) -> None:
     with pytest.raises(InputError) as refused:
         changed(assignment)

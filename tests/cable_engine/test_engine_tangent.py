@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from driven import Bench, Motion, truss
 from ringsim.exudyn.assembly import turn_rates
 
+pytestmark = pytest.mark.quick
+
 Array = NDArray[np.float64]
 
 STRETCHES = {"taut": 0.02, "almost taut": 5e-5, "almost slack": -5e-5, "slack": -5e-3}

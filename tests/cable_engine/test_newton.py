@@ -12,6 +12,8 @@ from driven import truss, write_all
 from ringsim.exudyn.build import build
 from ringsim.exudyn.integrate import solver_settings
 
+pytestmark = pytest.mark.quick
+
 
 def residuals(*, whole: bool, step: float) -> list[float]:
     """Residual norms (N) of full Newton's iterations in the first step of a taut truss.

@@ -94,12 +94,17 @@ def test_a_rope_that_parts_is_slack_no_longer() -> None:
     np.testing.assert_array_equal(begun, [0.0, math.nan])
 
 
-@ENGINES
+WEDGED = ("wedged", {"kind": "jammed-pulley", "pulley": "section 1 V"})
+FREE = ("free", {"kind": "cut-cable", "span": "section 1 V to second hinge"})
+
+
 @pytest.mark.parametrize(
-    ("rope", "alike"),
+    ("fidelity", "rope", "alike"),
     [
-        ("wedged", {"kind": "jammed-pulley", "pulley": "section 1 V"}),
-        ("free", {"kind": "cut-cable", "span": "section 1 V to second hinge"}),
+        ("frame", *WEDGED),
+        ("frame", *FREE),
+        pytest.param("full", *WEDGED, marks=pytest.mark.slow),
+        ("full", *FREE),
     ],
 )
 def test_off_its_sheave_a_rope_is_held_or_carries_nothing(

@@ -14,8 +14,14 @@ JAMS = [
 ]
 
 
-@pytest.mark.parametrize("limit", [0.25, 0.1])
-@pytest.mark.parametrize("fidelity", FIDELITIES)
+@pytest.mark.parametrize(
+    ("fidelity", "limit"),
+    [
+        *((fidelity, 0.1) for fidelity in FIDELITIES),
+        ("frame", 0.25),
+        pytest.param("full", 0.25, marks=pytest.mark.slow),
+    ],
+)
 def test_a_winch_that_pulls_at_a_jam_ends_the_run_where_the_rope_would_break(
     fidelity: str, limit: float
 ) -> None:

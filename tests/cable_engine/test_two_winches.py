@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from loops import for_each
 
 from driven import Bench, truss
 from ringsim.refusal import InputError
 from ringsim.simulation import run_frame
+
+pytestmark = pytest.mark.quick
 
 ROUND_OFF = 1e-12
 """Sums and exponentials of some ten spans in doubles, relative; points are 1 m from the origin."""
@@ -69,7 +72,7 @@ def test_the_last_hinge_pulley_has_a_coefficient_a_fault_and_a_span_of_its_own()
     assert np.isnan(tension[1, 6]).all()
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "text"),
     [
         ({"both__friction__coefficient[7]": 1e-4}, "choose one from 1 to 6"),

@@ -37,10 +37,17 @@ def last_of(found: Outcome, name: str) -> np.ndarray:
     return found.values[name][..., last]
 
 
-@pytest.mark.parametrize("winding", [CONSTANT, RAMP], ids=["constant", "ramp"])
-def test_a_prescribed_law_winds_what_it_says(winding: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    ("winding", "engine"),
+    [
+        pytest.param(CONSTANT, "frame", id="constant-frame"),
+        pytest.param(CONSTANT, "full", id="constant-full", marks=pytest.mark.slow),
+        pytest.param(RAMP, "full", id="ramp-full"),
+    ],
+)
+def test_a_prescribed_law_winds_what_it_says(winding: dict[str, Any], engine: str) -> None:
     given = scene(winding=winding, solver__end_time=3.0)
-    found = outcome(given)
+    found = outcome(given, engine)
     assert found.status == Status.OK
     times, wound = until(found, "wound_length", 0)
     law = given.cables.upper.winch.winding
@@ -48,9 +55,11 @@ def test_a_prescribed_law_winds_what_it_says(winding: dict[str, Any]) -> None:
     assert wound == pytest.approx([law.wound(t) for t in times], abs=2e-5)
 
 
-def test_a_table_ends_and_the_truss_rests_where_its_rope_ends() -> None:
+def test_a_table_ends_and_the_truss_rests_where_its_rope_ends(engine: str) -> None:
     table = {"kind": "table", "times": [0.0, 1.0, 3.0], "lengths": [0.0, 0.03, 0.12]}
-    found = outcome(scene(winding=table, both__initial_slack=0.0, joints__vjoint__viscous=0.5))
+    found = outcome(
+        scene(winding=table, both__initial_slack=0.0, joints__vjoint__viscous=0.5), engine
+    )
     assert found.fate is Fate.STALLED
     assert last_of(found, "wound_length") == pytest.approx(0.12, abs=1e-12)
     opened = np.radians(last_of(found, "opening_angle").mean())
@@ -77,7 +86,7 @@ def test_a_stalling_motor_holds_its_tension_and_runs_where_it_can() -> None:
     assert found.values["energy_error"] < BALANCE
 
 
-@pytest.mark.parametrize("stiffness", [1e3, 1e6])
+@pytest.mark.parametrize("stiffness", [1e3, pytest.param(1e6, marks=pytest.mark.slow)])
 def test_tension_feedback_keeps_its_target_without_slack(stiffness: float) -> None:
     law = {"kind": "tension-feedback", "target": 0.5, "max_speed": 0.3}
     found = outcome(scene(winding=law, both__axial_stiffness=stiffness))
@@ -90,9 +99,9 @@ def test_tension_feedback_keeps_its_target_without_slack(stiffness: float) -> No
     assert found.values["energy_error"] < BALANCE
 
 
-def test_a_winch_at_the_last_section_mirrors_the_truss() -> None:
+def test_a_winch_at_the_last_section_mirrors_the_truss(engine: str) -> None:
     first, last = (
-        outcome(scene(boom="none", both__end=end, solver__end_time=2.0))
+        outcome(scene(boom="none", both__end=end, solver__end_time=2.0), engine)
         for end in ("first", "last")
     )
     one, other = (f.values["opening_angle"][:, :, -1] for f in (first, last))
@@ -101,8 +110,8 @@ def test_a_winch_at_the_last_section_mirrors_the_truss() -> None:
     assert one == pytest.approx(other[:, ::-1], abs=1e-4)
 
 
-def test_winches_at_both_ends_pull_evenly() -> None:
-    found = outcome(scene(boom="none", both__end="both", solver__end_time=2.0))
+def test_winches_at_both_ends_pull_evenly(engine: str) -> None:
+    found = outcome(scene(boom="none", both__end="both", solver__end_time=2.0), engine)
     angle = found.values["opening_angle"][:, :, -1]
     assert angle[:, 0] == pytest.approx(angle[:, 1], abs=1e-3)
     # Mirror symmetric but for the rods' initial swing, which Newton leaves at 1e-5 of the forces.
@@ -112,9 +121,9 @@ def test_winches_at_both_ends_pull_evenly() -> None:
     assert found.values["wound_length"][:, -1] == pytest.approx(2 * (2.0 - 0.25) * 0.05, rel=1e-6)
 
 
-def test_a_late_motor_and_one_that_stops() -> None:
+def test_a_late_motor_and_one_that_stops(engine: str) -> None:
     loose = {"both__initial_slack": 1e-3, "solver__end_time": 4.0}
-    late = outcome(scene(both__winch__start_time=1.0, **loose))
+    late = outcome(scene(both__winch__start_time=1.0, **loose), engine)
     times = late.coordinates["time"]
     before = times < 1.0
     angles = late.values["opening_angle"]
@@ -123,7 +132,9 @@ def test_a_late_motor_and_one_that_stops() -> None:
     # The step across the start is interpolated.
     assert late.values["wound_length"][:, before].max() < 1e-7
     assert angles[..., -1].min() > 65.0
-    stopped = outcome(scene(both__winch__stop_time=2.0, joints__vjoint__viscous=0.5, **loose))
+    stopped = outcome(
+        scene(both__winch__stop_time=2.0, joints__vjoint__viscous=0.5, **loose), engine
+    )
     assert stopped.fate is Fate.STALLED
     # Rest is watched for a tenth of the end time, from the end of the last step in which the winch
     # turned: 0.07 ms before it stops.
@@ -131,13 +142,14 @@ def test_a_late_motor_and_one_that_stops() -> None:
     assert last_of(stopped, "wound_length") == pytest.approx(0.05 * 1.75, abs=1e-12)
 
 
-def test_the_faster_of_two_motors_carries_all() -> None:
+def test_the_faster_of_two_motors_carries_all(engine: str) -> None:
     found = outcome(
         scene(
             cables__lower__winch__start_time=1.5,
             solver__end_time=1.4,
             cables__lower__initial_slack=1e-3,
-        )
+        ),
+        engine,
     )
     assert found.values["cable_tension"][1].max() == pytest.approx(0.0, abs=1e-6)
     assert found.values["cable_tension"][0, 0, -1] > 0.1

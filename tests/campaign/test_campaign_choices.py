@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from loops import for_each
 
 from ringsim.campaign.specification import load_campaign
 from ringsim.refusal import InputError
@@ -65,7 +66,7 @@ def test_set_and_samples_stand_above_the_file(tmp_path):
     assert load_campaign(tmp_path / "again.toml").scene.solver.end_time == 0.5  # only remarks
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("old", "new", "settings", "samples", "words"),
     [
         ("", "", {"solver.step": -1.0}, None, r"choosing.toml: set: .*solver.step = -1.0 s must"),

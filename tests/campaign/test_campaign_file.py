@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loops import for_each
 
 from ringsim.campaign.specification import load_campaign
 from ringsim.execution.work import longest_first, relative_cost
@@ -43,6 +44,7 @@ def test_paths_may_be_quoted_or_nested(tmp_path):
     assert list(campaign.specification.inputs) == ["rods.young_modulus", "loads.force"]
 
 
+@pytest.mark.quick
 def test_scene_file_is_looked_up_beside_the_campaign_file(tmp_path):
     scene = loaded(tmp_path).scene
     (tmp_path / "mine.toml").write_text(scene.to_toml())
@@ -50,12 +52,13 @@ def test_scene_file_is_looked_up_beside_the_campaign_file(tmp_path):
     assert again.scene == scene
 
 
-@pytest.mark.parametrize("file", sorted((ROOT / "campaigns").glob("*.toml")), ids=lambda p: p.stem)
+@for_each("file", sorted((ROOT / "campaigns").glob("*.toml")), ids=lambda p: p.stem)
 def test_shipped_campaigns_can_be_drawn(file):
     campaign = load_campaign(file)
     assert campaign.draw().samples >= 1
 
 
+@pytest.mark.quick
 def test_example_in_the_guide_can_be_drawn(tmp_path):
     guide = ROOT / "docs" / "guide"
     page = (guide / "campaigns.md").read_text(encoding="utf-8")
@@ -67,7 +70,8 @@ def test_example_in_the_guide_can_be_drawn(tmp_path):
     assert len(campaign.specification.requirements) == 2
 
 
-@pytest.mark.parametrize(
+@pytest.mark.quick
+@for_each(
     ("old", "new", "words"),
     [
         ("seed = 3", "sead = 3", r"sead is not a known key \(did you mean seed\?\)"),
@@ -104,7 +108,7 @@ def test_mistakes_are_refused_in_one_line(old, new, words, tmp_path):
     assert str(refusal.value).startswith("good.toml: ")
 
 
-@pytest.mark.parametrize("part", ["0/2", "3/2", "2", "a/b", "-1/2", "1/0"])
+@for_each("part", ["0/2", "3/2", "2", "a/b", "-1/2", "1/0"])
 def test_senseless_parts_are_refused(part, bench):
     printed = bench.run("campaign", bench.write(2), "--part", part, code=2)
     assert "must read i/n" in printed
@@ -194,6 +198,7 @@ def test_replay_gives_the_stored_result_and_saves_it(bench):
     assert "absent: there is no such folder" in bench.run("replay", "absent", 0, code=2)
 
 
+@pytest.mark.quick
 def test_long_runs_come_first(tmp_path):
     text = GOOD + 'rods.elements = { kind = "discrete", values = [1, 2, 4] }\n'
     campaign = loaded(tmp_path, text.replace("samples = 4", "samples = 30"))

@@ -43,6 +43,7 @@ def test_growing_a_design_gives_the_file_of_the_large_one(bench, reference):
     xr.testing.assert_identical(comparable(bench.result("out")), comparable(reference))
 
 
+@pytest.mark.quick
 def test_file_says_what_everything_is(reference):
     assert reference.sample.attrs["standard_name"] == "realization"
     assert reference.sample.attrs["units"] == "1"
@@ -65,12 +66,14 @@ def test_file_says_what_everything_is(reference):
     assert reference.attrs["git_commit"]
 
 
+@pytest.mark.quick
 def test_inputs_are_what_was_run(reference):
     modulus = reference.rods_young_modulus.values.mean(axis=1)
     expected = 2.0 / np.sqrt(reference.loads_force.values) * (1.0 + 1e9 / modulus)
     np.testing.assert_allclose(reference.deployment_time.values, expected, rtol=1e-15)
 
 
+@pytest.mark.quick
 def test_missing_counts_are_missing_and_times_are_numbers(reference):
     assert reference.steps.values.tolist() == [100] * 20
     assert np.isnan(reference.newton_iterations).all()
@@ -86,6 +89,7 @@ def test_second_run_has_nothing_to_do(bench):
     assert journals(bench) == before
 
 
+@pytest.mark.quick
 def test_sample_seeds_depend_on_seed_and_index_alone(reference):
     for sample in (0, 13):
         state = np.random.SeedSequence(7, spawn_key=(sample,)).generate_state(1, np.uint64)[0]

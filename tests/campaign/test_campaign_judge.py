@@ -7,6 +7,7 @@ import shutil
 import numpy as np
 import pytest
 import xarray as xr
+from loops import for_each
 
 from campaign_bench import Bench, comparable, journals, lose
 from ringsim.campaign.specification import load_campaign
@@ -167,7 +168,7 @@ def test_parts_check_their_own_samples(bench):
     assert bench.result("out").status_checked.values.tolist() == [0, -1, 0, -1, 0]
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("top", "words"),
     [
         ("check_every = 2\n", 'but fidelity = "full": leave check_every out'),

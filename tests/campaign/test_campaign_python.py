@@ -15,6 +15,7 @@ import pytest
 import tomli_w
 import xarray as xr
 from click.testing import CliRunner
+from loops import for_each
 
 import fake_solver
 import ringsim
@@ -76,7 +77,7 @@ def test_arguments_may_be_of_numpy_or_models() -> None:
     )
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("more", "words"),
     [
         ({"desing": {}}, "ringsim.Campaign: desing is not a known key (did you mean design?)"),
@@ -193,7 +194,7 @@ def test_large_files_are_read_as_far_as_they_are_used(monkeypatch: pytest.Monkey
         assert not found["opening_angle"].variable._in_memory
 
 
-@pytest.mark.parametrize("where", ["gone", ".", "run.nc"])
+@for_each("where", ["gone", ".", "run.nc"])
 def test_opening_what_is_no_campaign_is_refused(where: str) -> None:
     xr.Dataset({"status": 0}).to_netcdf("run.nc")
     with pytest.raises(InputError, match=r"no such file or folder|no campaign"):

@@ -128,7 +128,11 @@ def wait_until_some_are_done(bench, process, samples=1):
 SLEEPY = {"shared": '"rods.damping" = 0.05'}
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+NOTICE = pytest.param(signal.SIGUSR1, marks=pytest.mark.slow)
+"""As Slurm sends it; it also reaches a campaign in the tests below."""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, NOTICE])
 def test_stop_signal_ends_the_campaign_and_it_goes_on_later(number, bench):
     start = ("campaign", bench.write(100, **SLEEPY), "--workers", 2, "--out", "out")
     process = bench.start(*start, solver="fake_solver:slow")

@@ -7,6 +7,7 @@ import re
 import time
 
 import pytest
+from loops import for_each
 
 from campaign_bench import Bench, assert_same, finished, opened
 from ringsim.analysis.verdicts import Looks
@@ -133,7 +134,7 @@ def test_looks_are_whole_replicates():
     assert [next(numbers) for _ in range(4)] == [24, 32, 48, 72]
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("change", "words"),
     [
         (('kind = "random"', 'kind = "latin-hypercube"'), "design of kind latin-hypercube"),

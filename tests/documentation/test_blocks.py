@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from loops import for_each
 
 from pages import PAGES, ROOT, blocks, calls
 from ringsim.cli import VERBS, cli, command_of
@@ -27,7 +28,8 @@ SCRIPTS = [
 ]
 
 
-@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.quick
+@for_each("call", CALLS)
 def test_commands_and_their_options_exist(call: list[str]) -> None:
     verb, *arguments = call
     assert verb in VERBS
@@ -36,7 +38,8 @@ def test_commands_and_their_options_exist(call: list[str]) -> None:
     command.make_context(verb, arguments).close()
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+@pytest.mark.quick
+@for_each("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_links_lead_to_files(page: Path) -> None:
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     for target in re.findall(r"\]\(([^)#\s]+)", text):

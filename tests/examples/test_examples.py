@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from loops import for_each
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
@@ -34,7 +35,7 @@ def runs(script: Path, tmp_path: Path) -> None:
         assert (tmp_path / name).stat().st_size > 0
 
 
-@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
+@for_each("script", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_is_short_and_says_what_it_shows(script: Path) -> None:
     text = script.read_text(encoding="utf-8")
     assert 20 <= len(text.splitlines()) <= 50

@@ -1,8 +1,11 @@
 """How far a replay is apart from the stored result: beside its size, and beside its error bar."""
 
 import numpy as np
+import pytest
 
 from ringsim.cli.run import judged
+
+pytestmark = pytest.mark.quick
 
 OLD = {
     "deployment_time": np.array(20.0),

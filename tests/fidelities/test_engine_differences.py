@@ -12,6 +12,8 @@ from ringsim.analysis.engines import check_lines, differences, main_outputs
 from ringsim.analysis.intervals import quantities
 from ringsim.variables import Fate, Status
 
+pytestmark = pytest.mark.quick
+
 NAN = np.nan
 
 

@@ -27,6 +27,8 @@ from ringsim.frame.ropes import (
     tighten,
 )
 
+pytestmark = pytest.mark.quick
+
 ROUND_OFF = 1e-11
 """Sums of a dozen terms in another order, through exponentials of their logarithms."""
 WINCH = Winch(winding=ConstantWinding(speed=0.02))

@@ -1,9 +1,13 @@
 """Rings whose joints rub dry, and stop within steps: Newton must find where they stand."""
 
+import pytest
+
 from ringsim.frame.integrate import Integration
 from ringsim.frame.model import FrameModel
 from ringsim.scene import load_scene
 from ringsim.variables import Fate
+
+pytestmark = pytest.mark.quick
 
 DRY = {"kind": "viscous-coulomb", "coulomb": 0.05, "viscous": 0.3, "rate": 2e-4}
 

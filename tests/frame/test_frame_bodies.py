@@ -12,6 +12,8 @@ from ringsim.frame.mesh import tetrahedron
 from ringsim.frame.model import FrameModel
 from ringsim.scene import load_scene
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize("flat", [False, True], ids=["solid", "needle"])
 def test_four_points_are_a_body(flat: bool) -> None:

@@ -18,6 +18,8 @@ from one_element import (
     tangent,
 )
 
+pytestmark = pytest.mark.quick
+
 BENDS = [1e-4, 0.99e-3, 1.01e-3, 0.02, 0.3, 1.0, 2.0]
 """Bends, rad: both sides of where coefficients are taken by series, and more than rods survive."""
 

@@ -31,6 +31,7 @@ def test_energy_is_kept(name: str, values: dict[str, Any], frames: float, exudyn
     assert float(by_exudyn(scene).values["energy_error"]) < exudyn
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("told", [True, False], ids=["displacements", "rates"])
 def test_viscous_losses_of_even_acceleration_are_exact(told: bool) -> None:
     """The integral of c v^2 over v = v0 + a t, in one step; mean force times displacement misses

@@ -25,10 +25,12 @@ SLOW = {
                "taut", "backdrivable"},
 }  # fmt: skip
 """Near kin of what runs by default: some laws run together there, and alone here."""
+QUICK = {"closed-6", "both-bar-half", "all-joints"}
 
 
 def named(kind: str, scenes: dict[str, dict[str, object]]) -> list[object]:
-    marks = {name: pytest.mark.slow if name in SLOW[kind] else () for name in scenes}
+    marks = dict.fromkeys(scenes, ()) | dict.fromkeys(SLOW[kind] & {*scenes}, pytest.mark.slow)
+    marks |= dict.fromkeys(QUICK & {*scenes}, pytest.mark.quick)
     return [pytest.param(v, id=name, marks=marks[name]) for name, v in scenes.items()]
 
 

@@ -49,7 +49,8 @@ def test_free_rings_open_on_time(sections: int) -> None:
     assert abs(lateness(sections, 1e-6, boom="none")) < AGREEMENT
 
 
-@pytest.mark.parametrize("sections", [6, pytest.param(18, marks=pytest.mark.slow),
+@pytest.mark.parametrize("sections", [pytest.param(6, marks=pytest.mark.quick),
+                                      pytest.param(18, marks=pytest.mark.slow),
                                       pytest.param(30, marks=pytest.mark.slow)])  # fmt: skip
 def test_fixed_rings_open_on_time(sections: int) -> None:
     """A ring held at one corner bends: 6 sections of the built-in rods open 9e-5 late for that, at

@@ -8,6 +8,8 @@ from ringsim.frame.integrate import solve
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize(
     ("name", "values"),

@@ -5,6 +5,8 @@ import pytest
 
 from ringsim.frame.integrate import Secants
 
+pytestmark = pytest.mark.quick
+
 
 def test_one_unknown_is_the_secant_method() -> None:
     """x^2 = 2 with the tangent of x = 2: the iterates are those of the secant formula."""

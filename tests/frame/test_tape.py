@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loops import for_each
 
 from ringsim.cable.friction import (
     BearingFriction,
@@ -25,6 +26,8 @@ from ringsim.parts.joints import (
 )
 from ringsim.parts.net import SpringNet
 from ringsim.refusal import InputError
+
+pytestmark = pytest.mark.quick
 
 SHAPE = (2, 5)
 STOP = SpringDamperStop(stiffness=50.0, damping=0.3, stowed_angle=10.0)
@@ -129,7 +132,7 @@ def branching(x: Any) -> Any:
     return 2.0 * x if x > 0.0 else -5.0 * x
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("law", "cause"),
     [
         (lambda x: np.floor(x), "floor"),

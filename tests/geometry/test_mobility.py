@@ -11,6 +11,8 @@ from ringsim.layout.layout import internal_mobility, layout_of
 from ringsim.scene import Scene, load_scene
 from ringsim.structures.pantograph_ring import PantographRing, RingGeometry
 
+pytestmark = pytest.mark.quick
+
 Array = NDArray[np.float64]
 
 CLOSED = [3, 4, 5, 6, 18]

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from ringsim.structures.planar_truss import TrussGeometry
 
+pytestmark = pytest.mark.quick
+
 LENGTHS = st.floats(0.05, 5.0)
 SHARES = st.floats(0.05, 0.95)
 ANGLES = st.floats(0.02, 3.1)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 
 from ringsim.structures.pantograph_ring import polygon_corners as corners
 
@@ -90,13 +91,13 @@ def test_polygon_of_four_quarters_has_corners_on_both_axes(sides: int, ratio: fl
     )
 
 
-@pytest.mark.parametrize("sides", [0, 1, 2, -3])
+@for_each("sides", [0, 1, 2, -3])
 def test_fewer_than_three_sides_are_refused(sides: int) -> None:
     with pytest.raises(ValueError, match="at least 3 sides"):
         corners(sides, 0.9)
 
 
-@pytest.mark.parametrize("ratio", [0.0, -0.5, 1.0000001, 2.0, float("nan")])
+@for_each("ratio", [0.0, -0.5, 1.0000001, 2.0, float("nan")])
 def test_ratios_outside_zero_to_one_are_refused(ratio: float) -> None:
     with pytest.raises(ValueError, match="aspect_ratio"):
         corners(6, ratio)

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import exudyn as exu
 import numpy as np
 import pytest
+from loops import for_each
 
 from ringsim.cable.records import BarHalfBracket
 from ringsim.exudyn.build import build
@@ -16,6 +17,8 @@ from ringsim.layout.layout import Layout, layout_at_opening, layout_of
 from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene, builtin_scenes, load_scene
 from ringsim.structures.family import Structure
+
+pytestmark = pytest.mark.quick
 
 STEP = 1e-6
 CLOSE = 1e-9
@@ -185,7 +188,7 @@ def with_bare(parts: dict[str, Any], *, swapped: bool = False) -> Layout:
     return layout_of(scene.model_copy(update=update), 0.5)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("part", "wanted"),
     [
         ("boom", r'boom: this structure has no corners .* 2 of its planes.*\(boom = "none"\)'),

@@ -5,7 +5,7 @@ import importlib
 import re
 from pathlib import Path
 
-import pytest
+from loops import for_each
 
 PACKAGE = Path(__file__).parents[2] / "ringsim"
 WITH_EXAMPLES = sorted(
@@ -15,7 +15,7 @@ WITH_EXAMPLES = sorted(
 )
 
 
-@pytest.mark.parametrize("name", WITH_EXAMPLES)
+@for_each("name", WITH_EXAMPLES)
 def test_examples_of_a_module(name: str) -> None:
     found = doctest.testmod(importlib.import_module(name), optionflags=doctest.NORMALIZE_WHITESPACE)
     assert found.attempted > 0

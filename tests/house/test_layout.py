@@ -5,9 +5,12 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from loops import for_each
 
 from ringsim.cli import VERBS, command_of
 from ringsim.outputs import VARIABLES
+
+pytestmark = pytest.mark.quick
 
 ROOT = Path(__file__).parents[2]
 SOURCES = sorted((ROOT / "ringsim").rglob("*.py"))
@@ -22,7 +25,7 @@ def readme_block(marker: str) -> str:
     return found[1]
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+@for_each("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_no_file_is_longer_than_600_lines(path: Path) -> None:
     assert len(path.read_text(encoding="utf-8").splitlines()) <= 600
 

@@ -13,12 +13,13 @@ TOOLS = Path(sys.executable).parent
 @pytest.mark.parametrize(
     "command",
     [
-        ["lint-imports", "--no-cache"],
-        ["ruff", "check", "--no-cache", "."],
-        ["ruff", "format", "--no-cache", "--check", "."],
-        ["mypy"],
+        pytest.param(["lint-imports", "--no-cache"], id="imports", marks=pytest.mark.quick),
+        pytest.param(["ruff", "check", "--no-cache", "."], id="lint", marks=pytest.mark.quick),
+        pytest.param(
+            ["ruff", "format", "--no-cache", "--check", "."], id="format", marks=pytest.mark.quick
+        ),
+        pytest.param(["mypy"], id="types"),
     ],
-    ids=["imports", "lint", "format", "types"],
 )
 def test_tool_finds_nothing(command: list[str]) -> None:
     done = subprocess.run(

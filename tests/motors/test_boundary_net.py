@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 import xarray as xr
+from loops import for_each
 from pydantic import ValidationError
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -139,7 +140,7 @@ def test_drawings_tell_taut_cables_from_slack_ones() -> None:
     assert len(taut["net, taut"]) >= 2
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "text"),
     [
         ({"net": {"kind": "boundary", "strain": 0.01}}, "net.axial_stiffness"),

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from loops import for_each
 from pydantic import ValidationError
 
 from motor_rings import MOTOR, PLAIN, STALL, ring
@@ -154,7 +155,7 @@ def test_the_least_margin_is_least() -> None:
     assert least.margin == pytest.approx(fine.margin, rel=1e-4)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "text"),
     [
         ({"cables.upper.winch.winding": {"kind": "constant", "speed": 0.1}},

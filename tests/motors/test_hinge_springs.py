@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from loops import for_each
 from pydantic import ValidationError
 from rigid_motion import RigidRing
 from scipy.integrate import quad
@@ -123,7 +124,7 @@ def test_what_a_fault_takes_at_the_start_is_booked_once(fidelity: str) -> None:
     assert float(found.energy_error) < 1e-3
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "text"),
     [
         ({"hinge_spring": {"kind": "table", "angles": [10.0, 20.0], "torques": [0.1]}},

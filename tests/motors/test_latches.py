@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from loops import for_each
 from pydantic import ValidationError
 from scipy.integrate import quad
 
@@ -242,7 +243,7 @@ def test_the_latest_latch_tells_when_a_motor_stops() -> None:
     np.testing.assert_allclose(again.held, [[1.0, 3.0, 1.0], [np.nan] * 3], rtol=1e-6)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "text"),
     [
         ({"stop.latch": False}, "set stop.latch = true"),

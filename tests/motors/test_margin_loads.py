@@ -14,6 +14,8 @@ from ringsim.parts.margin import EcssMechanisms, MarginStandard, NasaMechanisms
 from ringsim.rigid.margin import DriveMargin
 from ringsim.scene import Scene
 
+pytestmark = pytest.mark.quick
+
 DRY = {"coulomb": 0.05}
 
 

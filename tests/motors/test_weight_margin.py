@@ -14,6 +14,8 @@ from ringsim.rigid.mechanism import Mechanism
 from ringsim.rigid.resistances import Opening, WeightResistance, resistances
 from ringsim.scene import load_scene
 
+pytestmark = pytest.mark.quick
+
 VECTOR = np.array([0.3, -0.5, -9.0])
 
 

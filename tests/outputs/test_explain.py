@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
 from click.testing import CliRunner
 
 from ringsim.cli import cli
 from ringsim.outputs import COORDINATES, VARIABLES
 from ringsim.outputs.family import SPAN_NAME
+
+pytestmark = pytest.mark.quick
 
 
 def explain(*names: str) -> str:

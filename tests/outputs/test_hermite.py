@@ -6,6 +6,8 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ringsim.hermite import Array, cubic, first_zero, monotone_slopes
 
+pytestmark = pytest.mark.quick
+
 _RANDOM = np.random.default_rng(20)
 _TIMES = np.sort(_RANDOM.random(40))
 _VALUES = _RANDOM.normal(size=(40, 2, 3)).cumsum(axis=0)

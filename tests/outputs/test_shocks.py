@@ -11,6 +11,8 @@ from ringsim.outputs.base import slowest_period, unresolved
 from ringsim.outputs.family import Run, Series
 from ringsim.scene import load_scene
 
+pytestmark = pytest.mark.quick
+
 PERIOD = 2.0 * 0.855**2 / math.pi * 4.0 * math.sqrt(1800.0 / 120e9 / (0.01**2 + 0.00915**2))
 """Of the diagonals of ring18, 2 x 0.4275 m: rho A / (E I) = 16 rho / (E (D^2 + d^2))."""
 

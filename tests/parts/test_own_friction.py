@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
+from loops import for_each
 from rigid_motion import RigidRing
 
 from ringsim.choice import kinds_of
@@ -73,7 +74,7 @@ def test_it_is_a_kind_as_others_are():
     assert scene(3, joints__vjoint__sticking=[1e-3, 2e-3, 3e-3]).joints.vjoint is not None
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "named"),
     [
         ({"joints__vjoint__stickin": 1.0}, "joints.vjoint.stickin is not a known key (did you"),

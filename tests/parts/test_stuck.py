@@ -1,6 +1,10 @@
 """A V-joint that sticks needs no cable."""
 
+import pytest
+
 from ringsim.scene import load_scene
+
+pytestmark = pytest.mark.quick
 
 
 def test_a_ring_without_cables_may_have_a_stuck_joint():

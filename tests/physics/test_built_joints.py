@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 import pytest
+from loops import for_each
 
 from ring_runs import ring
 from ringsim.exudyn.build import build
@@ -14,6 +15,8 @@ from ringsim.parts.faults import StuckVJoint
 from ringsim.parts.joints import Joints, SpringDamperStop
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
+
+pytestmark = pytest.mark.quick
 
 
 @pytest.mark.parametrize("kind", ["geometrically-exact", "ancf"])
@@ -43,7 +46,7 @@ def test_a_hinge_turns_about_the_axis_of_its_body(kind: str) -> None:
     assert (OnRod, OnBody) in orders  # without these nothing would have to be turned round
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "text"),
     [
         (

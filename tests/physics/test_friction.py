@@ -85,10 +85,14 @@ def test_the_equation_without_friction_is_the_quadrature() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(x, marks=pytest.mark.slow) if "viscous" in x else x for x in LAWS],
-)
+def mark(name: str) -> object:
+    if name == "pivot-coulomb":
+        return pytest.mark.quick
+    # The coulomb friction of all joints together runs by default.
+    return () if name == "all" else pytest.mark.slow
+
+
+@pytest.mark.parametrize("name", [pytest.param(x, marks=mark(x)) for x in LAWS])
 def test_friction_slows_the_ring_as_the_ideal_equation_says(name: str) -> None:
     # Ten times the paper's stiffness: slow rings dwell where elasticity tells (2.5e-4 else).
     scene = ring(3, joints=LAWS[name], rods__young_modulus=120e10)

@@ -36,6 +36,7 @@ def bare_work(scene: Scene, phi: float) -> float:
     return shape.sections * float(force) * (height - 2.0 * shape.half_bar * math.sin(phi))  # type: ignore[arg-type]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("sections", [3, 6, 18, 72])
 @pytest.mark.parametrize("phi", [0.0, 0.3, 1.1, 1.5])
 def test_inertia_of_a_circle_of_point_masses(sections: int, phi: float) -> None:
@@ -46,6 +47,7 @@ def test_inertia_of_a_circle_of_point_masses(sections: int, phi: float) -> None:
     )
 
 
+@pytest.mark.quick
 def test_the_same_time_by_adaptive_quadrature_of_the_closed_form() -> None:
     scene = ring(6, **BARE)
     start = scene.structure.coordinate
@@ -109,6 +111,7 @@ def test_a_free_ring_is_quicker_than_a_fixed_one() -> None:
     assert ideal_time(ring(6)) < ideal_time(ring(6, boom__base="fixed"))
 
 
+@pytest.mark.quick
 def test_the_force_is_the_slope_of_the_work() -> None:
     ideal = OneCoordinate(load_scene("ring18"))
     for phi in np.linspace(0.05, 1.15, 7):
@@ -117,6 +120,7 @@ def test_the_force_is_the_slope_of_the_work() -> None:
         assert ideal.work_rate(phi) == pytest.approx(slope, rel=1e-6)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("force", "published", "within"),
     [

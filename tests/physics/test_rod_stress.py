@@ -42,7 +42,8 @@ def bending_stress(moment: float, tube: tuple[float, float]) -> float:
 
 EXACT, SLOPES = "geometrically-exact", "ancf"
 RODS = pytest.mark.parametrize(
-    ("kind", "elements"), [(EXACT, 1), (EXACT, 2), (SLOPES, 1), (SLOPES, 2)]
+    ("kind", "elements"),
+    [(EXACT, 1), (EXACT, 2), (SLOPES, 1), pytest.param(SLOPES, 2, marks=pytest.mark.slow)],
 )
 
 

@@ -141,7 +141,7 @@ def left_after_a_bounce(damping: float) -> float:
     return float(found.y[1, -1] / SPEED) ** 2
 
 
-@pytest.mark.parametrize("damping", [0.0, *DAMPINGS])
+@pytest.mark.parametrize("damping", [pytest.param(0.0, marks=pytest.mark.quick), *DAMPINGS])
 def test_a_bounce_leaves_the_energy_that_the_damper_does_not_take(damping: float) -> None:
     run = stopped(damping, latch=False, settling=0.032)
     locked = float(run["deployment_time"])
@@ -158,7 +158,7 @@ def test_an_undamped_stop_holds_all_the_energy_at_its_deepest() -> None:
     assert most == pytest.approx(ENERGY + JOINTS * FORCE * HALF_BAR * deepest, rel=2.0 * CLOSE)
 
 
-@pytest.mark.parametrize("damping", DAMPINGS)
+@pytest.mark.parametrize("damping", [0.03, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_a_bounced_ring_folds_until_the_force_has_taken_what_is_left(damping: float) -> None:
     left = left_after_a_bounce(damping) * ENERGY
     turn = brentq(lambda angle: JOINTS * FORCE * (lift(180.0) - lift(angle)) - left, START, 180.0)

@@ -14,6 +14,8 @@ from truss_statics import (
     tension,
 )
 
+pytestmark = pytest.mark.quick
+
 SCENE = load_scene("planar-truss")
 TRUSS = SCENE.structure
 LENGTHS = np.linspace(0.1001, 0.9, 33)

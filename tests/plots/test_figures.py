@@ -8,6 +8,7 @@ import sys
 import matplotlib as mpl
 import numpy as np
 import pytest
+from loops import for_each
 from matplotlib.collections import LineCollection
 
 from ringsim.dataset import to_dataset
@@ -189,7 +190,7 @@ def test_stress_lines_are_the_halves_of_the_diagonals_in_black_and_red(deployed)
         assert red == [False, False, True, True]
 
 
-@pytest.mark.parametrize("sections", [[], [0], [1, 19], range(1, 8)])
+@for_each("sections", [[], [0], [1, 19], range(1, 8)])
 def test_sections_that_do_not_exist_are_refused(sections, deployed):
     with pytest.raises(ValueError, match=r"sections = .* 1\.\.18"):
         rod_stress(deployed, sections)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from loops import for_each
 from matplotlib.figure import Figure
 
 from ringsim.plots import style
+
+pytestmark = pytest.mark.quick
 
 
 def quantity(values, units: str) -> xr.DataArray:
@@ -15,7 +18,7 @@ def quantity(values, units: str) -> xr.DataArray:
     return xr.DataArray(np.asarray(values, dtype=float), dims="time", attrs=attributes)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("largest", "units", "wanted"),
     [
         (0.06, "J", "mJ"),
@@ -73,7 +76,7 @@ def test_a_run_that_does_not_tell_its_outcome_gives_the_reason(unfinished):
     assert style.ending(run) == "Ended after 12 s: the end time was reached"
 
 
-@pytest.mark.parametrize(("title", "wanted"), [
+@for_each(("title", "wanted"), [
     ("18-section ring, 2 cables", "2-section ring, 2 cables"),
     ("Truss of paper 000", "Truss of paper 000, 2 sections"),
     ("", "2 sections"),

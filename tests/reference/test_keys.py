@@ -6,6 +6,7 @@ import tomllib
 
 import pytest
 from click.testing import CliRunner
+from loops import for_each
 
 from ringsim.cli import cli
 from ringsim.reference.keys import Key, keys_of
@@ -13,6 +14,8 @@ from ringsim.reference.tree import ROOTS, facts, find, known, paths, places
 from ringsim.refusal import InputError
 from ringsim.scene import builtin_scenes, load_scene
 from ringsim.units import Model
+
+pytestmark = pytest.mark.quick
 
 EVERY = [
     pytest.param(root, model, key, id=f"{root}-{model.__name__}.{key.name}")
@@ -27,7 +30,7 @@ def explain(*names: str) -> str:
     return found.output
 
 
-@pytest.mark.parametrize(("root", "model", "key"), EVERY)
+@for_each(("root", "model", "key"), EVERY)
 def test_every_key_has_a_meaning_a_form_and_a_path(root: str, model: type[Model], key: Key) -> None:
     assert len(key.meaning) > 10, f"{model.__name__}.{key.name} needs a docstring below its field"
     assert key.form != "any value" or key.name == "values"
@@ -50,7 +53,7 @@ def test_every_key_of_the_built_in_scenes_is_found() -> None:
             assert any(each.root == "scene" for each in find(path)), path
 
 
-@pytest.mark.parametrize("path", [
+@for_each("path", [
     "structure.sections", "rods.young_modulus", "loads.force", "solver.tolerance",
     "cables.upper.axial_stiffness", "cables.upper.winch.start_time", "limits.overrun",
     "stop.stiffness", "structure.opening_angle", "net.stiffness",
@@ -107,7 +110,7 @@ def test_keys_that_scenes_and_campaigns_share_are_told_of_both() -> None:
     assert "structure: table with a kind" in explain("scene")
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("name", "meant"),
     [
         ("cables.upper.winsh", "did you mean cables.upper.winch?"),

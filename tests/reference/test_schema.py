@@ -10,10 +10,13 @@ from typing import Any
 import jsonschema
 import pytest
 from click.testing import CliRunner
+from loops import for_each
 
 from ringsim.cli import cli
 from ringsim.reference.schema import schema_of
 from ringsim.scene import builtin_scenes, load_scene
+
+pytestmark = pytest.mark.quick
 
 ROOT = Path(__file__).parents[2]
 CAMPAIGNS = sorted((ROOT / "campaigns").glob("*.toml"))
@@ -50,13 +53,13 @@ def test_the_command_prints_a_valid_schema(kind: str) -> None:
     jsonschema.Draft202012Validator.check_schema(json.loads(printed.stdout))
 
 
-@pytest.mark.parametrize("name", builtin_scenes())
+@for_each("name", builtin_scenes())
 def test_built_in_scenes_are_accepted(name: str, scene: jsonschema.Draft202012Validator) -> None:
     scene.validate(tomllib.loads(builtin_scenes()[name]))
     scene.validate(load_scene(name).to_table())  # with every default written out
 
 
-@pytest.mark.parametrize("file", CAMPAIGNS, ids=lambda path: path.stem)
+@for_each("file", CAMPAIGNS, ids=lambda path: path.stem)
 def test_shipped_campaigns_are_accepted(
     file: Path, campaign: jsonschema.Draft202012Validator
 ) -> None:
@@ -87,7 +90,7 @@ BAD_SCENES = [
 ]
 
 
-@pytest.mark.parametrize(("path", "value"), GOOD_SCENES, ids=str)
+@for_each(("path", "value"), GOOD_SCENES, ids=str)
 def test_what_scenes_may_hold_is_accepted(
     path: str, value: Any, scene: jsonschema.Draft202012Validator
 ) -> None:
@@ -96,14 +99,14 @@ def test_what_scenes_may_hold_is_accepted(
     load_scene("ring18-cable").with_values({path.replace("/", "."): value})
 
 
-@pytest.mark.parametrize(("path", "value"), BAD_SCENES, ids=str)
+@for_each(("path", "value"), BAD_SCENES, ids=str)
 def test_what_scenes_must_not_hold_is_refused(
     path: str, value: Any, scene: jsonschema.Draft202012Validator
 ) -> None:
     assert not scene.is_valid(changed(SCENE, path, value))
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("path", "value", "good"),
     [
         ("inputs/rods", {"young_modulus": {"kind": "uniform", "low": 1e11, "high": 2e11}}, True),
@@ -144,7 +147,7 @@ def test_a_printed_scene_stands_beside_the_schema_that_it_names(tmp_path: Path) 
     assert load_scene(out) == load_scene("ring18")
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("arguments", "words"),
     [
         (["explain", "--schema", "scenes"], "did you mean scene?"),

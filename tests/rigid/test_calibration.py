@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from click.testing import CliRunner
+from loops import for_each
 
 from ringsim.calibration import opening_angle_for
 from ringsim.cli import cli
@@ -41,7 +42,7 @@ def test_cables_open_a_ring_too() -> None:
     assert float(found.values["deployment_time"]) == pytest.approx(WANTED - 1.0, rel=2e-3)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("time", "begun", "words"),
     [(1e-2, 47.0, "too short"), (60.0, 2.0, "too long"), (-1.0, 47.0, "above 0 s")],
 )

@@ -11,6 +11,8 @@ from ringsim.layout.layout import layout_of
 from ringsim.rigid.statics import OneCoordinate, first_acceleration, first_reaction
 from ringsim.scene import load_scene
 
+pytestmark = pytest.mark.quick
+
 RING = load_scene("ring18").with_values(
     {
         "structure.sections": 4, "structure.opening_angle": 60.0, "net": "none",

@@ -12,6 +12,8 @@ from ringsim.rigid.mechanism import Mechanism
 from ringsim.rigid.resistances import JointFrictionResistance, Opening
 from small_rings import pulled
 
+pytestmark = pytest.mark.quick
+
 
 def diagonal_rate(shape, phi: float) -> float:
     """d theta / d phi from cos(theta) = l cos(phi) / d."""

@@ -13,6 +13,8 @@ from ringsim.scene import Scene
 from ringsim.structures.pantograph_ring import PantographRing
 from small_rings import pulled
 
+pytestmark = pytest.mark.quick
+
 PIECES = 200
 
 

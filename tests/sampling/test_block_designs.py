@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loops import for_each
 from pydantic import TypeAdapter
 from SALib.sample import sobol as salib_sobol
 
@@ -14,6 +15,8 @@ from ringsim.refusal import InputError
 from ringsim.sampling.columns import Correlation
 from ringsim.sampling.designs.blocks import Morris, Saltelli
 from ringsim.sampling.table import AnyDistribution
+
+pytestmark = pytest.mark.quick
 
 UNIFORM = {"kind": "uniform", "low": 0.0, "high": 1.0}
 EACH = UNIFORM | {"each_section": True}
@@ -107,8 +110,8 @@ def test_stretches_of_places_are_groups(kind):
     assert [*whole] == ["force", "friction", "modulus"]
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(
+@for_each("kind", KINDS)
+@for_each(
     ("wrong", "words"),
     [
         ({"groups": {"a": ("frictoin",)}}, "did you mean friction"),

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from loops import for_each
 from pydantic import TypeAdapter
 
 from ringsim.refusal import InputError
@@ -14,6 +15,8 @@ from ringsim.sampling.columns import Correlation, Table
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import read_design, write_design
+
+pytestmark = pytest.mark.quick
 
 TRUSS = load_scene("truss2")
 IDENTITY = {"identity": "x", "scene": "", "solver": ""}
@@ -126,7 +129,7 @@ def test_a_shared_value_is_one_axis_of_correlations_and_grids() -> None:
     assert drawn(inputs, design={"kind": "grid", "levels": {"friction": 4}}).samples == 4 * 3
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("inputs", "words"),
     [
         ({"friction": FRICTION, UPPER: FRICTION | {"shared": []}}, "upper.*is drawn twice"),

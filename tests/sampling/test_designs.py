@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loops import for_each
 from pydantic import TypeAdapter
 
 from ringsim.choice import kinds_of
@@ -14,6 +15,8 @@ from ringsim.sampling.columns import Correlation
 from ringsim.sampling.designs.family import Design
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import load_scene
+
+pytestmark = pytest.mark.quick
 
 DESIGN = TypeAdapter(AnyDesign)
 INPUTS = TypeAdapter(dict[str, AnyDistribution])
@@ -230,7 +233,7 @@ def test_correlation_of_values_for_each_section_goes_section_by_section(base):
     np.testing.assert_allclose(matrix, -0.9 * np.eye(6), atol=0.1)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("inputs", "words"),
     [
         ({"rods.yung_modulus": THREE["rods.young_modulus"]}, "young_modulus"),
@@ -253,7 +256,7 @@ def test_inputs_that_the_scene_refuses_are_refused_before_anything_runs(inputs, 
         drawn(base, {"kind": "random", "samples": 30}, inputs)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("pairs", "words"),
     [
         ([("rods.young_modulus", "rods.young_modulus", 0.5)], "two different"),
@@ -282,7 +285,7 @@ def test_grid_refuses_correlations_and_unknown_levels(base):
         drawn(base, {"kind": "grid", "levels": {"loads.forc": 3}})
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "words"),
     [
         (None, "there is no file"),

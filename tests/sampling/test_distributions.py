@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 from pydantic import TypeAdapter, ValidationError
 from scipy import stats
 
 from ringsim.choice import kinds_of
 from ringsim.sampling.distributions import Distribution
 from ringsim.sampling.table import AnyDistribution
+
+pytestmark = pytest.mark.quick
 
 READ = TypeAdapter(AnyDistribution)
 
@@ -107,7 +110,7 @@ def test_uniform_reaches_its_ends_exactly():
     assert ends.quantile(np.array([0.0, 1.0])).tolist() == [0.1, 0.7]
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("table", "words"),
     [
         ({"kind": "uniform", "low": 1.0, "high": 1.0}, "must be below"),

@@ -6,9 +6,9 @@ import json
 from itertools import combinations
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 
 from ringsim.sampling.distributions import label_of
 
@@ -53,7 +53,7 @@ def test_values_that_read_alike_have_their_own_labels() -> None:
         assert label_of(one) != label_of(other), (one, other)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("value", "label"),
     [
         ([{"time": 0.2, "kind": "stuck-vjoint", "section": 2}],

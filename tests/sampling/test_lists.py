@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loops import for_each
 from pydantic import TypeAdapter
 
 from ringsim.refusal import InputError
@@ -14,6 +15,8 @@ from ringsim.sampling.designs.independent import Listed
 from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import load_scene
 from ringsim.storage.netcdf import read_design, write_design
+
+pytestmark = pytest.mark.quick
 
 TRUSS = load_scene("truss2")
 PATH = "cables.upper.friction.coefficient"
@@ -64,7 +67,7 @@ def test_lists_from_another_campaign_keep_their_arrays(tmp_path: Path) -> None:
         draw(ring, {}, (), Listed(file="design.nc"), seed=1, folder=tmp_path)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "words"),
     [
         (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from loops import for_each
 from scipy.special import ndtr, ndtri
 from scipy.stats import norm
 
@@ -133,7 +134,7 @@ def test_an_event_that_never_happens_ends_too():
     assert len(points) == 2 * (20 + 2 * 18)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("more", "words"),
     [
         ({"of": "opening_angle"}, "opening_angle has a value for each plane and section and time"),

@@ -17,6 +17,8 @@ from ringsim.sampling.table import AnyDesign, AnyDistribution, draw
 from ringsim.scene import Scene, load_scene
 from ringsim.storage.netcdf import add_coordinate, read_design, write_design
 
+pytestmark = pytest.mark.quick
+
 
 def drawn(base: Scene, inputs: dict[str, object]) -> Table:
     return draw(

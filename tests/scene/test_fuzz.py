@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 
 from ringsim.overrides import parse_assignment
 from ringsim.refusal import InputError
@@ -118,7 +119,7 @@ def test_any_accepted_number_is_kept_as_it_is(number: float) -> None:
         assert scene.loads.force == number
 
 
-@pytest.mark.parametrize("path", KNOWN)
+@for_each("path", KNOWN)
 def test_a_wrong_type_at_every_path_names_that_path(path: str) -> None:
     with pytest.raises(InputError) as refused:
         RING18.with_values({path: date(2026, 11, 21)})

@@ -12,6 +12,8 @@ from ringsim.exudyn.build import build
 from ringsim.rigid.statics import OneCoordinate
 from ringsim.scene import Scene, load_scene
 
+pytestmark = pytest.mark.quick
+
 RING = load_scene("ring18")
 HEAVY = {"boom.length": 3.0, "boom.density": 18000.0}
 

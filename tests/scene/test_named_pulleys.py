@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from loops import for_each
 
 from ringsim.cable.records import BlockSheave
 from ringsim.cli import cli
@@ -13,6 +14,8 @@ from ringsim.layout.layout import layout_of
 from ringsim.overrides import field_at
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene, scene_from_toml
+
+pytestmark = pytest.mark.quick
 
 TRUSS = load_scene("truss2")
 COEFFICIENT = "cables.upper.friction.coefficient"
@@ -24,7 +27,7 @@ def with_fault(**fault: object) -> Scene:
     return TRUSS.with_values({"faults": [{"time": 1.0, **fault}]})
 
 
-@pytest.mark.parametrize("end", ["first", "last", "both"])
+@for_each("end", ["first", "last", "both"])
 def test_names_are_those_of_the_places(end) -> None:
     """V pulleys are the blocks at the section's V-joint; a section's first hinge is the one on
     the hinge assembly that it shares with the section before, also where the winch is last."""
@@ -59,7 +62,7 @@ def test_names_are_those_of_the_places(end) -> None:
         assert near < 0.5 * far
 
 
-@pytest.mark.parametrize("end", ["first", "last", "both"])
+@for_each("end", ["first", "last", "both"])
 def test_a_name_changes_its_own_value(end) -> None:
     base = TRUSS.with_values({"cables.upper.end": end})
     # As the docstring of Cables tells the path; seen from the last section it is reversed.
@@ -96,7 +99,7 @@ def test_faults_name_them() -> None:
     ).span_names["upper"]  # fmt: skip
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "words"),
     [
         ({f'{COEFFICIENT}["section 2 W"]': 0.002},

@@ -2,11 +2,14 @@
 
 import pytest
 from click.testing import CliRunner
+from loops import for_each
 
 from ringsim.cli import cli
 from ringsim.overrides import parse_assignment
 from ringsim.refusal import InputError
 from ringsim.scene import Scene, load_scene
+
+pytestmark = pytest.mark.quick
 
 RING18 = load_scene("ring18")
 BARE = Scene(name="bare")
@@ -16,7 +19,7 @@ def changed(scene: Scene, *assignments: str) -> Scene:
     return scene.with_values(dict(parse_assignment(text) for text in assignments))
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("text", "value"),
     [
         ("a=3", 3), ("a=3.0", 3.0), ("a=-1e-3", -1e-3), ("a = 0.5 ", 0.5), ("a=true", True),
@@ -52,7 +55,7 @@ def test_tables_that_are_given_stay_as_they_were() -> None:
     assert values == {"structure": {"kind": "pantograph-ring"}, "structure.sections": 6}
 
 
-@pytest.mark.parametrize("section", [1, 2, 18])
+@for_each("section", [1, 2, 18])
 def test_sections_are_counted_from_one(section: int) -> None:
     scene = changed(RING18, f"rods.young_modulus[{section}]=1e11")
     expected = [120e9] * 18
@@ -82,7 +85,7 @@ def test_net_of_an_open_arc_has_a_value_for_each_corner() -> None:
     assert scene.net.stiffness == (0.001, 0.001, 0.5)
 
 
-@pytest.mark.parametrize("part", ["boom", "net", "loads", "stop"])
+@for_each("part", ["boom", "net", "loads", "stop"])
 def test_none_removes_a_part(part: str) -> None:
     assert getattr(changed(RING18, f"{part}=none"), part) is None
     assert getattr(RING18.with_values({part: None}), part) is None
@@ -145,13 +148,13 @@ def test_table_takes_the_place_of_the_whole_part() -> None:
     assert scene.stop.model_dump(exclude_defaults=True) == {"stiffness": 50.0}
 
 
-@pytest.mark.parametrize("value", ["{ kind = 'rigid'", "[1.0, 2.0", "{ kind = rigid }"])
+@for_each("value", ["{ kind = 'rigid'", "[1.0, 2.0", "{ kind = rigid }"])
 def test_broken_table_is_refused_as_such(value: str) -> None:
     with pytest.raises(InputError, match=r"--set boom = .*no table or list as TOML writes them"):
         parse_assignment(f"boom={value}")
 
 
-@pytest.mark.parametrize(
+@for_each(
     "path",
     ["structure.sections", "structure.closed", "structure.opening_angle", "loads.force",
      "net.stiffness", "rods.kind", "rods.elements", "solver.step", "boom.base"],

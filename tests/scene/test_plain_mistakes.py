@@ -13,6 +13,7 @@ import preloaded
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from loops import for_each
 
 from ringsim import load_scene, simulate
 from ringsim.cli import VERBS, cli
@@ -51,7 +52,7 @@ def test_unknown_verb_is_told_the_nearest() -> None:
     assert "known: scenes, check, run" in refused("xyzzy")
 
 
-@pytest.mark.parametrize("verb", ["run", "check", "stability", "accuracy"])
+@for_each("verb", ["run", "check", "stability", "accuracy"])
 def test_campaign_file_is_no_scene(verb: str, tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(CAMPAIGN)
@@ -171,7 +172,7 @@ def test_changed_distribution_is_told_with_its_input(tmp_path: Path) -> None:
     assert "its scene differs: solver.end_time = 0.6 instead of 0.5" in line
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("assignment", "named"),
     [
         ("end_time=3", "end_time is not a known key (did you mean solver.end_time?)"),
@@ -195,7 +196,7 @@ def test_plausible_assignments_are_told_what_they_mean(assignment: str, named: s
     assert named in refused("check", "ring18", "--set", assignment)
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("lines", "named"),
     [
         ('"loads.force" = { mean = 0.01, standard_deviation = 0.001 }',
@@ -224,7 +225,7 @@ def test_keys_that_belong_elsewhere_in_a_campaign_file(tmp_path: Path) -> None:
         assert named in refused("campaign", path)
 
 
-@pytest.mark.parametrize("verb", ["run", "check", "campaign"])
+@for_each("verb", ["run", "check", "campaign"])
 def test_a_result_is_no_input(verb: str, tmp_path: Path) -> None:
     path = tmp_path / "old.nc"
     save(xr.Dataset({"a": ("x", np.arange(3.0))}), path)
@@ -245,7 +246,7 @@ def test_places_without_a_campaign_are_told_apart(tmp_path: Path) -> None:
     assert "there is no such file" in refused("campaign", tmp_path / "nowhere.toml")
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("words", "named"),
     [
         (("run", "truss2", "--accuracy", "1%"), "'1%' is not a valid number"),
@@ -260,7 +261,7 @@ def test_bad_numbers_of_options_are_told_in_english(words: tuple[str, ...], name
     assert len(done.stderr.splitlines()) == 1
 
 
-@pytest.mark.parametrize("verb", ["", *VERBS])
+@for_each("verb", ["", *VERBS])
 def test_help_reads_as_english(verb: str) -> None:
     text = ringsim(*verb.split(), "--help")
     assert "``" not in text
@@ -305,7 +306,7 @@ def test_a_scene_file_without_its_ending_is_suggested(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("values", "text"),
     [
         ({"gravity.vector": [0, 0, 0]},

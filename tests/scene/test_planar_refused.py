@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from loops import for_each
 
 from ringsim.refusal import InputError
 from ringsim.scene import load_scene
+
+pytestmark = pytest.mark.quick
 
 SCENE = load_scene("planar-truss")
 BAD: list[tuple[dict[str, Any], tuple[str, ...]]] = [
@@ -37,9 +40,7 @@ BAD: list[tuple[dict[str, Any], tuple[str, ...]]] = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("values", "named"), BAD, ids=[next(iter(v)) + str(k) for k, (v, _) in enumerate(BAD)]
-)
+@for_each(("values", "named"), BAD, ids=[next(iter(v)) + str(k) for k, (v, _) in enumerate(BAD)])
 def test_refused_in_one_line(values: dict[str, Any], named: tuple[str, ...]) -> None:
     with pytest.raises(InputError) as refused:
         SCENE.with_values(values)

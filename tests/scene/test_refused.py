@@ -7,6 +7,7 @@ from pathlib import Path
 import preloaded
 import pytest
 from click.testing import CliRunner, Result
+from loops import for_each
 
 from bad_scenes import BAD_SCENES, Bad
 from ringsim.cli import cli
@@ -36,7 +37,8 @@ def test_there_are_more_than_a_hundred_bad_scenes() -> None:
     assert len(BAD_SCENES) > 100
 
 
-@pytest.mark.parametrize("key", BAD_SCENES)
+@pytest.mark.quick
+@for_each("key", BAD_SCENES)
 def test_bad_scene_gets_one_line_with_file_field_and_cure(key: str, tmp_path: Path) -> None:
     bad = BAD_SCENES[key]
     line = the_line(check(str(write(tmp_path, bad))))
@@ -82,12 +84,13 @@ def test_an_absent_file_names_the_built_in_scenes(tmp_path: Path) -> None:
     assert "did you mean ring18?" in the_line(check("ring81"))
 
 
-@pytest.mark.parametrize("name", ["", "a\0b", "x" * 5000, "with\nbreak"])
+@for_each("name", ["", "a\0b", "x" * 5000, "with\nbreak"])
 def test_impossible_file_names_are_refused(name: str) -> None:
     the_line(check(name))
 
 
-@pytest.mark.parametrize(
+@pytest.mark.quick
+@for_each(
     ("assignment", "named"),
     [
         ("loads.force", "must read PATH=VALUE"),

@@ -4,9 +4,9 @@ import struct
 import tomllib
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loops import for_each
 
 from ringsim.scene import Scene, builtin_scenes, scene_from_table, scene_from_toml
 
@@ -160,7 +160,7 @@ def test_replacing_nothing_changes_nothing(table: dict[str, Any]) -> None:
     assert scene.with_values({}) == scene
 
 
-@pytest.mark.parametrize("name", builtin_scenes())
+@for_each("name", builtin_scenes())
 def test_built_in_scenes_are_named_after_their_file_and_survive_toml(name: str) -> None:
     scene = scene_from_toml(builtin_scenes()[name], source=name)
     assert scene.name == name
@@ -168,7 +168,7 @@ def test_built_in_scenes_are_named_after_their_file_and_survive_toml(name: str) 
     assert scene_from_toml(scene.to_toml(), source=name) == scene
 
 
-@pytest.mark.parametrize("name", builtin_scenes())
+@for_each("name", builtin_scenes())
 def test_kind_is_the_first_line_of_its_table(name: str) -> None:
     table = scene_from_toml(builtin_scenes()[name], source=name).to_table()
     assert next(iter(table["structure"])) == next(iter(table["rods"])) == "kind"

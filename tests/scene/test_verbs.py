@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from loops import for_each
 
 from ringsim.cli import cli
 from ringsim.scene import builtin_scenes, load_scene
@@ -33,7 +34,7 @@ def test_scenes_lists_every_built_in_scene_with_its_title() -> None:
         assert scene.title in listed
 
 
-@pytest.mark.parametrize("name", builtin_scenes())
+@for_each("name", builtin_scenes())
 def test_printed_scene_is_a_starting_point(name: str, tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(run("scenes", name), encoding="utf-8")
@@ -93,7 +94,7 @@ def test_check_of_any_number_of_sections(sections: int) -> None:
     assert axes[1] / axes[0] == pytest.approx(3.2856 / 3.5184, abs=1.5e-4)
 
 
-@pytest.mark.parametrize("verb", ["scenes", "check", "run", "campaign"])
+@for_each("verb", ["scenes", "check", "run", "campaign"])
 def test_help_lists_the_verb(verb: str) -> None:
     assert verb in run("--help")
 

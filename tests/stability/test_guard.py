@@ -12,6 +12,8 @@ from ringsim.parts.solver import Solver
 from ringsim.stepping.guard import BLOW_UP, GAIN, GAP, LOSS, PEAK_BEND, SLIGHT, STEPS, Guard
 from ringsim.stepping.instant import Energies, Instant, Scales
 
+pytestmark = pytest.mark.quick
+
 TOLERANCE, LEAST, BAR = 0.02, 1e-3, 0.3
 SOLVER = Solver(energy_tolerance=TOLERANCE)
 SCALES = Scales(rate=0.1, energy=LEAST, travel=math.pi, length=BAR)

@@ -29,6 +29,8 @@ from ringsim.parts.solver import Solver
 from ringsim.plots.studies import stability
 from ringsim.variables import Cause, Fate, Status
 
+pytestmark = pytest.mark.quick
+
 NEWTON = "the solver gave up at 1 s after 9 reductions of the step: reduce solver.step"
 ENDS = {
     "all V-joints have reached 180 deg": (Status.OK, Cause.NONE, Fate.DEPLOYED),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from loops import for_each
 
 from ringsim.analysis.stability import ENDED, OK
 from ringsim.campaign.panels import Panel, by_engines, panels_over, sweep_of
@@ -109,7 +110,7 @@ def test_the_same_command_goes_on_without_running_anything_again(mapped) -> None
     assert {path: path.stat().st_mtime_ns for path in out.glob("*/*/journals/*")} == stamps
 
 
-@pytest.mark.parametrize(
+@for_each(
     ("over", "wanted"),
     [
         (["rods.damping=1..2"], "--over rods.damping=1..2: has no partner"),
@@ -153,7 +154,7 @@ def test_values_are_geometric_from_a_decade_on_and_whole_where_the_field_is() ->
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", builtin_scenes())
+@for_each("name", builtin_scenes())
 def test_default_axes_stand_around_what_the_scene_has(name) -> None:
     scene = load_scene(name)
     panels = panels_over(scene, [], points=5)

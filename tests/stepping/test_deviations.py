@@ -12,6 +12,8 @@ from ringsim.stepping.control import RunControl
 from ringsim.stepping.instant import Energies, Instant, Scales
 from ringsim.stepping.repeats import MOST, DeviationSteps
 
+pytestmark = pytest.mark.quick
+
 AMPLITUDE, FREQUENCY, DURATION, TOLERANCE = 1e-3, 10.0, 20.0, 0.02
 REST = Energies(0.0, 0.0, 0.0, 0.0)
 

@@ -7,6 +7,8 @@ import pytest
 
 from ringsim.stepping.events import extrapolated
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_polynomial_goes_on(degree: int) -> None:

@@ -7,12 +7,15 @@ from collections import deque
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ringsim.stepping.instant import Energies, Instant, Remembering, pack, unpack
 from ringsim.stepping.locks import Overrun
 from ringsim.variables import Cause, Fate, Reason
+
+pytestmark = pytest.mark.quick
 
 LEAVES = st.one_of(
     st.none(), st.booleans(), st.integers(-(10**9), 10**9), st.floats(allow_nan=False), st.text()

@@ -9,6 +9,8 @@ import pytest
 from ringsim.stepping.ending import MOVED, WINDOW, Rest
 from ringsim.stepping.instant import Energies, Instant
 
+pytestmark = pytest.mark.quick
+
 END, BEGIN = 10.0, 1.0
 """End time of the run, s, and the angle from which the joints start, rad."""
 

@@ -16,6 +16,8 @@ from ringsim.stepping.instant import Energies, Instant, Scales, pack, unpack
 from ringsim.stepping.locks import Latches, Locks
 from ringsim.variables import Fate, Status
 
+pytestmark = pytest.mark.quick
+
 INERTIA, TORQUE, BEGIN = 0.2, 0.01, math.radians(20.0)
 """Of each of six V-joints, kg m^2 and N m, and the opening angle that they start from."""
 SCALES = Scales(rate=0.2, energy=1e-3, travel=math.pi - BEGIN, length=0.3, contact_step=1e-3)

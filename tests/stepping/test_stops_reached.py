@@ -8,6 +8,8 @@ import pytest
 from ringsim.stepping.locks import Locks
 from ringsim.variables import Fate
 
+pytestmark = pytest.mark.quick
+
 STOWED = 0.8
 
 

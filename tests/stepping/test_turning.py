@@ -6,6 +6,8 @@ import pytest
 from ringsim.parts.joints import ViscousCoulombFriction
 from ringsim.stepping.locks import Turning
 
+pytestmark = pytest.mark.quick
+
 SLIP = 2e-4
 FRICTION = ViscousCoulombFriction(coulomb=0.01, viscous=0.02, rate=5e-4)
 
