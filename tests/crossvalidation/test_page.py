@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "cross_validation.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "evidence" / "cross_validation.md").read_text(encoding="utf-8")
 
 
 def test_every_file_that_the_page_names_exists() -> None:
