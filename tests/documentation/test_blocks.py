@@ -49,9 +49,8 @@ def test_what_wishes_lead_to_exists() -> None:
     assert len(commands) > 15
     for verb, *arguments in commands:
         command_of(verb).make_context(verb, arguments).close()
-    for key in keys:
-        done = CliRunner().invoke(cli, ["explain", key])
-        assert done.exit_code == 0, done.output
+    done = CliRunner().invoke(cli, ["explain", *keys])
+    assert done.exit_code == 0, done.output
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
