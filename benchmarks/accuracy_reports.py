@@ -2,8 +2,9 @@
 
 Run: python benchmarks/accuracy_reports.py [--brief] [scene ...]
 
-Writes docs/accuracy/SCENE.md and .png, and ringsim/scenes/evidence/SCENE.toml.  A study that was
-interrupted goes on from runs/accuracy-SCENE, and begins anew if the engine has changed since.
+Writes docs/evidence/accuracy/SCENE.md and .png, and ringsim/scenes/evidence/SCENE.toml.  A study
+that was interrupted goes on from runs/accuracy-SCENE, and begins anew if the engine has changed
+since.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
+
+from stamp import stamp
 
 ROOT = Path(__file__).parents[1]
 EVIDENCE = ROOT / "ringsim" / "scenes" / "evidence"
@@ -45,11 +48,13 @@ def remake(name: str, *words: str) -> None:
     folder = fresh(ROOT / "runs" / "-".join(["accuracy", name, *words]))
     command = [sys.executable, "-m", "ringsim", "accuracy", name, "--out", str(folder), *words]
     subprocess.run(command, check=True)
-    docs = ROOT / "docs" / "accuracy"
+    docs = ROOT / "docs" / "evidence" / "accuracy"
     for target in (docs, EVIDENCE):
         target.mkdir(parents=True, exist_ok=True)
-    for end in ("md", "png"):
-        shutil.copyfile(folder / f"accuracy.{end}", docs / f"{name}.{end}")
+    title, _, rest = (folder / "accuracy.md").read_text(encoding="utf-8").partition("\n")
+    made = stamp(" ".join(["python benchmarks/accuracy_reports.py", *words, name]))
+    (docs / f"{name}.md").write_text(f"{title}\n\n{made}\n{rest}", encoding="utf-8")
+    shutil.copyfile(folder / "accuracy.png", docs / f"{name}.png")
     shutil.copyfile(folder / "settings.toml", EVIDENCE / f"{name}.toml")
 
 

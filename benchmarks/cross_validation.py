@@ -4,8 +4,8 @@ Run: python benchmarks/cross_validation.py CASE [--set PATH=VALUE ...]
      python benchmarks/cross_validation.py table
 
 CASE is closed6_force, closed18_force or ring18.  "table" prints the Markdown table of
-docs/cross_validation.md.  Everything is compared at equal mean opening angle, before any stop
-acts.  tests/crossvalidation/mbdyn_data/README.md describes the reference and its own errors.
+docs/evidence/cross_validation.md.  Everything is compared at equal mean opening angle, before any
+stop acts.  tests/crossvalidation/mbdyn_data/README.md describes the reference and its own errors.
 """
 
 from __future__ import annotations

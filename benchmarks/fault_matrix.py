@@ -1,7 +1,7 @@
 """What becomes of a ring whose motor and whose structure fail: every pair of faults.
 
 Run: python benchmarks/fault_matrix.py [--sections 2 6 18] [--planes upper lower]
-    [--fidelity full | frame] [--out docs/faults.md]
+    [--fidelity full | frame] [--out docs/evidence/faults.md]
 
 The lower winch stops half-way, starts 3 s late or stalls at a tension that is half the peak of the
 sound run, while a V-joint sticks, a pulley jams or a cable parts in either plane.  The page tells
@@ -119,7 +119,7 @@ def main() -> None:
     """Write the page."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--sections", type=int, nargs="+", default=[2, 6, 18])
-    parser.add_argument("--out", type=Path, default=Path("docs/faults.md"))
+    parser.add_argument("--out", type=Path, default=Path("docs/evidence/faults.md"))
     parser.add_argument("--fidelity", choices=("full", "frame"), default="full")
     parser.add_argument("--planes", nargs="+", choices=PLANES, default=PLANES)
     chosen, mark = parser.parse_args(), "## "

@@ -3,10 +3,10 @@
 Run: python benchmarks/stability_map.py [--quick | --every N] [--fidelity full|frame|both]
                                         [--workers N] [--out DIR]
 
-docs/stability.md is what it wrote, of both engines with ``--every 3``.  Every panel spans the range
-from harmless to absurd.  Rings are small where an axis does not need more, and start half open
-where the stowed end is not the question, so that a cell takes seconds.  ``ringsim stability SCENE``
-maps around one scene.
+docs/evidence/stability.md is what it wrote, of both engines with ``--every 3``.  Every panel spans
+the range from harmless to absurd.  Rings are small where an axis does not need more, and start half
+open where the stowed end is not the question, so that a cell takes seconds.  ``ringsim stability
+SCENE`` maps around one scene.
 """
 
 from __future__ import annotations

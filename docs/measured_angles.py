@@ -1,4 +1,4 @@
-"""Prints the rows of docs/measured_angles.md: forces from opening angles beside those of the nodes.
+"""Prints the rows of docs/evidence/measured_angles.md: forces from angles and those of the nodes.
 
 ringsim run truss2 --fidelity frame --set record.positions=true --out truss2.nc
 ringsim run ring18-cable --fidelity frame --set record.positions=true --out ring18-cable.nc

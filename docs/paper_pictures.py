@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/published.md, and prints the rows of its table of stresses.
+"""Draws the pictures of docs/evidence/published.md, and prints the rows of its table of stresses.
 
     ringsim campaign campaigns/paper_002.toml --workers 2
     ringsim campaign campaigns/paper_002_ancf.toml --workers 2

@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/studies that are not figures of one campaign alone.
+"""Draws the pictures of docs/evidence/studies that are not figures of one campaign alone.
 
     python docs/study_pictures.py runs
 

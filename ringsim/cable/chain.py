@@ -272,7 +272,7 @@ def pulley_tensions(ropes: Ropes, tensions: Array) -> Array:
 #
 # It gives s_0 and s_n exactly, and needs no rate of the tension.  What it leaves out, the change
 # in how the stretch is distributed, is of second order in strain.  Energy is conserved identically:
-# see docs/cables.md.
+# see docs/theory/truss2.md.
 
 
 class Chain:

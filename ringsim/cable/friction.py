@@ -23,7 +23,7 @@ from ringsim.units import FrictionCoefficient, MetreOrZero, Model
 #
 #     exp(sum over pulleys of |ln eta| (1 - tanh(m v / s_slip))) - 1,
 #
-# which hardly depends on N; docs/cables.md lists it.
+# which hardly depends on N; docs/theory/truss2.md lists it.
 
 
 LARGEST_SLIP_SPEED = 2e-4

@@ -381,8 +381,8 @@ class BarHalfBracket(Bracket):
 
         b = H sin((2 theta - delta) / 2),   a = +-H cos((2 theta - delta) / 2)
 
-    (+ on the first half).  b is h of paper 000, eq. 21, which neglects a; see docs/cables.md.  The
-    span to that half's own hinge pulley keeps its length, and the other has
+    (+ on the first half).  b is h of paper 000, eq. 21, which neglects a (docs/theory/truss2.md).
+    The span to that half's own hinge pulley keeps its length, and the other has
 
         L^2 = l^2 + H^2 + 2 l H sin(theta - delta),
 

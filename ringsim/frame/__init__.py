@@ -1,4 +1,4 @@
-"""The frame engine: rings in joint coordinates, compiled; see docs/frame.md."""
+"""The frame engine: rings in joint coordinates, compiled; see docs/theory/frame.md."""
 
 from ringsim.compile_cache import choose_folder
 

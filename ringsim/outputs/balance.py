@@ -133,7 +133,7 @@ def summary(values: Values, span_names: SpanNames) -> dict[str, str]:
 # Integrator and elements are of second order: such a run has a quarter of the error, so that the
 # two are apart by three quarters of it (Richardson).  A finer run shows the error itself, a coarser
 # one only how errors grow: it says little of a vibration that it does not resolve.  Each output
-# states the factors of its bar (``ErrorBar``); docs/accuracy.md tells what they cover.
+# states the factors of its bar (``ErrorBar``); docs/evidence/accuracy.md tells what they cover.
 
 
 OF_DIFFERENCE = 4.0 / 3.0

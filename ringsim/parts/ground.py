@@ -80,7 +80,7 @@ class Loads(Model):
     Positive forces open the ring, negative ones fold it.  They keep their direction in space: a
     free ring that pitches turns under them, so that each pair of forces +F and -F, a height h apart
     in the ring and pitched by t, has the moment F h sin(t) that turns it back, and does the work of
-    h cos(t) instead of h.  docs/loads.md says how much that is.  Source: paper 002.
+    h cos(t) instead of h.  docs/guide/loads.md says how much that is.  Source: paper 002.
     """
 
     force: PerSection[Newton]

@@ -171,8 +171,8 @@ def pulley_forces(dataset: xr.Dataset, plane: str) -> xr.DataArray:
 
     The sum of the two pulls on a pulley, T_behind u_behind - T_before u_before: with the
     inclination gamma of the spans of eq. 20 they are paper 000's eqs 28 to 31 with the signs of
-    docs/cables.md.  The rope comes to the first pulley, and goes to a winch at its other end, along
-    the boom; where it ends at the last hinge, the force is on its end.
+    docs/theory/truss2.md.  The rope comes to the first pulley, and goes to a winch at its other
+    end, along the boom; where it ends at the last hinge, the force is on its end.
 
     Returns
     -------

@@ -1,5 +1,7 @@
-"""Steps, care and guard of a run, for every engine: numbers in, decisions out (docs/steps.md).
+"""Steps, care and guard of a run, for every engine: numbers in, decisions out.
 
-``RunControl`` (run_control.py) chooses the next step, has a bad one repeated and ends the run;
-``restarts.py`` starts a run anew that failed.
+The physics is told in docs/theory/steps.md.
+
+``RunControl`` (control.py) chooses the next step, has a bad one repeated and ends the run;
+``ending.py`` starts a run anew that failed.
 """

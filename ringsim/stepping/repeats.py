@@ -208,7 +208,7 @@ winch may take a ring that is nearly open to its stops within it."""
 _GLOBAL_ERROR = _LOCAL_ERROR / 15.0
 """C of deviations.  Local errors of a vibration cancel for the most part: on rings of 6 and 18
 sections errors against MBDyn are a fifteenth of what their sum would be, so that
-``solver.deviation_tolerance`` is the error found there (docs/cross_validation.md)."""
+``solver.deviation_tolerance`` is the error found there (docs/evidence/cross_validation.md)."""
 MOST = 2000.0
 """Steps that the deviations may ask for over a run.  The ovalisation of 18 sections takes 1300, and
 a shorter step would follow what Newton leaves of the residual."""

@@ -145,7 +145,7 @@ class PlanarTruss(Structure):
     the upper beam.
 
     Source: paper 001, fig. 4 and table 1, for parts and sections; where strut and cable are
-    attached, and the spring, are inferred from its figs 8 and 9 (docs/planar_truss.md).
+    attached, and the spring, are inferred from its figs 8 and 9 (docs/theory/planar_truss.md).
     """
 
     planes: ClassVar[tuple[str, ...]] = ("upper",)

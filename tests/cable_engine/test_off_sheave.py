@@ -41,7 +41,7 @@ def test_the_longest_slack_is_that_of_the_recorded_strains(fidelity: str) -> Non
         for first, last in stretches(strain[plane] < 0.0)
     }
     (plane, first), most = max(slack.items(), key=lambda one: one[1])
-    assert most > 200  # it is slack for a while: see docs/cables.md
+    assert most > 200  # it is slack for a while: see docs/theory/truss2.md
     assert float(found["longest_slack"]) == pytest.approx(0.001 * most, abs=0.003)
     assert float(found["longest_slack_time"]) == pytest.approx(0.001 * first, abs=0.003)
     assert str(found["longest_slack_plane"].item()) == found["plane"].values[plane]

@@ -1,4 +1,4 @@
-"""What docs/cables.md says of paper 000's figs 4, 6, 7, 9 and 10, computed anew from a run."""
+"""What docs/theory/truss2.md says of paper 000's figs 4, 6, 7, 9 and 10, computed anew."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ringsim.scene import load_scene
 from ringsim.simulation import simulate
 
 Array = NDArray[np.float64]
-PAGE = Path(__file__).parents[2] / "docs" / "cables.md"
+PAGE = Path(__file__).parents[2] / "docs" / "theory" / "truss2.md"
 HALF, OFFSET, RATIO, PLAN = 0.2889, 0.105, 0.04, np.radians(21.53959)
 """Of truss2: bar half and block offset (m), f / R, and the turn of the plan between sections."""
 

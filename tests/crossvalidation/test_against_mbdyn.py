@@ -183,7 +183,8 @@ def test_the_data_start_in_the_fold_state(case: str) -> None:
 
 def test_the_page_says_what_a_run_gives() -> None:
     """The row of closed6_force at default settings, to the digits that are written."""
-    page = (DATA.parents[2] / "docs" / "cross_validation.md").read_text(encoding="utf-8")
+    file = DATA.parents[2] / "docs" / "evidence" / "cross_validation.md"
+    page = file.read_text(encoding="utf-8")
     row = next(r for r in page.splitlines() if r.startswith("| closed6_force | default |"))
     time, _, _, asynchrony, mean_stress, worst_stress = row.strip("| ").split(" | ")[2:8]
     found = Comparison("closed6_force", default_run("closed6_force", stress=True))

@@ -8,7 +8,7 @@ import pytest
 pytestmark = pytest.mark.quick
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "cross_validation.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "evidence" / "cross_validation.md").read_text(encoding="utf-8")
 
 
 def test_every_file_that_the_page_names_exists() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -15,6 +16,7 @@ from loops import for_each
 from pages import PAGES, ROOT, blocks, calls
 from ringsim.cli import VERBS, cli, command_of
 
+WISHES = (ROOT / "docs" / "i_want_to.md").read_text(encoding="utf-8")
 TUTORIAL = ROOT / "docs" / "tutorial.md"
 CALLS = [
     pytest.param(call, id=f"{page.relative_to(ROOT)}: {' '.join(call)[:60]}")
@@ -36,6 +38,21 @@ def test_commands_and_their_options_exist(call: list[str]) -> None:
     command = command_of(verb)
     arguments = [each.strip("[]").split("|")[0] for each in arguments if each != "|"]
     command.make_context(verb, arguments).close()
+
+
+def test_what_wishes_lead_to_exists() -> None:
+    """Commands of the table are accepted with their options, its keys and variables are known."""
+    rows = [line.split(" | ") for line in WISHES.splitlines() if re.match(r"\| [a-z]", line)]
+    assert 25 <= len(rows) <= 40
+    named = [word for _, told, _ in rows for word in re.findall(r"`([^`]+)`", told)]
+    keys = [word for word in named if re.fullmatch(r"[a-z_.]+", word) and word != "kind"]
+    commands = [shlex.split(word)[1:] for word in named if word.startswith("ringsim ")]
+    assert len(keys) > 20
+    assert len(commands) > 15
+    for verb, *arguments in commands:
+        command_of(verb).make_context(verb, arguments).close()
+    done = CliRunner().invoke(cli, ["explain", *keys])
+    assert done.exit_code == 0, done.output
 
 
 @pytest.mark.quick

@@ -1,4 +1,4 @@
-"""Numbers of docs/published.md and docs/measured_angles.md that scripts of docs compute."""
+"""Numbers of published.md and measured_angles.md in docs/evidence that scripts of docs compute."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from pages import ROOT
 from ringsim.files import parse_toml
 from ringsim.scene import scene_from_toml
 
-PUBLISHED = (ROOT / "docs" / "published.md").read_text(encoding="utf-8")
-ANGLES = (ROOT / "docs" / "measured_angles.md").read_text(encoding="utf-8")
+PUBLISHED = (ROOT / "docs" / "evidence" / "published.md").read_text(encoding="utf-8")
+ANGLES = (ROOT / "docs" / "evidence" / "measured_angles.md").read_text(encoding="utf-8")
 
 
 def load_case(campaign: str, force: float) -> xr.Dataset:

@@ -1,4 +1,4 @@
-"""The blocks of docs/python.md run as they stand there, as one script without a main guard."""
+"""The blocks of docs/guide/python.md run as they stand, as one script without a main guard."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ringsim.plots.campaign import figures
 ONE_PICTURE = tuple(one for one in figures.PICTURES if one.name == "distributions")
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "guide" / "python.md").read_text(encoding="utf-8")
 
 
 def blocks(language: str) -> list[str]:

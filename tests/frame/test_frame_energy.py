@@ -23,8 +23,8 @@ from ringsim.stepping.instant import Passing, lost_between
     ids=["ring6", "truss2-short", "ring18", "truss2", "ring18-cable"],
 )
 def test_energy_is_kept(name: str, values: dict[str, Any], frames: float, exudyn: float) -> None:
-    """To a tenth more than docs/frame.md tells: both choose their steps by what goes missing, and
-    which of them is repeated is luck.
+    """To a tenth more than docs/evidence/frame.md tells: both choose their steps by what goes
+    missing, and which of them is repeated is luck.
     """
     scene = load_scene(name).with_values(values)
     assert float(by_frames(scene).values["energy_error"]) < frames

@@ -13,7 +13,7 @@ import pytest
 import ringsim
 from main_line import ROOT
 
-TABLE = (ROOT / "docs" / "published.md").read_text(encoding="utf-8")
+TABLE = (ROOT / "docs" / "evidence" / "published.md").read_text(encoding="utf-8")
 
 
 def stated(case: str) -> list[float]:
