@@ -196,7 +196,8 @@ def show(name: str) -> None:
         if found.status != Status.OK:
             beyond, verdict = True, f"needed: {found.status.word}" if taken else found.status.word
         elif found.fate != standing.outcome.fate:
-            beyond, verdict = True, f"needed: {found.fate.word}" if taken else found.fate.word
+            word = found.fate.word.replace("_", " ")
+            beyond, verdict = True, f"needed: {word}" if taken else word
         elif taken:
             verdict = "needed" if beyond else "changes less than the error bars"
         else:

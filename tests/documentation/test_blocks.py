@@ -17,6 +17,7 @@ from pages import PAGES, ROOT, blocks, calls
 from ringsim.cli import VERBS, cli, command_of
 
 WISHES = (ROOT / "docs" / "i_want_to.md").read_text(encoding="utf-8")
+EVIDENCE = [page for page in PAGES if "evidence" in page.parts and page.stem != "index"]
 TUTORIAL = ROOT / "docs" / "tutorial.md"
 CALLS = [
     pytest.param(call, id=f"{page.relative_to(ROOT)}: {' '.join(call)[:60]}")
@@ -55,6 +56,14 @@ def test_what_wishes_lead_to_exists() -> None:
     assert done.exit_code == 0, done.output
 
 
+@for_each("page", EVIDENCE, ids=lambda path: str(path.relative_to(ROOT)))
+def test_evidence_says_below_its_title_which_build_made_it(page: Path) -> None:
+    title, made, *_ = page.read_text(encoding="utf-8").split("\n\n")
+    assert title.startswith("# ")
+    assert re.search(r"made\sby\scommit\s`[0-9a-f]{7}`\s\(2026-\d\d-\d\d\)", made.replace("M", "m"))
+    assert re.search(r"again\sby", made, re.IGNORECASE)
+
+
 @pytest.mark.quick
 @for_each("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_links_lead_to_files(page: Path) -> None:
@@ -66,7 +75,7 @@ def test_links_lead_to_files(page: Path) -> None:
 
 @pytest.mark.parametrize("page", SCRIPTS, ids=lambda path: path.stem)
 def test_python_of_a_page_runs(page: Path, tmp_path: Path) -> None:
-    (script,) = blocks(page, "python")
+    script = "\n".join(blocks(page, "python"))
     (tmp_path / "script.py").write_text(script, encoding="utf-8")
     run([sys.executable, "-W", "error", "script.py"], tmp_path)
 
