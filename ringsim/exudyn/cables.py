@@ -238,7 +238,11 @@ class CableDrive:
         state = self.chain.state(ropes, placed.points, placed.velocities, wound, wound_rate)
         return state, placed
 
-    def advance(self, time: float, state: ChainState, slopes: Array) -> None:
+    def take(self, ropes: Ropes) -> None:
+        """Go on with ropes that a fault may have changed."""
+        self.ropes = ropes
+
+    def begin(self, time: float, state: ChainState, slopes: Array) -> None:
         """Let the winches begin the next step at a time (s) in a state of the chain.
 
         ``slopes`` are the derivatives of the cables' ideal paths after the opening angle, m/rad.

@@ -4,16 +4,15 @@ steps.
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import exudyn as exu
 import numpy as np
 
 from ringsim.cable.chain import ChainState
-from ringsim.cable.ropes import Flags
 from ringsim.exudyn.assembly import STIFFENING, Predictor
 from ringsim.exudyn.build import Built, build
+from ringsim.exudyn.laws import AngleForces
 from ringsim.exudyn.meters import (
     AccelerationMeter,
     BaseMeter,
@@ -28,14 +27,11 @@ from ringsim.exudyn.model import Openings, State, joint_groups
 from ringsim.layout.layout import Layout
 from ringsim.outputs.family import Reading
 from ringsim.outputs.recorder import Recorder
-from ringsim.parts.faults import AT_ONCE, Faults, Struck
 from ringsim.rigid.statics import residual_tolerance, rope_reach, scales_of
 from ringsim.scene import Scene
 from ringsim.scene.substituted import strained
-from ringsim.stepping.control import RunControl
-from ringsim.stepping.events import Events
 from ringsim.stepping.instant import Instant, Strained
-from ringsim.stepping.locks import Latches, locks_of
+from ringsim.stepping.run import Run
 from ringsim.variables import Cause, Outcome, Reason
 
 # When exudyn's modified Newton renews its Jacobian within a step, and when it gives up.
@@ -162,17 +158,17 @@ def solve(scene: Scene, watch: Watch | None = None) -> Outcome:
     return history.outcome()
 
 
-class Integration:
+class Integration(Run):
     """One run of a built model."""
 
     def __init__(self, built: Built, watch: Watch | None = None) -> None:
-        self._watch = watch
         model, scene = built.model, built.model.scene
-        self._built, self._scene = built, scene
+        super().__init__(scene, watch)
+        self._built, self._model, self._cables = built, model, built.cables
         self._system = model.assembly.system
         self._solver = exu.MainSolverImplicitSecondOrder()
         self._settings = solver_settings(scene, newton_norm(built))
-        self._state = State(model)
+        self._now = State(model)
         self._openings = Openings(model)
         self._energy = EnergyMeter(built)
         self._stress = StressMeter(model) if scene.record.stress else None
@@ -190,30 +186,35 @@ class Integration:
         if self._bending is not None:
             coordinates["station"] = self._bending.stations
         self._gaps = joint_groups(model)
-        angles = self._openings.read(self._state)[0]
-        self._latches = Latches(scene)
-        self._locks = locks_of(scene, angles, self._latches)
-        self._faults, self._events = Faults(scene.faults), Events(scene)
-        self._turn = scene.loads_turn_at
         self._fresh, self._refused = True, False
         self._weighed: Instant | None = None
         self._chain: ChainState | None = None
         self.history = Recorder(scene, coordinates)
         ropes = None if built.cables is None else built.cables.ropes.content
-        self._control = RunControl(
-            scene.solver,
+        self._set_out(
+            self._measured(0.0),
             scales_of(scene, model.layout, model.ideal, ropes),
-            self._read(self._measure(0.0)),
-            self._locks,
-            limits=scene.limits,
-            follow_deviations=scene.record.stress,
-            turn=scene.loads_turn_at,
-            strained=Strained(self._energy.strain_energy(), model.prestress),
+            Strained(self._energy.strain_energy(), model.prestress),
         )
+
+    @property
+    def _state(self) -> State:
+        """See ``Run``."""
+        return self._now
+
+    @property
+    def _at(self) -> ChainState | None:
+        """See ``Run``: of the state that was measured last."""
+        return self._chain
+
+    @property
+    def _laws(self) -> AngleForces:
+        """See ``Run``."""
+        return self._built.angles
 
     def run(self) -> Recorder:
         """Integrate until all V-joints have locked and settled, or to the end time."""
-        history, solver, control, system = self.history, self._solver, self._control, self._system
+        solver, control, system = self._solver, self._control, self._system
         solver.SetUserFunctionUpdateCurrentTime(system, self._update_time)
         system.SetPostStepUserFunction(self._after_step)
         model = self._built.model
@@ -247,10 +248,7 @@ class Integration:
             cause = _detail(str(error))
         if control.goes_on:
             control.fail(self._refusal() or cause)
-        control.conclude()
-        history.status, history.fate = control.status, control.fate
-        history.reason = control.reason + self._energy.note()
-        history.repeats, history.caught = control.repeats, self._latches.caught
+        history: Recorder = self._conclude(self._energy.note())
         history.newton_iterations = int(solver.it.newtonStepsCount)
         history.jacobians = int(solver.it.newtonJacobiCount)
         # exudyn keeps the callbacks, and they keep the system that they were given to.  Such a
@@ -280,24 +278,12 @@ class Integration:
         solver.it.currentTime = solver.it.currentTime + solver.it.currentStepSize
         system.systemData.SetTime(solver.it.currentTime, exu.ConfigurationType.Current)
 
-    def _begin(self, now: Instant) -> None:
-        """Let winches begin a step."""
-        cables, slope = self._built.cables, self._scene.structure.path_slope
-        if cables is None or self._chain is None:
-            return
-
-        def path_slope(number: int) -> float:
-            plane, cable = cables.present[number]
-            return slope(cable, now.angles[plane])
-
-        cables.advance(now.time, self._chain, cables.winches.path_slopes(path_slope))
-
     def _weigh(self, system: Any, time: float) -> list[float]:
         """Have exudyn repeat a step that has converged to a state that is not good enough."""
         if time > self._control.now.time and self._weighed is None:
-            self._state.refresh()
-            if self._state.finite():
-                self._weighed = self._measure(time)
+            self._now.refresh()
+            if self._now.finite():
+                self._weighed = self._measured(time)
                 self._refused = self._control.shorter(self._weighed) is not None
         return [_REFUSE if self._refused else 0.0, -1.0]
 
@@ -306,99 +292,40 @@ class Integration:
         if time <= self._control.now.time:
             return True
         self._fresh = True
-        self._state.refresh()
-        if not self._state.finite():
+        self._now.refresh()
+        if not self._now.finite():
             text = (
                 f"the state is not finite at {time:.6g} s: reduce solver.step or solver.tolerance"
             )
             self._control.diverge(Reason(Cause.NOT_FINITE, text))
             return False
-        found = self._weighed or self._measure(time)
-        goes_on = self._control.accept(found, self._read(found))
-        if self._watch is not None:
-            self._watch(self._control.now)
-        if self._locks is not None:
-            self._lock(self._latches.locked(self._locks.deployed), time)
-        return goes_on
+        return self._accepted(self._weighed or self._measured(time))
 
-    def _lock(self, locked: Flags, time: float) -> None:
-        """Latch the V-joints that have locked, and let winches know whose plane has."""
-        self._latches.hold(self._built.angles.switches)
-        self._built.angles.follow()
-        cables = self._built.cables
-        if cables is not None and self._chain is not None:
-            for number, (plane, _) in enumerate(cables.present):
-                if locked[plane].all():
-                    cables.winches.lock(number, time, self._chain)
-
-    def _read(self, now: Instant) -> Instant:
-        """Note a state that the run goes on from; returns it as events leave it.
-
-        ``self._chain`` holds the cables at the state that was measured last, which is this one.
-        """
-        if self._strike(now) | self._turn_loads(now.time) or self._events.at(now.time):
-            self._energy.go_on_from(now.energies.work, self._state)
-            self._begin(now)
-            after = self._measure(now.time)
-            # What a fault lets go is lost; nothing moves while it strikes.
-            lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
-            energies = after.energies._replace(lost=lost, driven=now.energies.driven)
-            now = replace(after, energies=energies)
-        self._energy.keep()
-        cables = self._built.cables
-        self.history.note(
-            Reading(
-                **vars(now),
-                chain=self._chain,
-                planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
-                stress=None if self._stress is None else self._stress.read(self._state),
-                places=None if self._position is None else self._position.read(self._state),
-                strain=None if self._bending is None else self._bending.read(self._state),
-                carried=None if self._base is None else self._base.read(now),
-                accelerations=None if self._shock is None else self._shock.read(),
-                put=None if self._shape is None else self._shape.read(self._state),
-                net=None if self._net is None else self._net.read(self._state),
-            )
+    def _reading(self, now: Instant) -> Reading:
+        """See ``Run``."""
+        state, cables = self._now, self._built.cables
+        return Reading(
+            **vars(now),
+            chain=self._chain,
+            planes=() if cables is None else tuple((plane,) for plane, _ in cables.present),
+            stress=None if self._stress is None else self._stress.read(state),
+            places=None if self._position is None else self._position.read(state),
+            strain=None if self._bending is None else self._bending.read(state),
+            carried=None if self._base is None else self._base.read(now),
+            accelerations=None if self._shock is None else self._shock.read(),
+            put=None if self._shape is None else self._shape.read(state),
+            net=None if self._net is None else self._net.read(state),
         )
-        return now
 
-    def _strike(self, now: Instant) -> bool:
-        """Strike all faults that are due; returns whether there was one."""
-        due, built, chain = self._faults.due(now.time), self._built, self._chain
-        if not due:
-            return False
-        hit = Struck(self._scene.structure.planes, built.angles.switches, np.pi - now.angles)
-        if built.cables is not None and chain is not None:
-            hit.ropes, hit.stored, hit.wound = built.cables.ropes, chain.stored, chain.wound
-        for fault in due:
-            fault.strike(hit)
-        built.angles.follow()
-        if built.cables is not None:
-            built.cables.ropes = hit.ropes
-        return True
-
-    def _turn_loads(self, time: float) -> bool:
-        """Turn the loads round if it is time (s); returns whether it was."""
-        due = self._turn <= time + AT_ONCE
-        if due:
-            self._turn = math.inf
-            self._built.model.turn_loads()
-        return due
-
-    def _measure(self, time: float) -> Instant:
-        """The state that was refreshed last."""
-        angles, rates = self._openings.read(self._state)
-        cables, state = self._built.cables, self._state
+    def _measured(self, time: float) -> Instant:
+        """See ``Run``: the state that was refreshed last."""
+        state, cables = self._now, self._built.cables
+        angles, rates = self._openings.read(state)
         if cables is not None:
             self._chain = cables.current(state.position, state.velocity, time)
         energies = self._energy.read(time, state, angles, rates, self._chain)
         gap = max(float(group.gaps(state).max()) for group in self._gaps)
-        tensions, stretch, driven = None, 0.0, math.isfinite(self._faults.next_time)
-        if cables is not None and self._chain is not None:
-            tensions = self._chain.tensions
-            stretch = float(np.max(self._chain.strains, where=self._chain.ropes.alive, initial=0.0))
-            driven = driven or cables.winches.driving(time, self._chain)
-        return Instant(time, angles, rates, energies, gap, tensions, stretch, driven)
+        return self._told(time, angles, rates, energies, gap, self._chain)
 
 
 def _detail(message: str) -> str:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -16,16 +16,17 @@ from ringsim.frame.model import FrameModel
 from ringsim.frame.readings import EnergyMeter, Readings
 from ringsim.frame.state import State
 from ringsim.layout.bodies import Array
+from ringsim.outputs.family import Reading
 from ringsim.outputs.recorder import Recorder, States, StoredState, cleared, struck_by
-from ringsim.parts.faults import AT_ONCE, Fault, Faults, Struck
+from ringsim.parts.faults import Fault, Struck
 from ringsim.parts.laws import Place, Switches
 from ringsim.refusal import InputError
 from ringsim.rigid.statics import scales_of
 from ringsim.scene import Scene
-from ringsim.stepping.control import RunControl, go_on
-from ringsim.stepping.events import Events, extrapolated
-from ringsim.stepping.instant import Instant, Memory, Remembering, Strained
-from ringsim.stepping.locks import Latches, locks_of
+from ringsim.stepping.control import go_on
+from ringsim.stepping.events import extrapolated
+from ringsim.stepping.instant import Instant, Memory, Strained
+from ringsim.stepping.run import Run
 from ringsim.variables import Outcome
 
 # Broyden's method: what a tangent that is not renewed learns from the changes made with it.
@@ -102,41 +103,48 @@ class NoBalanceError(Exception):
     """Newton found no state in balance; why."""
 
 
-class Integration(Remembering):
+class Integration(Run):
     """One run of a model."""
 
     changing = ("_moves", "_easy", "_steps", "_strains")
+    _model: FrameModel
 
     def __init__(self, model: FrameModel, watch: Watch | None = None) -> None:
-        self._model, self._watch = model, watch
         scene, elements = model.scene, len(model.mesh.length)
-        self._scene, self._now, self._energy = scene, model.start, EnergyMeter(model)
+        super().__init__(scene, watch)
+        self._model, self._cables, self._now = model, model.cables, model.start
+        self._energy = EnergyMeter(model)
         self._moves: list[tuple[float, Array]] = []
         self._easy = False
         self._steps: list[tuple[float, Array]] = []
-        self._faults, self._events = Faults(scene.faults), Events(scene)
-        self._turn = scene.loads_turn_at
         self._strains = Strains(model.start.strains, np.zeros((elements, 6)), 0.0)
         self._readings = Readings(model)
-        first = self._measure(0.0, self._now)
-        self._latches = Latches(scene)
-        self._locks = locks_of(scene, first.angles, self._latches)
         self.history = Recorder(scene, self._readings.coordinates)
         ropes = None if model.cables is None else model.cables.ropes.content
-        self._control = RunControl(
-            scene.solver,
+        self._set_out(
+            self._measure(0.0, self._now),
             scales_of(scene, model.layout, model.ideal, ropes),
-            self._read(first),
-            self._locks,
-            limits=scene.limits,
-            follow_deviations=scene.record.stress,
-            turn=scene.loads_turn_at,
-            strained=Strained(self._energy.strain_energy(model.start), model.prestress),
+            Strained(self._energy.strain_energy(model.start), model.prestress),
         )
+
+    @property
+    def _state(self) -> State:
+        """See ``Run``."""
+        return self._now
+
+    @property
+    def _at(self) -> ChainState | None:
+        """See ``Run``."""
+        return self._now.chain
+
+    @property
+    def _laws(self) -> JointLaws:
+        """See ``Run``."""
+        return self._model.laws
 
     def run(self) -> Recorder:
         """Integrate until all V-joints have locked and settled, or to the end time."""
-        control, history = self._control, self.history
+        control = self._control
         while control.goes_on:
             step = control.next_step(self._next_event())
             self._begin(control.now)
@@ -153,11 +161,7 @@ class Integration(Remembering):
                     self._accept(step, after, found)
                     break
                 step = control.retry(step)
-        control.conclude()
-        history.status, history.fate = control.status, control.fate
-        history.reason, history.repeats = control.reason, control.repeats
-        history.caught = self._latches.caught
-        return history
+        return cast(Recorder, self._conclude())
 
     def _next_event(self) -> float:
         """Time that no step may pass, s."""
@@ -166,15 +170,7 @@ class Integration(Remembering):
     def _begin(self, now: Instant) -> None:
         """Let joints and winches begin a step."""
         self._model.laws.begin()
-        cables, chain = self._model.cables, self._now.chain
-        if cables is None or chain is None:
-            return
-
-        def path_slope(number: int) -> float:
-            plane, cable = cables.present[number]
-            return self._scene.structure.path_slope(cable, now.angles[plane])
-
-        cables.begin(now.time, chain, cables.winches.path_slopes(path_slope))
+        super()._begin(now)
 
     def _try(self, step: float) -> tuple[State, Instant]:
         """The state a step later."""
@@ -245,30 +241,14 @@ class Integration(Remembering):
 
     def _accept(self, step: float, after: State, found: Instant) -> None:
         """Go on from a state."""
-        control, before = self._control, self._now
+        before = self._now
         moved = self._between(before, after) / step
         # Before rest it came as it leaves: the even motion through the first state.
         self._moves = [*(self._moves[-2:] or [(step, -moved)]), (step, moved)]
         self._steps = [(step, before.strains)]
         straighten(after.pose)
         self._now = after
-        control.accept(found, self._read(found))
-        if self._watch is not None:
-            self._watch(control.now)
-        self._latch(found.time)
-
-    def _latch(self, time: float) -> None:
-        """Latch V-joints that have locked, and let winches know whose plane has."""
-        model, chain = self._model, self._now.chain
-        if self._locks is None:
-            return
-        locked = self._latches.locked(self._locks.deployed)
-        self._latches.hold(model.laws.switches)
-        model.laws.follow()
-        if model.cables is not None and chain is not None:
-            for number, (plane, _) in enumerate(model.cables.present):
-                if locked[plane].all():
-                    model.cables.winches.lock(number, time, chain)
+        self._accepted(found)
 
     def _between(self, before: State, after: State) -> Array:
         """Changes of all unknowns."""
@@ -278,62 +258,27 @@ class Integration(Remembering):
             found[-3:] = after.hub - before.hub
         return found
 
-    def _read(self, now: Instant) -> Instant:
-        """Note a state that the run goes on from; returns it as events leave it."""
-        if self._strike(now) | self._turn_loads(now.time) or self._events.at(now.time):
-            self._energy.go_on_from(now.energies.work, self._now)
-            self._begin(now)
-            after = self._measure(now.time, self._now)
-            # What a fault lets go is lost; nothing moves while it strikes.
-            lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
-            energies = after.energies._replace(lost=lost, driven=now.energies.driven)
-            now = replace(after, energies=energies)
-        self._energy.keep()
-        self.history.note(self._readings.read(now, self._now, self._strains))
-        return now
+    def _reading(self, now: Instant) -> Reading:
+        """See ``Run``."""
+        return self._readings.read(now, self._now, self._strains)
 
-    def _turn_loads(self, time: float) -> bool:
-        """Turn the loads round if it is time (s); returns whether it was."""
-        due = self._turn <= time + AT_ONCE
-        if due:
-            self._turn = math.inf
-            self._model.turn_loads()
-        return due
-
-    def _strike(self, now: Instant) -> bool:
-        """Strike all faults that are due; returns whether there was one."""
-        due, model, chain = self._faults.due(now.time), self._model, self._now.chain
-        if not due:
-            return False
-        hit = Struck(self._scene.structure.planes, model.laws.switches, np.pi - now.angles)
-        if model.cables is not None and chain is not None:
-            hit.ropes, hit.stored, hit.wound = model.cables.ropes, chain.stored, chain.wound
-        for fault in due:
-            fault.strike(hit)
-        model.laws.follow()
-        if model.cables is not None:
-            model.cables.take(hit.ropes)
-        return True
+    def _measured(self, time: float) -> Instant:
+        """See ``Run``."""
+        return self._measure(time, self._now)
 
     def _measure(self, time: float, state: State) -> Instant:
         """A state, with its cables, and what has passed since the one that was kept last."""
         cables = self._model.cables
         if cables is not None:
             state.chain = cables.state(time, state.place.lines, state.rate.lines)
-        return self._told(time, state)
+        return self._known(time, state)
 
-    def _told(self, time: float, state: State) -> Instant:
+    def _known(self, time: float, state: State) -> Instant:
         """A state whose chain is known."""
-        model, chain = self._model, state.chain
-        tensions, stretch, driven = None, 0.0, math.isfinite(self._faults.next_time)
-        if model.cables is not None and chain is not None:
-            tensions = chain.tensions
-            stretch = float(np.max(chain.strains, where=chain.ropes.alive, initial=0.0))
-            driven = driven or model.cables.winches.driving(time, chain)
-        angles, rates = model.openings.read(state.pose.angle, state.rate.angles)
+        angles, rates = self._model.openings.read(state.pose.angle, state.rate.angles)
         energies = self._energy.read(time, state, self._strains)
-        gap = model.gap(state.pose)
-        return Instant(time, angles, rates, energies, gap, tensions, stretch, driven)
+        gap = self._model.gap(state.pose)
+        return self._told(time, angles, rates, energies, gap, state.chain)
 
 
 # Runs of the frame engine that store states on their way, or go on from one.
@@ -430,7 +375,7 @@ class Storing(Integration):
         before = self._control.now.energies
         if changed:
             self._energy.go_on_from(before.work, state)
-        now = self._told(start.time, state)
+        now = self._known(start.time, state)
         if not changed:
             self._energy.keep()
             return

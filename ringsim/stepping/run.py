@@ -1,0 +1,175 @@
+"""What happens between the steps of a run, whichever engine takes them."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsim.parts.faults import AT_ONCE, Faults, Struck
+from ringsim.stepping.control import RunControl
+from ringsim.stepping.events import Events
+from ringsim.stepping.instant import Energies, Instant, Remembering, Scales, Strained
+from ringsim.stepping.locks import Latches, locks_of
+
+Array = NDArray[np.float64]
+
+
+class Run(Remembering):
+    """Faults, loads that turn round, winches, latches and records of one run.
+
+    An engine takes the steps, and gives what the methods below that raise ask it for.  Between two
+    steps the state stays where it is while faults strike and laws change.
+
+    Attributes
+    ----------
+    _scene, _watch
+        What is run; what is shown every state that it goes on from, or None.
+    _model, _energy, _cables
+        The engine's model, its meter of energies, and its cables, None without.
+    history
+        The recorder of the run.
+    """
+
+    _model: Any
+    _energy: Any
+    _cables: Any
+    history: Any
+
+    def __init__(self, scene: Any, watch: Any) -> None:
+        self._scene, self._watch = scene, watch
+        self._faults, self._events = Faults(scene.faults), Events(scene)
+        self._turn = scene.loads_turn_at
+
+    def _set_out(self, first: Instant, scales: Scales, strained: Strained) -> None:
+        """Begin with the first state; a ``history`` stands ready."""
+        scene = self._scene
+        self._latches = Latches(scene)
+        self._locks = locks_of(scene, first.angles, self._latches)
+        self._control = RunControl(
+            scene.solver,
+            scales,
+            self._read(first),
+            self._locks,
+            limits=scene.limits,
+            follow_deviations=scene.record.stress,
+            turn=scene.loads_turn_at,
+            strained=strained,
+        )
+
+    # What an engine gives.
+
+    @property
+    def _state(self) -> Any:
+        """The state that the run goes on from, as the meter of energies takes it."""
+        raise NotImplementedError
+
+    @property
+    def _at(self) -> Any:
+        """The chain of the cables there, None without."""
+        raise NotImplementedError
+
+    @property
+    def _laws(self) -> Any:
+        """The laws on V-joints, with their ``switches`` and what lets the engine ``follow``."""
+        raise NotImplementedError
+
+    def _measured(self, time: float) -> Instant:
+        """That state, after what has changed."""
+        raise NotImplementedError
+
+    def _reading(self, now: Instant) -> Any:
+        """What outputs read of it."""
+        raise NotImplementedError
+
+    # What happens.
+
+    def _begin(self, now: Instant) -> None:
+        """Let winches begin a step."""
+        cables, chain = self._cables, self._at
+        if cables is None or chain is None:
+            return
+
+        def path_slope(number: int) -> float:
+            plane, cable = cables.present[number]
+            return float(self._scene.structure.path_slope(cable, now.angles[plane]))
+
+        cables.begin(now.time, chain, cables.winches.path_slopes(path_slope))
+
+    def _told(
+        self, time: float, angles: Array, rates: Array, energies: Energies, gap: float, chain: Any
+    ) -> Instant:
+        """A state with its ropes, and whether anything still drives it."""
+        tensions, stretch, driven = None, 0.0, math.isfinite(self._faults.next_time)
+        if self._cables is not None and chain is not None:
+            tensions = chain.tensions
+            stretch = float(np.max(chain.strains, where=chain.ropes.alive, initial=0.0))
+            driven = driven or self._cables.winches.driving(time, chain)
+        return Instant(time, angles, rates, energies, gap, tensions, stretch, driven)
+
+    def _read(self, now: Instant) -> Instant:
+        """Note a state that the run goes on from; returns it as events leave it."""
+        if self._strike(now) | self._turn_loads(now.time) or self._events.at(now.time):
+            self._energy.go_on_from(now.energies.work, self._state)
+            self._begin(now)
+            after = self._measured(now.time)
+            # What a fault lets go is lost; nothing moves while it strikes.
+            lost = now.energies.lost + (now.energies.elastic - after.energies.elastic)
+            energies = after.energies._replace(lost=lost, driven=now.energies.driven)
+            now = replace(after, energies=energies)
+        self._energy.keep()
+        self.history.note(self._reading(now))
+        return now
+
+    def _strike(self, now: Instant) -> bool:
+        """Strike all faults that are due; returns whether there was one."""
+        due, chain = self._faults.due(now.time), self._at
+        if not due:
+            return False
+        hit = Struck(self._scene.structure.planes, self._laws.switches, np.pi - now.angles)
+        if self._cables is not None and chain is not None:
+            hit.ropes, hit.stored, hit.wound = self._cables.ropes, chain.stored, chain.wound
+        for fault in due:
+            fault.strike(hit)
+        self._laws.follow()
+        if self._cables is not None:
+            self._cables.take(hit.ropes)
+        return True
+
+    def _turn_loads(self, time: float) -> bool:
+        """Turn the loads round if it is time (s); returns whether it was."""
+        due = self._turn <= time + AT_ONCE
+        if due:
+            self._turn = math.inf
+            self._model.turn_loads()
+        return bool(due)
+
+    def _accepted(self, found: Instant) -> bool:
+        """Go on from a state that a step has led to; returns whether the run goes on."""
+        goes_on = self._control.accept(found, self._read(found))
+        if self._watch is not None:
+            self._watch(self._control.now)
+        self._latch(found.time)
+        return goes_on
+
+    def _latch(self, time: float) -> None:
+        """Latch the V-joints that have locked, and let winches know whose plane has."""
+        if self._locks is None:
+            return
+        locked, chain = self._latches.locked(self._locks.deployed), self._at
+        self._latches.hold(self._laws.switches)
+        self._laws.follow()
+        if self._cables is not None and chain is not None:
+            for number, (plane, _) in enumerate(self._cables.present):
+                if locked[plane].all():
+                    self._cables.winches.lock(number, time, chain)
+
+    def _conclude(self, note: str = "") -> Any:
+        """The history, with how the run has ended; ``note`` follows the reason."""
+        control, history = self._control, self.history
+        control.conclude()
+        history.status, history.fate = control.status, control.fate
+        history.reason, history.repeats = control.reason + note, control.repeats
+        history.caught = self._latches.caught
+        return history
