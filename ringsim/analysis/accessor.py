@@ -1,4 +1,8 @@
-"""What every dataset of ringsim can be asked as ``dataset.ring``."""
+"""What every dataset of ringsim can be asked as ``dataset.ring``.
+
+It is there once a public word of ringsim has been used, or ringsim was imported after xarray; else
+``import ringsim.analysis.accessor``.
+"""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,13 +12,12 @@ import xarray as xr
 if TYPE_CHECKING:
     import pandas as pd
 
-NAME = "ring"
 
-
+@xr.register_dataset_accessor("ring")  # type: ignore[no-untyped-call]
 class Ring:
     """Questions to a run or a campaign: ``dataset.ring.outcomes()`` and others.
 
-    Imports stand in the methods: it is there wherever xarray and ringsim are, and costs nothing.
+    Imports stand in the methods: to have it costs nothing.
     """
 
     def __init__(self, dataset: xr.Dataset) -> None:
@@ -126,9 +129,3 @@ class Ring:
                 f"{what}: only a campaign has them, and this holds no samples: open one with "
                 "ringsim.open_campaign"
             )
-
-
-def register() -> None:
-    """Let all datasets have it; once, since xarray warns of a second time."""
-    if getattr(xr.Dataset, NAME, None) is not Ring:
-        xr.register_dataset_accessor(NAME)(Ring)  # type: ignore[no-untyped-call]

@@ -264,7 +264,7 @@ _LONGEST = 200
 
 def notes(campaign: xr.Dataset) -> list[str]:
     """All lines but those of the error budget."""
-    parts = (outcome_lines, latch_lines, peak_lines, override_lines, restart_lines)
+    parts = (outcome_lines, peak_lines, override_lines, restart_lines)
     return [line for part in parts for line in part(campaign)]
 
 
@@ -305,21 +305,6 @@ def ending_lines(
             first = textwrap.shorten(first, _LONGEST, placeholder=" ...")
             lines.append(f"{code.word.replace('_', ' ')}: {len(own)} of {ran}, {first}")
     return lines
-
-
-def latch_lines(campaign: xr.Dataset) -> list[str]:
-    """Which samples are told as deployed although latches have not caught: files of older runs."""
-    if "latched_joints" not in campaign or "locked_joints" not in campaign:
-        return []
-    loose = campaign["latched_joints"].to_numpy() < campaign["locked_joints"].to_numpy()
-    own = np.flatnonzero(loose & (campaign["outcome"].to_numpy() == Fate.DEPLOYED))
-    if not len(own):
-        return []
-    more = ", ..." if len(own) > _NAMED else ""
-    return [
-        f"{len(own)} deployed samples ({', '.join(map(str, own[:_NAMED]))}{more}) have latches "
-        "that did not catch: an older ringsim told them so; run them again, they are not latched"
-    ]
 
 
 def budget_lines(campaign: xr.Dataset) -> list[str]:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from ringsim.analysis.intervals import good, numbers, standard_error, used
 from ringsim.choice import kind_of, kinds_of
-from ringsim.files import parse_toml
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 from ringsim.sampling.columns import BLOCK_ROW
@@ -153,14 +152,7 @@ def placement_of(design: Design) -> Placement:
 
 def placement(campaign: xr.Dataset) -> Placement:
     """The placement that a merged campaign tells, or one of no population."""
-    if "design" in campaign.attrs:
-        table = json.loads(campaign.attrs["design"])
-    else:  # files that are older than the attribute have the text of the campaign
-        try:
-            text = parse_toml(str(campaign.attrs.get("campaign", "")), "campaign")
-        except InputError:
-            text = {}
-        table = text.get("design", {})
+    table = json.loads(campaign.attrs.get("design", "{}"))
     kind = kinds_of(Design).get(str(table.get("kind")))
     if kind is None or not issubclass(kind, Design):
         return Placement("", population=False, independent=False)
@@ -257,9 +249,7 @@ def inputs(campaign: xr.Dataset) -> list[str]:
     found: dict[str, str] = {}
     for name, variable in campaign.data_vars.items():
         if variable.attrs.get("role") == "input":
-            # Files of older runs tell the paths that share values, and no name.
-            told = str(variable.attrs.get("input") or paths_of(variable))
-            found.setdefault(told, str(name))
+            found.setdefault(called(variable), str(name))
     return [*found.values()]
 
 
@@ -282,9 +272,7 @@ def campaign_file(campaign: xr.Dataset) -> dict[str, Any]:
 
 def requirements_of(campaign: xr.Dataset) -> dict[str, dict[str, Any]]:
     """What the campaign requires of its numbers: tables with min, max or is, by name."""
-    stored = campaign.attrs.get("requirements")
-    wanted = json.loads(stored) if stored else campaign_file(campaign).get("requirements", {})
-    return {name: each for name, each in wanted.items() if {"min", "max", "is"} & each.keys()}
+    return dict(json.loads(campaign.attrs.get("requirements", "{}")))
 
 
 def distribution_of(variable: xr.DataArray) -> dict[str, Any]:

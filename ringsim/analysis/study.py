@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from ringsim.analysis import intervals
 from ringsim.analysis.accuracy import in_favour, settings_at
@@ -346,7 +346,6 @@ CHOICES = (*GROUPS, *OUTPUTS, "energy")
 class Setting(Model):
     """An engine and one setting by scene path, with measured errors and cost."""
 
-    model_config = ConfigDict(extra="ignore")  # files of earlier versions hold more
     seconds: float
     """Processor time of a run, s."""
     fidelity: Literal["full", "frame"] = "full"
@@ -361,7 +360,6 @@ class Evidence(Model):
     The scene's own setting comes before others that are hardly cheaper.
     """
 
-    model_config = ConfigDict(extra="ignore")
     scene: str
     kind: dict[str, Any]
     """See :func:`kind_of_scene`."""

@@ -399,8 +399,7 @@ def require_values(campaign: xr.Dataset, name: str) -> None:
         raise InputError(
             f"requirement on {name}: {len(none)} samples reached their goal without a value of "
             f"it, the first is {campaign['sample'].to_numpy()[none[0]]}: their model does not "
-            "compute it, or an older ringsim ran them; require another output, use the full "
-            "fidelity, or run them again"
+            "compute it; require another output, or use the full fidelity"
         )
 
 

@@ -14,7 +14,6 @@ import xarray as xr
 from made_campaign import made_campaign
 
 from made import drawn_campaign
-from ringsim.analysis.accessor import register
 from ringsim.analysis.brief import budget_lines
 from ringsim.analysis.comparison import compare, compared
 from ringsim.analysis.design import placement
@@ -88,7 +87,6 @@ def test_runs_lost_at_random_bend_nothing_and_are_named():
 
 
 def test_an_analysis_marks_the_variables_and_the_accessor_its_answers():
-    register()
     campaign = made(1)
     found = analyse(campaign, WANTED)
     note = found.attrs[NOTE]
