@@ -52,7 +52,7 @@ def __dir__() -> list[str]:
 
 def _register() -> None:
     """Let datasets have ``dataset.ring``."""
-    importlib.import_module(f"{__name__}.analysis.accessor")
+    importlib.import_module(f"{__name__}.analysis")
 
 
 if "xarray" in sys.modules:  # which takes most of a second; else with the first word that is used

@@ -234,20 +234,18 @@ def command(folder: str, sample: int) -> str:
     return f"ringsim replay {shlex.quote(folder)} {sample}"
 
 
-def worst_tables(analysis: xr.Dataset, folder: str) -> list[tuple[str, Table]]:
-    """Of each failure its words and a table of its worst samples; none of analyses without."""
+def worst_tables(analysis: xr.Dataset, folder: str) -> list[Table]:
+    """Of each failure a table of its worst samples, the worst first."""
     if "worst" not in analysis.dims:
         return []
     found: dict[str, list[tuple[str, ...]]] = {}
-    columns = [analysis[f"worst_{name}"].values.tolist() for name in COLUMNS]
-    for words, failed, of, sample, value, odd in zip(*columns, strict=True):
+    values = [analysis[f"worst_{name}"].values.tolist() for name in COLUMNS]
+    for words, failed, of, sample, value, odd in zip(*values, strict=True):
         head = f"{words} ({failed} of {counted(of, 'sample')})"
         row = (str(sample), value, odd, command(folder, sample))
         found.setdefault(head, []).append(row)
-    return [
-        (head, Table(("sample", "found", "unusual in its inputs", "run it again"), rows, left=4))
-        for head, rows in found.items()
-    ]
+    columns = ("sample", "found", "unusual in its inputs", "run it again")
+    return [Table(columns, rows, left=4, title=words) for words, rows in found.items()]
 
 
 COLUMNS = ("failure", "failed", "of", "sample", "found", "inputs")
@@ -256,8 +254,8 @@ COLUMNS = ("failure", "failed", "of", "sample", "found", "inputs")
 def worst_lines(analysis: xr.Dataset, folder: str) -> list[str]:
     """The same for terminals."""
     lines = list[str]()
-    for head, table in worst_tables(analysis, folder):
-        lines.append(f"worst of: {head}")
+    for table in worst_tables(analysis, folder):
+        lines.append(f"worst of: {table.title}")
         for sample, value, odd, again in table.rows:
             lines += [f"  sample {sample}: {value}", f"    inputs: {odd}", f"    {again}"]
     return [*lines, NOTE_ON_UNUSUAL] if lines else []

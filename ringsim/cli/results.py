@@ -7,7 +7,7 @@ from typing import Any
 import click
 import xarray as xr
 
-from ringsim.analysis.brief import notes
+from ringsim.analysis.campaign_notes import notes
 from ringsim.analysis.engines import check_lines
 from ringsim.campaign.folder import open_folder
 from ringsim.campaign.stopping import as_decided, merge

@@ -40,7 +40,8 @@ def campaign() -> xr.Dataset:
 def test_every_dataset_has_it(order: str) -> None:
     """Whoever comes first, and without loading anything but xarray."""
     code = (
-        f"{order}\nimport sys\nprint(type(xarray.Dataset().ring).__name__, 'scipy' in sys.modules)\n"
+        f"{order}\nimport sys\n"
+        "print(type(xarray.Dataset().ring).__name__, 'scipy' in sys.modules)\n"
         "import importlib; importlib.reload(ringsim)"
     )
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from made_campaign import made_campaign
 
-from ringsim.analysis.brief import peak_lines
+from ringsim.analysis.campaign_notes import peak_lines
 
 
 def test_the_numerical_error_of_a_sample_that_is_named_stands_beside_its_value() -> None:
