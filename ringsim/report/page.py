@@ -16,7 +16,7 @@ from ringsim.analysis.study_text import head_lines, outputs_in, sections
 from ringsim.analysis.worst import NOTE_ON_UNUSUAL
 from ringsim.campaign.specification import flat
 from ringsim.files import write_text
-from ringsim.plots.campaign.figures import figures_of
+from ringsim.plots.figures import figures_of
 from ringsim.plots.style import inline
 from ringsim.refusal import show
 from ringsim.report import tables

@@ -14,7 +14,6 @@ from ringsim.layout.layout import layout_at_opening, layout_of
 from ringsim.layout.points import points_of
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.shapes import COMPUTED, FROM_ANGLES, middle_of
-from ringsim.structures.pantograph_ring import PantographRing
 
 POSES = 25
 """Mean opening angles at which the ring is tabled: between two, lines are off by about 2 mm."""
@@ -27,13 +26,14 @@ _MOST_BYTES, _LEAST_FRAMES = 42_000, 30
 
 
 def player(campaign: xr.Dataset, analysis: xr.Dataset) -> dict[str, Any] | None:
-    """Data of the player for JSON; None if the structure is no ring, or nothing was recorded.
+    """Data of the player for JSON; None if the structure has no joints that open between two rods,
+    or nothing was recorded.
 
     Shown are the median and the worst sample, the worst of each failure in ``analysis``, then
     others that failed.
     """
     scene = scene_from_toml(str(campaign.attrs["scene"]), source="attribute scene")
-    if not isinstance(scene.structure, PantographRing) or "opening_angle" not in campaign:
+    if "opening_angle" not in campaign or not points_of(layout_of(scene)).openings.size:
         return None
     shown = [_course(campaign, *each) for each in _chosen(campaign, analysis)]
     if not shown:

@@ -12,7 +12,7 @@ from scipy.stats import norm
 from campaign_bench import Bench, assert_same, finished
 from ringsim.analysis.study import analyse
 from ringsim.analysis.tails import approach
-from ringsim.plots.campaign import figures
+from ringsim.plots import figures
 from ringsim.report.page import page
 
 DESIGN = """

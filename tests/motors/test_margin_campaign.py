@@ -14,7 +14,7 @@ from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import statistics_table, told
 from ringsim.analysis.verdicts import read_requirements
 from ringsim.execution.work import solve
-from ringsim.plots.campaign import figures
+from ringsim.plots import figures
 from ringsim.refusal import InputError
 from ringsim.report.page import page
 from ringsim.rigid.margin import MOST, DriveMargin, with_margin

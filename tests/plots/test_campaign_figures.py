@@ -21,9 +21,9 @@ from ringsim.plots import style
 from ringsim.plots.campaign import endings
 from ringsim.plots.campaign.courses import lock_order, shares
 from ringsim.plots.campaign.endings import base_load, margin, motors, tension
-from ringsim.plots.campaign.figures import PICTURES, draw_campaign, figures_of
 from ringsim.plots.campaign.numbers import by_input, convergence, distributions, drawn
 from ringsim.plots.campaign.tornado import moves, named, one_by_one
+from ringsim.plots.figures import PICTURES, draw_figures, figures_of
 from ringsim.variables import Fate
 
 GOOD = [0, 1, 3, 4, 6]
@@ -36,8 +36,9 @@ def mixed() -> xr.Dataset:
 
 def names_for(campaign: xr.Dataset) -> set[str]:
     """Figures of what campaigns of the kind hold."""
-    absent = {each.name for each in PICTURES if not set(each.needs) <= set(campaign)}
-    return {each.name for each in PICTURES} - absent - {"rare_event", "one_by_one"}
+    own = [each for each in PICTURES if each.of == "campaign"]
+    absent = {each.name for each in own if not set(each.needs) <= set(campaign)}
+    return {each.name for each in own} - absent - {"rare_event", "one_by_one"}
 
 
 def words(figure: Figure) -> str:
@@ -158,7 +159,7 @@ def test_all_figures_of_a_file(tmp_path: Path, mixed: xr.Dataset) -> None:
 def test_campaigns_in_which_nothing_deployed(
     choice: dict[str, tuple[int, ...]], tmp_path: Path
 ) -> None:
-    names = {path.stem for path in draw_campaign(made_campaign(2, **choice), tmp_path)}
+    names = {path.stem for path in draw_figures(made_campaign(2, **choice), tmp_path, "campaign")}
     stalled = {"distributions", "convergence", "fan", "lag_map", "tension", "by_input"}
     expected = stalled if "stalled" in choice else {"by_input"} if "failed" in choice else set()
     assert names == {f"campaign-fig-{name}" for name in expected}

@@ -19,7 +19,7 @@ from ringsim.analysis.campaign_notes import notes
 from ringsim.analysis.study_text import verdict_lines
 from ringsim.cli import cli
 from ringsim.dataset import save
-from ringsim.plots.campaign import figures
+from ringsim.plots import figures
 from told_numbers import (
     FATES,
     LOSSES,

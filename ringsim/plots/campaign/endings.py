@@ -16,6 +16,7 @@ from ringsim.analysis.intervals import good, used
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, bands, head
+from ringsim.plots.registry import picture
 
 # Courses of some samples of every ending: bands that tell what those have in common that stall.
 
@@ -96,7 +97,10 @@ def over_time(
 _WORDS = {"base_force": "force at the base", "base_torque": "torque at the base"}
 
 
-@style.styled
+@picture(
+    "campaign", 120, "Force and torque at the base over time, by ending",
+    ("base_force", "base_torque"), name="base",
+)  # fmt: skip
 def base_load(campaign: xr.Dataset) -> Figure:
     """Magnitudes of ``base_force`` and ``base_torque`` (sample, axis, time)."""
     read, words = chosen(campaign, [*_WORDS])
@@ -122,7 +126,10 @@ _GOLDEN = 0.618034
 _ANGLES = 161
 
 
-@style.styled
+@picture(
+    "campaign", 40, "Smallest margin of the drive by ending, and its course",
+    ("drive_margin", "least_drive_margin", "opening_angle"),
+)  # fmt: skip
 def margin(campaign: xr.Dataset) -> Figure:
     """``least_drive_margin`` (sample) by ending; below, ``drive_margin`` (sample, time) over the
     mean opening angle.
@@ -199,7 +206,10 @@ def _laid(grid: Array, angle: Array, margins: Array) -> Array:
 # Torque and speed of the motors over time, by ending.
 
 
-@style.styled
+@picture(
+    "campaign", 110, "Torque and speed of the motors over time, by ending",
+    ("motor_torque", "motor_speed"),
+)  # fmt: skip
 def motors(campaign: xr.Dataset) -> Figure:
     """A row a motor, from ``motor_torque`` and ``motor_speed`` (sample, plane, winch, time)."""
     names = ["motor_torque", "motor_speed", "final_time", "deployment_time"]
@@ -238,7 +248,10 @@ def peaks(campaign: xr.Dataset) -> xr.DataArray:
     return xr.concat(found, "sample")
 
 
-@style.styled
+@picture(
+    "campaign", 130, "Largest tension of each span along the cables",
+    ("cable_tension", "final_time", "deployment_time"),
+)  # fmt: skip
 def tension(campaign: xr.Dataset) -> Figure:
     """A panel a cable: median, 5-95 % and 0-100 % over the samples, from the winch on."""
     found = peaks(campaign)

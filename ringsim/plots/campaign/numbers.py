@@ -38,6 +38,8 @@ from ringsim.analysis.verdicts import OUTCOME, Requirement, judge, read_requirem
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, WIDE, head, in_lines, legend, standing
+from ringsim.plots.campaign.tornado import is_one_by_one
+from ringsim.plots.registry import picture
 
 # Cumulative distribution of the main numbers, with the limits that the campaign sets them.
 
@@ -46,6 +48,16 @@ _LEVELS = [0.05, 0.5, 0.95]
 """Where dots are."""
 _STEPS = 2000
 """Steps of a curve at most: more than a figure resolves."""
+
+
+def reached(campaign: xr.Dataset) -> bool:
+    """Whether any level of a rare event has been reached."""
+    return any(len(places) for places, _ in approach(campaign))
+
+
+def _spread(campaign: xr.Dataset) -> bool:
+    """Whether main numbers are of samples that no other figure tells better."""
+    return bool(scalars(campaign)) and not reached(campaign) and not is_one_by_one(campaign)
 
 
 def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
@@ -65,7 +77,9 @@ def points(values: Array, of: int) -> tuple[Array, Array]:
     return quantile(values, places[known].tolist()), np.array(_LEVELS)[known]
 
 
-@style.styled
+@picture(
+    "campaign", 30, "Cumulative distribution of each main number, with its limits", applies=_spread
+)
 def distributions(campaign: xr.Dataset) -> Figure:
     """Share of the samples at or below each value, a step a sample; dots at 5, 50 and 95 %.
 
@@ -125,6 +139,11 @@ _INTERVALS = 20
 """Points of the band: each costs a bootstrap."""
 
 
+def _converges(campaign: xr.Dataset) -> bool:
+    """Whether more samples make means and quantiles more certain."""
+    return bool(scalars(campaign)) and placement(campaign).population
+
+
 def _counts(samples: int, most: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(1, samples, min(most, samples)).astype(int))
 
@@ -180,7 +199,11 @@ def _required(campaign: xr.Dataset) -> Mapping[str, Requirement]:
     }  # fmt: skip
 
 
-@style.styled
+@picture(
+    "campaign", 100,
+    "Mean, 95 % quantile and probability of each requirement as samples come in",
+    applies=_converges,
+)  # fmt: skip
 def convergence(campaign: xr.Dataset) -> Figure:
     """A panel a number, then one a requirement, in the order of the samples.
 
@@ -240,6 +263,11 @@ _MANY = 500
 """Samples from which on marks are drawn as dots: as shapes they would make a page too large."""
 
 
+def _has_run(campaign: xr.Dataset) -> bool:
+    """Whether something became of drawn inputs."""
+    return bool(inputs(campaign)) and bool(ran(campaign).any())
+
+
 def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
     """An input as one number a sample: the mean of its places, or the place of its word in the
     list that comes second, which is empty for numbers.
@@ -254,7 +282,7 @@ def drawn(variable: xr.DataArray) -> tuple[NDArray[np.floating], list[str]]:
     return places.astype(float), words.tolist()
 
 
-@style.styled
+@picture("campaign", 80, "What became of each sample, by each drawn input", applies=_has_run)
 def by_input(campaign: xr.Dataset) -> Figure:
     """A panel an input: the main number of each sample that has run over the value drawn for it.
 
@@ -325,12 +353,9 @@ def _label(variable: xr.DataArray) -> str:
 # How a campaign of subset simulation came to its rare event.
 
 
-def reached(campaign: xr.Dataset) -> bool:
-    """Whether any level of a rare event has been reached."""
-    return any(len(places) for places, _ in approach(campaign))
-
-
-@style.styled
+@picture(
+    "campaign", 10, "Probability of what levels reached, up to the rare event", applies=reached
+)
 def rare_event(campaign: xr.Dataset) -> Figure:
     """Probability to be at or beyond the values that levels reached, a line a replicate; the
     event's own with its interval.

@@ -32,6 +32,7 @@ from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import subset_simulation
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import FAILED, LOOKS, head, in_lines, legend
+from ringsim.plots.registry import picture
 
 # Which inputs matter for the main numbers: bars with intervals, the longest on top.
 
@@ -160,7 +161,9 @@ def explained(campaign: xr.Dataset) -> bool:
     return varied and bool(drawn(campaign).names) and subset_simulation(campaign) is None
 
 
-@style.styled
+@picture(
+    "campaign", 90, "Which inputs matter for each main number, with intervals", applies=explained
+)
 def tornado(campaign: xr.Dataset) -> Figure:
     """A panel a main number, a bar an input or group; whiskers are intervals of 95 %."""
     # Those that something is required of first: a page has no room for all.
@@ -298,7 +301,7 @@ def _word(variable: xr.DataArray, value: object, base: object, place: int) -> st
     return f"{last} {', '.join(new) or value}"
 
 
-@style.styled
+@picture("campaign", 20, "Main numbers after each single change", applies=is_one_by_one)
 def one_by_one(campaign: xr.Dataset) -> Figure:
     """A panel a main number, a mark a move in the order of the design; the line is the base case.
 
