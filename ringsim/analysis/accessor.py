@@ -101,7 +101,7 @@ class Ring:
         import pandas as pd
 
         from ringsim.analysis.design import population_of, requirements_of
-        from ringsim.analysis.verdicts import read_requirements
+        from ringsim.analysis.requirements import read_requirements
         from ringsim.analysis.worst import COLUMNS, command, worst
 
         self._require_samples("worst samples")

@@ -20,14 +20,14 @@ from ringsim.analysis.intervals import (
     numbers,
     quantities,
 )
-from ringsim.analysis.tails import subset_simulation
-from ringsim.analysis.verdicts import (
+from ringsim.analysis.requirements import (
     OUTCOME,
     Requirement,
     read_requirements,
     require_values,
     violations,
 )
+from ringsim.analysis.tails import subset_simulation
 from ringsim.analysis.worst import NOTE, losses, marked
 from ringsim.refusal import InputError
 from ringsim.stepping.instant import Array

@@ -12,8 +12,8 @@ from ringsim.analysis import indices
 from ringsim.analysis.design import Drawn, Placement, drawn
 from ringsim.analysis.indices import centred_ranks, chance_of_each, largest_by_chance
 from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, used
+from ringsim.analysis.requirements import OUTCOME, Requirement, violations
 from ringsim.analysis.tails import subset_simulation
-from ringsim.analysis.verdicts import OUTCOME, Requirement, violations
 from ringsim.refusal import InputError
 from ringsim.stepping.instant import Array
 from ringsim.tables import counted

@@ -25,7 +25,8 @@ from ringsim.analysis.intervals import (
     ran,
     standard_error,
 )
-from ringsim.analysis.verdicts import OUTCOME, Requirement, Verdict, rule_of, verdict_of, violations
+from ringsim.analysis.requirements import OUTCOME, Requirement, violations
+from ringsim.analysis.verdicts import Verdict, rule_of, verdict_of
 from ringsim.choice import kind_of
 from ringsim.files import parse_toml
 from ringsim.overrides import parse_value

@@ -29,10 +29,11 @@ from ringsim.analysis.intervals import (
     share_interval,
     worst_sample,
 )
+from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
 from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import tail
-from ringsim.analysis.verdicts import OUTCOME, Requirement, judge, read_requirements, stopping_lines
+from ringsim.analysis.verdicts import judge, stopping_lines
 from ringsim.analysis.worst import LOST, NOTE, losses, worst
 from ringsim.choice import kind_of
 from ringsim.files import parse_toml, read_text

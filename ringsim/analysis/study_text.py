@@ -16,6 +16,7 @@ from ringsim.analysis.influence_text import (
     what_separates,
 )
 from ringsim.analysis.intervals import LEAST_OF_BOOTSTRAP, numbers, quantities, ranks
+from ringsim.analysis.requirements import OUTCOME, read_requirements
 from ringsim.analysis.reweighting import (
     LEAST_OF_MEAN,
     LEAST_OF_SHARE,
@@ -25,7 +26,7 @@ from ringsim.analysis.reweighting import (
 )
 from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
 from ringsim.analysis.tails import tail, tail_table
-from ringsim.analysis.verdicts import OUTCOME, Verdict, judge, read_requirements, stopping_lines
+from ringsim.analysis.verdicts import Verdict, judge, stopping_lines
 from ringsim.analysis.worst import (
     LOST,
     MARK,

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ringsim.analysis.design import blocks_of, called, drawn, inputs, place_names
 from ringsim.analysis.indices import UNLIKELY, dependence
 from ringsim.analysis.intervals import Mask, good, lost, numbers, quantities, ran
+from ringsim.analysis.requirements import OUTCOME, Requirement, require_values, violations
 from ringsim.analysis.tails import subset_simulation
-from ringsim.analysis.verdicts import OUTCOME, Requirement, require_values, violations
 from ringsim.stepping.instant import Array
 from ringsim.tables import Table, counted
 from ringsim.variables import GOALS, Fate, Status
@@ -192,10 +192,7 @@ def _failures(
     for name, wanted in requirements.items():
         badness, value = stuck, ""
         if name != OUTCOME:
-            values, value = numbers(campaign, name), name
-            low = -np.inf if wanted.min is None else wanted.min
-            high = np.inf if wanted.max is None else wanted.max
-            badness = np.maximum(low - values, values - high)
+            badness, value = wanted.beyond(numbers(campaign, name)), name
         words, own = f"violates {wanted.told(name)}", violations(campaign, name, wanted)
         if not np.isfinite(badness[own]).any():  # why they ended tells more
             badness, value = stuck, ""

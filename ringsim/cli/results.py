@@ -92,10 +92,10 @@ def analyse_command(
 
     Exit codes: 0 done, whatever the verdicts; 2 bad input.
     """
+    from ringsim.analysis.requirements import parse_requirements, read_requirements
     from ringsim.analysis.reweighting import parse_reweighted
     from ringsim.analysis.study import analyse
     from ringsim.analysis.study_text import told
-    from ringsim.analysis.verdicts import parse_requirements, read_requirements
     from ringsim.dataset import require_file, save
 
     others = parse_reweighted(reweighted)

@@ -16,9 +16,10 @@ from made_campaign import made_campaign
 from made import drawn_campaign
 from ringsim.analysis.comparison import compare, compared
 from ringsim.analysis.design import placement
+from ringsim.analysis.requirements import read_requirements, to_json
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import error_lines, told, verdict_lines
-from ringsim.analysis.verdicts import Verdict, judge, read_requirements, to_json
+from ringsim.analysis.verdicts import Verdict, judge
 from ringsim.analysis.worst import MARK, NOTE, losses
 from ringsim.plots.campaign.numbers import distributions
 from ringsim.report import page as of_pages

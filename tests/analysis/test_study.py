@@ -8,9 +8,10 @@ import xarray as xr
 
 from made import campaign, points, response
 from ringsim.analysis.intervals import samples_needed, share_bounds
+from ringsim.analysis.requirements import to_json
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import told
-from ringsim.analysis.verdicts import Verdict, to_json
+from ringsim.analysis.verdicts import Verdict
 from ringsim.refusal import InputError
 from ringsim.variables import Fate, Status
 
@@ -147,7 +148,7 @@ def test_samples_that_have_not_run_are_neither_used_nor_lost():
 
 
 def test_requirements_of_the_file_are_judged_and_outcomes_are():
-    from ringsim.analysis.verdicts import read_requirements
+    from ringsim.analysis.requirements import read_requirements
 
     made = campaign(np.full(300, 9.0))
     wanted = MOST_TEN | {"outcome": {"is": "deployed", "probability": 0.9, "confidence": 0.9}}

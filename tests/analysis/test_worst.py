@@ -12,9 +12,9 @@ from ringsim.analysis.campaign_notes import peak_lines
 from ringsim.analysis.comparison import compare, compared
 from ringsim.analysis.design import median_and_worst
 from ringsim.analysis.intervals import quantities, worst_sample
+from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import statistics_table
-from ringsim.analysis.verdicts import read_requirements
 from ringsim.outputs import VARIABLES
 from ringsim.refusal import InputError
 

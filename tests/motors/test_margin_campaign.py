@@ -10,9 +10,9 @@ import xarray as xr
 from made_campaign import made_campaign, with_motors
 
 from motor_rings import ring
+from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.study import analyse
 from ringsim.analysis.study_text import statistics_table, told
-from ringsim.analysis.verdicts import read_requirements
 from ringsim.execution.work import solve
 from ringsim.plots import figures
 from ringsim.refusal import InputError

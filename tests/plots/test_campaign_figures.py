@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -188,7 +189,8 @@ def test_the_margin_by_ending_and_over_the_angle() -> None:
     np.testing.assert_allclose(stalled.get_ydata(), (angle - 20.0) / 160.0, atol=1e-9)
     band = lower.collections[1].get_paths()[0].vertices
     assert band[:, 1].min() == pytest.approx(-0.1)
-    campaign.attrs["requirements"] = '{"least_drive_margin": {"min": -0.3, "probability": 0.9}}'
+    wanted = {"least_drive_margin": {"min": -0.3, "probability": 0.9, "confidence": 0.9}}
+    campaign.attrs["requirements"] = json.dumps(wanted)
     assert [t.get_text() for t in margin(campaign).axes[0].texts] == ["required -0.3"]
 
 

@@ -11,11 +11,11 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsim.analysis.courses import ends
-from ringsim.analysis.design import blocks, endings, requirements_of, told, values_of
+from ringsim.analysis.design import blocks, endings, told, values_of
 from ringsim.analysis.intervals import good, used
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import FAILED, LOOKS, bands, head
+from ringsim.plots.campaign.frame import FAILED, LOOKS, bands, head, limits
 from ringsim.plots.registry import picture
 
 # Courses of some samples of every ending: bands that tell what those have in common that stall.
@@ -171,8 +171,7 @@ def _strips(axes: Axes, campaign: xr.Dataset, samples: Array, values: Array) -> 
     axes.set_yticks(range(len(shown)), [f"{word} ({(words == word).sum()})" for word in shown])
     axes.set_ylim(len(shown) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
-    wanted = requirements_of(campaign).get("least_drive_margin", {})
-    for limit in [float(wanted[word]) for word in ("min", "max") if word in wanted]:
+    for _, limit in limits(campaign, "least_drive_margin"):
         axes.axvline(limit, color=style.VERMILLION, linewidth=1.3)
         axes.annotate(f"required {limit:g}", (limit, 1.0), rotation=0, ha="center", va="bottom",
                       color=style.VERMILLION, fontsize=9,

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ringsim.analysis.courses import QUANTILES
-from ringsim.analysis.design import population_of
+from ringsim.analysis.design import population_of, requirements_of
+from ringsim.analysis.requirements import read_requirements
 from ringsim.analysis.worst import losses
 from ringsim.plots import style
 
@@ -56,6 +57,12 @@ def standing(campaign: xr.Dataset) -> tuple[xr.Dataset, str]:
     found = population_of(campaign)
     left = found.sizes["sample"] < campaign.sizes["sample"]
     return found, " Of blocks the samples A and B, which stand for the population." if left else ""
+
+
+def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
+    """The least and the largest value of a number that ``[requirements]`` of the campaign allow."""
+    wanted = read_requirements(requirements_of(campaign), "requirements")
+    return wanted[name].limits if name in wanted else []
 
 
 def legend(figure: Figure, panels: Sequence[Axes], columns: int = 3) -> None:

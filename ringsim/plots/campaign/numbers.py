@@ -33,11 +33,21 @@ from ringsim.analysis.intervals import (
     ran,
     tells_of,
 )
+from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements, violations
 from ringsim.analysis.tails import approach, subset_simulation, tail
-from ringsim.analysis.verdicts import OUTCOME, Requirement, judge, read_requirements, violations
+from ringsim.analysis.verdicts import judge
 from ringsim.outputs.family import Array
 from ringsim.plots import style
-from ringsim.plots.campaign.frame import FAILED, LOOKS, WIDE, head, in_lines, legend, standing
+from ringsim.plots.campaign.frame import (
+    FAILED,
+    LOOKS,
+    WIDE,
+    head,
+    in_lines,
+    legend,
+    limits,
+    standing,
+)
 from ringsim.plots.campaign.tornado import is_one_by_one
 from ringsim.plots.registry import picture
 
@@ -58,12 +68,6 @@ def reached(campaign: xr.Dataset) -> bool:
 def _spread(campaign: xr.Dataset) -> bool:
     """Whether main numbers are of samples that no other figure tells better."""
     return bool(scalars(campaign)) and not reached(campaign) and not is_one_by_one(campaign)
-
-
-def limits(campaign: xr.Dataset, name: str) -> list[tuple[str, float]]:
-    """The least and the largest value of a number that ``[requirements]`` of the campaign allow."""
-    wanted = requirements_of(campaign).get(name, {})
-    return [(word, float(wanted[word])) for word in ("min", "max") if word in wanted]
 
 
 def points(values: Array, of: int) -> tuple[Array, Array]:
