@@ -8,11 +8,19 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsim.analysis.design import (
+    LOST,
+    NOT_RUN,
+    REACHED,
+    UNKNOWN,
+    endings_of,
+    kinds_of_ends,
+)
 from ringsim.analysis.intervals import used, worst_sample
 from ringsim.analysis.worst import losses
 from ringsim.outputs import OUTPUTS
 from ringsim.outputs.balance import summary
-from ringsim.variables import GOALS, Fate, Status, Variable
+from ringsim.variables import Variable
 
 _NAMED = 6
 """Samples that a line names at most."""
@@ -42,26 +50,20 @@ def ending_lines(
 
     Counts are of the samples that have run.
     """
-    good, lines = status == Status.OK, []
-    ran = int(np.sum(status >= Status.OK))  # below: has not run
-    for fate in Fate:
-        own = np.flatnonzero(good & (fates == fate))
-        if not len(own) or fate == Fate.NONE:
-            continue
-        more = ", ..." if len(own) > _NAMED else ""
-        named = f" (sample{'s' * (len(own) > 1)} {', '.join(map(str, own[:_NAMED]))}{more})"
-        if fate in GOALS:
-            named = ""
-        elif why := reason_of(int(own[0])):
-            named += f": {textwrap.shorten(why, _LONGEST, placeholder=' ...')}"
-        lines.append(f"{fate.word.replace('_', ' ')}: {len(own)} of {ran}{named}")
-    for code in Status:
-        own = np.flatnonzero(status == code)
-        if code.failed and len(own):
-            why = reason_of(int(own[0]))
-            first = f"first sample {own[0]}{': ' if why else ''}{why}"
-            first = textwrap.shorten(first, _LONGEST, placeholder=" ...")
-            lines.append(f"{code.word.replace('_', ' ')}: {len(own)} of {ran}, {first}")
+    words, lines = endings_of(status, fates), list[str]()
+    run = int(np.sum(words != NOT_RUN))
+    for word in kinds_of_ends(words):
+        own = np.flatnonzero(words == word)
+        why = "" if word in (*REACHED, UNKNOWN) else reason_of(int(own[0]))
+        if word.startswith(LOST):
+            told = f", first sample {own[0]}"
+        else:
+            more = ", ..." if len(own) > _NAMED else ""
+            told = f" (sample{'s' * (len(own) > 1)} {', '.join(map(str, own[:_NAMED]))}{more})"
+        told += ": " * bool(why) + textwrap.shorten(why, _LONGEST, placeholder=" ...")
+        told = "" if word in REACHED else told
+        if word != UNKNOWN:
+            lines.append(f"{word.removeprefix(LOST)}: {len(own)} of {run}{told}")
     return lines
 
 

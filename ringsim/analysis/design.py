@@ -1,5 +1,6 @@
 """How the samples of a campaign were placed, and what was read of them."""
 
+import functools
 import hashlib
 import json
 import tomllib
@@ -21,7 +22,7 @@ from ringsim.sampling.columns import BLOCK_ROW
 from ringsim.sampling.designs.blocks import Grouped, stretches
 from ringsim.sampling.designs.family import Design
 from ringsim.stepping.instant import Array
-from ringsim.variables import Fate, Status
+from ringsim.variables import GOALS, Fate, Status
 
 # The blocks of runs that designs for Sobol' indices and for screening are made of.
 
@@ -171,26 +172,50 @@ NUMERICAL = ("energy_error", "constraint_error")
 _EFFORT = ("wall_time",)
 
 
+LOST = "lost: "
+"""How the words begin for what became of a run whose numbers do not hold."""
+UNKNOWN, NOT_RUN = "unknown", "not run"
+REACHED = tuple(fate.word.replace("_", " ") for fate in GOALS)
+"""What became of those that reached their goal."""
+
+
 def endings(campaign: xr.Dataset) -> NDArray[np.str_]:
     """What became of each sample in words: an outcome, or why its numbers do not hold; (sample,).
 
     >>> codes = {"status": ("sample", [0, 0, 7, -1]), "outcome": ("sample", [1, 3, 0, -1])}
     >>> endings(xr.Dataset(codes)).tolist()
-    ['deployed', 'stalled', 'failed: memory', 'not run']
+    ['deployed', 'stalled', 'lost: memory', 'not run']
     """
     status = campaign["status"].to_numpy()
     fates = campaign["outcome"].to_numpy() if "outcome" in campaign else np.zeros_like(status)
-    known = {int(fate) for fate in Fate}
-    words = []
-    for code, fate in zip(status.tolist(), fates.tolist(), strict=True):
-        if code < 0:
-            words.append("not run")
-        elif Status(code).failed:
-            words.append(f"failed: {Status(code).word.replace('_', ' ')}")
-        else:
-            named = Fate(fate) if fate in known else Fate.NONE
-            words.append("ok" if named == Fate.NONE else named.word.replace("_", " "))
-    return np.array(words, dtype=str)
+    return endings_of(status, fates)
+
+
+def endings_of(status: NDArray[Any], fates: NDArray[Any]) -> NDArray[np.str_]:
+    """The same from the codes of samples, shape (sample,)."""
+    fates = np.where(np.isin(fates, [int(fate) for fate in Fate]), fates, Fate.NONE)
+    return np.array([_word(*codes) for codes in zip(status.tolist(), fates.tolist(), strict=True)])
+
+
+@functools.cache
+def _word(code: int, fate: int) -> str:
+    if code < 0:
+        return NOT_RUN
+    word = f"{LOST}{Status(code).word}" if Status(code).failed else Fate(fate).word
+    return UNKNOWN if word == Fate.NONE.word else word.replace("_", " ")
+
+
+def kinds_of_ends(words: NDArray[np.str_]) -> list[str]:
+    """The different words, outcomes before losses, without what has not run."""
+    every = [Fate.NONE, *Fate], [*Status]
+    order = [_word(0, fate) for fate in every[0]] + [_word(code, 0) for code in every[1]]
+    return [word for word in dict.fromkeys(order) if word != NOT_RUN and (words == word).any()]
+
+
+def short_of_goal(words: NDArray[np.str_]) -> list[str]:
+    """The outcomes among words that fall short of the goal."""
+    known = kinds_of_ends(words)
+    return [w for w in known if w not in (*REACHED, UNKNOWN) and not w.startswith(LOST)]
 
 
 def told(campaign: xr.Dataset, counted: int) -> str:

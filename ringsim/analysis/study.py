@@ -14,7 +14,15 @@ from pydantic import Field, ValidationError
 
 from ringsim.analysis import intervals
 from ringsim.analysis.accuracy import in_favour, settings_at
-from ringsim.analysis.design import NUMERICAL, Placement, placement, population_of
+from ringsim.analysis.design import (
+    LOST,
+    NUMERICAL,
+    Placement,
+    endings,
+    kinds_of_ends,
+    placement,
+    population_of,
+)
 from ringsim.analysis.engines import GROUPS, OUTPUTS
 from ringsim.analysis.influence import influence
 from ringsim.analysis.intervals import (
@@ -29,12 +37,12 @@ from ringsim.analysis.intervals import (
     share_interval,
     worst_sample,
 )
-from ringsim.analysis.requirements import OUTCOME, Requirement, read_requirements
+from ringsim.analysis.requirements import Requirement, read_requirements
 from ringsim.analysis.reweighting import read_distributions, reweight
 from ringsim.analysis.sensitivity import sensitivity
 from ringsim.analysis.tails import tail
 from ringsim.analysis.verdicts import judge, stopping_lines
-from ringsim.analysis.worst import LOST, NOTE, losses, worst
+from ringsim.analysis.worst import NOTE, losses, worst
 from ringsim.choice import kind_of
 from ringsim.files import parse_toml, read_text
 from ringsim.parts.solver import NO_DEVIATIONS
@@ -42,7 +50,7 @@ from ringsim.refusal import InputError
 from ringsim.scene import Scene, scene_from_toml
 from ringsim.stepping.instant import Array
 from ringsim.units import ListIn, Model
-from ringsim.variables import Fate, Status
+from ringsim.variables import Status
 
 # What the samples of a campaign say about its population: estimates, intervals, verdicts.
 
@@ -329,17 +337,11 @@ def outcomes(campaign: xr.Dataset, placed: Placement) -> xr.Dataset:
     each outcome (``outcome_lost``), and its interval reaches from none of them to all.
     """
     ok, gone, index = good(campaign), lost(campaign), campaign["sample"].to_numpy()
-    fates = campaign[OUTCOME].to_numpy() if OUTCOME in campaign else np.full(len(ok), Fate.NONE)
-    status = campaign["status"].to_numpy()
-    of = ok | gone
-    rows: dict[str, tuple[NDArray[np.bool_], NDArray[np.bool_]]] = {}
-    for fate in Fate:
-        word = fate.word if fate != Fate.NONE else "unknown"
-        own = ok & (np.maximum(fates, 0) == fate)
-        rows[word] = own, own | gone
-    for code in Status:
-        rows[f"{LOST}: {code.word}"] = (own := gone & (status == code)), own
-    rows = {word: (own, most) for word, (own, most) in rows.items() if own.any()}
+    of, words = ok | gone, endings(campaign)
+    rows = {
+        word: (own, own if word.startswith(LOST) else own | gone)
+        for word in kinds_of_ends(words) for own in [words == word]
+    }  # fmt: skip
     shares = np.full((len(rows), len(PARTS)), np.nan)
     ends, run = np.full((len(rows), 2), np.nan), np.flatnonzero(ran(campaign))
     for k, (own, most) in enumerate(rows.values()):

@@ -28,7 +28,6 @@ from ringsim.analysis.study import PARTS, SOURCES, STATISTICS, statistics
 from ringsim.analysis.tails import tail, tail_table
 from ringsim.analysis.verdicts import Verdict, judge, stopping_lines
 from ringsim.analysis.worst import (
-    LOST,
     MARK,
     NOTE,
     losses,
@@ -80,7 +79,7 @@ def reweighting_tables(analysis: xr.Dataset) -> list[Table]:
         few = decisive < LEAST_OF_SHARE
         thin |= few
         shares.append((
-            f"{event}{THIN * few}{'' if event == LOST else bent}",
+            f"{event}{THIN * few}{'' if event == 'lost' else bent}",
             number_text(one["reweighted_share"].item()),
             interval_text(*one["reweighted_share_interval"].values.tolist()),
             number_text(decisive, 3),
@@ -275,7 +274,7 @@ def outcome_table(analysis: xr.Dataset) -> Table:
     """What the antenna did, and how runs were lost, with shares."""
     rows = [
         (
-            str(kind).replace("_", " "),
+            str(kind),
             f"{one['outcome_samples'].item()} of {one['outcome_of'].item()}"
             + f" ({one['outcome_lost'].item()} lost)" * bool(one["outcome_lost"].item()),
             number_text(one["outcome_share"].item()),

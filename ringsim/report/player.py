@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsim.analysis.design import endings, judged_by, median_and_worst
+from ringsim.analysis.design import REACHED, UNKNOWN, endings, judged_by, median_and_worst
 from ringsim.analysis.intervals import used
 from ringsim.layout.layout import layout_at_opening, layout_of
 from ringsim.layout.points import points_of
@@ -18,7 +18,7 @@ from ringsim.shapes import COMPUTED, FROM_ANGLES, middle_of
 POSES = 25
 """Mean opening angles at which the ring is tabled: between two, lines are off by about 2 mm."""
 MOST_FRAMES, MOST_OTHERS = 240, 8
-UNKNOWN = -32768
+UNRECORDED = -32768
 """An opening angle that was not recorded."""
 _LARGEST = 32767
 _MOST_BYTES, _LEAST_FRAMES = 42_000, 30
@@ -58,7 +58,7 @@ def _chosen(campaign: xr.Dataset, analysis: xr.Dataset) -> list[tuple[int, str]]
         by = f" by {name}" if (name := judged_by(campaign)) else ""
         for sample, word in zip(both, ("median", "worst"), strict=True):
             found.setdefault(sample, [f"{word}{by}"])
-    fell_short = np.flatnonzero(~good | ~np.isin(words, ("deployed", "folded", "finished", "ok")))
+    fell_short = np.flatnonzero(~good | ~np.isin(words, (*REACHED, UNKNOWN)))
     # Those whose numbers do not hold first: nothing else on the page shows them.
     fell_short = fell_short[np.argsort(good[fell_short], kind="stable")]
     # A failure is no ending: what ended as "stalled" need not be told so twice.
@@ -104,7 +104,7 @@ def _course(campaign: xr.Dataset, sample: int, name: str) -> dict[str, Any]:
     rows = angle.to_numpy().reshape(len(places), -1)
     return {
         "name": name, "sample": sample, "times": np.round(angle["time"].to_numpy(), 4).tolist(),
-        "angles": packed(np.clip(100.0 * rows, UNKNOWN, _LARGEST)),
+        "angles": packed(np.clip(100.0 * rows, UNRECORDED, _LARGEST)),
         "lowest": float(rows.mean(axis=1).min()),
         "places": _places(campaign, sample),
     }  # fmt: skip

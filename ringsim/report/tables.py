@@ -8,9 +8,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ringsim.analysis.design import called, distribution_of, endings, inputs, paths_of
+from ringsim.analysis.design import (
+    LOST,
+    NOT_RUN,
+    REACHED,
+    UNKNOWN,
+    called,
+    distribution_of,
+    endings,
+    inputs,
+    paths_of,
+)
 from ringsim.refusal import show
-from ringsim.variables import GOALS, Cause
+from ringsim.variables import Cause
 
 MOST_FAILURES = 100
 """Rows of the table of failures; the page says how many more there are."""
@@ -31,7 +41,7 @@ def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
     Runs that lost their numbers, and sound ones in which the antenna fell short of its goal; a row
     for all that ended in the same way.
     """
-    words, goals = endings(campaign), [goal.word for goal in GOALS] + ["ok", "not run"]
+    words, goals = endings(campaign), (*REACHED, UNKNOWN, NOT_RUN)
     causes = {int(cause): cause.word.replace("_", " ") for cause in Cause if cause}
     codes, reasons = campaign["cause"].values.tolist(), campaign["reason"].values.tolist()
     alike: dict[tuple[str, str, str], list[int]] = {}
@@ -40,7 +50,7 @@ def failures(campaign: xr.Dataset, folder: str) -> tuple[Rows, int]:
             how = str(words[place]), causes.get(int(codes[place]), ""), str(reasons[place])
             alike.setdefault(how, []).append(sample)
     rows = []
-    for how, samples in sorted(alike.items(), key=lambda each: not each[0][0].startswith("failed")):
+    for how, samples in sorted(alike.items(), key=lambda each: not each[0][0].startswith(LOST)):
         named = ", ".join(map(str, samples[:_MOST_NAMED]))
         named += f" and {len(samples) - _MOST_NAMED} more" * (len(samples) > _MOST_NAMED)
         rows.append([named, *how, f"ringsim replay {shlex.quote(folder)} {samples[0]}"])

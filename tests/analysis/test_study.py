@@ -164,7 +164,7 @@ def test_requirements_of_the_file_are_judged_and_outcomes_are():
 def test_outcomes_are_rows_with_exact_intervals():
     outcome = np.where(np.arange(100) < 7, Fate.PARTLY_DEPLOYED, Fate.DEPLOYED)
     found = analyse(campaign(np.full(100, 9.0), outcome=outcome))
-    own = found.sel(kind="partly_deployed")
+    own = found.sel(kind="partly deployed")
     assert own.outcome_share.item() == pytest.approx(0.07)
     # Clopper and Pearson's interval of 7 of 100, from their tables.
     np.testing.assert_allclose(own.outcome_share_interval.values, [0.0286, 0.1389], atol=1e-4)

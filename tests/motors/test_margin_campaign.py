@@ -107,4 +107,4 @@ def test_a_grid_has_extremes_and_no_means(campaign: xr.Dataset) -> None:
         assert ("std. dev." in heads) == (kind == "random")
         assert {len(row) for row in rows} == {len(heads)}
         (convergence,) = (each for each in figures.PICTURES if each.name == "convergence")
-        assert convergence.of(made) == (kind == "random")
+        assert convergence.applies(made) == (kind == "random")

@@ -120,7 +120,7 @@ def test_inputs_with_places_count_by_their_mean(mixed: xr.Dataset) -> None:
     figure = by_input(mixed)
     points = {c.get_label(): c.get_offsets() for c in figure.axes[1].collections}
     assert {name: len(at) for name, at in points.items()} == {
-        "deployed (5)": 5, "failed: timeout (2)": 2,
+        "deployed (5)": 5, "lost: timeout (2)": 2,
     }  # fmt: skip
     np.testing.assert_allclose(points["deployed (5)"][:, 0], np.array(GOOD) + 1.0)
     np.testing.assert_allclose(points["deployed (5)"][:, 1], mixed["asynchrony_max"].values[GOOD])
@@ -136,7 +136,7 @@ def test_no_figure_drops_a_sample_in_silence(mixed: xr.Dataset) -> None:
         if picture.name == "by_input":
             assert "7 of 8 samples run; 2 without" in told
         else:
-            assert "5 of 8 samples; left out: 2 failed: timeout, 1 not run" in told, picture.name
+            assert "5 of 8 samples; left out: 2 lost: timeout, 1 not run" in told, picture.name
 
 
 def test_the_median_is_a_sample_and_the_worst_has_the_largest_asynchrony(

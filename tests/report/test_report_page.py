@@ -165,7 +165,7 @@ def test_the_tables_hold_the_numbers(made: tuple[str, xr.Dataset, str]) -> None:
 def test_samples_that_ended_alike_share_a_row_and_words_have_no_unit() -> None:
     campaign = made_campaign(30, failed=(2,), stalled=tuple(range(5, 30)))
     rows, more = tables.failures(campaign, "made")
-    assert [row[1] for row in rows] == ["failed: timeout", "stalled"]
+    assert [row[1] for row in rows] == ["lost: timeout", "stalled"]
     assert rows[1][0] == ", ".join(map(str, range(5, 25))) + " and 5 more"
     assert (rows[1][-1], more) == ("ringsim replay made 5", 0)
     assert {row[0]: row[1] for row in tables.drawn(campaign)}["cables.lower_winch_stop_time"] == "s"
@@ -231,7 +231,7 @@ def test_the_player_offers_median_worst_and_failures() -> None:
         "sample 6: worst by asynchrony_max, violates asynchrony_max <= 3 degree, deployed",
         "sample 4: violates deployment_time <= 40 s, violates outcome is deployed, "
         "violates asynchrony_max <= 3 degree, stalled",
-        "sample 2: failed: timeout", "sample 5: failed: timeout",
+        "sample 2: lost: timeout", "sample 5: lost: timeout",
     ]  # fmt: skip
     assert len(data["samples"][0]["times"]) == len(TIMES)
     assert data["samples"][3]["times"][-1] == 4.0

@@ -1,6 +1,5 @@
 """Main numbers of all samples: distributions, convergence, by input, the tail."""
 
-import itertools
 import textwrap
 from collections.abc import Mapping
 from typing import Any
@@ -39,13 +38,12 @@ from ringsim.analysis.verdicts import judge
 from ringsim.outputs.family import Array
 from ringsim.plots import style
 from ringsim.plots.campaign.frame import (
-    FAILED,
-    LOOKS,
     WIDE,
     head,
     in_lines,
     legend,
     limits,
+    looks_of,
     standing,
 )
 from ringsim.plots.campaign.tornado import is_one_by_one
@@ -319,8 +317,7 @@ def by_input(campaign: xr.Dataset) -> Figure:
         axes.set_xlabel(_label(campaign[each]), fontsize=9, labelpad=15)
         if number % columns == 0 and name:
             axes.set_ylabel(style.label(campaign[name], width=30), fontsize=9)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)))
+    legend(figure, panels[:1], 4)
     lost = int((height == foot).sum())
     below = f"; {lost} without the number stand below the line" if lost else ""
     note = (
@@ -332,11 +329,8 @@ def by_input(campaign: xr.Dataset) -> Figure:
 
 
 def _scatter(axes: Axes, x: Any, y: Any, words: NDArray[np.str_]) -> None:
-    others = sorted(set(words.tolist()) - LOOKS.keys())
-    looks = LOOKS | dict(zip(others, itertools.cycle(FAILED), strict=False))
-    for word in filter(set(words.tolist()).__contains__, looks):
+    for word, (colour, marker) in looks_of(words).items():
         own = words == word
-        colour, marker = looks[word]
         axes.scatter(x[own], y[own], s=26, color=colour, marker=marker, alpha=0.8,
                      linewidths=1.2 if marker in "x+1234|" else 0.0,
                      label=f"{word} ({own.sum()})", zorder=3,
@@ -382,7 +376,6 @@ def rare_event(campaign: xr.Dataset) -> Figure:
     axes.set_yscale("log")
     axes.set_xlabel(style.label(campaign[design.of]))
     axes.set_ylabel("Probability of this or beyond")
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    legend(figure, [axes], 2)
     head(figure, campaign, "Rare event", f"{told(campaign, int(good(campaign).sum()))}.")
     return figure
